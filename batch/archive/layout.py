@@ -1,0 +1,238 @@
+"""What stands where in an archive: one description, by which files are written and sized.
+
+    /                       attributes: schema, deck, and for a single experiment those of its group
+      <variables>           a single experiment lies in the root
+    /<experiment>           several: one group each
+    /provenance             source (files of the deck, whole), plan (JSON); versions and git commit as attributes
+      cases.<experiment>    coordinate by case: the whole case table, where it is too large for the plan's JSON
+
+Dimensions, each with its coordinate variable:
+
+    case            row of the case table (position that `met cases` prints)
+    recorded_case   the cases whose histories were kept
+    time            s, of the recorded rows
+    joint           names of the moving joints; a signal of some joints only has a dimension of its own, `joint_of_...`
+    requirement     texts of the requirements
+
+A variable says what it is by its attribute `role`: dimension, case, coordinate, metric, requirement or signal.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from met.plan import Coordinate, Experiment, MetricUse, Plan, Recorded
+
+SCHEMA = "met.archive"
+VERSION = 1
+
+Role = Literal["dimension", "case", "coordinate", "metric", "requirement", "signal"]
+Kind = Literal["float64", "int64", "int8", "str"]
+
+CHUNK_BYTES = 4 << 20
+"""A chunk is one case's signal, cut in time beyond this size."""
+
+FRAME = (
+    "joint frame: the parent link's frame moved by `at`, turned by `rpy` (fixed x-y-z); a joint moves about or along "
+    "its axis in it; the link's frame is the joint frame at q = 0; the world is the base"
+)
+JOINT_FRAME = "about or along the joint's axis"
+
+RESERVED = frozenset({
+    "case", "recorded_case", "time", "joint", "requirement", "case_id", "case_key", "repeat", "seed", "status",
+    "cause", "n_valid", "met", "friction_splits", "friction_clamped", "friction_undecided",
+})  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable of a group. dims: names of its dimensions; attributes: units, long_name and the like, in order."""
+
+    name: str
+    kind: Kind
+    dims: tuple[str, ...]
+    role: Role
+    long_name: str
+    unit: str = ""
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    source: str = ""
+
+    @property
+    def key(self) -> str:
+        """What the engine calls it."""
+        return self.source or self.name
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The group of one experiment: sizes of its dimensions, and its variables in the order they are written."""
+
+    sizes: Mapping[str, int]
+    variables: tuple[Variable, ...]
+    attributes: Mapping[str, Any]
+
+    def role(self, role: Role) -> tuple[Variable, ...]:
+        return tuple(variable for variable in self.variables if variable.role == role)
+
+    def shape(self, variable: Variable) -> tuple[int, ...]:
+        return tuple(self.sizes[dim] for dim in variable.dims)
+
+    @property
+    def bytes(self) -> int:
+        """About the size of the group in the file."""
+        widths = {"float64": 8, "int64": 8, "int8": 1, "str": 48}
+        return sum(int(np.prod(self.shape(v), dtype=np.int64)) * widths[v.kind] for v in self.variables)
+
+    def chunks(self, variable: Variable) -> tuple[int, ...] | None:
+        """Chunks of a signal: one case each, cut in time where that is too large."""
+        if variable.role != "signal":
+            return None
+        _, rows, *joints = self.shape(variable)
+        row = 8 * int(np.prod(joints, dtype=np.int64))
+        return (1, max(1, min(rows, CHUNK_BYTES // row)), *joints)
+
+
+def layout(experiment: Experiment, cases: int, recorded: bool) -> Layout:
+    """The group of an experiment of which `cases` cases are run, with their histories or without."""
+    structure = experiment.structure
+    sizes = {"case": cases, "requirement": len(experiment.requirements)}
+    variables = [
+        Variable("case", "int64", ("case",), "dimension", "position of the case in the case table"),
+        *_case_variables(experiment),
+    ]
+    if recorded:
+        sizes |= {"recorded_case": cases, "time": structure.schedule.rows}
+        variables += [
+            Variable("recorded_case", "int64", ("recorded_case",), "dimension", "cases whose histories are kept"),
+            Variable("time", "float64", ("time",), "dimension", "time", "s"),
+        ]
+        variables += _signals(experiment, sizes)
+    return Layout(sizes, tuple(variables), _attributes(experiment, variables))
+
+
+def joint_dimensions(experiment: Experiment) -> dict[tuple[str, ...], str]:
+    """The dimensions that hold joints, by the names they hold."""
+    moving = tuple(joint.name for joint in experiment.structure.moving)
+    found = {moving: "joint"}
+    for recorded in experiment.structure.record:
+        if recorded.joints and recorded.joints not in found:
+            found[recorded.joints] = "joint_of_" + re.sub(r"\W", "_", recorded.name)
+    return found
+
+
+def coordinate_unit(experiment: Experiment, coordinate: Coordinate) -> str:
+    """SI unit of a coordinate's values: that of the parameter it sets, else of the unit the deck wrote."""
+    for path in coordinate.sets:
+        if path in experiment.parameters:
+            return experiment.parameters[path].unit
+    from met import units
+
+    try:
+        return units.text(units.parse_unit(coordinate.unit).dimension)
+    except ValueError:
+        return coordinate.unit
+
+
+def metric_unit(experiment: Experiment, use: MetricUse) -> str:
+    """SI unit of a metric's result; `of` in its declaration stands for the channel's unit."""
+    from met import models
+    from met.channel import channels
+
+    declared = models.find("metric", use.model, use.place).unit
+    if "of" not in re.findall(r"\w+", declared):
+        return str(declared)
+    unit = channels(experiment.structure)[use.of].unit
+    return unit if declared == "of" else re.sub(r"\bof\b", f"({unit})", declared)
+
+
+def _case_variables(experiment: Experiment) -> list[Variable]:
+    def variable(name: str, kind: Kind, long_name: str, **attributes: Any) -> Variable:
+        return Variable(name, kind, ("case",), "case", long_name, attributes=attributes)
+
+    out = [
+        variable("case_id", "str", "digest of all parameters of the case"),
+        variable("case_key", "str", "digest of the coordinates of the case"),
+        variable("repeat", "int64", "number of the repeat"),
+        variable("seed", "int64", "seed of the run's noise"),
+    ]
+    out += [_coordinate(experiment, coordinate) for coordinate in experiment.cases.coordinates]
+    out += [
+        variable("status", "int8", "how the case ended", flag_values=np.array([0, 1], np.int8), flag_meanings="done failed"),
+        variable("cause", "str", "why the case failed; empty where it did not"),
+        variable("n_valid", "int64", "recorded rows before the case failed; after them, not-a-number"),
+        variable("friction_splits", "int64", "steps split where a joint came to rest"),
+        variable("friction_clamped", "int64", "crossings of zero rate that were clamped"),
+        variable("friction_undecided", "int64", "decisions at rest that the passes left open"),
+    ]
+    taken = RESERVED | {c.path for c in experiment.cases.coordinates} | {r.name for r in experiment.structure.record}
+    for use in experiment.structure.metrics:
+        name = use.name if use.name not in taken else f"metrics.{use.name}"
+        unit = metric_unit(experiment, use)
+        words = f"{use.model} of {use.of}"
+        out.append(Variable(name, "float64", ("case",), "metric", words, unit, {"model": use.model, "of": use.of}, use.name))
+    if experiment.requirements:
+        flags = {"flag_values": np.array([1, 0, -1], np.int8), "flag_meanings": "met missed unknown"}
+        out += [
+            Variable("requirement", "str", ("requirement",), "dimension", "the requirement, as the deck wrote it"),
+            Variable("met", "int8", ("case", "requirement"), "requirement", "whether the requirement is met", attributes=flags),
+        ]
+    return out
+
+
+def _coordinate(experiment: Experiment, coordinate: Coordinate) -> Variable:
+    written = {"deck_unit": coordinate.unit, "deck_scale": coordinate.scale, "sets": " ".join(coordinate.sets)}
+    unit = coordinate_unit(experiment, coordinate)
+    return Variable(coordinate.path, "float64", ("case",), "coordinate", f"varied: {coordinate.path}", unit, written)
+
+
+def _signals(experiment: Experiment, sizes: dict[str, int]) -> list[Variable]:
+    dimensions = joint_dimensions(experiment)
+    out = []
+    for joints, dim in dimensions.items():
+        if any(recorded.joints == joints for recorded in experiment.structure.record):
+            sizes[dim] = len(joints)
+            out.append(Variable(dim, "str", (dim,), "dimension", "joint"))
+    for recorded in experiment.structure.record:
+        dims = ("recorded_case", "time", *([dimensions[recorded.joints]] if recorded.joints else []))
+        out.append(Variable(recorded.name, "float64", dims, "signal", recorded.doc, *_signal_unit(recorded)))
+    return out
+
+
+def _signal_unit(recorded: Recorded) -> tuple[str, dict[str, Any]]:
+    """The unit, where all joints share one, and further attributes."""
+    units = recorded.unit if len(recorded.unit) > 1 else recorded.unit * max(1, len(recorded.joints))
+    frame = {} if ".servo." in recorded.channels[0] else {"frame": JOINT_FRAME}
+    if len(set(units)) > 1:
+        return "", {"units_by_joint": list(units), **frame}
+    return units[0], frame
+
+
+def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, Any]:
+    from met import keys
+
+    structure, schedule = experiment.structure, experiment.structure.schedule
+    coordinates = ["case_id", "case_key", *(v.name for v in variables if v.role == "coordinate")]
+    return {
+        "experiment": experiment.name,
+        "arm": structure.arm,
+        "integrator": structure.integrator,
+        "velocity_products": "on" if structure.velocity_products else "off",
+        "base_hz": schedule.base_hz,
+        "dynamics_hz": schedule.base_hz / schedule.dynamics,
+        "record_hz": schedule.base_hz / schedule.record,
+        "duration_s": schedule.duration,
+        "structure_key": keys.structure_key(structure, keys.inputs(experiment)),
+        "cases_in_table": experiment.cases.count,
+        "frame": FRAME,
+        "coordinates": " ".join(coordinates),
+    }
+
+
+def group_names(plan: Plan) -> tuple[str, ...]:
+    """Paths of the experiments' groups."""
+    return ("/",) if len(plan.experiments) == 1 else tuple(f"/{experiment.name}" for experiment in plan.experiments)

@@ -1,0 +1,86 @@
+"""Where results come from: what stands inside the archive, and what beside it.
+
+Inside is what decides the numbers: deck, plan, versions, git commit of MET and whether it was changed. Beside it, in
+`<archive>.run.json`, is what differs from one making to the next: dates, host, CPU, wall times.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+UNKNOWN = "unknown"
+
+
+class Revision:
+    """Git's answer about MET's own source, asked for at once and read later."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[str] | None = None
+        home = Path(__file__).resolve().parents[2]
+        if not (home / ".git").exists():
+            return
+        command = ["git", "-C", str(home), "describe", "--always", "--dirty", "--abbrev=40", "--exclude", "*"]
+        quiet = {**os.environ, "GIT_OPTIONAL_LOCKS": "0"}
+        try:
+            self._process = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=quiet
+            )
+        except OSError:
+            self._process = None
+
+    def read(self) -> tuple[str, str]:
+        """Commit, and "yes" or "no": whether tracked files differ from it; both "unknown" outside a repository."""
+        if self._process is None:
+            return UNKNOWN, UNKNOWN
+        try:
+            said = self._process.communicate(timeout=10)[0].strip()
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.communicate()
+            return UNKNOWN, UNKNOWN
+        if self._process.returncode != 0 or not said:
+            return UNKNOWN, UNKNOWN
+        commit, _, dirty = said.partition("-")
+        return commit, "yes" if dirty else "no"
+
+    def close(self) -> None:
+        """Leave no process behind, whether or not it was read."""
+        if self._process is not None and self._process.poll() is None:
+            self._process.kill()
+            self._process.communicate()
+
+
+def version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return UNKNOWN
+
+
+def machine() -> dict[str, Any]:
+    """Host, CPU and software that the numbers do not depend on."""
+    return {
+        "host": platform.node(),
+        "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "cpu": _cpu(),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+        "h5py": getattr(sys.modules.get("h5py"), "__version__", UNKNOWN),
+    }
+
+
+def _cpu() -> str:
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
+            for line in file:
+                if line.startswith(("model name", "Model")):
+                    return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or UNKNOWN

@@ -1,0 +1,311 @@
+"""A campaign: which cases of a plan are run, what is kept of them, and the running itself.
+
+`prepare` settles everything that can be refused (names, cases, room on the disk, the output) and writes nothing;
+`perform` runs the cases batch by batch, in bounded memory, into an archive that has its name only when it is whole.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import os
+import shutil
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from batch.archive import layout as archive_layout
+from met import keys
+from met.diagnostic import Problem, error
+from met.plan import Experiment, Plan
+
+Histories = Literal["default", "all", "none"]
+
+KEPT_BYTES = 1 << 30
+"""Histories are kept by default while the archive stays below this."""
+
+BATCH_BYTES = 128 << 20
+"""Histories held in memory at a time."""
+
+BATCH_CASES = 1 << 16
+"""Cases a batch where no histories are kept."""
+
+
+class Progress(Protocol):
+    """Who is told how far a campaign is (batch/progress.py)."""
+
+    def begin(self, name: str, cases: int) -> None: ...
+    def advance(self, done: int) -> None: ...
+    def end(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class Part:
+    """The cases of one experiment that are run: rows of its case table, and whether their histories are kept."""
+
+    experiment: Experiment
+    rows: np.ndarray
+    recorded: bool
+
+    @property
+    def bytes(self) -> int:
+        return archive_layout.layout(self.experiment, len(self.rows), self.recorded).bytes
+
+    @property
+    def batch(self) -> int:
+        """Cases a batch: whole blocks of the kernel where there are many."""
+        if not self.recorded:
+            return BATCH_CASES
+        cases = max(1, min(BATCH_CASES, BATCH_BYTES // history_bytes(self.experiment)))
+        return cases if cases < 64 else cases // 32 * 32
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What will be run, all of it checked."""
+
+    plan: Plan
+    parts: tuple[Part, ...]
+    output: Path
+    notes: tuple[str, ...] = ()
+
+    @property
+    def cases(self) -> int:
+        return sum(len(part.rows) for part in self.parts)
+
+    @property
+    def bytes(self) -> int:
+        return sum(part.bytes for part in self.parts)
+
+
+def history_bytes(experiment: Experiment) -> int:
+    """Size of one case's histories."""
+    columns = sum(len(recorded.channels) for recorded in experiment.structure.record)
+    return 8 * columns * experiment.structure.schedule.rows
+
+
+def prepare(
+    plan: Plan,
+    *,
+    output: str | os.PathLike[str] | None = None,
+    experiments: Sequence[str] | None = None,
+    cases: Sequence[int | str] | None = None,
+    histories: Histories = "default",
+) -> Campaign:
+    """Settle what will be run; raises Problem for anything that would stop it later, and writes nothing.
+
+    output       None: the deck's name with `.h5`, in the current folder
+    experiments  names; None: all of the plan's
+    cases        rows of the case table, `"#7"` or the beginning of a case_id; None: all
+    histories    "default": all while the archive stays below 1 GiB, else none, and a note says so
+    """
+    chosen = _experiments(plan, experiments)
+    selected = _selected(chosen, cases)
+    target = Path(output) if output is not None else default_output(plan, experiments)
+    kept = {"default": True, "all": True, "none": False}[histories]
+    parts = tuple(Part(e, rows, kept and history_bytes(e) > 0) for e, rows in selected)
+    notes: list[str] = []
+    whole = sum(part.bytes for part in parts)
+    if histories == "default" and whole > KEPT_BYTES:
+        parts = tuple(Part(part.experiment, part.rows, False) for part in parts)
+        notes.append(
+            f"histories would take {size_text(whole)}, over {size_text(KEPT_BYTES)}: metrics only are kept "
+            f"(`--histories all` keeps them; any case can be run again alone: `--case '#0'`)"
+        )
+    kept_plan = Plan(plan.deck, tuple(part.experiment for part in parts), plan.sources, plan.defines)
+    campaign = Campaign(kept_plan, parts, target, tuple(notes))
+    check_output(campaign)
+    return campaign
+
+
+def default_output(plan: Plan, experiments: Sequence[str] | None = None) -> Path:
+    """`two_link.h5`; `two_link.gains.h5` where runs are named. A deck of the standard library is called `<name>`."""
+    return Path(".".join([Path(plan.deck.strip("<>")).stem, *(experiments or ()), "h5"]))
+
+
+def perform(campaign: Campaign, *, threads: int | None = None, progress: Progress | None = None) -> list[dict[str, Any]]:
+    """Run a campaign into its archive. What is unlike from one making to the next (times) is returned, and
+    written beside the archive as `<archive>.run.json`. However this ends, no half file is left."""
+    from batch.archive.provenance import machine
+    from batch.archive.write import Writer
+
+    began = time.time()
+    temporary = _temporary(campaign.output)
+    try:
+        writer = Writer(temporary, campaign.plan, [(p.experiment, p.rows, p.recorded) for p in campaign.parts])
+        try:
+            timings = [
+                _run_part(writer, index, part, threads, progress) for index, part in enumerate(campaign.parts)
+            ]
+            writer.finish()
+            sidecar = {
+                "archive": campaign.output.name,
+                "began": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(began)),
+                "seconds": round(time.time() - began, 6),
+                "threads": threads,
+                "experiments": timings,
+                **machine(),
+            }
+            publish(campaign.output, temporary, sidecar)
+        except BaseException:
+            writer.abandon()
+            raise
+    except OSError as reason:
+        raise Problem(_cannot_write(campaign.output, reason)) from reason
+    return timings
+
+
+def _run_part(writer: Any, index: int, part: Part, threads: int | None, progress: Progress | None) -> dict[str, Any]:
+    """Run one experiment; its wall time."""
+    from met import run as engine
+
+    began = time.perf_counter()
+    if progress is not None:
+        progress.begin(part.experiment.name, len(part.rows))
+    prepared = engine.prepare(part.experiment)
+    for first, rows in _batches(part):
+        report = None if progress is None else _from(progress, first)
+        writer.put(index, first, engine.run(prepared, rows, threads=threads, record=part.recorded, progress=report))
+        if progress is not None:
+            progress.advance(first + len(rows))
+    if progress is not None:
+        progress.end()
+    return {"experiment": part.experiment.name, "cases": len(part.rows), "seconds": round(time.perf_counter() - began, 6)}
+
+
+def _from(progress: Progress, first: int) -> Any:
+    return lambda done: progress.advance(first + done)
+
+
+def _batches(part: Part) -> Iterator[tuple[int, np.ndarray]]:
+    for first in range(0, len(part.rows), part.batch):
+        yield first, part.rows[first : first + part.batch]
+
+
+def publish(output: Path, temporary: Path, sidecar: dict[str, Any]) -> None:
+    """Give a finished archive its name, and its sidecar."""
+    beside = sidecar_path(output)
+    beside_temporary = _temporary(beside)
+    beside_temporary.write_text(json.dumps(sidecar, indent=1) + "\n", encoding="utf-8")
+    temporary.replace(output)
+    beside_temporary.replace(beside)
+    folder = os.open(output.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+def sidecar_path(output: Path) -> Path:
+    return output.with_name(output.name + ".run.json")
+
+
+def _temporary(target: Path) -> Path:
+    return target.with_name(f".{target.name}.{os.getpid()}.tmp")
+
+
+# What can be refused
+
+
+def _experiments(plan: Plan, names: Sequence[str] | None) -> tuple[Experiment, ...]:
+    if names is None:
+        return plan.experiments
+    by_name = {experiment.name: experiment for experiment in plan.experiments}
+    problems = []
+    for name in names:
+        if name not in by_name:
+            near = difflib.get_close_matches(name, by_name, n=1)
+            helps = [f"did you mean `{near[0]}`?"] if near else []
+            helps.append(f"runs and sweeps of {plan.deck}: {', '.join(by_name)}")
+            problems.append(error("E310", f"no run or sweep `{name}` in {plan.deck}", help=helps))
+    if problems:
+        raise Problem(problems)
+    return tuple(by_name[name] for name in dict.fromkeys(names))
+
+
+def _selected(
+    experiments: tuple[Experiment, ...], cases: Sequence[int | str] | None
+) -> list[tuple[Experiment, np.ndarray]]:
+    """The rows of each experiment; one that a case_id leaves without any is not run."""
+    if cases is None:
+        return [(experiment, np.arange(experiment.cases.count)) for experiment in experiments]
+    found: dict[str, set[int]] = {experiment.name: set() for experiment in experiments}
+    for case in cases:
+        matches = [(e, row) for e in experiments for row in _rows(e, case)]
+        if not matches:
+            counts = ", ".join(f"`{e.name}` has #0 to #{e.cases.count - 1}" for e in experiments)
+            raise Problem(error("E311", f"no case `{_case_text(case)}`", help=[counts, "`met cases DECK` lists them"]))
+        if len(matches) > 1 and not _is_row(case):
+            some = ", ".join(f"#{row} of `{e.name}`" for e, row in matches[:4])
+            message = f"case `{case}` may be any of {len(matches)}: {some}"
+            raise Problem(error("E312", message, help="give more of its id, or its position: `--case '#0'`"))
+        for experiment, row in matches:
+            found[experiment.name].add(row)
+    return [(e, np.array(sorted(found[e.name]), dtype=np.int64)) for e in experiments if found[e.name]]
+
+
+def _is_row(case: int | str) -> bool:
+    return not isinstance(case, str) or (case.startswith("#") and case[1:].isdecimal())
+
+
+def _case_text(case: int | str) -> str:
+    return case if isinstance(case, str) else f"#{case}"
+
+
+def _rows(experiment: Experiment, case: int | str) -> list[int]:
+    if _is_row(case):
+        row = int(case.lstrip("#")) if isinstance(case, str) else int(case)
+        return [row] if 0 <= row < experiment.cases.count else []
+    return [row for row, case_id in enumerate(keys.case_ids(experiment)) if case and case_id.startswith(str(case))]
+
+
+def check_output(campaign: Campaign) -> None:
+    """Refuse an output that could not be written in the end, before anything runs."""
+    from batch.archive.read import is_archive
+
+    output = campaign.output
+    for target in (output, sidecar_path(output)):
+        if target.is_dir():
+            helps = f"name a file in it: `-o {target / default_output(campaign.plan)}`" if target == output else ()
+            raise Problem(error("E305", f"cannot write {target}: it is a folder", help=helps))
+    if not output.parent.is_dir():
+        what = "is a file, not a folder" if output.parent.exists() else "does not exist"
+        helps = () if output.parent.exists() else f"make it first: `mkdir -p {output.parent}`"
+        raise Problem(error("E305", f"cannot write {output}: {output.parent} {what}", help=helps))
+    if output.exists() and output.stat().st_size > 0 and not is_archive(output):
+        helps = "give another name with `-o`, or remove the file"
+        raise Problem(error("E305", f"{output} exists and is no archive of MET: it is not written over", help=helps))
+    probe = _temporary(output)
+    try:
+        probe.open("xb").close()
+        probe.unlink()
+        free = shutil.disk_usage(output.parent).free
+    except OSError as reason:
+        raise Problem(_cannot_write(output, reason)) from reason
+    if campaign.bytes > free:
+        message = f"cannot write {output}: it needs about {size_text(campaign.bytes)}, and the disk has {size_text(free)} left"
+        helps = "`--histories none` keeps metrics only; fewer signals in `record`, or a slower `rates.record`, take less"
+        raise Problem(error("E306", message, help=helps))
+
+
+def _cannot_write(output: Path, reason: OSError) -> Any:
+    why = (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
+    for number, words in ((28, "no space left on device"), (27, "file too large"), (122, "disk quota exceeded")):
+        if f"errno = {number}" in str(reason):
+            why = words
+    return error("E305", f"cannot write {output}: {why}", help="nothing was kept; `-o FILE` names another place")
+
+
+def size_text(size: float) -> str:
+    """1536 -> `1.5 KiB`."""
+    for unit in ("B", "KiB", "MiB", "GiB"):
+        if size < 1024:
+            break
+        size /= 1024
+    else:
+        unit = "TiB"
+    return f"{size:.0f} {unit}" if size >= 100 or unit == "B" else f"{size:.1f} {unit}"

@@ -1,0 +1,86 @@
+"""`met run`, `met show`, `met plot`: faces of batch.campaign, batch.show and batch.plot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from met.cli import NO, YES, deck_options, format_option, loudness_options
+
+
+@click.command(short_help="Run the cases of a deck or a plan into an archive.")
+@click.argument("source", metavar="DECK|PLAN.json")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck.")
+@click.option("-o", "--output", metavar="FILE", help="The archive [DECK.h5, or DECK.NAME.h5, in this folder].")
+@click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'.")
+@click.option("--histories", type=click.Choice(["default", "all", "none"]), default="default", show_default=True,
+              help="What to keep besides metrics; default: all, while the archive stays below 1 GiB.")  # fmt: skip
+@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads [one a core].")
+@click.option("--no-picture", is_flag=True, help="Draw no picture beside the archive.")
+@deck_options
+@format_option
+@loudness_options
+def run(source: str, names: tuple[str, ...], form: str, **options: Any) -> int:
+    """Run a deck's only run or sweep, else the one marked `default`; or those of these NAMEs.
+
+    The archive opens in xarray as it is; a picture of it lies beside it. Exit status: 0 all cases reached their end and
+    met the requirements; 1 not all; 2 the input is wrong, and nothing was written.
+    """
+    from batch.running import run_and_tell
+
+    return YES if run_and_tell(source, names, json=form == "json", **options) else NO
+
+
+@click.command(short_help="Show an archive in the terminal: outcome, metrics, signals.")
+@click.argument("archive", metavar="ARCHIVE")
+@click.argument("signals", nargs=-1, metavar="[SIGNAL]...")
+@click.option("--run", "experiments", multiple=True, metavar="NAME", help="Only this run or sweep of the archive.")
+@click.option("--case", metavar="ID", help="The case to draw: the beginning of its id, or '#0' [the first].")
+@click.option("--no-plots", is_flag=True, help="Numbers only.")
+@format_option
+def show(
+    archive: str, signals: tuple[str, ...], experiments: tuple[str, ...], case: str | None, no_plots: bool, form: str
+) -> int:
+    """Show what an archive holds: what was run, how it went, metrics, requirements, and SIGNALs (`qd`, `elbow.q`)."""
+    import shutil
+    import sys
+
+    from batch.archive.read import ArchiveFile
+    from batch.show import as_json, show
+    from met.render import wants_colour
+
+    with ArchiveFile(archive) as file:
+        if form == "json":
+            click.echo(as_json(file, experiments))
+            return YES
+        width = min(100, shutil.get_terminal_size((100, 24)).columns)
+        colour = wants_colour(sys.stdout)
+        text = show(file, signals, experiments=experiments, case=case, width=width, colour=colour, plots=not no_plots)
+        click.echo(text, nl=False, color=colour)
+    return YES
+
+
+@click.command(short_help="Draw an archive's signals into a PNG.")
+@click.argument("archive", metavar="ARCHIVE")
+@click.argument("signals", nargs=-1, metavar="[SIGNAL]...")
+@click.option("-o", "--output", metavar="FILE", help="The picture [ARCHIVE.png].")
+@click.option("--run", "experiment", metavar="NAME", help="The run or sweep to draw [the first].")
+@click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case (beginning of its id, or '#0').")
+@loudness_options
+def plot(
+    archive: str, signals: tuple[str, ...], output: str | None, experiment: str | None, cases: tuple[str, ...],
+    quiet: bool, verbose: bool,
+) -> int:  # fmt: skip
+    """Draw SIGNALs (`qd`, `elbow.q`; all by default): a panel each, joints as lines, cases overlaid or as a fan."""
+    from pathlib import Path
+
+    from batch.archive.read import ArchiveFile
+    from batch.plot import plot
+
+    with ArchiveFile(archive) as file:
+        target = plot(file, output or Path(archive).with_suffix(".png"), signals, experiment=experiment, cases=cases)
+    if not quiet:
+        click.echo(f"{target}")
+    return YES

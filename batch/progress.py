@@ -1,0 +1,84 @@
+"""How far a campaign is: a bar on a terminal, a plain line now and then elsewhere; nothing for what is done at once."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TextIO
+
+FIRST_SECONDS = 0.3
+"""What is over sooner needs no bar."""
+
+BAR_SECONDS = 0.1
+LINE_SECONDS = 5.0
+WIDTH = 24
+
+
+@dataclass
+class Bar:
+    """Told of cases done, it prints at most ten times a second on a terminal, every five seconds elsewhere."""
+
+    stream: TextIO = field(default_factory=lambda: sys.stderr)
+    clock: Callable[[], float] = time.monotonic
+
+    def __post_init__(self) -> None:
+        self._live = self.stream.isatty()
+        self._now = self.clock
+        self._name, self._cases, self._began, self._next, self._drawn = "", 0, 0.0, 0.0, False
+
+    def begin(self, name: str, cases: int) -> None:
+        """A new experiment starts."""
+        self._name, self._cases, self._began = name, cases, self._now()
+        self._next = self._began + (FIRST_SECONDS if self._live else LINE_SECONDS)
+        self._drawn = False
+
+    def advance(self, done: int) -> None:
+        """So many of its cases are done."""
+        now = self._now()
+        if now < self._next or done >= self._cases:
+            return
+        self._next = now + (BAR_SECONDS if self._live else LINE_SECONDS)
+        line = status(self._name, done, self._cases, now - self._began, bar=self._live)
+        if self._live:
+            self.stream.write(f"\r{line}\x1b[K")
+        else:
+            self.stream.write(line + "\n")
+        self.stream.flush()
+        self._drawn = True
+
+    def end(self) -> None:
+        """The experiment is over; a bar is wiped away."""
+        if self._live and self._drawn:
+            self.stream.write("\r\x1b[K")
+            self.stream.flush()
+
+
+def status(name: str, done: int, cases: int, seconds: float, *, bar: bool) -> str:
+    """One line: share, cases, rate, time left."""
+    share = done / cases
+    drawn = ""
+    if bar:
+        eighths = int(share * WIDTH * 8)
+        full, rest = divmod(eighths, 8)
+        drawn = "█" * full + (" ▏▎▍▌▋▊▉"[rest] if rest else "")
+        drawn = drawn.ljust(WIDTH) + "▏ "
+    text = f"{name}  {drawn}{100 * share:3.0f} %  {done:,} of {cases:,} cases"
+    if done and seconds > 0.0:
+        rate = done / seconds
+        text += f"  {rate:,.3g} cases/s" if rate < 1000 else f"  {rate:,.0f} cases/s"
+        text += f"  {duration((cases - done) / rate)} left"
+    return text
+
+
+def duration(seconds: float) -> str:
+    """95 -> `1 min 35 s`."""
+    if seconds < 10:
+        return f"{seconds:.1f} s"
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest} s"
+    return f"{minutes // 60} h {minutes % 60} min"

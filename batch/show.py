@@ -1,0 +1,168 @@
+"""`met show`: an archive in a terminal. What was run, how it went, and its signals."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+
+from batch import braille
+from batch.archive.read import ArchiveFile, Group
+from batch.campaign import size_text
+from batch.signals import case_text, history, number_text, panels, pretty_unit
+from batch.summary import MetricSummary, Summary, summary_of
+from met.diagnostic import Problem, error
+
+PLOTS = 4
+"""Signals that are drawn unless some are asked for."""
+
+
+def show(
+    archive: ArchiveFile,
+    signals: Sequence[str] = (),
+    *,
+    experiments: Sequence[str] = (),
+    case: str | None = None,
+    width: int = 100,
+    colour: bool = False,
+    plots: bool = True,
+) -> str:
+    """The whole text; a plot is of one case, the first recorded unless `case` names another."""
+    out = [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
+    for group in chosen(archive, experiments):
+        summary = summary_of(group)
+        out += ["", *heading(group, width), "", *verdict(summary, width), ""]
+        if plots:
+            out += _plots(group, signals, case, width, colour)
+    return "\n".join(out).rstrip() + "\n"
+
+
+def as_json(archive: ArchiveFile, experiments: Sequence[str] = ()) -> str:
+    """The same for programs: outcome, variables and attributes, without the signals' values."""
+    import json
+
+    from batch import summary as outcomes
+
+    groups = [
+        {
+            **outcomes.as_json(summary_of(group)),
+            "attributes": group.attributes,
+            "variables": [{"name": v.name, "role": v.role, "dims": v.dims, "unit": v.unit} for v in group.variables.values()],
+        }
+        for group in chosen(archive, experiments)
+    ]
+    data = {"archive": str(archive.path), "deck": archive.deck, "provenance": archive.provenance, "experiments": groups}
+    return json.dumps(data, indent=1)
+
+
+def chosen(archive: ArchiveFile, names: Sequence[str]) -> tuple[Group, ...]:
+    """The experiments of these names, all where none is given."""
+    groups = {group.name: group for group in archive.groups}
+    for name in names:
+        if name not in groups:
+            helps = f"in it: {', '.join(groups)}"
+            raise Problem(error("E325", f"no run or sweep `{name}` in {archive.path}", help=helps))
+    return tuple(groups[name] for name in names) if names else archive.groups
+
+
+def heading(group: Group, width: int) -> list[str]:
+    """What was run."""
+    a = group.attributes
+    cases = f"{group.count:,} case{'s' if group.count != 1 else ''}"
+    if group.count < a["cases_in_table"]:
+        cases += f" of {a['cases_in_table']:,}"
+    text = (
+        f"{cases}, {a['duration_s']:g} s, {a['integrator']} at {a['dynamics_hz']:g} Hz, recorded at "
+        f"{a['record_hz']:g} Hz, arm {a['arm']}, velocity products {a['velocity_products']}"
+    )
+    lines = textwrap.wrap(text, width - len(group.name) - 2)
+    out = [f"{group.name}  {lines[0]}", *(" " * (len(group.name) + 2) + line for line in lines[1:])]
+    for variable in group.role("coordinate"):
+        scale = float(variable.attributes.get("deck_scale", 1.0))
+        unit = pretty_unit(str(variable.attributes.get("deck_unit", variable.unit)))
+        values = np.unique(group.values(variable.name)) / scale
+        few = ", ".join(number_text(value) for value in values[:6]) if len(values) <= 6 else ""
+        many = f"{len(values)} values from {number_text(values[0])} to {number_text(values[-1])}"
+        out.append(f"  {variable.name} = {few or many} {unit}".removesuffix(" 1"))
+    return out
+
+
+def verdict(summary: Summary, width: int) -> list[str]:
+    """How it went: cases, metrics, requirements."""
+    out = [_counts(summary)]
+    for failure in summary.failures:
+        head = f"  #{failure.row} {failure.case_id[:8]}  "
+        out += textwrap.wrap(failure.cause, max(width, 40), initial_indent=head, subsequent_indent=" " * len(head))
+    if summary.failed > len(summary.failures):
+        out.append(f"  and {summary.failed - len(summary.failures):,} more; `cause` in the archive has them all")
+    if summary.metrics:
+        out += _metric_table(summary)
+    wide = max((len(r.text) for r in summary.requirements), default=0)
+    for r in summary.requirements:
+        if summary.cases == 1:
+            said = "met" if r.met else "missed" if r.missed else "not known: the case failed"
+        else:
+            said = f"met by {r.met:,} of {summary.cases:,} ({100 * r.met / summary.cases:.3g} %)"
+            said += f", not known of {r.unknown:,}" if r.unknown else ""
+        out.append(f"  require {r.text:<{wide}}  {said}")
+    return out
+
+
+def _counts(summary: Summary) -> str:
+    if summary.cases == 1:
+        return "the case failed" if summary.failed else "the case reached its end"
+    done = summary.cases - summary.failed
+    return f"{done:,} of {summary.cases:,} cases reached their end" + (f", {summary.failed:,} failed" if summary.failed else "")
+
+
+def _metric_table(summary: Summary) -> list[str]:
+    single = summary.cases == 1
+    head = ("", "", "") if single else ("min", "median", "max")
+    rows = [("", *(head[:1] if single else head), "", "")]
+    for metric in summary.metrics:
+        rows.append((metric.name, *_metric_numbers(metric, single), pretty_unit(metric.unit), _metric_words(metric, single)))
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    out = []
+    for row in rows[1:] if single else rows:
+        numbers = "  ".join(f"{text:>{wide}}" for text, wide in zip(row[1:-2], widths[1:-2], strict=True))
+        out.append(f"  {row[0]:<{widths[0]}}  {numbers} {row[-2]:<{widths[-2]}}  {row[-1]}".rstrip())
+    return out
+
+
+def _metric_numbers(metric: MetricSummary, single: bool) -> tuple[str, ...]:
+    if single:
+        return ("inf" if metric.infinite else "-" if metric.unknown else number_text(metric.median),)
+    values = (metric.minimum, metric.median, metric.maximum)
+    return tuple("-" if math.isnan(value) else number_text(value) for value in values)
+
+
+def _metric_words(metric: MetricSummary, single: bool) -> str:
+    words = metric.about
+    if metric.infinite and not single:
+        words += f"; infinite in {metric.infinite:,}"
+    return words
+
+
+def _plots(group: Group, signals: Sequence[str], case: str | None, width: int, colour: bool) -> list[str]:
+    if not group.recorded:
+        if signals or case:
+            panels(group, signals)  # says that there are none
+        return ["no histories kept"]
+    position = 0
+    if case is not None:
+        position = group.find_case(case)
+    wanted = panels(group, signals)
+    drawn = wanted if signals else wanted[:PLOTS]
+    out = [case_text(group, position)] if group.count > 1 else []
+    time = group.values("time")
+    for panel in drawn:
+        values = history(group, panel, position)
+        about = f"  {panel.about}" if panel.about else ""
+        plot = braille.draw(time, list(values.T), panel.lines, title=f"{panel.axis}{about}", width=width, colour=colour)
+        out += [*plot, ""]
+    if len(drawn) < len(wanted):
+        rest = dict.fromkeys(panel.name for panel in wanted[len(drawn) :])
+        out.append(f"also recorded: {', '.join(rest)}")
+    return out

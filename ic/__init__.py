@@ -1,0 +1,41 @@
+"""The deck compiler: deck text -> tokens -> syntax -> model -> plan.
+
+    plan = ic.compile("two_link.ic")
+
+Importing this package loads nothing of it: each function imports what it needs when it is called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from os import PathLike
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from ic.lower import Compiled
+    from met.plan import Plan
+
+__all__ = ["check", "compile"]
+
+
+def check(path: str | PathLike[str], *, include_dirs: Iterable[str | PathLike[str]] = (), defines: Iterable[str] = (),
+          select: Sequence[str] | Literal["all"] | None = "all") -> Compiled:
+    """The plan of all runs and sweeps, or None, with all diagnostics and every file's text. A mistake raises nothing."""
+    from ic.lower import check as lowered
+
+    return lowered(path, include_dirs=tuple(include_dirs), defines=tuple(defines), select=select)
+
+
+def compile(path: str | PathLike[str], *, include_dirs: Iterable[str | PathLike[str]] = (),
+            defines: Iterable[str] = (), select: Sequence[str] | Literal["all"] | None = None) -> Plan:
+    """The run plan of a deck.
+
+    select  names of runs and sweeps, "all", or None: the only one, else the one marked `default`
+    Raises `met.diagnostic.Problem` with every error and warning found, and the text of every file read.
+    """
+    from met.diagnostic import Problem
+
+    compiled = check(path, include_dirs=include_dirs, defines=defines, select=select)
+    if compiled.plan is None:
+        raise Problem(compiled.diagnostics, compiled.sources)
+    return compiled.plan

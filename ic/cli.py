@@ -1,0 +1,245 @@
+"""The commands check, plan, cases, explain, doc and dump: faces over `ic.check`, the plan and the printing of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import click
+
+from met.cli import BAD_INPUT, YES, complain, deck_options, format_option, loudness_options
+from met.diagnostic import Problem
+
+if TYPE_CHECKING:
+    from ic.lower import Compiled
+    from met.plan import Plan
+
+DECK = click.argument("deck")
+
+
+@click.command()
+@DECK
+@deck_options
+@format_option
+@loudness_options
+def check(
+    deck: str, defines: tuple[str, ...], include_dirs: tuple[str, ...], form: str, quiet: bool, verbose: bool
+) -> int:
+    """Find all that is wrong with a deck.
+
+    Every run and sweep of it is compiled to its plan; nothing is run.
+    """
+    import ic
+    from ic.find import find
+
+    find(deck)
+    compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, select="all")
+    if form == "json":
+        complain(compiled.diagnostics, compiled.sources, json=True)
+        return YES if compiled.plan is not None else BAD_INPUT
+    if compiled.diagnostics and (compiled.plan is None or not quiet):
+        complain(compiled.diagnostics, compiled.sources)
+    if compiled.plan is None:
+        return BAD_INPUT
+    if not quiet:
+        from ic.print_check import verdict
+
+        click.echo(verdict(compiled.plan, compiled.diagnostics))
+    return YES
+
+
+@click.command()
+@DECK
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck.")
+@click.option("-o", "output", metavar="FILE", help="Write the plan to this file (JSON); `met run FILE` runs it.")
+@deck_options
+@format_option
+@loudness_options
+def plan(
+    deck: str,
+    names: tuple[str, ...],
+    everything: bool,
+    output: str | None,
+    defines: tuple[str, ...],
+    include_dirs: tuple[str, ...],
+    form: str,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Show what a deck means, and write its plan.
+
+    The arm as a tree, rates and steps, channels, cases, sizes; of the runs and sweeps NAME, or else of the only one or
+    the default.
+    """
+    from met import plan_file
+
+    made = _plan(deck, include_dirs, defines, names, everything, quiet)
+    if output is not None:
+        plan_file.write(made, output)
+        if not quiet and form == "text":
+            click.echo(f"wrote {output}")
+    elif form == "json":
+        click.echo(plan_file.dumps(made), nl=False)
+    elif not quiet:
+        from ic.print_plan import print_plan
+
+        _print(print_plan(made))
+
+
+@click.command()
+@DECK
+@click.argument("names", nargs=-1, metavar="[SWEEP]...")
+@click.option("--all", "everything", is_flag=True, help="Every row, however many there are.")
+@deck_options
+@format_option
+@loudness_options
+def cases(
+    deck: str,
+    names: tuple[str, ...],
+    everything: bool,
+    defines: tuple[str, ...],
+    include_dirs: tuple[str, ...],
+    form: str,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """List the cases of a sweep: position, id and what varies.
+
+    Of SWEEP, or else of all sweeps of the deck. `met run --case` takes a position (`#3`) or the beginning of an id.
+    """
+    from ic.print_cases import cases_json, print_cases
+
+    made = _plan(deck, include_dirs, defines, names, not names, True)
+    shown = [e for e in made.experiments if names or e.cases.coordinates] or list(made.experiments)
+    if form == "json":
+        _print_json([cases_json(experiment) for experiment in shown])
+        return
+    for position, experiment in enumerate(shown):
+        if position:
+            click.echo()
+        _print(print_cases(experiment, everything=everything))
+
+
+@click.command()
+@DECK
+@click.argument("path")
+@click.option("--run", "name", metavar="NAME", help="The run or sweep to look in, where it is not the default one.")
+@deck_options
+@format_option
+@loudness_options
+def explain(
+    deck: str,
+    path: str,
+    name: str | None,
+    defines: tuple[str, ...],
+    include_dirs: tuple[str, ...],
+    form: str,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Say where a value comes from: who wrote it, and over what.
+
+    PATH is a parameter (elbow.servo.kt), the beginning of several (elbow.servo), or one of a definition (gearbox.kp).
+    """
+    from ic.print_explain import explain_json, print_explain
+
+    made = _plan(deck, include_dirs, defines, (name,) if name else (), False, True)
+    experiment = made.experiments[0]
+    if form == "json":
+        _print_json(explain_json(experiment, path))
+        return
+    _print(print_explain(experiment, path, {source.name: source.text for source in made.sources}))
+
+
+@click.command()
+@click.argument("words", nargs=-1, metavar="[KIND] [MODEL]")
+@format_option
+def doc(words: tuple[str, ...], form: str) -> None:
+    """Show the models there are and what each declares.
+
+    KIND is servo, command, environment, metric or integrator; MODEL one of them by name.
+    """
+    from ic import print_models
+    from met import models
+
+    if len(words) > 2:
+        raise click.UsageError("at most a kind and a model")
+    found = print_models.chosen(words)
+    if form == "json":
+        _print_json([print_models.model_json(kind, model) for kind, model in found])
+    elif not words or words[0].removesuffix("s") in models.GROUPS and len(words) == 1:
+        _print(print_models.print_list(found))
+    else:
+        for position, (kind, model) in enumerate(found):
+            if position:
+                click.echo()
+            _print(print_models.print_model(kind, model))
+
+
+@click.command()
+@click.argument("stage")
+@DECK
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@deck_options
+def dump(
+    stage: str, deck: str, names: tuple[str, ...], defines: tuple[str, ...], include_dirs: tuple[str, ...]
+) -> None:
+    """Show what one stage of the way hands to the next.
+
+    STAGE is tokens, syntax, model, plan, program, kernel or assembly.
+    """
+    from ic.dump import Asked, find_stage
+
+    _print(find_stage(stage)(Asked(deck, include_dirs, defines, names or None)))
+
+
+def _plan(
+    deck: str,
+    include_dirs: tuple[str, ...],
+    defines: tuple[str, ...],
+    names: tuple[str, ...],
+    everything: bool,
+    quiet: bool,
+) -> Plan:
+    """The plan of a deck, or of a plan file; its warnings are printed on the way."""
+    if deck.endswith(".json"):
+        return _plan_in_file(deck, names)
+    import ic
+    from ic.find import find
+
+    find(deck)
+    select = "all" if everything else names or None
+    compiled: Compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, select=select)
+    if compiled.plan is None:
+        raise Problem(compiled.diagnostics, compiled.sources)
+    if compiled.diagnostics and not quiet:
+        complain(compiled.diagnostics, compiled.sources)
+    return compiled.plan
+
+
+def _plan_in_file(path: str, names: tuple[str, ...]) -> Plan:
+    from dataclasses import replace
+
+    from ic.complaints import did_you_mean, known_words
+    from met import plan_file
+    from met.diagnostic import error
+
+    made = plan_file.read(path)
+    known = {experiment.name: experiment for experiment in made.experiments}
+    for name in names:
+        if name not in known:
+            helps = [*did_you_mean(name, known), known_words("it has", known)]
+            raise Problem(error("D160", f"no run or sweep `{name}` in this plan", help=helps))
+    return replace(made, experiments=tuple(known[name] for name in names)) if names else made
+
+
+def _print(lines: Iterable[str]) -> None:
+    for line in lines:
+        click.echo(line)
+
+
+def _print_json(told: object) -> None:
+    import json
+
+    click.echo(json.dumps(told, indent=1))

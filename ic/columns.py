@@ -1,0 +1,55 @@
+"""Numbers and tables as the terminal shows them."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterable, Sequence
+
+
+def columns(rows: Sequence[Sequence[str]], *, right: Iterable[int] = (), indent: str = "  ") -> list[str]:
+    """The rows as lines with their cells below one another; those numbered in `right` are set flush right."""
+    flush = frozenset(right)
+    count = max((len(row) for row in rows), default=0)
+    widths = [max((_width(row[i]) for row in rows if i < len(row)), default=0) for i in range(count)]
+    lines = []
+    for row in rows:
+        cells = [
+            " " * (widths[i] - _width(cell)) + cell if i in flush else cell + " " * (widths[i] - _width(cell))
+            for i, cell in enumerate(row)
+        ]
+        lines.append((indent + "  ".join(cells)).rstrip())
+    return lines
+
+
+def number(value: float) -> str:
+    """A number to six digits, without what its last binary digits add: `0.3`, `1e-05`, `-0` as `0`."""
+    return f"{value + 0.0:.6g}"
+
+
+def quantity(value: float, unit: str) -> str:
+    """A number and its unit, which a pure number has not."""
+    return number(value) if unit in ("1", "") else f"{number(value)} {unit}"
+
+
+def vector(values: Iterable[float], unit: str) -> str:
+    """`[2, 0, 0] m`."""
+    text = f"[{', '.join(number(value) for value in values)}]"
+    return text if unit in ("1", "") else f"{text} {unit}"
+
+
+def count(n: int, thing: str, things: str = "") -> str:
+    """`1 case`, `37 cases`."""
+    return f"{n} {thing if n == 1 else things or thing + 's'}"
+
+
+def size(n: int) -> str:
+    """Bytes, in decimal units: `593 kB`."""
+    value, units = float(n), ["B", "kB", "MB", "GB", "TB", "PB"]
+    while value >= 999.5 and len(units) > 1:
+        value /= 1000.0
+        units.pop(0)
+    return f"{value:.3g} {units[0]}"
+
+
+def _width(text: str) -> int:
+    return sum(0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)

@@ -1,0 +1,85 @@
+"""A collector of diagnostics: a deck's mistakes are told together, so that none hides the next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+
+from met.diagnostic import Diagnostic, Label, Place, Problem, error
+
+MOST = 200  # a deck with more mistakes than this is told the first ones: the rest seldom say more
+
+
+class Complaints:
+    """Diagnostics in the order found, each once."""
+
+    def __init__(self, found: Iterable[Diagnostic] = ()) -> None:
+        self._found: dict[Diagnostic, None] = dict.fromkeys(found)
+        self._remarks: dict[Diagnostic, None] = {}
+
+    @property
+    def all(self) -> tuple[Diagnostic, ...]:
+        return tuple(self._found)
+
+    @property
+    def errors(self) -> tuple[Diagnostic, ...]:
+        return tuple(d for d in self._found if d.severity == "error")
+
+    @property
+    def warnings(self) -> tuple[Diagnostic, ...]:
+        return tuple(d for d in self._found if d.severity == "warning")
+
+    def add(self, *diagnostics: Diagnostic) -> None:
+        for diagnostic in diagnostics:
+            if len(self._found) < MOST:
+                self._found.setdefault(diagnostic)
+
+    def error(self, code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
+              help: Iterable[str] | str = ()) -> None:
+        self.add(error(code, message, at, also=also, help=help))
+
+    def warn(self, code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
+             help: Iterable[str] | str = ()) -> None:
+        made = error(code, message, at, also=also, help=help)
+        self.add(Diagnostic(made.code, made.message, made.at, made.also, made.help, "warning"))
+
+    def remark(self, code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
+               help: Iterable[str] | str = ()) -> None:
+        """A warning about what the deck means, which says something only once the deck has no errors."""
+        made = error(code, message, at, also=also, help=help)
+        self._remarks.setdefault(Diagnostic(made.code, made.message, made.at, made.also, made.help, "warning"))
+
+    def admit_remarks(self) -> None:
+        """Makes warnings of the remarks."""
+        self.add(*self._remarks)
+        self._remarks = {}
+
+    @contextmanager
+    def gather(self) -> Iterator[None]:
+        """What raises `Problem` inside is noted, and the rest of the block skipped."""
+        try:
+            yield
+        except Problem as problem:
+            self.add(*problem.diagnostics)
+
+    def raise_errors(self) -> None:
+        """Raises `Problem` with everything found, warnings too, where there is an error."""
+        if self.errors:
+            raise Problem(self.all)
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> tuple[str, ...]:
+    """The help line that offers the nearest known word, or none."""
+    import difflib  # only a deck with a mistake pays for it
+
+    candidates = list(dict.fromkeys(known))
+    folded = {candidate.lower(): candidate for candidate in candidates}
+    close = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.6)
+    return (f"did you mean `{folded[close[0]]}`?",) if close else ()
+
+
+def known_words(what: str, known: Iterable[str], most: int = 24) -> str:
+    """`keys of a link: com, inertia, mass, shape`, cut where there are many."""
+    names = list(dict.fromkeys(known))
+    shown = ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+    return f"{what}: {shown}" if names else f"{what}: none"

@@ -1,0 +1,29 @@
+"""Which decks there are: `met run two_link.ic` works anywhere, since a deck is looked for as a file first, then in the
+directories of MET_DECK_PATH and in the standard library."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+from ic.files import LIBRARY, Files
+from met.diagnostic import Problem, error
+
+
+def find(name: str) -> Path:
+    """The file of the deck of that name. Raises Problem D166 with what was probably meant and the standard decks."""
+    found = Files().deck(name)
+    if Path(found.path).exists():
+        return Path(found.path)
+    here = sorted(path.name for path in Path(name).parent.glob("*.ic"))
+    standard = standard_decks()
+    folder = "" if str(Path(name).parent) == "." else f"{Path(name).parent}/"
+    known = [f"{folder}{each}" for each in here] + standard
+    close = difflib.get_close_matches(name, known, n=1) or difflib.get_close_matches(f"{name}.ic", known, n=1)
+    helps = [f"did you mean `{close[0]}`?"] if close else []
+    raise Problem(error("D166", f"no deck `{name}`", help=[*helps, f"standard decks: {', '.join(standard)}"]))
+
+
+def standard_decks() -> list[str]:
+    """The decks of the standard library that can be run as they are; those in its folders are to be included."""
+    return sorted(path.name for path in LIBRARY.glob("*.ic"))

@@ -1,0 +1,223 @@
+"""Text to tokens, each of which knows exactly where it was written.
+
+One regular expression cuts a whole file. Numbers are decimal with an optional exponent and never swallow a unit or a
+range: `0.061`, `1e-3`, `.5`, `10mm` (a number and a name), `1..50` (a number, `..`, a number). What cannot be a token
+becomes a token of kind BAD, and is complained about only where it reaches the deck: text that `#if` leaves out may be
+anything.
+
+The kinds have the names that pcpp asks for, and a token answers to pcpp's names for its fields as well (`type`,
+`value`, `lexpos`, `lineno`): the same objects go through the preprocessor and on to the parser.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Any
+
+from met.diagnostic import Expansion, Place
+
+NAME = "CPP_ID"
+WHOLE = "CPP_INTEGER"
+DECIMAL = "CPP_FLOAT"
+STRING = "CPP_STRING"
+CHARACTER = "CPP_CHAR"
+SPACE = "CPP_WS"
+JOINED = "CPP_LINECONT"
+BAD = "BAD"  # no token; with an empty text where that has been said
+END = "END"
+PASTE = "CPP_DPOUND"
+
+NUMBERS = (WHOLE, DECIMAL)
+
+_SYMBOLS = {
+    "#": "CPP_POUND", "##": PASTE, "+": "CPP_PLUS", "-": "CPP_MINUS", "*": "CPP_STAR", "/": "CPP_FSLASH",
+    "%": "CPP_PERCENT", "|": "CPP_BAR", "&": "CPP_AMPERSAND", "~": "CPP_TILDE", "^": "CPP_HAT", "<": "CPP_LESS",
+    ">": "CPP_GREATER", "=": "CPP_EQUAL", "!": "CPP_EXCLAMATION", "?": "CPP_QUESTION", "(": "CPP_LPAREN",
+    ")": "CPP_RPAREN", "[": "CPP_LBRACKET", "]": "CPP_RBRACKET", "{": "CPP_LCURLY", "}": "CPP_RCURLY", ".": "CPP_DOT",
+    ",": "CPP_COMMA", ";": "CPP_SEMICOLON", ":": "CPP_COLON", "<<": "CPP_LSHIFT", "<=": "CPP_LESSEQUAL",
+    ">>": "CPP_RSHIFT", ">=": "CPP_GREATEREQUAL", "||": "CPP_LOGICALOR", "&&": "CPP_LOGICALAND", "==": "CPP_EQUALITY",
+    "!=": "CPP_INEQUALITY", "+=": "CPP_PLUSEQUAL", "-=": "CPP_MINUSEQUAL", "*=": "CPP_MULTIPLYEQUAL",
+    "/=": "CPP_DIVIDEEQUAL", "..": "RANGE", "...": "ELLIPSIS",
+}  # fmt: skip
+
+# the order of the alternatives matters; a hexadecimal number is for #if only
+_TOKEN = re.compile(
+    r"""
+      (?P<space>[ \t\f\v]+)
+    | (?P<name>[A-Za-z_][A-Za-z0-9_]*)
+    | (?P<newline>\n)
+    | (?P<number>0[xX][0-9a-fA-F]+|(?:[0-9]+(?:\.(?!\.)[0-9]*)?|(?<!\.)\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
+    | (?P<comment>//[^\n]*|/\*(?:[^*]|\*(?!/))*+\*/)
+    | (?P<unclosed>/\*)
+    | (?P<string>"(?:[^"\\\n]|\\.)*+")
+    | (?P<character>'(?:[^'\\\n]|\\.)*+')
+    | (?P<joined>\\[ \t]*\n)
+    | (?P<symbol>\#\#|\.\.\.|\.\.|<<|>>|[<>=!+*/-]=|\|\||&&|[][(){}<>=!+*/%^;:,.\#&|~?-])
+    | (?P<bad>"[^\n]*|'[^\n]*|[^\x00-\x7f]+|.)
+    """,
+    re.VERBOSE,
+)
+
+
+class Text:
+    """A file's text under the name that messages print, and the `#include` lines that led to it, innermost first.
+
+    The same file included twice makes two of these, since their chains differ.
+    """
+
+    def __init__(self, name: str, text: str, included: tuple[tuple[str, int], ...] = ()) -> None:
+        self.name = name
+        self.text = text
+        self.included = included
+
+    @cached_property
+    def _starts(self) -> list[int]:
+        starts = [0]
+        starts.extend(match.end() for match in re.finditer("\n", self.text))
+        return starts
+
+    def line(self, offset: int) -> int:
+        """The number of the line, from 1, that holds the character at `offset`."""
+        return bisect_right(self._starts, offset)
+
+    def place(self, offset: int, length: int, expansions: tuple[Expansion, ...] = ()) -> Place:
+        """The place of `length` characters from `offset`, cut at the end of the line."""
+        line = bisect_right(self._starts, offset)
+        start = self._starts[line - 1]
+        return Place(self.name, line, offset - start + 1, length or 1, expansions, self.included)
+
+    def indent(self, offset: int) -> int:
+        """The column, from 1, of the first thing on the line that holds `offset`."""
+        start = self._starts[bisect_right(self._starts, offset) - 1]
+        at = start
+        while at < len(self.text) and self.text[at] in " \t":
+            at += 1
+        return at - start + 1
+
+    def rest_of_line(self, offset: int) -> str:
+        """The text from `offset` to the end of its line."""
+        end = self.text.find("\n", offset)
+        return self.text[offset : len(self.text) if end < 0 else end]
+
+
+class Token:
+    """A piece of a deck: its kind, its text, and where it was written.
+
+    expansions  the macros it came through, innermost first, as in `Place`
+    hidden      names of macros that this token may not expand again (C's rule against endless expansion)
+    """
+
+    __slots__ = ("expansions", "hidden", "kind", "length", "lexer", "offset", "source", "text")
+
+    # pcpp's names for `kind`, `text` and `offset`: the same slots
+    type: str
+    value: str
+    lexpos: int
+
+    def __init__(self, kind: str, text: str, source: Text, offset: int, length: int) -> None:
+        self.kind = kind
+        self.text = text
+        self.source = source
+        self.offset = offset
+        self.length = length
+        self.expansions: tuple[Expansion, ...] = ()
+        self.hidden: frozenset[str] = frozenset()
+
+    @property
+    def line(self) -> int:
+        return self.source.line(self.offset)
+
+    @property
+    def lineno(self) -> int:
+        return self.source.line(self.offset)
+
+    @property
+    def place(self) -> Place:
+        return self.source.place(self.offset, self.length, self.expansions)
+
+    @property
+    def end(self) -> int:
+        """The offset just behind the token."""
+        return self.offset + self.length
+
+    def __copy__(self) -> Token:
+        other = Token(self.kind, self.text, self.source, self.offset, self.length)
+        other.expansions = self.expansions
+        other.hidden = self.hidden
+        return other
+
+    def __repr__(self) -> str:
+        return f"Token({self.kind!r}, {self.text!r}, {self.place})"
+
+
+_slots: Any = Token
+_slots.type, _slots.value, _slots.lexpos = Token.__dict__["kind"], Token.__dict__["text"], Token.__dict__["offset"]
+
+
+def logical_lines(source: Text) -> Iterator[list[Token]]:
+    """The tokens of each line, the last of them its newline. Comments are spaces; a backslash at a line's end joins
+    it to the next. The last line gets its newline too."""
+    line: list[Token] = []
+    add = line.append
+    for match in _TOKEN.finditer(source.text):
+        group = match.lastgroup
+        piece = match.group()
+        at = match.start()
+        if group == "space":
+            add(Token(SPACE, " ", source, at, len(piece)))
+        elif group == "name":
+            add(Token(NAME, piece, source, at, len(piece)))
+        elif group == "symbol":
+            add(Token(_SYMBOLS[piece], piece, source, at, len(piece)))
+        elif group == "newline":
+            add(Token(SPACE, "\n", source, at, 1))
+            yield line
+            line = []
+            add = line.append
+        elif group == "number":
+            add(Token(_number_kind(piece), piece, source, at, len(piece)))
+        elif group == "comment":
+            add(Token(SPACE, " ", source, at, len(piece)))
+        elif group == "joined":
+            add(Token(JOINED, " ", source, at, 1))
+        elif group == "string":
+            add(Token(STRING, piece, source, at, len(piece)))
+        elif group == "character":
+            add(Token(CHARACTER, piece, source, at, len(piece)))
+        elif group == "unclosed":
+            add(Token(BAD, piece, source, at, 2))
+            break
+        else:
+            add(Token(BAD, piece, source, at, len(piece.rstrip())))
+    if line:
+        add(Token(SPACE, "\n", source, len(source.text), 1))
+        yield line
+
+
+def _number_kind(piece: str) -> str:
+    return WHOLE if piece.isdigit() or piece[1:2] in ("x", "X") else DECIMAL
+
+
+class Lexer:
+    """What pcpp calls a lexer, for the little texts that it cuts itself: two tokens pasted by `##`.
+
+    made: how many tokens the last text gave.
+    """
+
+    def __init__(self) -> None:
+        self._left: list[Token] = []
+        self.made: list[tuple[str, int]] = []
+
+    def clone(self) -> Lexer:
+        return self
+
+    def input(self, text: str) -> None:
+        lines = list(logical_lines(Text("", text)))
+        self._left = [token for line in lines for token in line if token.text != "\n"][::-1]
+        self.made.append((text, len(self._left)))
+
+    def token(self) -> Token | None:
+        return self._left.pop() if self._left else None

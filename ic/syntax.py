@@ -1,0 +1,170 @@
+"""The syntax tree of a deck: what was written, in the order written, each node with its place.
+
+The tree knows the language's shape and none of its words: a `link` or a `vary` is an entry like any other, and
+what may stand where is decided when the tree is resolved. So a joint may be called `at` or `sample`.
+
+    let reach = 2.0 m;                                      Let
+    servo gearbox like rigid_gearbox { ... }                Group, words ("servo", "gearbox"), like ("rigid_gearbox",)
+    default run nominal { ... }                             Group, words ("default", "run", "nominal")
+    sweep gains of nominal { ... }                          Group, words ("sweep", "gains"), of ("nominal",)
+    joint elbow revolute { ... }                            Group, words ("joint", "elbow", "revolute")
+    shoulder = gearbox;      record += [q];                 Setting, words (), path, operator, value
+    metric settle = settling_time { ... };                  Setting, words ("metric",), path ("settle",)
+    vary gearbox.kp = linspace(0.01, 0.04, 7) V*s/rad;      Setting, words ("vary",), path ("gearbox", "kp")
+    require settle < 10 s;                                  Statement, words ("require",), value
+    exclude when kp > 3 V*s/rad and m > 5 kg;               Statement, words ("exclude", "when"), value
+    remove settle;                                          Statement, words ("remove",), value a Name
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from met.diagnostic import Diagnostic, Place
+
+
+@dataclass(frozen=True)
+class Word:
+    """An identifier and where it stands."""
+
+    text: str
+    place: Place
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as written: factors (name, exponent) in order. `%` is a unit of 0.01."""
+
+    factors: tuple[tuple[Word, int], ...]
+    place: Place
+    text: str
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number with the unit that follows it, None where it is bare."""
+
+    value: float
+    unit: Unit | None
+    place: Place
+    text: str
+
+
+@dataclass(frozen=True)
+class String:
+    value: str
+    place: Place
+
+
+@dataclass(frozen=True)
+class Name:
+    """A reference: `slow`, `gearbox.kp`, `shoulder.servo.voltage`, `on`."""
+
+    path: tuple[Word, ...]
+    place: Place
+
+    @property
+    def text(self) -> str:
+        return ".".join(word.text for word in self.path)
+
+
+@dataclass(frozen=True)
+class List:
+    items: tuple[Expression, ...]
+    place: Place
+
+
+@dataclass(frozen=True)
+class Call:
+    """`rod(length = reach, along = x)`, `linspace(0, 1, 5)`, `settling_time { of = q; }` (then `body` is not None)."""
+
+    name: Name
+    positional: tuple[Expression, ...]
+    named: tuple[tuple[Word, Expression], ...]
+    body: tuple[Entry, ...] | None
+    place: Place
+
+
+@dataclass(frozen=True)
+class WithUnit:
+    """`[...] unit` or `(...) unit` or `linspace(...) unit`: the unit applies to all bare numbers inside."""
+
+    inner: Expression
+    unit: Unit
+    place: Place
+
+
+@dataclass(frozen=True)
+class Unary:
+    operator: str  # "-" "+" "not"
+    operand: Expression
+    place: Place
+
+
+@dataclass(frozen=True)
+class Binary:
+    """operator: + - * / ^ < <= > >= == != and or"""
+
+    operator: str
+    left: Expression
+    right: Expression
+    place: Place  # of the operator
+
+
+Expression = Number | String | Name | List | Call | WithUnit | Unary | Binary
+
+
+@dataclass(frozen=True)
+class Let:
+    name: Word
+    value: Expression
+    place: Place
+
+
+@dataclass(frozen=True)
+class Setting:
+    words: tuple[Word, ...]
+    path: tuple[Word, ...]
+    operator: str  # "=" or "+="
+    value: Expression
+    place: Place  # of the path
+
+
+@dataclass(frozen=True)
+class Statement:
+    words: tuple[Word, ...]
+    value: Expression
+    place: Place
+
+
+@dataclass(frozen=True)
+class Group:
+    """`words { body }`, or with `like`/`of` a base. At the top level a definition, inside one a block."""
+
+    words: tuple[Word, ...]
+    like: Name | None
+    of: Name | None
+    body: tuple[Entry, ...]
+    place: Place  # of the words
+
+
+Entry = Let | Setting | Statement | Group
+
+
+@dataclass(frozen=True)
+class SourceText:
+    """A file that was read: the name messages print, its text, SHA-256 of its bytes."""
+
+    name: str
+    text: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Deck:
+    """A whole deck after the preprocessor: its entries in order, the files they came from, and warnings so far."""
+
+    file: str
+    entries: tuple[Entry, ...]
+    sources: tuple[SourceText, ...]
+    warnings: tuple[Diagnostic, ...] = ()

@@ -1,0 +1,15 @@
+"""The engine: what a plan means, compiled and run. Knows neither text, cluster nor serial line."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+_HOMES = {"case_ids": "met.keys", "case_keys": "met.keys", "structure_key": "met.keys", "Problem": "met.diagnostic"}
+
+
+def __getattr__(name: str) -> Any:
+    """What is offered here is imported when it is first asked for."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOMES[name]), name)

@@ -1,0 +1,224 @@
+"""The command `met`: a group over the table of subcommands that packages offer, and what holds for all of them.
+
+A subcommand is a click command offered as an entry point in the group `met.commands`; only the one that is asked for
+is imported. It returns None or 0 for yes and 1 for no (a case failed, a requirement was missed); whatever a user got
+wrong it raises as a `Problem`, which is printed here, once, and ends with 2.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
+
+import click
+
+from met.diagnostic import Diagnostic, Problem, error
+from met.entry_points import EntryPoint, offered
+from met.version import VERSION
+
+YES, NO, BAD_INPUT = 0, 1, 2
+INTERRUPTED, PIPE_CLOSED = 130, 141  # 128 + the signal, as a shell counts
+DEFECT = 70  # EX_SOFTWARE of sysexits.h
+
+# How `met --help` lists the commands: in the order of work. A command that is not named here comes after them.
+ORDER = (
+    "new", "fmt", "check", "explain", "plan", "cases", "run", "submit", "status", "show", "plot", "report", "diff",
+    "export", "import", "profile", "margin", "bed", "doc", "dump",
+)  # fmt: skip
+
+Face = TypeVar("Face", bound=Callable[..., Any])
+
+
+class Table(click.Group):
+    """The commands of the table, each imported when it is asked for."""
+
+    def table(self) -> dict[str, EntryPoint]:
+        """Commands by name, in the order of work."""
+        points = {point.name: point for point in reversed(offered("met.commands"))}
+        known = [name for name in ORDER if name in points]
+        return {name: points[name] for name in [*known, *sorted(points.keys() - set(known))]}
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(self.table())
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        point = self.table().get(name)
+        if point is None:
+            return None
+        try:
+            command = point.load()
+        except (ImportError, AttributeError) as reason:
+            if point.package == "met_arm":
+                raise
+            message = f"cannot load the command `{name}` of the package `{point.package}`: {reason}"
+            raise Problem(error("E216", message, help="mend or uninstall that package")) from reason
+        assert isinstance(command, click.Command)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if name not in self.table() and not name.startswith("-"):
+            raise click.UsageError(f"no command `{name}`{self._meant(name)}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        lines = []
+        for name in self.table():
+            try:
+                command = self.get_command(ctx, name)
+            except Problem as problem:
+                lines.append((name, problem.diagnostics[0].message))
+                continue
+            if command is not None and not command.hidden:
+                lines.append((name, command.get_short_help_str(100)))
+        with formatter.section("Commands, in the order of work"):
+            formatter.write_dl(lines)
+
+    def _meant(self, name: str) -> str:
+        import difflib
+
+        if name.endswith(".ic"):
+            return f"; did you mean `met run {name}`?"
+        close = difflib.get_close_matches(name, self.table(), n=1)
+        return f"; did you mean `met {close[0]}`?" if close else ""
+
+
+@click.command(
+    cls=Table,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
+    epilog="Start with `met run two_link.ic`. `met COMMAND --help` says more.",
+)
+@click.version_option(VERSION, "--version", prog_name="met", message="%(prog)s %(version)s")
+def met() -> None:
+    """MET takes a robot arm from a text deck to an answer: what it does under its servos, in one case or a million.
+
+    A deck is looked for as a file, then in the standard library. Exit status: 0 yes; 1 no (a case failed, a requirement
+    was missed); 2 the input or the usage is wrong.
+    """
+
+
+def deck_options(face: Face) -> Face:
+    """The options of whatever reads a deck: -D and -I, given on as `defines` and `include_dirs`."""
+    face = click.option(
+        "-I", "include_dirs", multiple=True, metavar="DIR", help="Look for included files here too; may be repeated."
+    )(face)
+    return click.option(
+        "-D", "defines", multiple=True, metavar="NAME[=VALUE]", help="Define a macro, as #define would; may be repeated."
+    )(face)
+
+
+def format_option(face: Face) -> Face:
+    """--format: text for people or JSON for programs, diagnostics included; given on as `form`."""
+    return click.option(
+        "--format", "form", type=click.Choice(["text", "json"]), default="text", help="How to print; json for programs."
+    )(face)
+
+
+def loudness_options(face: Face) -> Face:
+    """-q and -v, given on as `quiet` and `verbose`."""
+    face = click.option("-v", "--verbose", is_flag=True, help="Say more; show tracebacks.")(face)
+    return click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")(face)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `met` with these arguments (those of the process by default) and return its exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    # numpy's linear algebra would start a thread a core while it is imported (a sixth of `met check`); MET has its own.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    try:
+        status = _run(given)
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        # Whoever read our output has gone (`met cases | head`). What Python still holds for it must go nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return PIPE_CLOSED
+
+
+def _run(arguments: list[str]) -> int:
+    json = "--format=json" in arguments or ("--format", "json") in zip(arguments, arguments[1:], strict=False)
+    verbose = "-v" in arguments or "--verbose" in arguments
+    try:
+        if "_MET_COMPLETE" in os.environ:
+            met.main(arguments, prog_name="met")  # a shell asks what may follow; click answers and ends
+        # Not `met.main`, which would print and decide the exit status of much by itself.
+        with met.make_context("met", arguments) as context:
+            status = met.invoke(context)
+        return status if isinstance(status, int) else YES
+    except click.exceptions.Exit as told:  # --help, --version, or a command that leaves early
+        return told.exit_code
+    except Problem as problem:
+        complain(problem.diagnostics, problem.sources, json=json)
+        return BAD_INPUT
+    except click.ClickException as mistake:
+        if json:
+            complain([error("U001", mistake.format_message())], {}, json=True)
+        else:
+            mistake.show()
+        return BAD_INPUT
+    except (KeyboardInterrupt, click.Abort):
+        print("\nmet: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        raise
+    except MemoryError:
+        message = "there is not enough memory for this"
+        complain([error("E217", message, help="run fewer cases at once, or record less")], {}, json=json)
+        return BAD_INPUT
+    except OSError as mistake:
+        if verbose:
+            _show_traceback()
+        about = f"`{os.fsdecode(mistake.filename)}`: " if isinstance(mistake.filename, str | bytes) else ""
+        complain([error("E218", f"{about}{mistake.strerror or mistake}")], {}, json=json)
+        return BAD_INPUT
+    except Exception as defect:
+        _confess(defect, arguments, verbose)
+        return DEFECT
+
+
+def complain(diagnostics: Sequence[Diagnostic], sources: Mapping[str, str], *, json: bool = False) -> None:
+    """Print diagnostics: for people on stderr, for programs as JSON on stdout."""
+    from met import render
+
+    if json:
+        print(render.to_json(diagnostics))
+        return
+    print(render.render(diagnostics, sources, colour=render.wants_colour(sys.stderr)), end="", file=sys.stderr)
+
+
+def _confess(defect: Exception, arguments: Sequence[str], verbose: bool) -> None:
+    """Say that MET has a defect, in a paragraph; the traceback goes into a file, or with -v to the terminal."""
+    import platform
+    import shlex
+    import tempfile
+    import traceback
+
+    command = shlex.join(["met", *arguments])
+    if verbose:
+        _show_traceback()
+        where = "The traceback is above."
+    else:
+        handle, path = tempfile.mkstemp(prefix="met-defect-", suffix=".txt")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(f"{command}\nmet {VERSION}, Python {platform.python_version()}, {platform.platform()}\n\n")
+            traceback.print_exception(defect, file=file)
+        where = f"The traceback is in {path}; with -v it is printed."
+    print(
+        f"met: this is a defect of MET, not of what you gave it: {type(defect).__name__}: {defect}. {where} Please report "
+        f"it together with the deck and the command, `{command}`.",
+        file=sys.stderr,
+    )
+
+
+def _show_traceback() -> None:
+    import traceback
+
+    traceback.print_exc()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

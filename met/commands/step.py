@@ -1,0 +1,25 @@
+"""A jump from one value to another: `start` before the time `at`, `to` from then on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from met.commands.profile import Profile
+from met.parameter import Parameter
+from met.trace import Real, where
+
+
+def course(p: Any, t: Real) -> tuple[Real, Real]:
+    return where(t >= p.at, p.to, p.start), 0.0
+
+
+PROFILE = Profile(
+    name="step",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="start", unit="command", default=0.0, doc="value before the jump"),
+        Parameter(name="to", unit="command", doc="value after the jump"),
+        Parameter(name="at", unit="s", default=0.0, at_least=0.0, doc="time of the jump"),
+    ),
+    course=course,
+)

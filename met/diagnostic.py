@@ -1,0 +1,87 @@
+"""How anyone complains: one type for every message a user sees, whoever noticed.
+
+A diagnostic is a code, a severity, one sentence, the place it is about, other places involved, and the remedy.
+Functions that find a user's mistake raise `Problem` (carrying one or more); the command line catches it, renders
+it once and exits with 2. Nothing else is an acceptable way to refuse input.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+Severity = Literal["error", "warning", "note"]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A stretch of one line of a source file.
+
+    line and column count from 1; a column counts characters, not bytes. `expansions` is not empty for a token
+    that a macro made: the token is then written at this place, in the macro's body or in an argument, and each
+    expansion, innermost first, says through which macro it came and where that macro was used.
+    `included` is the chain of `#include` lines that led to the file, innermost first.
+    """
+
+    file: str
+    line: int
+    column: int
+    length: int = 1
+    expansions: tuple[Expansion, ...] = ()
+    included: tuple[tuple[str, int], ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """One step of macro expansion: the macro's name and the place where it was used."""
+
+    macro: str
+    use: Place
+
+
+@dataclass(frozen=True)
+class Label:
+    """A place and a few words about it, printed beside its caret."""
+
+    place: Place
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """What is wrong, where, why, and what to do."""
+
+    code: str
+    message: str
+    at: Label | None = None
+    also: tuple[Label, ...] = ()
+    help: tuple[str, ...] = ()
+    severity: Severity = "error"
+
+
+class Problem(Exception):
+    """Raised for a user's mistake; carries diagnostics, never a traceback's worth of program.
+
+    sources: file -> text, for those who show the lines that the diagnostics are about; may be empty.
+    """
+
+    def __init__(
+        self, diagnostics: Diagnostic | Iterable[Diagnostic], sources: Mapping[str, str] | None = None
+    ) -> None:
+        self.sources: Mapping[str, str] = dict(sources or {})
+        self.diagnostics: tuple[Diagnostic, ...] = (
+            (diagnostics,) if isinstance(diagnostics, Diagnostic) else tuple(diagnostics)
+        )
+        super().__init__("; ".join(f"{d.code}: {d.message}" for d in self.diagnostics))
+
+
+def error(code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
+          help: Iterable[str] | str = ()) -> Diagnostic:
+    """A `Diagnostic` of severity error, with a bare place allowed for a label and one string for the helps."""
+    label = Label(at) if isinstance(at, Place) else at
+    helps = (help,) if isinstance(help, str) else tuple(help)
+    return Diagnostic(code, message, label, tuple(also), helps)

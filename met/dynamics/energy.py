@@ -1,0 +1,68 @@
+"""Energy and momentum of the arm, from the bodies' own inertia."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from met.dynamics.kinematics import joint_poses, joint_rates
+from met.dynamics.spatial import (
+    HERE,
+    ZERO,
+    Pose,
+    Real,
+    Vector,
+    add,
+    apply_symmetric,
+    cross,
+    dot,
+    scale,
+    sub,
+    turn_vector,
+)
+from met.dynamics.tree import Tree
+
+
+class Energy(NamedTuple):
+    """Of everything that the joints move; links fixed to the base are not counted.
+
+    kinetic    J, 1/2 rotor qd^2 included
+    potential  J, of uniform gravity, zero at the world's origin
+    linear     momentum, world axes, kg m/s
+    angular    momentum about the world's origin, world axes, kg m^2/s. Neither momentum has a rotor term
+    """
+
+    kinetic: Real
+    potential: Real
+    linear: Vector
+    angular: Vector
+
+
+def energy(
+    tree: Tree,
+    q: Sequence[Real],
+    qd: Sequence[Real],
+    *,
+    rotor: Sequence[Real] | None = None,
+    gravity: Vector = ZERO,
+    base: Pose = HERE,
+    base_velocity: tuple[Vector, Vector] = (ZERO, ZERO),
+) -> Energy:
+    """Energy and momentum at a state; gravity in world axes (m/s^2), base as in `kinematics.link_motions`."""
+    steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
+    poses = joint_poses(tree, steps, base)
+    kinetic: Real = 0.0
+    weighed, linear, angular = ZERO, ZERO, ZERO
+    for i, (w, v) in enumerate(joint_rates(tree, steps, qd, base_velocity)):
+        m, h, I = tree.joints[i].body  # noqa: E741
+        R, p = poses[i]
+        momentum = sub(scale(m, v), cross(h, w))
+        spin = add(apply_symmetric(I, w), cross(h, v))
+        kinetic = kinetic + 0.5 * (dot(w, spin) + dot(v, momentum))
+        turned = turn_vector(R, momentum)
+        linear = add(linear, turned)
+        angular = add(angular, add(turn_vector(R, spin), cross(p, turned)))
+        weighed = add(weighed, add(scale(m, p), turn_vector(R, h)))
+        if rotor is not None:
+            kinetic = kinetic + 0.5 * (rotor[i] * (qd[i] * qd[i]))
+    return Energy(kinetic, -dot(gravity, weighed), linear, angular)

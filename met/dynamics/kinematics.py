@@ -1,0 +1,127 @@
+"""Where the links are and how they move, in the world, by their own (the deck's) frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from met.dynamics.joints import Step
+from met.dynamics.spatial import (
+    HERE,
+    ZERO,
+    Pose,
+    Real,
+    Vector,
+    add,
+    compose,
+    cross,
+    sub,
+    turn_vector,
+    turn_vector_back,
+)
+from met.dynamics.tree import Tree
+
+
+@dataclass(frozen=True)
+class LinkMotion:
+    """A link's frame in the world.
+
+    pose  R_WL and p_WL, m
+    w, v  angular velocity of the link, and velocity of its frame's origin, in link axes, rad/s and m/s
+    """
+
+    pose: Pose
+    w: Vector
+    v: Vector
+
+    def position(self, point: Vector = ZERO) -> Vector:
+        """World position of a point given in the link frame, m."""
+        return add(self.pose.p, turn_vector(self.pose.R, point))
+
+    def velocity(self, point: Vector = ZERO) -> Vector:
+        """Velocity in the world of a point fixed to the link, given in the link frame, m/s."""
+        return turn_vector(self.pose.R, add(self.v, cross(self.w, point)))
+
+    def rate(self) -> Vector:
+        """Angular velocity in world axes, rad/s."""
+        return turn_vector(self.pose.R, self.w)
+
+    def to_world(self, vector: Vector) -> Vector:
+        """World components of a vector given in link axes."""
+        return turn_vector(self.pose.R, vector)
+
+    def to_link(self, vector: Vector) -> Vector:
+        """Link components of a vector given in world axes."""
+        return turn_vector_back(self.pose.R, vector)
+
+    def wrench(self, force: Vector, moment: Vector = ZERO, point: Vector = ZERO) -> tuple[Vector, Vector]:
+        """Moment about the link's origin and force in link axes, as `solve` takes them, of a force (N) and a moment
+        (N m) in world axes, the force applied at a point of the link frame."""
+        own = self.to_link(force)
+        return add(self.to_link(moment), cross(point, own)), own
+
+
+def link_motions(
+    tree: Tree, q: Sequence[Real], qd: Sequence[Real], base: Pose = HERE,
+    base_velocity: tuple[Vector, Vector] = (ZERO, ZERO),
+) -> dict[str, LinkMotion]:
+    """Every link by name. base: the base frame in the world; its angular and linear velocity in its own axes."""
+    steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
+    poses = joint_poses(tree, steps, base)
+    rates = joint_rates(tree, steps, qd, base_velocity)
+    root_pose, root_rates = compose(base, tree.base), _at(base_velocity, tree.base)
+    result = {}
+    for name, frame in tree.frames.items():
+        outer, motion = (root_pose, root_rates) if frame.joint < 0 else (poses[frame.joint], rates[frame.joint])
+        result[name] = LinkMotion(compose(outer, frame.pose), *_at(motion, frame.pose))
+    return result
+
+
+def joint_poses(tree: Tree, steps: Sequence[Step], base: Pose = HERE) -> tuple[Pose, ...]:
+    """The recursion's frames in the world, by joint."""
+    poses = [HERE] * len(steps)
+    root = compose(base, tree.base)
+    for i in tree.order:
+        parent = tree.joints[i].parent
+        poses[i] = steps[i].below(root if parent < 0 else poses[parent])
+    return tuple(poses)
+
+
+def joint_rates(
+    tree: Tree, steps: Sequence[Step], qd: Sequence[Real], base_velocity: tuple[Vector, Vector] = (ZERO, ZERO)
+) -> tuple[tuple[Vector, Vector], ...]:
+    """Angular velocity and velocity of the origin of the recursion's frames, in their axes, by joint."""
+    rates = [(ZERO, ZERO)] * len(steps)
+    root = _at(base_velocity, tree.base)
+    for i in tree.order:
+        joint = tree.joints[i]
+        w, v = steps[i].lower_acceleration(*(root if joint.parent < 0 else rates[joint.parent]), ZERO)
+        along = (0.0, 0.0, qd[i])
+        rates[i] = (add(w, along), v) if joint.kind == "revolute" else (w, add(v, along))
+    return tuple(rates)
+
+
+def jacobian(tree: Tree, q: Sequence[Real], link: str, point: Vector = ZERO) -> tuple[tuple[Vector, Vector], ...]:
+    """For each joint, the angular velocity of the link and the velocity of a point of it (link frame, m), in world
+    axes, for each unit of that joint's rate. Zeros for joints that do not carry the link."""
+    steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
+    poses = joint_poses(tree, steps)
+    frame = tree.frames[link]
+    columns: list[tuple[Vector, Vector]] = [(ZERO, ZERO)] * len(tree.joints)
+    outer = tree.base if frame.joint < 0 else poses[frame.joint]
+    there = compose(outer, frame.pose)
+    target = add(there.p, turn_vector(there.R, point))
+    i = frame.joint
+    while i >= 0:
+        joint = tree.joints[i]
+        R, p = poses[i]
+        axis = (R[0][2], R[1][2], R[2][2])
+        columns[i] = (axis, cross(axis, sub(target, p))) if joint.kind == "revolute" else (ZERO, axis)
+        i = joint.parent
+    return tuple(columns)
+
+
+def _at(motion: tuple[Vector, Vector], inner: Pose) -> tuple[Vector, Vector]:
+    """The motion of a frame fixed to the moving one at the given pose, in its own axes."""
+    w, v = motion
+    return turn_vector_back(inner.R, w), turn_vector_back(inner.R, add(v, cross(w, inner.p)))

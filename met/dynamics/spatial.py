@@ -1,0 +1,407 @@
+"""Vectors, rotations and spatial quantities as tuples of Reals, in the few operations that planar steps need.
+
+Everything here is plain arithmetic on `Real = float | Scalar`: no arrays, so that a trace sees every zero and one.
+
+    Vector     (x, y, z)
+    Matrix     three rows; R_AB turns components in B into components in A
+    Rigid      mass, h = mass * centre of mass, I about the origin as (xx, xy, xz, yy, yz, zz)
+    Symmetric  a symmetric 6x6 in blocks [[A, B], [B', C]]: A, C as (xx, xy, xz, yy, yz, zz), B row by row
+
+Spatial order is angular over linear. A general change of frame costs too much on a 6x6, so every change is a
+chain of turns about one axis and shifts along one axis; the axes are 0, 1, 2 for x, y, z. "Raise" goes from a child
+frame to its parent frame, "lower" from parent to child, where the child frame is the parent frame turned by
+(c, s) = (cos, sin) about the axis, or shifted by d along it. A turn by a multiple of 90 degrees costs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, TypeGuard
+
+from met.trace import Real, Scalar, Truth, cos, sin, sqrt, where
+
+Vector = tuple[Real, Real, Real]
+Matrix = tuple[Vector, Vector, Vector]
+Six = tuple[Real, Real, Real, Real, Real, Real]
+Nine = tuple[Real, Real, Real, Real, Real, Real, Real, Real, Real]
+Turn = tuple[Real, Real]
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+NO_TURN: Turn = (1.0, 0.0)
+
+# Place of entry (i, j) of a symmetric 3x3 among its six numbers.
+AT = ((0, 1, 2), (1, 3, 4), (2, 4, 5))
+
+
+class Pose(NamedTuple):
+    """Frame B in frame A: R_AB and p_AB, the origin of B from that of A, in A's axes, m."""
+
+    R: Matrix
+    p: Vector
+
+
+HERE = Pose(IDENTITY, ZERO)
+
+
+class Rigid(NamedTuple):
+    """Inertia of a rigid body in a frame: mass kg, h = mass * centre kg m, I about the frame's origin kg m^2."""
+
+    mass: Real
+    h: Vector
+    I: Six  # noqa: E741
+
+
+NO_INERTIA = Rigid(0.0, ZERO, (0.0,) * 6)
+
+
+class Symmetric(NamedTuple):
+    """A symmetric 6x6 matrix, angular over linear: A angular, C linear, B = angular rows by linear columns."""
+
+    A: Six
+    B: Nine
+    C: Six
+
+    def column(self, k: int) -> Six:
+        """Column k of the 6x6."""
+        if k < 3:
+            row = AT[k]
+            return (self.A[row[0]], self.A[row[1]], self.A[row[2]],
+                    self.B[3 * k], self.B[3 * k + 1], self.B[3 * k + 2])
+        row = AT[k - 3]
+        return (self.B[k - 3], self.B[k], self.B[k + 3], self.C[row[0]], self.C[row[1]], self.C[row[2]])
+
+
+NOTHING = Symmetric((0.0,) * 6, (0.0,) * 9, (0.0,) * 6)
+
+
+def constant(x: object) -> TypeGuard[float]:
+    """Whether x is known when the tree is built: a plain Python number.
+
+    A Scalar is not, nor is numpy's float64, which stands for a case's value where the plain run must take exactly
+    the same path as the traced one.
+    """
+    return type(x) in (float, int)
+
+
+def settled(x: Real) -> Real:
+    """x as a plain number where a trace has found that it is one."""
+    if isinstance(x, Scalar):
+        known = x.graph.value(x.ref)
+        return x if known is None else known
+    return x
+
+
+def all_constant(*groups: tuple[object, ...]) -> bool:
+    """Whether every number of these tuples (of tuples) is known when the tree is built."""
+    return all(all_constant(x) if isinstance(x, tuple) else constant(x) for group in groups for x in group)
+
+
+def is_zero(x: Real) -> bool:
+    """Whether x is known to be nothing at all."""
+    return bool(constant(x) and x == 0.0)
+
+
+def turn_by(angle: Real) -> Turn:
+    """(cos, sin) of an angle; constants of a constant, where the trace's functions give numpy's numbers."""
+    return (float(cos(angle)), float(sin(angle))) if constant(angle) else (cos(angle), sin(angle))
+
+
+def root(x: Real) -> Real:
+    """The square root, a constant of a constant."""
+    return float(sqrt(x)) if constant(x) else sqrt(x)
+
+
+def choose(condition: Truth, a: Real, b: Real) -> Real:
+    """a where the condition holds, else b; untouched where the condition is known."""
+    if isinstance(condition, bool):
+        return a if condition else b
+    return where(condition, a, b)
+
+
+def snapped(x: float, scale: float = 1.0) -> float:
+    """x with rounding noise near 0 and +-scale removed, so that right angles fold: cos(pi/2) is 0, not 6e-17."""
+    tolerance = 2e-15 * scale
+    if abs(x) < tolerance:
+        return 0.0
+    if abs(abs(x) - scale) < tolerance:
+        return scale if x > 0.0 else -scale
+    return x
+
+
+def snap_rotation(R: Matrix) -> Matrix:
+    """R with its constant entries freed of rounding noise; others stay as they are."""
+    rows = [tuple(snapped(float(x)) if constant(x) else x for x in row) for row in R]
+    return (rows[0], rows[1], rows[2])  # type: ignore[return-value]
+
+
+# -- three-vectors and rotations -------------------------------------------------------------------------------------
+
+def add(a: Vector, b: Vector) -> Vector:
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+def sub(a: Vector, b: Vector) -> Vector:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def scale(k: Real, a: Vector) -> Vector:
+    return (k * a[0], k * a[1], k * a[2])
+
+
+def dot(a: Sequence[Real], b: Sequence[Real]) -> Real:
+    total = a[0] * b[0]
+    for x, y in zip(a[1:], b[1:], strict=True):
+        total = total + x * y
+    return total
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def turn_vector(R: Matrix, a: Vector) -> Vector:
+    """R a: components in the outer frame of a vector given in the inner one."""
+    return (dot(R[0], a), dot(R[1], a), dot(R[2], a))
+
+
+def transposed(R: Matrix) -> Matrix:
+    return ((R[0][0], R[1][0], R[2][0]), (R[0][1], R[1][1], R[2][1]), (R[0][2], R[1][2], R[2][2]))
+
+
+def turn_vector_back(R: Matrix, a: Vector) -> Vector:
+    """R' a: components in the inner frame of a vector given in the outer one."""
+    return turn_vector(transposed(R), a)
+
+
+def product(P: Matrix, Q: Matrix) -> Matrix:
+    columns = transposed(Q)
+    rows = [(dot(row, columns[0]), dot(row, columns[1]), dot(row, columns[2])) for row in P]
+    return (rows[0], rows[1], rows[2])
+
+
+def compose(outer: Pose, inner: Pose) -> Pose:
+    """Pose of C in A from B in A and C in B."""
+    return Pose(product(outer.R, inner.R), add(outer.p, turn_vector(outer.R, inner.p)))
+
+
+def inverse(pose: Pose) -> Pose:
+    """Pose of A in B from B in A."""
+    p = turn_vector_back(pose.R, pose.p)
+    return Pose(transposed(pose.R), (-p[0], -p[1], -p[2]))
+
+
+def rotation_rpy(roll: Real, pitch: Real, yaw: Real) -> Matrix:
+    """R = Rz(yaw) Ry(pitch) Rx(roll): turns about the fixed x, y, z axes in that order; rad."""
+    (cr, sr), (cp, sp), (cy, sy) = ((_turn(angle)) for angle in (roll, pitch, yaw))
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+
+
+def rotation_about(axis: Vector, angle: Real) -> Matrix:
+    """Rodrigues' rotation by angle (rad) about a unit axis."""
+    c, s = _turn(angle)
+    x, y, z = axis
+    k = 1.0 - c
+    return (
+        (c + x * x * k, x * y * k - z * s, x * z * k + y * s),
+        (x * y * k + z * s, c + y * y * k, y * z * k - x * s),
+        (x * z * k - y * s, y * z * k + x * s, c + z * z * k),
+    )
+
+
+def rotation_quaternion(w: Real, x: Real, y: Real, z: Real) -> Matrix:
+    """Rotation of a unit quaternion, scalar part first."""
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
+
+
+def _turn(angle: Real) -> Turn:
+    c, s = turn_by(angle)
+    return (snapped(c), snapped(s)) if constant(c) and constant(s) else (c, s)
+
+
+# -- rigid inertia ---------------------------------------------------------------------------------------------------
+
+def rigid_about_centre(mass: Real, com: Vector, inertia: Six) -> Rigid:
+    """Rigid in the link frame from inertia about the centre of mass, (xx, yy, zz, xy, xz, yz) in link axes."""
+    xx, yy, zz, xy, xz, yz = inertia
+    return rigid_shift(Rigid(mass, ZERO, (xx, xy, xz, yy, yz, zz)), com)
+
+
+def rigid_shift(body: Rigid, p: Vector) -> Rigid:
+    """The same body in a frame of the same axes in which the old origin is at p."""
+    m, h, I = body  # noqa: E741
+    moved = add(h, scale(m, p))
+    # I - h x p x - p x h' x with h' = h + m p, entry by entry.
+    e = tuple(h[i] * p[i] + p[i] * moved[i] for i in range(3))
+    return Rigid(m, moved, (
+        I[0] + (e[1] + e[2]), I[1] - (h[0] * p[1] + p[0] * moved[1]), I[2] - (h[0] * p[2] + p[0] * moved[2]),
+        I[3] + (e[0] + e[2]), I[4] - (h[1] * p[2] + p[1] * moved[2]), I[5] + (e[0] + e[1])))
+
+
+def rigid_turn(body: Rigid, R: Matrix) -> Rigid:
+    """The same body in a frame of the same origin, R turning old components into new ones."""
+    m, h, I = body  # noqa: E741
+    full = ((I[0], I[1], I[2]), (I[1], I[3], I[4]), (I[2], I[4], I[5]))
+    half = product(R, full)
+    return Rigid(m, turn_vector(R, h), (
+        dot(half[0], R[0]), dot(half[0], R[1]), dot(half[0], R[2]),
+        dot(half[1], R[1]), dot(half[1], R[2]), dot(half[2], R[2])))
+
+
+def rigid_raise(body: Rigid, pose: Pose) -> Rigid:
+    """The same body in the parent frame, its own frame having the given pose there."""
+    return rigid_shift(rigid_turn(body, pose.R), pose.p)
+
+
+def rigid_sum(a: Rigid, b: Rigid) -> Rigid:
+    return Rigid(a.mass + b.mass, add(a.h, b.h), tuple(x + y for x, y in zip(a.I, b.I, strict=True)))  # type: ignore
+
+
+def apply_symmetric(I: Six, w: Vector) -> Vector:  # noqa: E741
+    """I w for a symmetric 3x3."""
+    return (dot((I[0], I[1], I[2]), w), dot((I[1], I[3], I[4]), w), dot((I[2], I[4], I[5]), w))
+
+
+def add_rigid(M: Symmetric, body: Rigid) -> Symmetric:
+    """M plus the 6x6 of a rigid body, [[I, h x], [-h x, m]]."""
+    (hx, hy, hz), m = body.h, body.mass
+    B, C = M.B, M.C
+    return Symmetric(
+        tuple(x + y for x, y in zip(M.A, body.I, strict=True)),  # type: ignore[arg-type]
+        (B[0], B[1] - hz, B[2] + hy, B[3] + hz, B[4], B[5] - hx, B[6] - hy, B[7] + hx, B[8]),
+        (C[0] + m, C[1], C[2], C[3] + m, C[4], C[5] + m))
+
+
+def symmetric_sum(M: Symmetric, N: Symmetric) -> Symmetric:
+    return Symmetric(*(tuple(x + y for x, y in zip(a, b, strict=True)) for a, b in zip(M, N, strict=True)))  # type: ignore
+
+
+# -- planar turns and shifts along an axis ---------------------------------------------------------------------------
+
+def _others(axis: int) -> tuple[int, int]:
+    return ((1, 2), (2, 0), (0, 1))[axis]
+
+
+def _quarter(turn: Turn) -> int | None:
+    """How many quarter turns this is, or None."""
+    c, s = turn
+    if not (constant(c) and constant(s)):
+        return None
+    return {(1.0, 0.0): 0, (0.0, 1.0): 1, (-1.0, 0.0): 2, (0.0, -1.0): 3}.get((float(c), float(s)))
+
+
+def raise_vector(axis: int, turn: Turn, a: Vector) -> Vector:
+    """R a, R the turn about the axis: child components into parent components."""
+    i, j = _others(axis)
+    c, s = turn
+    out = list(a)
+    out[i] = c * a[i] - s * a[j]
+    out[j] = s * a[i] + c * a[j]
+    return (out[0], out[1], out[2])
+
+
+def lower_vector(axis: int, turn: Turn, a: Vector) -> Vector:
+    """R' a: parent components into child components."""
+    return raise_vector(axis, (turn[0], -turn[1]), a)
+
+
+def raise_turned(axis: int, turn: Turn, M: Symmetric) -> Symmetric:
+    """diag(R, R) M diag(R, R)', the turn of a 6x6 from child into parent components."""
+    quarter = _quarter(turn)
+    if quarter == 0:
+        return M
+    return Symmetric(_turn_symmetric(axis, turn, quarter, M.A), _turn_general(axis, turn, quarter, M.B),
+                     _turn_symmetric(axis, turn, quarter, M.C))
+
+
+def _turn_symmetric(axis: int, turn: Turn, quarter: int | None, A: Six) -> Six:
+    i, j = _others(axis)
+    c, s = turn
+    out = list(A)
+    ii, jj, ij, ik, jk = AT[i][i], AT[j][j], AT[i][j], AT[i][axis], AT[j][axis]
+    if quarter is None:
+        # xx' - xx = -(s^2 (xx - yy) + 2 c s xy), and the same bracket gives xy': five products in all.
+        w = s * (A[ii] - A[jj]) + (c + c) * A[ij]
+        out[ii] = A[ii] - s * w
+        out[jj] = A[jj] + s * w
+        out[ij] = c * w - A[ij]
+    elif quarter != 2:
+        out[ii], out[jj], out[ij] = A[jj], A[ii], -A[ij]
+    out[ik] = c * A[ik] - s * A[jk]
+    out[jk] = s * A[ik] + c * A[jk]
+    return tuple(out)  # type: ignore[return-value]
+
+
+def _turn_general(axis: int, turn: Turn, quarter: int | None, B: Nine) -> Nine:
+    i, j = _others(axis)
+    k = axis
+    c, s = turn
+    out = list(B)
+    ii, jj, ij, ji = 4 * i, 4 * j, 3 * i + j, 3 * j + i
+    if quarter is None:
+        w = s * (B[ii] - B[jj]) + c * (B[ij] + B[ji])
+        out[ii] = B[ii] - s * w
+        out[jj] = B[jj] + s * w
+        out[ij] = c * w - B[ji]
+        out[ji] = c * w - B[ij]
+    elif quarter != 2:
+        out[ii], out[jj], out[ij], out[ji] = B[jj], B[ii], -B[ji], -B[ij]
+    for a, b in ((3 * i + k, 3 * j + k), (3 * k + i, 3 * k + j)):
+        out[a] = c * B[a] - s * B[b]
+        out[b] = s * B[a] + c * B[b]
+    return tuple(out)  # type: ignore[return-value]
+
+
+def raise_shifted(axis: int, d: Real, M: Symmetric) -> Symmetric:
+    """A 6x6 inertia about the child's origin, taken about the parent's; the child's origin is at d along the axis."""
+    if is_zero(d):
+        return M
+    x = axis
+    y, z = _others(axis)
+    A, B, C = list(M.A), list(M.B), M.C
+    old = M.B
+    for k in range(3):
+        B[3 * y + k] = old[3 * y + k] - d * C[AT[z][k]]
+        B[3 * z + k] = old[3 * z + k] + d * C[AT[y][k]]
+    A[AT[x][y]] = A[AT[x][y]] - d * old[3 * x + z]
+    A[AT[x][z]] = A[AT[x][z]] + d * old[3 * x + y]
+    A[AT[y][y]] = A[AT[y][y]] - d * (old[3 * y + z] + B[3 * y + z])
+    A[AT[z][z]] = A[AT[z][z]] + d * (old[3 * z + y] + B[3 * z + y])
+    A[AT[y][z]] = A[AT[y][z]] + d * (old[4 * y] - B[4 * z])
+    return Symmetric(tuple(A), tuple(B), C)  # type: ignore[arg-type]
+
+
+def shift_force(axis: int, d: Real, moment: Vector, force: Vector) -> Vector:
+    """Moment about the parent's origin of a wrench given about the child's, which is at d along the axis."""
+    if is_zero(d):
+        return moment
+    y, z = _others(axis)
+    out = list(moment)
+    out[y] = moment[y] - d * force[z]
+    out[z] = moment[z] + d * force[y]
+    return (out[0], out[1], out[2])
+
+
+def shift_motion(axis: int, d: Real, angular: Vector, linear: Vector) -> Vector:
+    """linear + angular x d, the linear part at a child's origin at d along the axis."""
+    if is_zero(d):
+        return linear
+    y, z = _others(axis)
+    out = list(linear)
+    out[y] = linear[y] + d * angular[z]
+    out[z] = linear[z] - d * angular[y]
+    return (out[0], out[1], out[2])
+
+
+def swapped(M: Symmetric) -> Symmetric:
+    """The 6x6 with linear over angular."""
+    B = M.B
+    return Symmetric(M.C, (B[0], B[3], B[6], B[1], B[4], B[7], B[2], B[5], B[8]), M.A)

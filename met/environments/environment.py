@@ -1,0 +1,74 @@
+"""What an environment model is to the engine: loads on the arm, from where it is and how it moves.
+
+Evaluated at every stage of every step (`docs/physics.md`, "Rates"), as ordinary functions over numbers that may be traced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from met.parameter import Parameter
+from met.trace import Real
+
+Vector = tuple[Real, Real, Real]
+
+
+class World(Protocol):
+    """What an environment model may ask of the arm at a stage.
+
+    time                 s
+    joints, links        names, in the plan's order; joints are those that move
+    q(joint), qd(joint)  rad, rad/s (m, m/s)
+    position(link, point)  world position of a point given in the link's frame (m)
+    velocity(link, point)  its velocity in the world (m/s)
+    to_world(link, vector) a vector given in the link's axes, in the world's
+    """
+
+    time: Real
+    joints: tuple[str, ...]
+    links: tuple[str, ...]
+
+    def q(self, joint: str) -> Real: ...
+    def qd(self, joint: str) -> Real: ...
+    def position(self, link: str, point: Vector = (0.0, 0.0, 0.0)) -> Vector: ...
+    def velocity(self, link: str, point: Vector = (0.0, 0.0, 0.0)) -> Vector: ...
+    def to_world(self, link: str, vector: Vector) -> Vector: ...
+
+
+@dataclass(frozen=True)
+class Force:
+    """A force and a moment on a link, in the world's axes, the force at a point in the link's frame (m)."""
+
+    link: str
+    force: Vector = (0.0, 0.0, 0.0)
+    moment: Vector = (0.0, 0.0, 0.0)
+    point: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Loads:
+    """What one environment model does: loads of several models add up.
+
+    gravity  acceleration of free fall, world axes (m/s^2)
+    torques  torque on joints by name (N m; N)
+    forces   wrenches on links
+    """
+
+    gravity: Vector = (0.0, 0.0, 0.0)
+    torques: Mapping[str, Real] = field(default_factory=dict)
+    forces: tuple[Force, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Environment:
+    """The declaration of an environment model; one a file.
+
+    loads  (p, world) -> Loads. A parameter of shape "word" whose name is `joint` or `link` must name one of the arm's.
+    """
+
+    name: str
+    doc: str
+    parameters: tuple[Parameter, ...] = ()
+    loads: Callable[[Any, World], Loads]

@@ -1,0 +1,68 @@
+"""What an integrator is to the engine: a way from the state at the start of a step to the state at its end.
+
+The first stage's slopes are given (they are what is recorded at an instant), the rest is the integrator's.
+Friction modes are fixed during a step, so the slope is smooth in it; the engine finds the crossing of a rate
+through zero on the parabola through both ends (docs/physics.md, "Friction sticks").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from met.trace import Real
+
+Reals = tuple[Real, ...]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A state of the whole arm: joint positions q, rates qd (rad, rad/s; m, m/s), other integrated states x."""
+
+    q: Reals
+    qd: Reals
+    x: Reals = ()
+
+
+@dataclass(frozen=True)
+class Slope:
+    """Its derivative: qd of the positions, qdd of the rates, xd of the other states."""
+
+    qd: Reals
+    qdd: Reals
+    xd: Reals = ()
+
+
+def ahead(y: Motion, h: Real, k: Slope) -> Motion:
+    """y + h k."""
+    return Motion(
+        tuple(a + h * b for a, b in zip(y.q, k.qd, strict=True)),
+        tuple(a + h * b for a, b in zip(y.qd, k.qdd, strict=True)),
+        tuple(a + h * b for a, b in zip(y.x, k.xd, strict=True)),
+    )
+
+
+def mean(k1: Slope, k2: Slope) -> Slope:
+    """(k1 + k2)/2."""
+    return Slope(
+        tuple(0.5 * (a + b) for a, b in zip(k1.qd, k2.qd, strict=True)),
+        tuple(0.5 * (a + b) for a, b in zip(k1.qdd, k2.qdd, strict=True)),
+        tuple(0.5 * (a + b) for a, b in zip(k1.xd, k2.xd, strict=True)),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Integrator:
+    """The declaration of an integrator; one a file.
+
+    order       the power of the step with which its error falls
+    real_limit  the largest h lambda for which a decay at the rate lambda stays stable
+    advance     (slope, h, y, k1) -> y at the end of a step of h s. slope(c, y) is the derivative at the share c of
+                the step; k1 = slope(0, y)
+    """
+
+    name: str
+    doc: str
+    order: int
+    real_limit: float
+    advance: Callable[[Callable[[float, Motion], Slope], Real, Motion, Slope], Motion]

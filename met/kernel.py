@@ -1,0 +1,241 @@
+"""A program as machine code that runs many cases at once: compile, cache, run, step.
+
+A block is as many cases as a vector has lanes; it runs from the first tick to the last while its memory stays in the
+processor's nearest cache. Threads take chunks of blocks. A case's bits depend on the case and on the program alone:
+not on lanes, threads, chunk, neighbours or, given fused multiply-add, on the machine.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from met.diagnostic import Problem, error
+from met.trace import cache
+from met.trace.ir import emit
+from met.trace.pieces import operations
+from met.trace.program import Program, Recording, record
+
+if TYPE_CHECKING:
+    from met.trace.llvm import Machine
+
+# live operations of the largest section up to which four parts of a block take turns rather than two: the shorter
+# the code, the more of it a processor has in flight at once
+_SMALL = 400
+# blocks that one call into machine code runs at most: calls cannot be interrupted, and progress is told between them
+_CHUNK = 256
+
+_SIGNATURE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4, *[ctypes.c_int64] * 6)
+
+
+def compile(program: Program, lanes: int | None = None, cpu: str | None = None, *, level: int = 2) -> Kernel:
+    """Machine code of a program.
+
+    lanes   cases a block: 2, 4, 8, 16 or 32; by default what is fastest here. Decides nothing but speed.
+    cpu     one of LLVM's names of processors; the one we run on by default
+    level   of optimisation, 0 to 3
+    """
+    recording = record(program)
+    return from_recording(recording, lanes, cpu, level=level)
+
+
+def from_recording(recording: Recording, lanes: int | None = None, cpu: str | None = None, *, level: int = 2) -> Kernel:
+    """Machine code of a program that is recorded already."""
+    from met.trace import llvm
+
+    machine = llvm.machine(cpu)
+    if not machine.fma:
+        _refuse_or_warn(machine)
+    if lanes is None:
+        lanes = choose_lanes(recording, machine)
+    if lanes not in (2, 4, 8, 16, 32):
+        raise ValueError(f"{lanes} lanes")
+    text = emit(recording, lanes, vector=min(lanes, machine.width), width=machine.width)
+    name = cache.key(text, llvm.versions(), machine.cpu, machine.features, str(level))
+    code, hit = cache.kept(name, lambda: llvm.assemble(text, machine, level=level))
+    return Kernel(recording, lanes, machine, llvm.Loaded(code, machine), hit)
+
+
+def choose_lanes(recording: Recording, machine: Machine) -> int:
+    """Cases a block: several registers' worth, which take turns and so hide each other's latency."""
+    largest = max((len(operations(section)) for section in recording.sections), default=0)
+    return machine.width * (4 if largest <= _SMALL else 2)
+
+
+def _refuse_or_warn(machine: Machine) -> None:
+    if os.environ.get("MET_ALLOW_NO_FMA") != "1":
+        raise Problem(error(
+            "E210", f"this processor ({machine.cpu}) has no fused multiply-add, which results depend on to the bit",
+            help=("run on a processor with FMA (Intel since 2013, AMD since 2012, every arm64)",
+                  "MET_ALLOW_NO_FMA=1 computes the same bits here, many times slower")))
+    warnings.warn(f"{machine.cpu} has no fused multiply-add: each is computed by software, many times slower",
+                  stacklevel=4)
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """Machine code of a program. `cached` says whether it was found rather than made."""
+
+    recording: Recording
+    lanes: int
+    machine: Machine
+    loaded: Any
+    cached: bool
+
+    @property
+    def program(self) -> Program:
+        """What it runs."""
+        return self.recording.program
+
+    @property
+    def entry(self) -> Callable[..., None]:
+        """The entry function (met/trace/entry.py says what it takes); runs without Python's lock."""
+        return _SIGNATURE(self.loaded.address)
+
+    def rows(self, first: int, last: int) -> int:
+        """Rows recorded by ticks first to last, both done."""
+        divisor = self.program.record_divisor
+        return last // divisor - (first + divisor - 1) // divisor + 1
+
+    def run(self, inputs: np.ndarray, ticks: int, record: bool = True, threads: int | None = None,
+            progress: Callable[[int], None] | None = None) -> tuple[np.ndarray | None, np.ndarray]:
+        """Runs cases from tick 0 to tick `ticks`, both done.
+
+        inputs    [case, input], in the order of `program.inputs`
+        progress  told how many cases are done, from the thread that called
+        Returns rows [case, row, column], or None without `record`, and outputs [case, output].
+        """
+        program = self.program
+        inputs = np.ascontiguousarray(inputs, dtype=np.float64)
+        if inputs.ndim != 2 or inputs.shape[1] != len(program.inputs):
+            raise ValueError(f"inputs of shape {inputs.shape} for a program with {len(program.inputs)} inputs")
+        if ticks < 0:
+            raise ValueError(f"{ticks} ticks")
+        cases = len(inputs)
+        rows = np.empty((cases, self.rows(0, ticks), program.columns)) if record else None
+        outputs = np.empty((cases, len(program.outputs)))
+        threads = _threads(threads)
+        blocks = -(-cases // self.lanes)
+        chunk = self.lanes * max(1, min(_CHUNK, -(-blocks // (8 * threads))))
+        starts = range(0, cases, chunk)
+
+        def work(start: int) -> int:
+            stop = min(start + chunk, cases)
+            self._run_chunk(inputs[start:stop], ticks, None if rows is None else rows[start:stop], outputs[start:stop])
+            return stop - start
+
+        done = 0
+        if threads == 1 or len(starts) <= 1:
+            for start in starts:
+                done += work(start)
+                if progress is not None:
+                    progress(done)
+            return rows, outputs
+        with ThreadPoolExecutor(threads) as pool:
+            waiting = {pool.submit(work, start) for start in starts}
+            try:
+                while waiting:
+                    finished, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                    done += sum(future.result() for future in finished)
+                    if progress is not None:
+                        progress(done)
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+        return rows, outputs
+
+    def _run_chunk(self, inputs: np.ndarray, ticks: int, rows: np.ndarray | None, outputs: np.ndarray) -> None:
+        """Some cases, in this thread; all blocks use one state in turn."""
+        cases, lanes = len(inputs), self.lanes
+        blocks = -(-cases // lanes)
+        packed = _aligned((blocks, inputs.shape[1], lanes))
+        _pack(inputs, packed)
+        state = _aligned((max(1, len(self.recording.cells)), lanes))
+        results = _aligned((blocks, max(1, outputs.shape[1]), lanes))
+        record = rows is not None and rows.shape[2] > 0
+        self.entry(packed.ctypes.data, state.ctypes.data, rows.ctypes.data if record and rows is not None else None,
+                   results.ctypes.data, blocks, 0, ticks, cases, rows.strides[0] // 8 if rows is not None else 0, 0)
+        width = outputs.shape[1]
+        flat = results.reshape(-1)[:blocks * width * lanes].reshape(blocks, width, lanes)
+        outputs[:] = flat.transpose(0, 2, 1).reshape(blocks * lanes, width)[:cases]
+
+    def block(self, inputs: np.ndarray) -> Block:
+        """One block whose state stays from call to call. inputs [case, input]; at most `lanes` cases."""
+        return Block(self, inputs)
+
+
+class Block:
+    """Up to `lanes` cases, stepped by hand: the bed's loop, a debugger.
+
+    inputs    [input, lane], to be changed at will between steps
+    outputs   [output, lane], as of the last step
+    """
+
+    def __init__(self, kernel: Kernel, inputs: np.ndarray | Sequence[Sequence[float]]) -> None:
+        given = np.atleast_2d(np.asarray(inputs, dtype=np.float64))
+        program = kernel.program
+        if not 1 <= len(given) <= kernel.lanes or given.shape[1] != len(program.inputs):
+            raise ValueError(f"inputs of shape {given.shape} for {kernel.lanes} lanes, {len(program.inputs)} inputs")
+        self.kernel = kernel
+        self.cases = len(given)
+        packed = _aligned((1, given.shape[1], kernel.lanes))
+        _pack(given, packed)
+        self.inputs = packed[0]
+        self.state = _aligned((max(1, len(kernel.recording.cells)), kernel.lanes))
+        self.outputs = _aligned((len(program.outputs), kernel.lanes))
+        self._spare = _aligned((1, kernel.lanes))
+        self._entry = kernel.entry
+        self._inputs = packed.ctypes.data
+        self._state = self.state.ctypes.data
+        self._outputs = (self.outputs if len(program.outputs) else self._spare).ctypes.data
+
+    def step(self, first: int, last: int) -> None:
+        """Ticks first to last, both done, then `end`. Tick 0 starts afresh."""
+        self._entry(self._inputs, self._state, None, self._outputs, 1, first, last, self.cases, 0, 0)
+
+    def recorded(self, first: int, last: int) -> np.ndarray:
+        """The same, with the rows [case, row, column] of those ticks."""
+        count = max(0, self.kernel.rows(first, last))
+        rows = np.empty((self.cases, count, self.kernel.program.columns))
+        self._entry(self._inputs, self._state, rows.ctypes.data if rows.size else None, self._outputs, 1, first, last,
+                    self.cases, rows.shape[1] * rows.shape[2], 0)
+        return rows
+
+    def cells(self) -> Mapping[str, np.ndarray]:
+        """The state by name, [lane] each: views, to be read or changed. Cells that nothing reads are not kept."""
+        return {name: self.state[slot] for slot, name in enumerate(self.kernel.recording.cells)}
+
+
+def _threads(asked: int | None) -> int:
+    """Threads to use: as many as asked for, else as many as this process may run on."""
+    if asked is not None:
+        return max(1, asked)
+    if hasattr(os, "sched_getaffinity"):
+        return max(1, len(os.sched_getaffinity(0)))
+    return os.cpu_count() or 1
+
+
+def _aligned(shape: tuple[int, ...]) -> np.ndarray:
+    """Zeros, aligned to a cache line and to the widest register."""
+    size = int(np.prod(shape)) * 8
+    raw = np.zeros(size + 64, dtype=np.uint8)
+    offset = -raw.ctypes.data % 64
+    return raw[offset:offset + size].view(np.float64).reshape(shape)
+
+
+def _pack(inputs: np.ndarray, packed: np.ndarray) -> None:
+    """[case, input] into [block][input][lane]; lanes beyond the last case repeat it."""
+    blocks, width, lanes = packed.shape
+    whole = len(inputs) // lanes
+    packed[:whole] = inputs[:whole * lanes].reshape(whole, lanes, width).transpose(0, 2, 1)
+    if whole < blocks:
+        rest = inputs[whole * lanes:]
+        packed[whole, :, :len(rest)] = rest.T
+        packed[whole, :, len(rest):] = rest[-1][:, None]

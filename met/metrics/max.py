@@ -1,0 +1,31 @@
+"""The largest value."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from met.metrics.metric import Metric
+from met.parameter import Memory
+from met.trace import Real, maximum
+
+
+def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
+    return {"most": maximum(held.most, x)}
+
+
+def result(p: Any, held: Any, t: Real) -> Real:
+    return held.most
+
+
+METRIC = Metric(
+    name="max",
+    doc=__doc__,
+    unit="of",
+    memory=(
+        Memory(name="most", unit="of", doc="largest so far", start=-math.inf),
+    ),
+    update=update,
+    result=result,
+)

@@ -1,0 +1,32 @@
+"""What a metric is to the engine: one number about one channel over a whole run, gathered as the run goes.
+
+It sees its channel at every tick of the channel's owner (the dynamics' for motion and torque, the servo's for what
+its computer holds), whatever is recorded, so its value does not depend on the record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from met.parameter import Memory, Parameter
+from met.trace import Real
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metric:
+    """The declaration of a metric; one a file.
+
+    unit    of the result: "of" is the channel's, "s" a time, "1" a pure number
+    update  (p, held, x, t, dt) -> new memory: x the channel at time t (s), dt s since the sample before (0 at first)
+    result  (p, held, t) -> the metric, at the run's last sample, time t
+    """
+
+    name: str
+    doc: str
+    unit: str
+    parameters: tuple[Parameter, ...] = ()
+    memory: tuple[Memory, ...]
+    update: Callable[[Any, Any, Real, Real, Real], Mapping[str, Real]]
+    result: Callable[[Any, Any, Real], Real]

@@ -1,0 +1,31 @@
+"""The smallest value."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from met.metrics.metric import Metric
+from met.parameter import Memory
+from met.trace import Real, minimum
+
+
+def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
+    return {"least": minimum(held.least, x)}
+
+
+def result(p: Any, held: Any, t: Real) -> Real:
+    return held.least
+
+
+METRIC = Metric(
+    name="min",
+    doc=__doc__,
+    unit="of",
+    memory=(
+        Memory(name="least", unit="of", doc="smallest so far", start=math.inf),
+    ),
+    update=update,
+    result=result,
+)

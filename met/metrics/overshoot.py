@@ -1,0 +1,42 @@
+"""How far the channel goes beyond its target, as a share of the way from its first value to the target.
+
+Zero where it never passes the target; not a number where it starts on it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from met.metrics.metric import Metric
+from met.parameter import Memory, Parameter
+from met.trace import Real, absolute, maximum, where
+
+
+def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
+    first = where(held.count == 0.0, x, held.first)
+    beyond = where(p.target >= first, x - p.target, p.target - x)
+    return {"first": first, "beyond": maximum(held.beyond, beyond), "count": held.count + 1.0}
+
+
+def result(p: Any, held: Any, t: Real) -> Real:
+    way = absolute(p.target - held.first)
+    return where(way > 0.0, held.beyond / way, math.nan)
+
+
+METRIC = Metric(
+    name="overshoot",
+    doc=__doc__,
+    unit="1",
+    parameters=(
+        Parameter(name="target", unit="of", doc="value to be reached"),
+    ),
+    memory=(
+        Memory(name="first", unit="of", doc="first value"),
+        Memory(name="beyond", unit="of", doc="furthest beyond the target so far"),
+        Memory(name="count", unit="1", doc="samples"),
+    ),
+    update=update,
+    result=result,
+)

@@ -1,0 +1,31 @@
+"""Root of the mean square over the samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from met.metrics.metric import Metric
+from met.parameter import Memory
+from met.trace import Real, sqrt
+
+
+def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
+    return {"squares": held.squares + x * x, "count": held.count + 1.0}
+
+
+def result(p: Any, held: Any, t: Real) -> Real:
+    return sqrt(held.squares / held.count)
+
+
+METRIC = Metric(
+    name="rms",
+    doc=__doc__,
+    unit="of",
+    memory=(
+        Memory(name="squares", unit="1", doc="sum of squares"),
+        Memory(name="count", unit="1", doc="samples"),
+    ),
+    update=update,
+    result=result,
+)

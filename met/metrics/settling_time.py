@@ -1,0 +1,40 @@
+"""The time from which the channel stays within a band about its target, to the end of the run.
+
+Infinite where it is outside at the end. The band is `band` of the target's size, plus `within`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from met.metrics.metric import Metric
+from met.parameter import Memory, Parameter
+from met.trace import Real, absolute, where
+
+
+def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
+    inside = absolute(x - p.target) <= p.band * absolute(p.target) + p.within
+    return {"since": where(inside, where(held.since < math.inf, held.since, t), math.inf)}
+
+
+def result(p: Any, held: Any, t: Real) -> Real:
+    return held.since
+
+
+METRIC = Metric(
+    name="settling_time",
+    doc=__doc__,
+    unit="s",
+    parameters=(
+        Parameter(name="target", unit="of", doc="value to be reached"),
+        Parameter(name="band", unit="1", default=0.02, at_least=0.0, doc="half width of the band, share of the target"),
+        Parameter(name="within", unit="of", default=0.0, at_least=0.0, doc="half width of the band, added to it"),
+    ),
+    memory=(
+        Memory(name="since", unit="s", doc="start of the stretch inside the band; infinite outside", start=math.inf),
+    ),
+    update=update,
+    result=result,
+)

@@ -1,0 +1,129 @@
+"""Where models are found: MET's own tuples, and the entry points of other installed packages.
+
+A package of your own offers a model by an entry point in one of the groups below, whose object is the declaration:
+
+    [project.entry-points."met.servos"]
+    harmonic_drive = "my_arm.harmonic_drive:SERVO"
+
+Names are unique over all packages; two that offer the same name are an error, never a race.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib.metadata
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Literal, Protocol
+
+from met.diagnostic import Place, Problem, error
+from met.parameter import Parameter
+
+Kind = Literal["servo", "environment", "command", "metric", "integrator"]
+
+
+class Model(Protocol):
+    """What all declarations have."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def doc(self) -> str: ...
+
+
+@dataclass(frozen=True)
+class Group:
+    """One kind of model: the entry-point group, MET's own declarations, and the type they must have."""
+
+    entry_points: str
+    own: Callable[[], tuple[Iterable[Any], type]]
+
+
+def _servos() -> tuple[Iterable[Any], type]:
+    from met.servos import SERVOS, Servo
+
+    return SERVOS, Servo
+
+
+def _environments() -> tuple[Iterable[Any], type]:
+    from met.environments import ENVIRONMENTS, Environment
+
+    return ENVIRONMENTS, Environment
+
+
+def _commands() -> tuple[Iterable[Any], type]:
+    from met.commands import PROFILES, Profile
+
+    return PROFILES, Profile
+
+
+def _metrics() -> tuple[Iterable[Any], type]:
+    from met.metrics import METRICS, Metric
+
+    return METRICS, Metric
+
+
+def _integrators() -> tuple[Iterable[Any], type]:
+    from met.integrators import INTEGRATORS, Integrator
+
+    return INTEGRATORS, Integrator
+
+
+GROUPS: dict[Kind, Group] = {
+    "servo": Group("met.servos", _servos),
+    "environment": Group("met.environments", _environments),
+    "command": Group("met.profiles", _commands),
+    "metric": Group("met.metrics", _metrics),
+    "integrator": Group("met.integrators", _integrators),
+}
+
+
+@cache
+def available(kind: Kind) -> dict[str, Any]:
+    """Every model of this kind by name: MET's own first, then those of other packages, by name.
+
+    Raises Problem E215 where a package offers something that is not a declaration, or a name that is taken.
+    """
+    group = GROUPS[kind]
+    own, declaration = group.own()
+    found: dict[str, Any] = {model.name: model for model in own}
+    for point in sorted(importlib.metadata.entry_points(group=group.entry_points), key=lambda point: point.value):
+        found_at = f"entry point `{point.name} = {point.value}` in group `{group.entry_points}`"
+        try:
+            model = point.load()
+        except Exception as reason:  # another package's code: whatever it raises is its user's to read
+            message = f"cannot load the {kind} of {found_at}: {type(reason).__name__}: {reason}"
+            raise Problem(error("E215", message, help="mend or uninstall the package that offers it")) from reason
+        if not isinstance(model, declaration):
+            message = f"{found_at} is a {type(model).__name__}, not a {declaration.__module__}.{declaration.__name__}"
+            raise Problem(error("E215", message, help=f"let it name the {declaration.__name__} that the file declares"))
+        if model.name in found and found[model.name] is not model:
+            message = f"{found_at} offers {kind} `{model.name}`, which exists already"
+            raise Problem(error("E215", message, help="give the model another name"))
+        found[model.name] = model
+    return found
+
+
+def find(kind: Kind, name: str, place: Place | None = None) -> Any:
+    """The model of this kind and name. Raises Problem D140, placed, with what was probably meant."""
+    models = find_own(kind)
+    if name in models:
+        return models[name]
+    models = available(kind)
+    if name in models:
+        return models[name]
+    close = difflib.get_close_matches(name, models, n=1)
+    helps = [f"did you mean `{close[0]}`?"] if close else []
+    helps.append(f"{kind} models: {', '.join(sorted(models))}")
+    raise Problem(error("D140", f"no {kind} model `{name}`", place, help=helps))
+
+
+def find_own(kind: Kind) -> dict[str, Any]:
+    """MET's own models of this kind by name: found without looking through the installed packages (40 ms)."""
+    return {model.name: model for model in GROUPS[kind].own()[0]}
+
+
+def parameter(model: Any, name: str) -> Parameter | None:
+    """The declared parameter of this name, None where there is none."""
+    return next((p for p in model.parameters if p.name == name), None)

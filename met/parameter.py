@@ -1,0 +1,66 @@
+"""What a model declares of itself: its parameters, what it holds, what it shows.
+
+Checking, `met doc`, error messages, plans and archives all read these declarations, so a number's unit, range,
+meaning and source are written once, in the model's own file.
+
+A unit is written as in a deck (`"V*s/rad"`, `"1"` for a pure number). Four names stand for what only the use
+decides: `joint` (rad, or m on a prismatic joint), `effort` (N*m, or N), `command` (the unit of what is commanded)
+and `of` (the unit of the channel that a metric watches).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Shape = Literal["number", "vector", "list", "word"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """One number (or vector of three, list, or word) that a deck may set on a model.
+
+    `default` None means that the deck must write it. The bounds are in SI: `above` and `below` exclude their
+    value, `at_least` and `at_most` include it. `words` lists what a word may be. A list or a word cannot vary in a sweep.
+    """
+
+    name: str
+    unit: str = "1"
+    doc: str
+    default: float | tuple[float, ...] | str | None = None
+    above: float | None = None
+    at_least: float | None = None
+    below: float | None = None
+    at_most: float | None = None
+    shape: Shape = "number"
+    words: tuple[str, ...] = ()
+    source: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Memory:
+    """A number that a model's computer holds from one of its ticks to the next; recorded under its name."""
+
+    name: str
+    unit: str
+    doc: str
+    start: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class State:
+    """A number that nature integrates for a model, with the motion of the arm; recorded under its name."""
+
+    name: str
+    unit: str
+    doc: str
+    start: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signal:
+    """A number that a model shows at every instant, computed from the rest; recorded under its name."""
+
+    name: str
+    unit: str
+    doc: str

@@ -1,0 +1,263 @@
+"""The run plan: what a deck means, in SI, with the origin of every value; what the engine is given.
+
+A plan is a portable file (`plan_file`): it holds everything that the engine needs and nothing of the deck's syntax.
+One plan holds one or more experiments (the runs and sweeps that were asked for); the cases of one experiment share
+one structure, hence one kernel, and differ in parameters alone.
+
+Parameters are named by paths, the ones a deck uses inside a run:
+
+    links.<link>.mass                      kg
+    links.<link>.com.x|y|z                 m, link frame
+    links.<link>.inertia.xx|yy|zz|xy|xz|yz kg m^2, about the centre of mass, link axes
+    <joint>.at.x|y|z                       m, parent link's frame
+    <joint>.rpy.x|y|z                      rad, fixed x-y-z (R = Rz Ry Rx)
+    <joint>.axis.x|y|z                     unit vector in the joint frame
+    <joint>.servo.<parameter>              as the servo declares
+    <joint>.servo.command.<parameter>      as the command declares
+    initial.<joint>.q|qd                   rad, rad/s (m, m/s)
+    environment.<name>.<parameter>         as the environment model declares; uniform gravity is `gravity`, `g`
+    metrics.<name>.<parameter>             as the metric declares
+
+A vector parameter of a model is three numbers, `.x .y .z`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from met.diagnostic import Place
+from met.trace.graph import Formulas
+
+JointKind = Literal["revolute", "prismatic", "fixed"]
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a value comes from: the place that wrote it, the places it overrode (latest first), and in words.
+
+    kind: "deck", "default" (a model's declaration; place is None), "case" (a sweep varies it, at `place`) or
+    "derived" (computed from others, such as a rod's inertia; `note` says how).
+    """
+
+    kind: Literal["deck", "default", "case", "derived"]
+    place: Place | None = None
+    overrides: tuple[Place, ...] = ()
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A value that varies with the case: output number `output` of the structure's `formulas`."""
+
+    output: int
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A resolved parameter: SI value (or formula, list or word), its SI unit as text, its origin."""
+
+    value: float | tuple[float, ...] | str | Formula
+    unit: str
+    origin: Origin
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid body; its numbers are parameters. `shape` is what to draw, in words of `ic` (kind, numbers in SI)."""
+
+    name: str
+    place: Place | None = None
+    shape: tuple[str, tuple[tuple[str, float], ...]] | None = None
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Connects `parent` (a link, or "base") to `child`, along or about its axis."""
+
+    name: str
+    kind: JointKind
+    parent: str
+    child: str
+    place: Place | None = None
+
+
+@dataclass(frozen=True)
+class Command:
+    """What a servo is told: kind "rate", "position" or "torque", and the model of its course in time."""
+
+    kind: str
+    model: str
+
+
+@dataclass(frozen=True)
+class ServoUse:
+    """A servo on a joint: the definition's name in the deck, the model, the command, ticks of base rate a tick."""
+
+    joint: str
+    definition: str
+    model: str
+    command: Command | None
+    divisor: int
+    place: Place | None = None
+
+
+@dataclass(frozen=True)
+class EnvironmentUse:
+    """An environment model under a name of the deck's. divisor None: evaluated at every stage."""
+
+    name: str
+    model: str
+    divisor: int | None = None
+    place: Place | None = None
+
+
+@dataclass(frozen=True)
+class MetricUse:
+    """A metric under a name of the deck's, watching one channel (`Channel.path`)."""
+
+    name: str
+    model: str
+    of: str
+    place: Place | None = None
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A condition on a metric that a case meets or misses, in SI; `text` as the deck wrote it."""
+
+    text: str
+    metric: str
+    comparison: Literal["<", "<=", ">", ">="]
+    limit: float
+    place: Place | None = None
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Rates as integer divisors of one base rate. A run of `ticks` base ticks has both ends, 0 and `ticks`.
+
+    base_hz      base rate, Hz
+    dynamics     base ticks a dynamics step
+    record       base ticks a recorded row
+    """
+
+    base_hz: float
+    dynamics: int
+    record: int
+    ticks: int
+
+    @property
+    def step(self) -> float:
+        """Length of a dynamics step, s."""
+        return self.dynamics / self.base_hz
+
+    @property
+    def duration(self) -> float:
+        """Length of a run, s."""
+        return self.ticks / self.base_hz
+
+    @property
+    def rows(self) -> int:
+        """Recorded rows of a run that reaches its end."""
+        return self.ticks // self.record + 1
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """One variable of the archive: a channel of one thing, or of all joints (`joints` then names them in order).
+
+    name      the variable's name, as the deck records it: `q`, `shoulder.qd`, `shoulder.servo.voltage`
+    channels  paths of the scalar channels, one a joint or just one
+    """
+
+    name: str
+    channels: tuple[str, ...]
+    joints: tuple[str, ...] = ()
+    unit: tuple[str, ...] = ("1",)
+    doc: str = ""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """All that decides which program is compiled, values apart."""
+
+    arm: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    servos: tuple[ServoUse, ...]
+    environment: tuple[EnvironmentUse, ...]
+    metrics: tuple[MetricUse, ...]
+    velocity_products: bool
+    integrator: str
+    schedule: Schedule
+    record: tuple[Recorded, ...]
+
+    @property
+    def moving(self) -> tuple[Joint, ...]:
+        """The joints that have a coordinate, in the order of `joints`: the order of every `joint` dimension."""
+        return tuple(joint for joint in self.joints if joint.kind != "fixed")
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One varied parameter of a sweep, as the deck wrote its path; values are in SI, one a case.
+
+    sets: paths of the parameters that follow it directly. unit, scale: as the deck wrote it, for display;
+    shown = value / scale.
+    """
+
+    path: str
+    unit: str
+    scale: float
+    values: np.ndarray
+    sets: tuple[str, ...]
+    place: Place | None = None
+
+
+@dataclass(frozen=True)
+class Cases:
+    """The case table: `count` rows of coordinates, in the order that `met cases` prints."""
+
+    count: int
+    coordinates: tuple[Coordinate, ...] = ()
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A run or sweep: structure, parameters, cases.
+
+    formulas   from the coordinates (inputs, by path) to every parameter that varies (`Formula.output`)
+    """
+
+    name: str
+    structure: Structure
+    parameters: Mapping[str, Quantity]
+    formulas: Formulas
+    cases: Cases
+    requirements: tuple[Requirement, ...] = ()
+    place: Place | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Source:
+    """A deck file as it was read: name as messages print it, whole text, SHA-256 of its bytes."""
+
+    name: str
+    text: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a deck means. `deck` names the root file; `sources` holds every file that was read."""
+
+    deck: str
+    experiments: tuple[Experiment, ...]
+    sources: tuple[Source, ...] = ()
+    defines: tuple[str, ...] = field(default=())

@@ -1,0 +1,82 @@
+"""Which parameters an experiment must have, by the declarations of its models, and what those it lacks default to."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+
+from met import models
+from met.channel import channels, joint_unit
+from met.parameter import Parameter
+from met.plan import Experiment, Origin, Quantity, Structure
+
+INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
+
+
+def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity | None]]:
+    """Paths that the experiment lacks, each with its model's default, None where there is none."""
+    for path, unit, default in required(experiment.structure):
+        if path not in experiment.parameters:
+            note = "not in the plan file" if default is not None else ""
+            yield path, None if default is None else Quantity(default, unit, Origin("default", note=note))
+
+
+def unknown_parameters(experiment: Experiment) -> Iterator[tuple[str, str | None]]:
+    """Paths under a model of the experiment that its declaration does not have, with the nearest that it has."""
+    structure = experiment.structure
+    known = {path for path, _, _ in required(structure)}
+    models_of = [f"{use.joint}.servo." for use in structure.servos]
+    models_of += [f"environment.{use.name}." for use in structure.environment]
+    models_of += [f"metrics.{use.name}." for use in structure.metrics]
+    for path in experiment.parameters:
+        if path not in known and path.startswith(tuple(models_of)):
+            near = difflib.get_close_matches(path, known, n=1, cutoff=0.8)
+            yield path, near[0] if near else None
+
+
+def required(structure: Structure) -> Iterator[tuple[str, str, float | tuple[float, ...] | str | None]]:
+    """Path, SI unit and default of every parameter of a structure (head of `met.plan`)."""
+    for link in structure.links:
+        yield f"links.{link.name}.mass", "kg", None
+        for axis in "xyz":
+            yield f"links.{link.name}.com.{axis}", "m", None
+        for entry in INERTIA:
+            yield f"links.{link.name}.inertia.{entry}", "kg*m^2", None
+    kinds = {joint.name: joint for joint in structure.joints}
+    for joint in structure.joints:
+        vectors = [("at", "m"), ("rpy", "rad"), *([] if joint.kind == "fixed" else [("axis", "1")])]
+        for name, unit in vectors:
+            for axis in "xyz":
+                yield f"{joint.name}.{name}.{axis}", unit, None
+    for joint in structure.moving:
+        yield f"initial.{joint.name}.q", joint_unit("joint", joint), None
+        yield f"initial.{joint.name}.qd", joint_unit("joint/s", joint), None
+    for use in structure.servos:
+        joint = kinds[use.joint]
+        for parameter in models.find("servo", use.model, use.place).parameters:
+            yield from _numbers(f"{use.joint}.servo", parameter, joint_unit(parameter.unit, joint))
+        if use.command is not None:
+            for parameter in models.find("command", use.command.model, use.place).parameters:
+                unit = joint_unit(parameter.unit, joint, use.command.kind)
+                yield from _numbers(f"{use.joint}.servo.command", parameter, unit)
+    for environment in structure.environment:
+        for parameter in models.find("environment", environment.model, environment.place).parameters:
+            yield from _numbers(f"environment.{environment.name}", parameter, parameter.unit)
+    watched = channels(structure) if structure.metrics else {}
+    for metric in structure.metrics:
+        of = watched[metric.of].unit if metric.of in watched else "1"
+        for parameter in models.find("metric", metric.model, metric.place).parameters:
+            yield from _numbers(f"metrics.{metric.name}", parameter, of if parameter.unit == "of" else parameter.unit)
+
+
+def _numbers(
+    prefix: str, parameter: Parameter, unit: str
+) -> Iterator[tuple[str, str, float | tuple[float, ...] | str | None]]:
+    """A vector is three numbers, `.x .y .z`; everything else is one."""
+    path = f"{prefix}.{parameter.name}"
+    if parameter.shape != "vector":
+        yield path, unit, parameter.default
+        return
+    for index, axis in enumerate("xyz"):
+        default = parameter.default[index] if isinstance(parameter.default, tuple) else None
+        yield f"{path}.{axis}", unit, default

@@ -1,0 +1,243 @@
+"""Plans as files: canonical JSON with a schema version, exact to the bit, and the same bytes for the same plan.
+
+    {"schema": "met.plan", "version": 1, "deck": ..., "experiments": [...], "sources": [...], "defines": [...]}
+
+Every dataclass of `met.plan` is an object of its fields, those that equal their default left out. A number is the
+shortest text that reads back to the same bits; "nan", "inf" and "-inf" are words. A parameter's value is a number, a
+list, {"word": ...} or {"formula": output}.
+
+A case table of more than `INLINE_ROWS` rows lies beside the plan, one binary file an experiment
+(`plan.gains.cases.npy`: coordinate by case, little-endian doubles), named in the plan with its SHA-256.
+
+Version 1 is the first. A plan of a newer version is refused. In an older one, parameters that its models have got
+since take their defaults, and the experiment's notes list them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from met.diagnostic import Problem, error
+from met.plan import Experiment, Plan
+from met.plan_codec import Damaged, decode, encode
+
+SCHEMA = "met.plan"
+VERSION = 1
+INLINE_ROWS = 10_000
+
+Refer = Callable[[Experiment, int], dict[str, Any]]
+Fetch = Callable[[dict[str, Any]], np.ndarray]
+
+
+def write(plan: Plan, path: str | os.PathLike[str]) -> tuple[Path, ...]:
+    """Write a plan, and its large case tables beside it; the files written. Raises Problem E300 where it cannot."""
+    path = Path(path)
+    files: dict[Path, bytes] = {}
+
+    def refer(experiment: Experiment, index: int) -> dict[str, Any]:
+        beside = path.with_name(f"{path.stem}.{experiment.name}.cases.npy")
+        if beside not in files:
+            files[beside] = table_bytes(experiment)
+        return {"file": beside.name, "row": index, "sha256": hashlib.sha256(files[beside]).hexdigest()}
+
+    files[path] = dumps(plan, refer).encode()  # last, so that a plan never names a table that is not there yet
+    for target, data in files.items():
+        _replace_file(target, data)
+    return tuple(files)
+
+
+def read(path: str | os.PathLike[str]) -> Plan:
+    """The plan in a file. Raises Problem E301 (no file), E302 (damaged), E303 (newer), E304 (a model's parameter)."""
+    path = Path(path)
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except OSError as reason:
+        raise Problem(error("E301", f"cannot read the plan {path}: {_why(reason)}")) from reason
+    except UnicodeDecodeError as reason:
+        raise Problem(_damaged(str(path), "it is not text")) from reason
+    tables: dict[str, tuple[np.ndarray, str]] = {}
+
+    def fetch(reference: dict[str, Any]) -> np.ndarray:
+        name, row = _word(reference, "file"), reference.get("row")
+        if name not in tables:
+            tables[name] = _read_table(path, name)
+        table, digest = tables[name]
+        if digest != reference.get("sha256"):
+            raise Damaged("", f"the case table {name} beside it is not the one it was written with (SHA-256 differs)")
+        if type(row) is not int or not 0 <= row < len(table):
+            raise Damaged("", f"the case table {name} has no row {row}")
+        return table[row]
+
+    return loads(text, str(path), fetch)
+
+
+def dumps(plan: Plan, refer: Refer | None = None) -> str:
+    """A plan as canonical JSON. refer: what to write in place of a large table's coordinate; None: all values."""
+    body = encode(Plan, plan)
+    for experiment, written in zip(plan.experiments, body.get("experiments", ()), strict=True):
+        if refer is not None and experiment.cases.count > INLINE_ROWS:
+            for index, coordinate in enumerate(written["cases"].get("coordinates", ())):
+                coordinate["values"] = refer(experiment, index)
+    document = {"schema": SCHEMA, "version": VERSION, **body}
+    return json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def loads(text: str, name: str = "plan", fetch: Fetch | None = None) -> Plan:
+    """A plan from its JSON. name: for messages. fetch: gives the values of a coordinate that are kept elsewhere."""
+    try:
+        document = json.loads(text, parse_constant=_no_constant)
+    except (ValueError, RecursionError) as reason:
+        where = f" (line {reason.lineno})" if isinstance(reason, json.JSONDecodeError) else ""
+        raise Problem(_damaged(name, f"it is not JSON{where}; was it cut short?")) from reason
+    if not isinstance(document, dict) or document.pop("schema", None) != SCHEMA:
+        helps = "plans are written by `met plan DECK -o FILE`"
+        raise Problem(error("E302", f"{name} is not a plan of MET", help=helps))
+    version = document.pop("version", None)
+    if type(version) is not int or version < 1:
+        raise Problem(_damaged(name, f"its schema version is {version!r}"))
+    if version > VERSION:
+        message = f"{name} was written by a newer MET: plan schema {version}, and this one reads up to {VERSION}"
+        raise Problem(error("E303", message, help="update MET, or make the plan again from its deck"))
+    try:
+        plan: Plan = decode(Plan, document, "", fetch)
+        plan = replace(plan, experiments=tuple(_checked(experiment) for experiment in plan.experiments))
+    except Damaged as reason:
+        raise Problem(_damaged(name, str(reason))) from reason
+    return completed(plan, name, version)
+
+
+def completed(plan: Plan, name: str = "plan", version: int = VERSION) -> Plan:
+    """The plan with the defaults of parameters that it does not have, each listed in its experiment's notes."""
+    from met.plan_defaults import missing_parameters, unknown_parameters
+
+    problems, experiments = [], []
+    for experiment in plan.experiments:
+        for path, near in unknown_parameters(experiment):
+            message = f"{name}: run `{experiment.name}`: parameter `{path}` is none of its model's"
+            helps = [f"did you mean `{near}`?"] if near else []
+            problems.append(error("E304", message, help=[*helps, "make the plan again from its deck"]))
+        added = dict(experiment.parameters)
+        notes = list(experiment.notes)
+        for path, quantity in missing_parameters(experiment):
+            if quantity is None:
+                message = f"{name}: run `{experiment.name}`: parameter `{path}` is missing and has no default"
+                problems.append(error("E304", message, help="make the plan again from its deck"))
+                continue
+            added[path] = quantity
+            shown = quantity.value if isinstance(quantity.value, str) else f"{quantity.value!r} {quantity.unit}"
+            notes.append(f"`{path}` is not in the plan (schema {version}): its default, {shown}, is taken")
+        if len(added) > len(experiment.parameters):
+            experiment = replace(experiment, parameters=added, notes=tuple(notes))
+        experiments.append(experiment)
+    if problems:
+        raise Problem(problems)
+    return replace(plan, experiments=tuple(experiments))
+
+
+def table_bytes(experiment: Experiment) -> bytes:
+    """A case table as the bytes of a .npy file: coordinate by case, little-endian doubles."""
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, table(experiment), version=(1, 0), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def table(experiment: Experiment) -> np.ndarray:
+    """The values of all coordinates: (coordinate, case), SI."""
+    out = np.empty((len(experiment.cases.coordinates), experiment.cases.count), dtype="<f8")
+    for row, coordinate in enumerate(experiment.cases.coordinates):
+        out[row] = coordinate.values
+    return out
+
+
+def _checked(experiment: Experiment) -> Experiment:
+    """What the types cannot say: a plan whose parts do not fit together is damaged."""
+    where = f"run {experiment.name}"
+    names = [joint.name for joint in experiment.structure.joints]
+    known = {link.name for link in experiment.structure.links} | {"base"}
+    for joint in experiment.structure.joints:
+        for link in (joint.parent, joint.child):
+            if link not in known:
+                raise Damaged(where, f"joint {joint.name} connects link {link}, which is not there")
+    for use in experiment.structure.servos:
+        if use.joint not in names:
+            raise Damaged(where, f"a servo is on joint {use.joint}, which is not there")
+    count = experiment.cases.count
+    for coordinate in experiment.cases.coordinates:
+        if coordinate.values.shape != (count,):
+            raise Damaged(where, f"coordinate {coordinate.path} has {coordinate.values.size} values for {count} cases")
+    schedule = experiment.structure.schedule
+    whole = (schedule.dynamics, schedule.record, *(use.divisor for use in experiment.structure.servos))
+    if not schedule.base_hz > 0.0 or schedule.ticks < 0 or min(whole) < 1 or count < 1:
+        raise Damaged(where, "its schedule or its number of cases makes no sense")
+    names_of_metrics = {use.name for use in experiment.structure.metrics}
+    for requirement in experiment.requirements:
+        if requirement.metric not in names_of_metrics:
+            raise Damaged(where, f"a requirement is on metric {requirement.metric}, which is not there")
+    outputs = len(experiment.formulas.outputs)
+    for path, quantity in experiment.parameters.items():
+        output = getattr(quantity.value, "output", 0)
+        if output and not 0 <= output < outputs:
+            raise Damaged(where, f"parameter {path} follows formula {output} of {outputs}")
+    return experiment
+
+
+def _read_table(plan: Path, name: str) -> tuple[np.ndarray, str]:
+    if Path(name).name != name:
+        raise Damaged("", f"it names a case table outside its folder: {name}")
+    try:
+        data = plan.with_name(name).read_bytes()
+    except OSError as reason:
+        raise Damaged("", f"its case table {name}, which should lie beside it, cannot be read: {_why(reason)}") from reason
+    try:
+        array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    except (ValueError, EOFError, OSError) as reason:
+        raise Damaged("", f"the case table {name} beside it is damaged") from reason
+    if array.ndim != 2 or array.dtype != np.dtype("<f8"):
+        raise Damaged("", f"the case table {name} beside it is not a table of doubles")
+    return array, hashlib.sha256(data).hexdigest()
+
+
+def _replace_file(target: Path, data: bytes) -> None:
+    """Write a file whole or not at all."""
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    try:
+        try:
+            with temporary.open("xb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(target)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+    except OSError as reason:
+        raise Problem(error("E300", f"cannot write {target}: {_why(reason)}")) from reason
+
+
+def _word(reference: dict[str, Any], key: str) -> str:
+    value = reference.get(key)
+    if not isinstance(value, str):
+        raise Damaged("", f"a reference to a case table lacks its `{key}`")
+    return value
+
+
+def _no_constant(name: str) -> Any:
+    raise ValueError(f"{name} is not JSON")
+
+
+def _damaged(name: str, why: str) -> Any:
+    helps: Iterable[str] = "make the plan again from its deck: `met plan DECK -o FILE`"
+    return error("E302", f"the plan {name} is damaged: {why}", help=helps)
+
+
+def _why(reason: OSError) -> str:
+    return (reason.strerror or str(reason)).lower()

@@ -1,0 +1,137 @@
+"""The derivative: what every model does at a state, and the motion of the arm that follows (docs/physics.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from met.dynamics.recursion import Solved, solve
+from met.dynamics.tree import Tree
+from met.environments.environment import Vector
+from met.integrators.integrator import Motion, Slope
+from met.program.machine import Actuator, Machine, ReadCell
+from met.program.values import Values, parameters, returned
+from met.program.world import ArmWorld
+from met.servos.servo import Drive, JointMotion
+from met.trace import Real, Truth, not_
+
+
+@dataclass(frozen=True)
+class Derivative:
+    """What holds at one stage.
+
+    slope    derivative of the state
+    tau      torque of the servo on each moving joint, its rotor's share included (N m; N)
+    need     smooth torque on each joint less what the arm takes: what dry friction must hold where it sticks
+    solved   the recursion's own results
+    drives   what each servo does, by joint number; None for a passive joint
+    """
+
+    slope: Slope
+    tau: tuple[Real, ...]
+    need: tuple[Real, ...]
+    solved: Solved
+    drives: tuple[Drive | None, ...]
+
+
+def derivative(
+    machine: Machine, read: ReadCell, *, y: Motion, held: Sequence[Values], friction: Sequence[Real | None], time: Real
+) -> Derivative:
+    """The derivative at state y (`held`, `friction`: one for each moving joint).
+
+    friction  None for a joint without dry friction; else s in {0, +1, -1}: stuck, sliding forward, backward
+    """
+    drives = tuple(
+        None if actuator is None else drive_of(machine, actuator, read, y, held[i], time)
+        for i, actuator in enumerate(machine.actuators)
+    )
+    tree = machine.tree(read)
+    gravity, torques, wrenches = _environment(machine, tree, read, y, time)
+
+    given: list[Real] = []
+    mode: list[Truth] = []
+    dry: list[Real] = []
+    for i, drive in enumerate(drives):
+        s = friction[i]
+        in_torque_mode: Truth = True
+        if drive is not None and drive.given is not None:
+            in_torque_mode = not_(drive.given)
+        elif s is not None:
+            in_torque_mode = s != 0.0
+        mode.append(in_torque_mode)
+        given.append(drive.qdd if drive is not None else 0.0)
+        dry.append(0.0 if drive is None or s is None else s * drive.dry)
+
+    smooth = [torques[i] + (0.0 if drive is None else drive.torque) for i, drive in enumerate(drives)]
+    solved = solve(
+        tree,
+        y.q,
+        y.qd,
+        tau=tuple(a - b for a, b in zip(smooth, dry, strict=True)),
+        qdd=tuple(given),
+        mode=tuple(mode),
+        rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
+        gravity=gravity,
+        wrenches=wrenches,
+        velocity_products=machine.structure.velocity_products,
+    )
+    return Derivative(
+        slope=Slope(y.qd, solved.qdd, _slopes(machine, drives)),
+        tau=tuple(a - b for a, b in zip(solved.tau, torques, strict=True)),
+        need=tuple(a - b for a, b in zip(smooth, solved.tau_load, strict=True)),
+        solved=solved,
+        drives=drives,
+    )
+
+
+def drive_of(machine: Machine, actuator: Actuator, read: ReadCell, y: Motion, held: Values, time: Real) -> Drive:
+    """What a servo does to its joint at state y with this memory, its answer checked against its declaration."""
+    servo = actuator.servo
+    names = state_names(machine)
+    states = {state.name: y.x[names.index(f"{actuator.path}.{state.name}")] for state in servo.states}
+    motion = JointMotion(y.q[actuator.index], y.qd[actuator.index], time)
+    drive = servo.drive(machine.servo_values(actuator, read), held, Values(actuator.owner, states), motion)
+    returned(actuator.owner, "slopes", drive.slopes, states)
+    returned(actuator.owner, "signals", drive.signals, (signal.name for signal in servo.signals))
+    return drive
+
+
+def state_names(machine: Machine) -> tuple[str, ...]:
+    """Channels of the states that servos integrate, in the order of `Motion.x`."""
+    return tuple(f"{a.path}.{state.name}" for a in machine.working for state in a.servo.states)
+
+
+def _slopes(machine: Machine, drives: Sequence[Drive | None]) -> tuple[Real, ...]:
+    slopes: list[Real] = []
+    for actuator in machine.working:
+        drive = drives[actuator.index]
+        assert drive is not None
+        slopes.extend(drive.slopes[state.name] for state in actuator.servo.states)
+    return tuple(slopes)
+
+
+def _environment(
+    machine: Machine, tree: Tree, read: ReadCell, y: Motion, time: Real
+) -> tuple[Vector, list[Real], dict[str, tuple[Vector, Vector]]]:
+    """Sum of all loads: gravity (world), torque a joint, wrench a link (moment about the link's origin, force; link axes)."""
+    world = ArmWorld(machine, tree, y.q, y.qd, time)
+    gravity: list[Real] = [0.0, 0.0, 0.0]
+    torques: list[Real] = [0.0 for _ in machine.joints]
+    wrenches: dict[str, tuple[Vector, Vector]] = {}
+    for name, model in machine.environment:
+        prefix = f"environment.{name}"
+        owner = f"environment model `{model.name}` (as `{name}`)"
+        p = parameters(owner, prefix, model.parameters, lambda path: machine.value(path, read))
+        loads = model.loads(p, world)
+        gravity = [a + b for a, b in zip(gravity, loads.gravity, strict=True)]
+        for joint, torque in loads.torques.items():
+            number = world._number(joint)
+            torques[number] = torques[number] + torque
+        for force in loads.forces:
+            moment, total = world.link(force.link).wrench(force.force, force.moment, force.point)
+            if force.link in wrenches:
+                before = wrenches[force.link]
+                moment = tuple(a + b for a, b in zip(before[0], moment, strict=True))  # type: ignore[assignment]
+                total = tuple(a + b for a, b in zip(before[1], total, strict=True))  # type: ignore[assignment]
+            wrenches[force.link] = (moment, total)
+    return (gravity[0], gravity[1], gravity[2]), torques, wrenches

@@ -1,0 +1,106 @@
+"""Dry friction that truly sticks: modes decided at rest, a step split where a rate comes to zero.
+
+Each joint with dry friction has s in {0, +1, -1}: stuck, sliding forward, sliding backward, fixed during a (sub)step.
+Stuck is acceleration mode with qdd = 0, so a stuck joint does not creep, ever. docs/physics.md, "Friction sticks".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from met.integrators.integrator import Motion, Slope, ahead
+from met.trace import Real, Truth, absolute, both, either, minimum, not_, sign, sqrt, where
+
+SPLITS = 2
+"""A step is split at most this often; a crossing after that is clamped to the step's end, and counted."""
+
+
+def passes(joints: int) -> int:
+    """Decision passes at rest, at most, for this many joints with dry friction: two a joint.
+
+    A pass changes modes of all violators at once; chains of release and return longer than that do not settle.
+    """
+    return max(3, 2 * joints)
+
+
+def decide(s: Real, at_rest: Truth, need: Real, dry: Real, qdd: Real) -> Real:
+    """The mode after one decision pass, from what the pass found with mode s.
+
+    need  torque that friction must hold for the joint to stay (N m; N), dry its limit, qdd the acceleration found
+    """
+    breaks_away = both(s == 0.0, absolute(need) > dry)
+    turned_back = both(s != 0.0, s * qdd < 0.0)
+    at_rest_now = where(breaks_away, sign(need), where(turned_back, 0.0, s))
+    return where(at_rest, at_rest_now, s)
+
+
+def crossings(s: Sequence[Real | None], y_new: Motion) -> list[Truth]:
+    """Which sliding joints have come to zero rate, or beyond, at the step's end. s None: no dry friction."""
+    return [
+        False if mode is None else both(mode != 0.0, mode * rate <= 0.0)
+        for mode, rate in zip(s, y_new.qd, strict=True)
+    ]
+
+
+@dataclass(frozen=True)
+class Split:
+    """Where a (sub)step with a crossing stops: the state, crossing joints at rest, and the share of the step done."""
+
+    y: Motion
+    share: Real
+
+
+def split_at_rest(
+    y: Motion, k1: Slope, y_new: Motion, h: Real, s: Sequence[Real | None], *, may_split: Truth
+) -> Split:
+    """Find the first instant in the step at which a sliding joint comes to rest, and stop there.
+
+    Between its ends the step is the parabola through y with slope k1 and through y_new. Where `may_split` is false
+    the step is kept whole and the crossing joints are put to rest at its end.
+    """
+    crossed = crossings(s, y_new)
+    shares = [
+        where(crossing, first_root(rate, h * slope, end), 2.0)
+        for crossing, rate, slope, end in zip(crossed, y.qd, k1.qdd, y_new.qd, strict=True)
+    ]
+    first: Real = 1.0
+    for share in shares:
+        first = minimum(first, share)
+    part = _part_way(y, k1, y_new, h, first)
+    whole = not_(may_split)
+    q, qd, x = (
+        tuple(where(whole, b, a) for a, b in zip(there, end, strict=True))
+        for there, end in ((part.q, y_new.q), (part.qd, y_new.qd), (part.x, y_new.x))
+    )
+    qd = tuple(
+        where(both(crossing, either(whole, share <= first)), 0.0, rate)
+        for crossing, share, rate in zip(crossed, shares, qd, strict=True)
+    )
+    return Split(Motion(q, qd, x), where(whole, 1.0, first))
+
+
+def first_root(rate: Real, slope: Real, end: Real) -> Real:
+    """Smallest root in (0, 1] of the parabola through `rate` at 0 with slope `slope` and `end` at 1; 1 where none is."""
+    curve = end - rate - slope
+    reach = sqrt(slope * slope - 4.0 * curve * rate)
+    half = -0.5 * (slope + where(slope >= 0.0, reach, -reach))
+    one, other = half / curve, rate / half
+    one = where(both(one > 0.0, one <= 1.0), one, 1.0)
+    other = where(both(other > 0.0, other <= 1.0), other, 1.0)
+    return minimum(one, other)
+
+
+def _part_way(y: Motion, k1: Slope, y_new: Motion, h: Real, share: Real) -> Motion:
+    """The parabola at `share` of the step: y + share h k1 + share^2 (y_new - y - h k1)."""
+    straight = ahead(y, h, k1)
+    along = ahead(y, share * h, k1)
+    square = share * share
+
+    def bend(start: tuple[Real, ...], end: tuple[Real, ...], line: tuple[Real, ...]) -> tuple[Real, ...]:
+        return tuple(a + square * (b - c) for a, b, c in zip(start, end, line, strict=True))
+
+    return Motion(
+        bend(along.q, y_new.q, straight.q), bend(along.qd, y_new.qd, straight.qd), bend(along.x, y_new.x, straight.x)
+    )
+

@@ -1,0 +1,205 @@
+"""The machine that an experiment describes: its models looked up, its parameters ready to be read.
+
+This is what stays the same during a run. A parameter is a float where the plan gives it one value, and is read
+from the case's memory where a sweep varies it (`PARAMETER` cells, computed once before the run).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from met import models
+from met.channel import Channel, channels
+from met.commands.profile import Profile
+from met.diagnostic import Problem, error
+from met.dynamics.tree import Body, Tree
+from met.environments.environment import Environment
+from met.integrators.integrator import Integrator
+from met.metrics.metric import Metric
+from met.plan import Experiment, Formula, Joint, ServoUse, Structure
+from met.program.values import Values, parameters
+from met.servos.servo import Drive, JointMotion, Servo
+from met.trace import Graph, Real, Scalar
+
+PARAMETER, TREE = "parameter:", "tree:"
+"""Prefixes of the cells that hold a case's own parameters, and what of the tree follows from them."""
+
+ReadCell = Callable[[str], Real]
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """A servo at work on a moving joint: its declaration, use, and number in the order of moving joints.
+
+    level    of its dry friction, where it is the same at all times and for all cases, N m (N); None where it varies
+    """
+
+    index: int
+    use: ServoUse
+    servo: Servo
+    profile: Profile | None
+    level: float | None
+
+    @property
+    def dry(self) -> bool:
+        """Whether any case may have dry friction at this joint, so that the joint may stick."""
+        return self.level != 0.0
+
+    @property
+    def path(self) -> str:
+        return f"{self.use.joint}.servo"
+
+    @property
+    def owner(self) -> str:
+        """Name for messages."""
+        return f"servo `{self.use.definition}` of joint `{self.use.joint}` (model {self.use.model})"
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Models and parameters of one experiment."""
+
+    experiment: Experiment
+
+    @property
+    def structure(self) -> Structure:
+        return self.experiment.structure
+
+    @cached_property
+    def joints(self) -> tuple[Joint, ...]:
+        return self.structure.moving
+
+    @cached_property
+    def channels(self) -> dict[str, Channel]:
+        return channels(self.structure)
+
+    @cached_property
+    def integrator(self) -> Integrator:
+        return models.find("integrator", self.structure.integrator)
+
+    @cached_property
+    def environment(self) -> tuple[tuple[str, Environment], ...]:
+        """Environment models by the deck's name for them."""
+        return tuple((use.name, models.find("environment", use.model)) for use in self.structure.environment)
+
+    @cached_property
+    def metrics(self) -> tuple[tuple[str, Metric, Channel], ...]:
+        return tuple(
+            (use.name, models.find("metric", use.model), self.channels[use.of]) for use in self.structure.metrics
+        )
+
+    @cached_property
+    def actuators(self) -> tuple[Actuator | None, ...]:
+        """One a moving joint, in order; None for a passive joint."""
+        uses = {use.joint: use for use in self.structure.servos}
+        return tuple(
+            self._actuator(index, uses[joint.name]) if joint.name in uses else None
+            for index, joint in enumerate(self.joints)
+        )
+
+    @property
+    def working(self) -> tuple[Actuator, ...]:
+        """The actuators of the joints that have one."""
+        return tuple(actuator for actuator in self.actuators if actuator is not None)
+
+    @cached_property
+    def sticking(self) -> tuple[Actuator, ...]:
+        """The actuators with dry friction."""
+        return tuple(actuator for actuator in self.working if actuator.dry)
+
+    @cached_property
+    def varying(self) -> tuple[str, ...]:
+        """Paths of the parameters that vary with the case."""
+        return tuple(path for path, q in self.experiment.parameters.items() if isinstance(q.value, Formula))
+
+    def value(self, path: str, read: ReadCell) -> Any:
+        """A parameter: a float, list or word as the plan has it, or read from the case's memory."""
+        value = self.experiment.parameters[path].value
+        return read(PARAMETER + path) if isinstance(value, Formula) else value
+
+    def servo_values(self, actuator: Actuator, read: ReadCell) -> Values:
+        return parameters(
+            actuator.owner, actuator.path, actuator.servo.parameters, lambda path: self.value(path, read)
+        )
+
+    def tree(self, read: ReadCell) -> Tree:
+        """The arm as the dynamics see it: built once where no case varies it, else kept in the case's memory."""
+        if self._fixed_tree is not None:
+            return self._fixed_tree
+        return self._tree(read).each(lambda name, _: read(TREE + name))
+
+    def keep_tree(self, read: ReadCell, write: Callable[[str, Real], None]) -> None:
+        """Compute what of the tree varies with the case, and keep it for `tree`."""
+
+        def keep(name: str, value: Real) -> Real:
+            write(TREE + name, value)
+            return value
+
+        if self._fixed_tree is None:
+            self._tree(read).each(keep)
+
+    @cached_property
+    def _fixed_tree(self) -> Tree | None:
+        joints = {joint.name for joint in self.structure.joints}
+        for path in self.varying:
+            head, *rest = path.split(".")
+            if head == "links" or (head in joints and rest[0] in ("at", "rpy", "axis")):
+                return None
+        return self._tree(lambda _: 0.0)
+
+    def _tree(self, read: ReadCell) -> Tree:
+        numbers = {link.name: index for index, link in enumerate(self._link_order())}
+
+        def vector(path: str) -> tuple[Real, Real, Real]:
+            return tuple(self.value(f"{path}.{axis}", read) for axis in "xyz")  # type: ignore[return-value]
+
+        joints = {joint.child: joint for joint in self.structure.joints}
+        bodies = []
+        for link in self._link_order():
+            joint = joints[link.name]
+            inertia = tuple(
+                self.value(f"links.{link.name}.inertia.{entry}", read) for entry in ("xx", "yy", "zz", "xy", "xz", "yz")
+            )
+            bodies.append(
+                Body(
+                    name=link.name,
+                    joint=joint.name,
+                    kind=joint.kind,
+                    parent=-1 if joint.parent == "base" else numbers[joint.parent],
+                    at=vector(f"{joint.name}.at"),
+                    rpy=vector(f"{joint.name}.rpy"),
+                    axis=(0.0, 0.0, 1.0) if joint.kind == "fixed" else vector(f"{joint.name}.axis"),
+                    mass=self.value(f"links.{link.name}.mass", read),
+                    com=vector(f"links.{link.name}.com"),
+                    inertia=inertia,  # type: ignore[arg-type]
+                )
+            )
+        return Tree.build(tuple(bodies), tuple(joint.name for joint in self.joints))
+
+    def _link_order(self) -> list[Any]:
+        """Links in the order of the joints that carry them."""
+        links = {link.name: link for link in self.structure.links}
+        return [links[joint.child] for joint in self.structure.joints]
+
+    def _actuator(self, index: int, use: ServoUse) -> Actuator:
+        servo = models.find("servo", use.model, use.place)
+        profile = models.find("command", use.command.model, use.place) if use.command is not None else None
+        bare = Actuator(index, use, servo, profile, None)
+        drive, level = self._probe(bare)
+        if drive.given is not None and level != 0.0:
+            message = f"{bare.owner} gives both an acceleration and dry friction"
+            raise Problem(error("E219", message, use.place, help="a joint that is told its acceleration has no use for friction"))
+        return Actuator(index, use, servo, profile, level)
+
+    def _probe(self, actuator: Actuator) -> tuple[Drive, float | None]:
+        """The servo's physics recorded once, to see what it uses; and its level of dry friction, where known now."""
+        graph = Graph()
+        servo = actuator.servo
+        held = Values(actuator.owner, {memory.name: graph.input(memory.name) for memory in servo.memory})
+        states = Values(actuator.owner, {state.name: graph.input(state.name) for state in servo.states})
+        joint = JointMotion(graph.input("q"), graph.input("qd"), graph.input("time"))
+        drive = servo.drive(self.servo_values(actuator, graph.input), held, states, joint)
+        return drive, graph.value(drive.dry.ref) if isinstance(drive.dry, Scalar) else float(drive.dry)

@@ -1,0 +1,50 @@
+"""The arm as environment models see it: positions and velocities in the world, computed only where asked."""
+
+from __future__ import annotations
+
+from met.diagnostic import Problem, error
+from met.dynamics.kinematics import LinkMotion, link_motions
+from met.dynamics.tree import Tree
+from met.environments.environment import Vector
+from met.program.machine import Machine
+from met.trace import Real
+
+
+class ArmWorld:
+    """A `met.environments.environment.World` at one stage."""
+
+    def __init__(self, machine: Machine, tree: Tree, q: tuple[Real, ...], qd: tuple[Real, ...], time: Real) -> None:
+        self.time = time
+        self.joints = tuple(joint.name for joint in machine.joints)
+        self.links = tuple(link.name for link in machine.structure.links)
+        self._tree, self._q, self._qd = tree, q, qd
+        self._motions: dict[str, LinkMotion] | None = None
+
+    def q(self, joint: str) -> Real:
+        return self._q[self._number(joint)]
+
+    def qd(self, joint: str) -> Real:
+        return self._qd[self._number(joint)]
+
+    def position(self, link: str, point: Vector = (0.0, 0.0, 0.0)) -> Vector:
+        return self.link(link).position(point)
+
+    def velocity(self, link: str, point: Vector = (0.0, 0.0, 0.0)) -> Vector:
+        return self.link(link).velocity(point)
+
+    def to_world(self, link: str, vector: Vector) -> Vector:
+        return self.link(link).to_world(vector)
+
+    def link(self, link: str) -> LinkMotion:
+        if self._motions is None:
+            self._motions = link_motions(self._tree, self._q, self._qd)
+        if link not in self._motions:
+            message = f"an environment model asks for link `{link}`, which the arm does not have"
+            raise Problem(error("E218", message, help=f"links: {', '.join(self.links)}"))
+        return self._motions[link]
+
+    def _number(self, joint: str) -> int:
+        if joint not in self.joints:
+            message = f"an environment model asks for joint `{joint}`, which the arm does not have"
+            raise Problem(error("E218", message, help=f"moving joints: {', '.join(self.joints)}"))
+        return self.joints.index(joint)

@@ -1,0 +1,237 @@
+"""Diagnostics as people and editors read them: one renderer for the terminal, one for JSON.
+
+    error[D031]: servo `shoulder` at 300 Hz does not divide the base rate, 1000 Hz
+      --> arm.ic:42:12
+       |
+    42 |     rate = 300 Hz;
+       |            ^^^^^^ 1000/300 = 3.33
+      ::: rates.ic:3:5  base rate set here
+       = help: nearest that fit: 333.333 Hz (1000/3), 250 Hz (1000/4)
+
+For a token that a macro made, the place shown is where the deck used the macro; the place in the macro's body follows.
+A token from an argument is shown where the argument was written.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import unicodedata
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import Any, TextIO
+
+from met.diagnostic import Diagnostic, Label, Place
+
+JSON_VERSION = 1
+TAB = 4
+WIDEST = 120  # columns of a source line; a longer one is shown in part
+MOST_STEPS = 8  # of macro expansion, or of includes
+ELLIPSIS = "..."
+
+_COLOURS: Mapping[str, str] = MappingProxyType(
+    {"error": "\x1b[1;31m", "warning": "\x1b[1;33m", "note": "\x1b[1;36m", "frame": "\x1b[1;34m", "bold": "\x1b[1m"}
+)
+_RESET = "\x1b[0m"
+
+
+def render(
+    diagnostics: Iterable[Diagnostic], sources: Mapping[str, str] = MappingProxyType({}), *, colour: bool = False
+) -> str:
+    """The diagnostics as text, with the lines they are about and a count at the end; "" for none.
+
+    sources: the text of each file by the name that places give it; a file that is not there is named, not shown.
+    """
+    found = tuple(diagnostics)
+    lines = {name: text.split("\n") for name, text in sources.items()}
+    paint = _Paint(colour)
+    blocks = [_one(diagnostic, lines, paint) for diagnostic in found]
+    if found:
+        blocks.append(count_line(found) + "\n")
+    return "\n".join(blocks)
+
+
+def count_line(diagnostics: Iterable[Diagnostic]) -> str:
+    """`2 errors, 1 warning`."""
+    found = tuple(diagnostics)
+    counts = ((sum(d.severity == kind for d in found), kind) for kind in ("error", "warning", "note"))
+    return ", ".join(f"{n} {kind}{'s' * (n != 1)}" for n, kind in counts if n)
+
+
+def wants_colour(stream: TextIO, environ: Mapping[str, str] = os.environ) -> bool:
+    """Whether to colour what is written there: a terminal, and nobody said NO_COLOR."""
+    return stream.isatty() and not environ.get("NO_COLOR") and environ.get("TERM") != "dumb"
+
+
+def shown_place(place: Place) -> Place:
+    """Where the deck's author should look: the place itself, or the outermost use of the macro that made it.
+
+    A macro's body stands before its uses, or in another file; what stands behind the use is one of its arguments.
+    """
+    if not place.expansions:
+        return place
+    use = place.expansions[-1].use
+    argument = place.file == use.file and (place.line, place.column) > (use.line, use.column)
+    return place if argument and place.included == use.included else use
+
+
+def to_json(diagnostics: Iterable[Diagnostic]) -> str:
+    """The diagnostics for programs: an object with `version`, `diagnostics`, `errors` and `warnings`."""
+    found = tuple(diagnostics)
+    result = {
+        "version": JSON_VERSION,
+        "errors": sum(d.severity == "error" for d in found),
+        "warnings": sum(d.severity == "warning" for d in found),
+        "diagnostics": [
+            {
+                "code": d.code,
+                "severity": d.severity,
+                "message": d.message,
+                "shown": _place_json(shown_place(d.at.place)) if d.at else None,
+                "at": _label_json(d.at) if d.at else None,
+                "also": [_label_json(label) for label in d.also],
+                "help": list(d.help),
+            }
+            for d in found
+        ],
+    }
+    return json.dumps(result, indent=1)
+
+
+def _label_json(label: Label) -> dict[str, Any]:
+    return {"place": _place_json(label.place), "text": label.text}
+
+
+def _place_json(place: Place) -> dict[str, Any]:
+    made: dict[str, Any] = {"file": place.file, "line": place.line, "column": place.column, "length": place.length}
+    if place.expansions:
+        made["expansions"] = [{"macro": step.macro, "use": _place_json(step.use)} for step in place.expansions]
+    if place.included:
+        made["included"] = [{"file": file, "line": line} for file, line in place.included]
+    return made
+
+
+class _Paint:
+    def __init__(self, colour: bool) -> None:
+        self.colour = colour
+
+    def __call__(self, style: str, text: str) -> str:
+        return f"{_COLOURS[style]}{text}{_RESET}" if self.colour and text else text
+
+
+def _one(diagnostic: Diagnostic, lines: Mapping[str, list[str]], paint: _Paint) -> str:
+    head = paint(diagnostic.severity, f"{diagnostic.severity}[{diagnostic.code}]")
+    out = [head + paint("bold", f": {_safe(diagnostic.message)}")]
+    at = diagnostic.at
+    shown = shown_place(at.place) if at else None
+    number = str(shown.line) if shown else ""
+    gutter = " " * len(number)
+    if at and shown:
+        out.append(f"{gutter}{paint('frame', '-->')} {_safe(str(shown))}")
+        source = lines.get(shown.file, [])
+        if 0 < shown.line <= len(source):
+            out.append(f"{gutter} {paint('frame', '|')}")
+            text, caret = _excerpt(source[shown.line - 1], shown)
+            out.append(f"{paint('frame', number)} {paint('frame', '|')} {text}".rstrip())
+            note = f" {_safe(at.text)}" if at.text else ""
+            out.append(f"{gutter} {paint('frame', '|')} {caret[0]}{paint(diagnostic.severity, caret[1] + note)}")
+        elif at.text:
+            out.append(f"{gutter} {paint('frame', '=')} {_safe(at.text)}")
+        if shown is not at.place:
+            macro = at.place.expansions[0].macro
+            out.append(f"{gutter}{paint('frame', ':::')} {_safe(str(at.place))}  written here, in macro {_safe(macro)}")
+    for label in diagnostic.also:
+        place = shown_place(label.place)
+        out.append(f"{gutter}{paint('frame', ':::')} {_safe(str(place))}  {_safe(label.text)}".rstrip())
+    notes = [f"help: {text}" for text in diagnostic.help]
+    if at and shown:
+        notes += _came_through(at.place) + _came_in(shown)
+    for note in notes:
+        kind, _, text = note.partition(": ")
+        body = f"\n{gutter}   {' ' * len(kind)}  ".join(_safe(line) for line in text.split("\n"))
+        out.append(f"{gutter} {paint('frame', '=')} {paint('bold', kind)}: {body}")
+    return "\n".join(out) + "\n"
+
+
+def _came_through(place: Place) -> list[str]:
+    """The macros that made a token, innermost first."""
+    steps = [f"note: in expansion of macro {step.macro}, used at {step.use}" for step in place.expansions]
+    return _cut(steps, "macros")
+
+
+def _came_in(place: Place) -> list[str]:
+    """The includes that led to a file, innermost first."""
+    return _cut([f"note: included from {file}:{line}" for file, line in place.included], "files")
+
+
+def _cut(steps: list[str], what: str) -> list[str]:
+    if len(steps) <= MOST_STEPS:
+        return steps
+    half = MOST_STEPS // 2
+    return [*steps[:half], f"note: ... {len(steps) - 2 * half} {what} more ...", *steps[-half:]]
+
+
+def _excerpt(line: str, place: Place) -> tuple[str, tuple[str, str]]:
+    """The line as shown, and its caret line in two parts: the space before, and the carets.
+
+    Tabs become spaces, characters take the columns that a terminal gives them, and of a long line the part around the
+    place is shown.
+    """
+    start = min(max(place.column - 1, 0), len(line))
+    stop = min(max(start + place.length, start + 1), max(len(line), start + 1))
+    first, last = 0, len(line)
+    if sum(_width(c) for c in line[: 4 * WIDEST]) > WIDEST:
+        first, last = _window(line, start)
+    before, under, after = line[first:start], line[start : min(stop, last)], line[min(stop, last) : last]
+    lead = ELLIPSIS if first > 0 else ""
+    column = len(lead)
+    text, column = _spread(before, column)
+    marked, end = _spread(under, column)
+    rest, _ = _spread(after, end)
+    tail = ELLIPSIS if last < len(line) else ""
+    return lead + text + marked + rest + tail, (" " * column, "^" * max(1, end - column))
+
+
+def _window(line: str, start: int) -> tuple[int, int]:
+    """A stretch of at most WIDEST columns with the place in its first two thirds."""
+    first = start
+    room = WIDEST // 3
+    while first > 0 and room > 0:
+        first -= 1
+        room -= max(1, _width(line[first]))
+    last = first
+    room = WIDEST - 2 * len(ELLIPSIS)
+    while last < len(line) and room > 0:
+        room -= max(1, _width(line[last]))
+        last += 1
+    return first, last
+
+
+def _spread(text: str, column: int) -> tuple[str, int]:
+    """The text as it is printed from a column on, and the column behind it."""
+    out = []
+    for character in text:
+        if character == "\t":
+            width = TAB - column % TAB
+            out.append(" " * width)
+        else:
+            width = _width(character)
+            out.append(_safe(character))
+        column += width
+    return "".join(out), column
+
+
+def _width(character: str) -> int:
+    """Columns that a terminal gives a character."""
+    if character < "\x7f":
+        return TAB if character == "\t" else 1
+    if unicodedata.combining(character):
+        return 0
+    return 2 if unicodedata.east_asian_width(character) in ("W", "F") else 1
+
+
+def _safe(text: str) -> str:
+    """Text without what could steer a terminal."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or unicodedata.combining(c) else "\ufffd" for c in text)

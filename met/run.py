@@ -1,0 +1,158 @@
+"""Cases -> results: run the cases of an experiment through its kernel, and say in words how each ended."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from met.plan import Experiment
+from met.program.build import EVENTS, NOT_FINITE, OUTPUTS, SINGULAR, build
+from met.trace.program import Program
+
+DONE, FAILED = 0, 1
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the engine gives back for some cases of one experiment; the first axis of every array is the case.
+
+    case         row of the case table
+    status       DONE or FAILED;  cause: why, with time and joint, empty where done
+    n_valid      recorded rows before the failure; all of them where done
+    time         (row,) s, of the recorded rows
+    signals      by name of `plan.Recorded`: (case, row) or (case, row, joint); not-a-number from n_valid on.
+                 Empty where histories were not asked for
+    metrics      by name, SI; not-a-number where the case failed
+    met          requirements by their text: True where met; False for a failed case
+    coordinates  the varied parameters as the engine used them, by path, SI
+    events       friction events by name (`program.build.EVENTS`): splits, clamped, undecided (docs/physics.md, section 6)
+    """
+
+    case: np.ndarray
+    status: np.ndarray
+    cause: list[str]
+    n_valid: np.ndarray
+    time: np.ndarray
+    signals: dict[str, np.ndarray]
+    metrics: dict[str, np.ndarray]
+    met: dict[str, np.ndarray]
+    coordinates: dict[str, np.ndarray]
+    events: dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """An experiment with its program; the kernel is compiled, or fetched from the cache, when first used."""
+
+    experiment: Experiment
+    lanes: int | None = None
+    _cells: dict[str, object] = field(default_factory=dict, repr=False, compare=False)
+
+    @cached_property
+    def program(self) -> Program:
+        return build(self.experiment)
+
+    @cached_property
+    def kernel(self):  # type: ignore[no-untyped-def]
+        from met.kernel import compile
+
+        return compile(self.program, lanes=self.lanes)
+
+
+def prepare(experiment: Experiment, *, lanes: int | None = None) -> Prepared:
+    """Make an experiment ready to run; lanes: cases a block, None for what suits the machine."""
+    return Prepared(experiment, lanes)
+
+
+def run(
+    experiment: Experiment | Prepared,
+    cases: Sequence[int] | np.ndarray | None = None,
+    *,
+    threads: int | None = None,
+    record: bool = True,
+    progress: Callable[[int], None] | None = None,
+    lanes: int | None = None,
+) -> Run:
+    """Run cases (rows of the case table; all by default) and gather their results.
+
+    threads   None: as many as there are cores.  record: whether to keep histories
+    progress  called with the number of cases done so far
+    """
+    prepared = experiment if isinstance(experiment, Prepared) else prepare(experiment, lanes=lanes)
+    experiment = prepared.experiment
+    schedule = experiment.structure.schedule
+    rows = np.arange(experiment.cases.count) if cases is None else np.asarray(cases, dtype=np.int64)
+    coordinates = experiment.cases.coordinates
+    inputs = np.empty((len(rows), len(coordinates)))
+    for column, coordinate in enumerate(coordinates):
+        inputs[:, column] = coordinate.values[rows]
+    history, outputs = prepared.kernel.run(
+        inputs, schedule.ticks, record=record and prepared.program.columns > 0, threads=threads, progress=progress
+    )
+    return _results(experiment, prepared.program, rows, history, outputs)
+
+
+def _results(
+    experiment: Experiment, program: Program, rows: np.ndarray, history: np.ndarray | None, outputs: np.ndarray
+) -> Run:
+    schedule = experiment.structure.schedule
+    out = {name: outputs[:, column] for column, name in enumerate(program.outputs)}
+    failed = out["failure"] != 0.0
+    n_valid = np.where(failed, np.ceil(out["failure.tick"] / schedule.record), schedule.rows).astype(np.int64)
+    signals: dict[str, np.ndarray] = {}
+    if history is not None:
+        for case in np.flatnonzero(failed):
+            history[case, n_valid[case] :, :] = math.nan
+        column = 0
+        for recorded in experiment.structure.record:
+            width = len(recorded.channels)
+            signals[recorded.name] = history[:, :, column : column + width]
+            if not recorded.joints:
+                signals[recorded.name] = signals[recorded.name][:, :, 0]
+            column += width
+    metrics = {
+        use.name: np.where(failed, math.nan, out[f"metrics.{use.name}"]) for use in experiment.structure.metrics
+    }
+    return Run(
+        case=rows,
+        status=np.where(failed, FAILED, DONE).astype(np.int8),
+        cause=[_cause(experiment, *row) for row in outputs[:, :3].tolist()],
+        n_valid=n_valid,
+        time=np.arange(schedule.rows) * schedule.record / schedule.base_hz,
+        signals=signals,
+        metrics=metrics,
+        met={r.text: _met(metrics[r.metric], r.comparison, r.limit) for r in experiment.requirements},
+        coordinates={coordinate.path: out[coordinate.path] for coordinate in experiment.cases.coordinates},
+        events={name.split(".")[1]: out[name].astype(np.int64) for name in EVENTS},
+    )
+
+
+def _met(metric: np.ndarray, comparison: str, limit: float) -> np.ndarray:
+    compare = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal}[comparison]
+    return np.asarray(compare(metric, limit))
+
+
+def _cause(experiment: Experiment, failure: float, number: float, tick: float) -> str:
+    """Why a case failed, in words; empty where it did not."""
+    assert OUTPUTS[:3] == ("failure", "failure.joint", "failure.tick")
+    if failure == 0.0:
+        return ""
+    joint = experiment.structure.moving[int(number)]
+    prismatic = joint.kind == "prismatic"
+    unit = "kg" if prismatic else "kg m^2"
+    head = f"t = {tick / experiment.structure.schedule.base_hz:g} s: joint {joint.name}: "
+    where = f" ({joint.place.file}:{joint.place.line})" if joint.place else ""
+    if failure == SINGULAR:
+        return (
+            f"{head}D is not above 0 {unit}, so qdd is undefined. Nothing outboard has inertia about this "
+            f"joint{where}. Give the link mass or the servo a rotor inertia."
+        )
+    assert failure == NOT_FINITE
+    return (
+        f"{head}the acceleration is no longer a finite number{where}. A step too long for the servo or the arm is "
+        f"the usual reason: try a faster rate for the dynamics, and see the stability figures of `met plan`."
+    )

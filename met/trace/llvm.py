@@ -1,0 +1,101 @@
+"""Machine code: IR text to object bytes to an address. The only file that knows llvmlite.
+
+Where results could depend on the compiler nothing is left to it (met/trace/ir.py); here only speed is decided.
+"""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import llvmlite
+import llvmlite.binding as llvm
+
+from met.trace.entry import ENTRY
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What code is made for: LLVM's names of processor and features, doubles in a register, whether it has fma."""
+
+    cpu: str
+    features: str
+    width: int
+    fma: bool
+
+
+@cache
+def _ready() -> None:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+
+
+@cache
+def machine(cpu: str | None = None) -> Machine:
+    """The machine we run on, or one of LLVM's processors of its kind (`haswell`, `skylake-avx512`)."""
+    _ready()
+    arm = platform.machine().lower() in ("arm64", "aarch64")
+    if cpu is None:
+        features = llvm.get_host_cpu_features()
+        width = 2 if arm else 8 if features.get("avx512f") else 4 if features.get("avx") else 2
+        return Machine(llvm.get_host_cpu_name(), features.flatten(), width, arm or bool(features.get("fma")))
+    text = ('define <8 x double> @f(<8 x double> %a) #0 {\n'
+            '  %b = call <8 x double> @llvm.fma.v8f64(<8 x double> %a, <8 x double> %a, <8 x double> %a)\n'
+            '  ret <8 x double> %b\n}\ndeclare <8 x double> @llvm.fma.v8f64(<8 x double>, <8 x double>, <8 x double>)\n'
+            'attributes #0 = { "prefer-vector-width"="512" }\n')
+    assembly = _target_machine(Machine(cpu, "", 2, True), 2).emit_assembly(llvm.parse_assembly(text))
+    width = 2 if arm else 8 if "%zmm" in assembly else 4 if "%ymm" in assembly else 2
+    return Machine(cpu, "", width, arm or "vfmadd" in assembly)
+
+
+def _target_machine(target: Machine, level: int) -> Any:
+    _ready()
+    triple = llvm.Target.from_triple(llvm.get_process_triple())
+    return triple.create_target_machine(cpu=target.cpu, features=target.features, opt=level, reloc="pic",
+                                        codemodel="small")
+
+
+def versions() -> str:
+    """What else decides the code that a text becomes."""
+    return f"llvmlite {llvmlite.__version__} llvm {'.'.join(map(str, llvm.llvm_version_info))}"
+
+
+def assemble(text: str, target: Machine, *, level: int = 2) -> bytes:
+    """The object file of a module."""
+    machine_ = _target_machine(target, level)
+    module = _optimised(text, machine_, level)
+    return bytes(machine_.emit_object(module))
+
+
+def listing(text: str, target: Machine, *, level: int = 2) -> str:
+    """The assembly of a module, to look at."""
+    machine_ = _target_machine(target, level)
+    return str(machine_.emit_assembly(_optimised(text, machine_, level)))
+
+
+def _optimised(text: str, machine_: Any, level: int) -> Any:
+    module = llvm.parse_assembly(text)
+    module.triple = llvm.get_process_triple()
+    module.data_layout = str(machine_.target_data)
+    options = llvm.create_pipeline_tuning_options(speed_level=level)
+    options.slp_vectorization = False
+    options.loop_vectorization = False
+    options.loop_interleaving = False
+    options.loop_unrolling = False
+    builder = llvm.create_pass_builder(machine_, options)
+    builder.getModulePassManager().run(module, builder)
+    return module
+
+
+class Loaded:
+    """Machine code in memory; `address` is the entry's."""
+
+    def __init__(self, code: bytes, target: Machine) -> None:
+        _ready()
+        self._compiler = llvm.create_lljit_compiler(_target_machine(target, 2), use_jit_link=True)
+        library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(ENTRY)
+        self._tracker = library.link(self._compiler, "met")
+        self.address: int = self._tracker[ENTRY]
+

@@ -1,0 +1,302 @@
+"""Units: a closed table, their dimensions and their size in SI.
+
+A dimension is six small integers, the exponents of m, kg, s, A, K and rad. Angle is a dimension of its own, so that
+60 rpm (rad/s) is not 60 Hz (1/s); but it is compared only where the rest is a power of time or nothing. Elsewhere a
+radian counts as one, since N*m/A and V*s/rad are the same thing.
+
+Units exist only until a plan is made; the plan is SI (angles in rad). There are no offsets (no degree Celsius) and no
+prefixes beyond the table, so that a unit's name is known to be one wherever a deck writes it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+from typing import NamedTuple
+
+BIGGEST_EXPONENT = 9
+
+
+class Dimension(NamedTuple):
+    """Exponents of the base units."""
+
+    m: int = 0
+    kg: int = 0
+    s: int = 0
+    A: int = 0
+    K: int = 0
+    rad: int = 0
+
+    def __mul__(self, other: object) -> Dimension:
+        if not isinstance(other, Dimension):
+            return NotImplemented
+        return Dimension(*(mine + theirs for mine, theirs in zip(self, other, strict=True)))
+
+    def __truediv__(self, other: Dimension) -> Dimension:
+        return Dimension(*(mine - theirs for mine, theirs in zip(self, other, strict=True)))
+
+    def __pow__(self, exponent: int) -> Dimension:
+        return Dimension(*(mine * exponent for mine in self))
+
+    def __str__(self) -> str:
+        return text(self)
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What a unit means: its dimension, and how many SI units one of it is."""
+
+    dimension: Dimension
+    scale: float
+
+    def __mul__(self, other: Measure) -> Measure:
+        return Measure(self.dimension * other.dimension, self.scale * other.scale)
+
+    def __pow__(self, exponent: int) -> Measure:
+        return Measure(self.dimension**exponent, self.scale**exponent)
+
+
+@dataclass(frozen=True)
+class NamedUnit:
+    """A row of the table: the name that decks write, the word that messages say, and the meaning."""
+
+    name: str
+    word: str
+    measure: Measure
+
+
+PURE = Dimension()
+ONE = Measure(PURE, 1.0)
+
+_LENGTH = Dimension(m=1)
+_MASS = Dimension(kg=1)
+_TIME = Dimension(s=1)
+_CURRENT = Dimension(A=1)
+_ANGLE = Dimension(rad=1)
+_FORCE = _MASS * _LENGTH / _TIME**2
+_ENERGY = _FORCE * _LENGTH
+_POWER = _ENERGY / _TIME
+_VOLTAGE = _POWER / _CURRENT
+_RESISTANCE = _VOLTAGE / _CURRENT
+_INDUCTANCE = _RESISTANCE * _TIME
+_CAPACITANCE = _TIME / _RESISTANCE
+_PRESSURE = _FORCE / _LENGTH**2
+
+_ROWS: tuple[tuple[str, str, Dimension, float], ...] = (
+    ("m", "metre", _LENGTH, 1.0),
+    ("km", "kilometre", _LENGTH, 1e3),
+    ("cm", "centimetre", _LENGTH, 1e-2),
+    ("mm", "millimetre", _LENGTH, 1e-3),
+    ("um", "micrometre", _LENGTH, 1e-6),
+    ("kg", "kilogram", _MASS, 1.0),
+    ("g", "gram", _MASS, 1e-3),
+    ("t", "tonne", _MASS, 1e3),
+    ("s", "second", _TIME, 1.0),
+    ("ms", "millisecond", _TIME, 1e-3),
+    ("us", "microsecond", _TIME, 1e-6),
+    ("min", "minute", _TIME, 60.0),
+    ("h", "hour", _TIME, 3600.0),
+    ("rad", "radian", _ANGLE, 1.0),
+    ("mrad", "milliradian", _ANGLE, 1e-3),
+    ("deg", "degree", _ANGLE, math.pi / 180),
+    ("arcmin", "minute of arc", _ANGLE, math.pi / 10800),
+    ("arcsec", "second of arc", _ANGLE, math.pi / 648000),
+    ("cycle", "cycle", _ANGLE, 2 * math.pi),
+    ("rpm", "cycle a minute", _ANGLE / _TIME, 2 * math.pi / 60),
+    ("Hz", "hertz", _TIME**-1, 1.0),
+    ("kHz", "kilohertz", _TIME**-1, 1e3),
+    ("N", "newton", _FORCE, 1.0),
+    ("mN", "millinewton", _FORCE, 1e-3),
+    ("kN", "kilonewton", _FORCE, 1e3),
+    ("J", "joule", _ENERGY, 1.0),
+    ("W", "watt", _POWER, 1.0),
+    ("kW", "kilowatt", _POWER, 1e3),
+    ("Pa", "pascal", _PRESSURE, 1.0),
+    ("A", "ampere", _CURRENT, 1.0),
+    ("mA", "milliampere", _CURRENT, 1e-3),
+    ("V", "volt", _VOLTAGE, 1.0),
+    ("mV", "millivolt", _VOLTAGE, 1e-3),
+    ("kV", "kilovolt", _VOLTAGE, 1e3),
+    ("ohm", "ohm", _RESISTANCE, 1.0),
+    ("mohm", "milliohm", _RESISTANCE, 1e-3),
+    ("kohm", "kiloohm", _RESISTANCE, 1e3),
+    ("H", "henry", _INDUCTANCE, 1.0),
+    ("mH", "millihenry", _INDUCTANCE, 1e-3),
+    ("uH", "microhenry", _INDUCTANCE, 1e-6),
+    ("F", "farad", _CAPACITANCE, 1.0),
+    ("uF", "microfarad", _CAPACITANCE, 1e-6),
+    ("K", "kelvin", Dimension(K=1), 1.0),
+    ("%", "per cent", PURE, 0.01),
+)
+
+UNITS: Mapping[str, NamedUnit] = MappingProxyType(
+    {name: NamedUnit(name, word, Measure(dimension, scale)) for name, word, dimension, scale in _ROWS}
+)
+
+# what people write for what the table has; for messages only
+_OTHER_WORDS: Mapping[str, str] = MappingProxyType({
+    "sec": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us", "hr": "h", "hour": "h", "hours": "h",
+    "minute": "min", "minutes": "min", "meter": "m", "metre": "m", "meters": "m", "metres": "m", "micron": "um",
+    "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad", "rev": "cycle", "revs": "cycle",
+    "turn": "cycle", "turns": "cycle", "cycles": "cycle", "RPM": "rpm", "hz": "Hz", "HZ": "Hz", "khz": "kHz",
+    "KHz": "kHz", "Ohm": "ohm", "ohms": "ohm", "Ohms": "ohm", "kOhm": "kohm", "mOhm": "mohm", "volt": "V", "volts": "V",
+    "amp": "A", "amps": "A", "ampere": "A", "newton": "N", "newtons": "N", "watt": "W", "watts": "W", "joule": "J",
+    "kgs": "kg", "KG": "kg", "Kg": "kg", "gram": "g", "grams": "g", "tonne": "t", "ton": "t", "percent": "%",
+    "pct": "%", "v": "V", "mv": "mV", "n": "N", "M": "m", "MM": "mm", "S": "s", "k": "K",
+})  # fmt: skip
+
+# how a dimension is said, where base units would be hard to read; the first that matches
+_SPOKEN = (
+    "N*m/A", "V*s/rad", "V/rad", "N*m*s/rad", "kg*m^2", "N", "N*m", "W", "V", "ohm", "H", "F", "Pa", "N/m", "N*s/m", "V*s",
+    "V/s", "N*m/s", "N/s", "N/A",
+)  # fmt: skip
+
+
+def is_unit(name: str) -> bool:
+    """Whether a deck's word is the name of a unit, and so cannot name a value."""
+    return name in UNITS
+
+
+def measure(factors: Iterable[tuple[str, int]]) -> Measure:
+    """The meaning of a product of units, (name, exponent) each; ValueError for a name that is no unit."""
+    result = ONE
+    for name, exponent in factors:
+        if name not in UNITS:
+            raise ValueError(f"`{name}` is not a unit")
+        result = result * UNITS[name].measure ** exponent
+    return result
+
+
+def counted(dimension: Dimension) -> Dimension:
+    """The dimension as it is compared: without the angle, unless the rest is a power of time or nothing."""
+    if dimension.m or dimension.kg or dimension.A or dimension.K:
+        return dimension._replace(rad=0)
+    return dimension
+
+
+def same(a: Dimension, b: Dimension) -> bool:
+    """Whether a quantity of dimension `a` may stand where `b` is wanted."""
+    return counted(a) == counted(b)
+
+
+def text(dimension: Dimension) -> str:
+    """The dimension in SI units, as a deck would write it: `N*m`, `rad/s`, `1` for a pure number."""
+    spoken = _spoken().get(dimension)
+    if spoken is not None:
+        return spoken
+    above = [_power(name, e) for name, e in zip(Dimension._fields, dimension, strict=True) if e > 0]
+    below = [_power(name, -e) for name, e in zip(Dimension._fields, dimension, strict=True) if e < 0]
+    if not below:
+        return "*".join(above) or "1"
+    divisor = below[0] if len(below) == 1 else f"({'*'.join(below)})"
+    return f"{'*'.join(above) or '1'}/{divisor}"
+
+
+def suggest(name: str) -> str | None:
+    """What was probably meant by a name that is no unit: `sec` -> `s`, `Nm` -> `N*m`; None where nothing is near."""
+    if name in _OTHER_WORDS:
+        return _OTHER_WORDS[name]
+    if len(name) > 16:
+        return None
+    for cut in range(1, len(name)):
+        if name[:cut] in UNITS and name[cut:] in UNITS:
+            return f"{name[:cut]}*{name[cut:]}"
+    whole = {unit.word: unit.name for unit in UNITS.values()}
+    if name.lower() in whole:
+        return whole[name.lower()]
+    folded = {unit.lower(): unit for unit in UNITS}
+    if name.lower() in folded:
+        return folded[name.lower()]
+    near = difflib.get_close_matches(name, UNITS, n=1, cutoff=0.75)
+    return near[0] if near else None
+
+
+def parse_unit(written: str, names: Mapping[str, Measure] = MappingProxyType({})) -> Measure:
+    """The meaning of a unit as a model's declaration writes it: `V*s/rad`, `N*m/(rad*s)`, `m^2`, `1/s`, `1`.
+
+    names: further words and what they stand for here, such as `joint`. ValueError where it cannot be read: a
+    declaration is a programmer's text (a deck's units are read by ic).
+    """
+    return _Reader(written, names).whole()
+
+
+def _power(name: str, exponent: int) -> str:
+    return name if exponent == 1 else f"{name}^{exponent}"
+
+
+@lru_cache(maxsize=1)
+def _spoken() -> Mapping[Dimension, str]:
+    table: dict[Dimension, str] = {}
+    for written in _SPOKEN:
+        table.setdefault(parse_unit(written).dimension, written)
+    return table
+
+
+_PIECE = re.compile(r"\s*(?:(%|[A-Za-z_]+)|(-?\d+)|([*/^()]))")
+
+
+class _Reader:
+    """Recursive descent over a declaration's unit."""
+
+    def __init__(self, written: str, names: Mapping[str, Measure]) -> None:
+        self.written = written
+        self.names = names
+        self.pieces: list[str] = []
+        at = 0
+        while written[at:].strip():
+            match = _PIECE.match(written, at)
+            if match is None:
+                raise ValueError(f"unit `{written}`: cannot read `{written[at:].strip()}`")
+            self.pieces.append(match.group().strip())
+            at = match.end()
+        self.at = 0
+
+    def whole(self) -> Measure:
+        result = self.product()
+        if self.at < len(self.pieces):
+            raise ValueError(f"unit `{self.written}`: cannot read `{self.pieces[self.at]}`")
+        return result
+
+    def take(self) -> str:
+        if self.at >= len(self.pieces):
+            raise ValueError(f"unit `{self.written}` ends too early")
+        self.at += 1
+        return self.pieces[self.at - 1]
+
+    def next_is(self, *wanted: str) -> bool:
+        return self.at < len(self.pieces) and self.pieces[self.at] in wanted
+
+    def product(self) -> Measure:
+        result = self.factor()
+        while self.next_is("*", "/"):
+            sign = 1 if self.take() == "*" else -1
+            result = result * self.factor() ** sign
+        return result
+
+    def factor(self) -> Measure:
+        piece = self.take()
+        if piece == "(":
+            result = self.product()
+            if self.take() != ")":
+                raise ValueError(f"unit `{self.written}`: `)` is missing")
+        elif piece == "1":
+            result = ONE
+        elif piece in self.names:
+            result = self.names[piece]
+        elif piece in UNITS:
+            result = UNITS[piece].measure
+        else:
+            near = suggest(piece)
+            raise ValueError(f"unit `{self.written}`: `{piece}` is not a unit" + (f"; `{near}`?" if near else ""))
+        if self.next_is("^"):
+            self.take()
+            exponent = self.take()
+            if not exponent.lstrip("-").isdigit() or abs(int(exponent)) > BIGGEST_EXPONENT:
+                raise ValueError(f"unit `{self.written}`: `{exponent}` is not a small whole exponent")
+            result = result ** int(exponent)
+        return result

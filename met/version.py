@@ -1,0 +1,3 @@
+"""The version of MET; setup.cfg takes it from here."""
+
+VERSION = "0.1.0"

@@ -1,0 +1,36 @@
+"""What a user waits for: whole commands, from the shell's start of the process to its end."""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+from benchmarks.benchmark import Benchmark
+
+MET = Path(__file__).parents[1] / "met"
+
+
+def _seconds(*words: str) -> float:
+    """Wall time of `scripts/met` with these words, in an empty directory."""
+    with tempfile.TemporaryDirectory() as directory:
+        begun = time.perf_counter()
+        done = subprocess.run([MET, *words], cwd=directory, capture_output=True, text=True)
+        seconds = time.perf_counter() - begun
+    if done.returncode not in (0, 1):  # 1: a requirement was missed, which is an answer
+        raise SystemExit(f"`met {' '.join(words)}` ended with {done.returncode}:\n{done.stderr}")
+    return seconds
+
+
+BENCHMARKS = (
+    Benchmark("version", "met --version: Python and the command's frame", "s", lambda: _seconds("--version")),
+    Benchmark("check", "met check two_link.ic", "s", lambda: _seconds("check", "two_link.ic"), target=0.25),
+    Benchmark(
+        "run",
+        "met run two_link.ic --case '#0' --no-picture",
+        "s",
+        lambda: _seconds("run", "two_link.ic", "--case", "#0", "--no-picture"),
+        target=1.0,
+    ),
+)

@@ -1,0 +1,99 @@
+"""Link frames, velocities and wrenches in the world, by the deck's frames."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from met.dynamics.kinematics import jacobian, link_motions
+from met.dynamics.spatial import Pose, rotation_about, rotation_quaternion, rotation_rpy
+from met.dynamics.tree import Tree
+from tests.oracles.pinocchio_tree import PinocchioTree
+from tests.oracles.random_tree import random_tree
+
+SEEDS = range(30)
+
+# Positions of metres through up to a dozen joints: some tens of roundings.
+CLOSE = 1e-12
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_every_links_own_frame_is_where_pinocchio_has_it(seed: int) -> None:
+    arm = random_tree(seed)
+    theirs = PinocchioTree(arm.bodies, arm.gravity, arm.rotor)
+    motions = link_motions(Tree.build(arm.bodies), arm.q, arm.qd)
+    assert set(motions) == {body.name for body in arm.bodies}
+    for name, motion in motions.items():
+        R, p = theirs.link_pose(arm.q, name)
+        assert np.allclose(motion.pose.R, R, rtol=0.0, atol=CLOSE), f"seed {seed}, {name}"
+        assert np.allclose(motion.pose.p, p, rtol=CLOSE, atol=20 * CLOSE), f"seed {seed}, {name}"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_links_and_points_of_them_move_as_in_pinocchio(seed: int) -> None:
+    arm = random_tree(seed)
+    theirs = PinocchioTree(arm.bodies, arm.gravity, arm.rotor)
+    point = (0.3, -0.2, 0.5)
+    for name, motion in link_motions(Tree.build(arm.bodies), arm.q, arm.qd).items():
+        w, v = theirs.link_velocity(arm.q, arm.qd, name)
+        R, p = theirs.link_pose(arm.q, name)
+        size = 1.0 + np.linalg.norm(w) + np.linalg.norm(v)
+        assert np.allclose(motion.rate(), w, rtol=0.0, atol=10 * CLOSE * size), f"seed {seed}, {name}"
+        assert np.allclose(motion.velocity(), v, rtol=0.0, atol=10 * CLOSE * size), f"seed {seed}, {name}"
+        assert np.allclose(motion.velocity(point), v + np.cross(w, R @ point), rtol=0.0, atol=10 * CLOSE * size)
+        assert np.allclose(motion.position(point), p + R @ point, rtol=CLOSE, atol=20 * CLOSE), f"seed {seed}, {name}"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_jacobian_times_the_rates_is_the_points_velocity(seed: int) -> None:
+    arm = random_tree(seed)
+    tree = Tree.build(arm.bodies)
+    name, point = arm.bodies[-1].name, (0.1, 0.4, -0.3)
+    motion = link_motions(tree, arm.q, arm.qd)[name]
+    columns = np.array(jacobian(tree, arm.q, name, point))
+    w, v = np.einsum("i,ijk->jk", np.array(arm.qd), columns)
+    assert np.allclose(w, motion.rate(), rtol=0.0, atol=1e-11), f"seed {seed}"
+    assert np.allclose(v, motion.velocity(point), rtol=0.0, atol=1e-11 * (1.0 + np.max(np.abs(v)))), f"seed {seed}"
+
+
+def test_a_force_at_a_point_does_the_work_of_its_wrench() -> None:
+    arm = random_tree(11)
+    motion = link_motions(Tree.build(arm.bodies), arm.q, arm.qd)[arm.bodies[-1].name]
+    force, moment, point = (3.0, -1.0, 2.0), (0.5, 0.25, -1.5), (0.2, -0.7, 0.1)
+    own_moment, own_force = motion.wrench(force, moment, point)
+    power = np.dot(force, motion.velocity(point)) + np.dot(moment, motion.rate())
+    assert np.dot(own_moment, motion.w) + np.dot(own_force, motion.v) == pytest.approx(power, rel=1e-12)
+
+
+def test_the_base_may_stand_and_move_anywhere() -> None:
+    arm = random_tree(5)
+    tree = Tree.build(arm.bodies)
+    base = Pose(rotation_rpy(0.3, -0.7, 2.0), (1.0, -2.0, 0.5))
+    w, v = (0.2, 0.5, -0.3), (1.0, 2.0, 3.0)
+    still, moved = link_motions(tree, arm.q, arm.qd), link_motions(tree, arm.q, arm.qd, base, (w, v))
+    R = np.array(base.R)
+    for name, motion in moved.items():
+        assert np.allclose(motion.position(), R @ still[name].position() + base.p, atol=1e-12)
+        carried = np.array(v) + np.cross(w, still[name].position()) + np.array(still[name].velocity())
+        assert np.allclose(motion.velocity(), R @ carried, atol=1e-11)
+
+
+def test_rpy_turns_about_the_fixed_axes_x_then_y_then_z() -> None:
+    R = np.array(rotation_rpy(math.pi / 2, math.pi / 2, 0.0))
+    # y goes to z about x, then to x about y.
+    assert np.array_equal(R @ [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+    assert np.array_equal(R @ [0.0, 0.0, 1.0], [0.0, -1.0, 0.0])
+
+
+def test_a_right_angle_leaves_no_rounding_noise() -> None:
+    entries = {x for row in rotation_rpy(math.pi / 2, -math.pi, math.pi / 2) for x in row}
+    assert entries <= {0.0, 1.0, -1.0}
+
+
+def test_quaternion_axis_and_angle_and_rpy_name_the_same_turn() -> None:
+    half = 0.6
+    quaternion = rotation_quaternion(math.cos(half), 0.0, 0.0, math.sin(half))
+    assert np.allclose(quaternion, rotation_about((0.0, 0.0, 1.0), 2 * half), rtol=0.0, atol=1e-15)
+    assert np.allclose(quaternion, rotation_rpy(0.0, 0.0, 2 * half), rtol=0.0, atol=1e-15)

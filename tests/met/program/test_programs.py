@@ -1,0 +1,125 @@
+"""Programs of whole decks: kernel and plain floats agree, bits depend on the case alone, rates and instants."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ic
+from met import run as engine
+from met.plan import Experiment
+from met.program import build
+from met.trace import execute
+from tests.oracles.random_deck import random_deck
+
+
+def compiled(folder: Path, text: str, select: str | None = None) -> Experiment:
+    deck = folder / "deck.ic"
+    deck.write_text(text)
+    plan = ic.compile(str(deck), select=[select] if select else None)
+    return plan.experiments[0]
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_kernel_and_plain_floats_agree_on_random_decks(tmp_path: Path, seed: int) -> None:
+    experiment = compiled(tmp_path, random_deck(seed))
+    run = engine.run(experiment)
+    assert run.status[0] == engine.DONE, (seed, run.cause)
+    rows, out = execute(build(experiment), {}, experiment.structure.schedule.ticks)
+    kernel = np.concatenate([run.signals[name][0] for name in ("q", "qd", "qdd", "tau")], axis=1)
+    size = np.abs(rows).max(axis=0) + np.abs(rows).max() * 1e-3
+    # rounding (1e-16) grows along 400 steps of a driven arm by the factor that neighbouring motions part: up to 1e5
+    assert np.abs(kernel - rows).max() / size.max() < 1e-10, seed
+    assert (np.abs(kernel - rows).max(axis=0) < 1e-9 * size).all(), seed
+    for name in ("peak", "size"):
+        assert run.metrics[name][0] == pytest.approx(out[f"metrics.{name}"], rel=1e-9, abs=1e-12), seed
+    for name, count in run.events.items():
+        assert count[0] == out[f"friction.{name}"], (seed, name)
+
+
+SWEEP = """
+#include <two_link.ic>
+let swing = 0.2 rad/s;
+servo reversing like gearbox { command = rate(sine(amplitude = swing, frequency = 0.7 Hz)); }
+run back_and_forth like nominal {
+    servos { shoulder = reversing; elbow = reversing; }
+    rates { dynamics = 100 Hz; servos = 200 Hz; record = 100 Hz; }
+    duration = 2 s;
+}
+sweep many of back_and_forth {
+    vary links.lower.mass = linspace(5, 60, 7) kg;
+    vary reversing.kp = linspace(0.01, 0.04, 5) V*s/rad;
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def sweep(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
+    return compiled(tmp_path_factory.mktemp("sweep"), SWEEP, "many")
+
+
+def _bits(run: engine.Run) -> list[bytes]:
+    """Everything that each case left, as bytes."""
+    return [
+        b"".join(
+            array[i].tobytes()
+            for array in (*run.signals.values(), *run.metrics.values(), *run.events.values(), run.n_valid)
+        )
+        for i in range(len(run.case))
+    ]
+
+
+def test_bits_depend_on_the_case_alone(sweep: Experiment) -> None:
+    reference = engine.run(sweep, threads=1, lanes=8)
+    assert reference.events["splits"].min() >= 2, "the sweep is to have friction events in every case"
+    expected = _bits(reference)
+    for lanes in (2, 4, 16):
+        assert _bits(engine.run(sweep, threads=1, lanes=lanes)) == expected, lanes
+    assert _bits(engine.run(sweep, threads=2, lanes=2)) == expected
+    order = np.random.default_rng(3).permutation(sweep.cases.count)
+    shuffled = _bits(engine.run(sweep, order))
+    assert [shuffled[i] for i in np.argsort(order)] == expected
+    for case in (0, 17, 34):
+        assert _bits(engine.run(sweep, [case])) == [expected[case]], "alone"
+
+
+def test_metrics_are_the_same_without_histories(sweep: Experiment) -> None:
+    with_histories, without = engine.run(sweep), engine.run(sweep, record=False)
+    assert without.signals == {}
+    for name, values in with_histories.metrics.items():
+        assert values.tobytes() == without.metrics[name].tobytes()
+
+
+def test_a_run_records_both_ends_and_holds_between_ticks(tmp_path: Path) -> None:
+    text = """
+    #include <two_link.ic>
+    run fine like nominal {
+        rates { base = 400 Hz; dynamics = 25 Hz; servos = 100 Hz; record = 200 Hz; }
+        duration = 1 s;
+        record = [q, shoulder.servo.voltage];
+    }
+    """
+    run = engine.run(compiled(tmp_path, text, "fine"))
+    assert run.time[0] == 0.0 and run.time[-1] == 1.0 and len(run.time) == 201
+    q, voltage = run.signals["q"][0], run.signals["shoulder.servo.voltage"][0]
+    assert (q[:8] == q[0]).all() and (q[8] != q[0]).all(), "q moves at the dynamics' ticks: 8 rows apart"
+    assert voltage[0] == voltage[1] != voltage[2], "the servo ticks at 100 Hz: every second row"
+    moved = [i for i in range(1, 201) if voltage[i] != voltage[i - 1]]
+    assert all(i % 2 == 0 for i in moved) and len(moved) >= 99
+
+
+def test_a_failed_case_says_when_and_where_and_the_others_go_on(tmp_path: Path) -> None:
+    text = """
+    #include <two_link.ic>
+    run spun like nominal { environment { velocity_products = on; } duration = 1 s; }
+    sweep some of spun { vary initial.elbow.qd = [0, 1e200, 0.1] rad/s; }
+    """
+    run = engine.run(compiled(tmp_path, text, "some"))
+    assert run.status.tolist() == [engine.DONE, engine.FAILED, engine.DONE]
+    assert run.cause[1].startswith("t = 0 s: joint shoulder: the acceleration is no longer a finite number (")
+    assert "two_link.ic>:" in run.cause[1]
+    assert run.n_valid.tolist() == [26, 0, 26]
+    assert np.isnan(run.signals["q"][1]).all() and np.isfinite(run.signals["q"][[0, 2]]).all()
+    assert np.isnan(run.metrics["settle"][1])

@@ -1,0 +1,228 @@
+"""What holds for every command: how it is found, how it fails, what its exit status says, what it may import."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+
+from met import cli
+from met.diagnostic import Place, Problem, error
+from met.entry_points import EntryPoint, offered
+from met.version import VERSION
+
+ROOT = Path(__file__).parents[2]
+
+BROKEN = """\
+arm one {
+    link bar { mass = 2 kg; shape = rod(length = 1 m, along = x); }
+    joint pivot revolute { parent = base; child = bar; axis = z; }
+}
+run swing {
+    arm = one;
+    rates { dynamics = 1 kHz; }
+    duration = 1 s;
+    durations = 2 s;
+    record = [q];
+}
+"""
+
+
+def offer(monkeypatch: pytest.MonkeyPatch, **commands: object) -> None:
+    """Let the table hold these commands, as another package would offer them."""
+
+    class Point(EntryPoint):
+        def load(self) -> object:
+            return commands[self.name]
+
+    points = [Point(name, f"plugin:{name}", "plugin") for name in commands]
+    monkeypatch.setattr(cli, "offered", lambda group: points)
+
+
+def command(function: object) -> click.Command:
+    return click.command()(function)  # type: ignore[call-overload, no-any-return]
+
+
+def met(*words: str, **more: object) -> subprocess.CompletedProcess[str]:
+    """`met` in a process of its own, as a user starts it."""
+    surroundings = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        [sys.executable, "-m", "met.cli", *words], capture_output=True, text=True, env=surroundings, **more
+    )  # type: ignore[call-overload, no-any-return]
+
+
+def test_help_lists_the_commands_in_the_order_of_work(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["--help"]) == 0
+    listed = [line.split()[0] for line in capsys.readouterr().out.split("order of work:")[1].splitlines() if line[:2] == "  "]
+    assert [word for word in listed if word in cli.ORDER] == [word for word in cli.ORDER if word in listed]
+    assert {"check", "plan", "cases", "explain", "run", "show", "plot", "doc", "dump"} <= set(listed)
+
+
+def test_every_command_has_a_line_of_help_of_its_own() -> None:
+    lines = [cli.met.get_command(click.Context(cli.met), name) for name in cli.met.list_commands(click.Context(cli.met))]
+    helps = [line.get_short_help_str(100) for line in lines if line is not None]
+    assert all(helps) and len(set(helps)) == len(helps)
+    assert all(not text.endswith("...") for text in helps), helps
+
+
+def test_the_table_of_setup_cfg_is_what_an_installed_package_says() -> None:
+    """In a checkout setup.cfg is read; where MET is installed, what the installer made of it. They are the same table."""
+    setuptools_reads = {}
+    from setuptools.config.setupcfg import read_configuration
+
+    for line in read_configuration(ROOT / "setup.cfg")["options"]["entry_points"]["met.commands"]:
+        name, _, value = line.partition("=")
+        setuptools_reads[name.strip()] = value.strip()
+    assert {point.name: point.value for point in offered("met.commands")} == setuptools_reads
+
+
+def test_another_package_can_offer_a_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = tmp_path / "my_arm-1.0.dist-info"
+    made.mkdir()
+    (made / "entry_points.txt").write_text("[console_scripts]\nx = y:z\n\n[met.commands]\nwave = my_arm.cli:wave\n[other]\na = b:c\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert EntryPoint("wave", "my_arm.cli:wave", "my_arm") in offered("met.commands")
+
+
+def test_a_package_that_is_there_twice_offers_its_first_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for place, value in (("late", "old:wave"), ("early", "new:wave")):
+        made = tmp_path / place / "my_arm-1.0.dist-info"
+        made.mkdir(parents=True)
+        (made / "entry_points.txt").write_text(f"[met.commands]\nwave = {value}\n")
+        monkeypatch.syspath_prepend(str(tmp_path / place))
+    assert [point.value for point in offered("met.commands") if point.name == "wave"] == ["new:wave"]
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [("chek", "met check"), ("plto", "met plot"), ("two_link.ic", "met run two_link.ic")],
+)
+def test_an_unknown_command_is_answered_with_what_was_meant(
+    typed: str, meant: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main([typed]) == cli.BAD_INPUT
+    assert f"no command `{typed}`; did you mean `{meant}`?" in capsys.readouterr().err
+
+
+def test_a_command_says_yes_or_no_by_what_it_returns(monkeypatch: pytest.MonkeyPatch) -> None:
+    offer(monkeypatch, yes=command(lambda: None), no=command(lambda: cli.NO))
+    assert (cli.main(["yes"]), cli.main(["no"])) == (0, 1)
+
+
+def test_a_problem_is_rendered_once_on_stderr_and_ends_with_2(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail() -> None:
+        raise Problem(error("D999", "no such thing", Place("a.ic", 2, 3, 4), help="leave it out"), {"a.ic": "x\n  this\n"})
+
+    offer(monkeypatch, fail=command(fail))
+    assert cli.main(["fail"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err == (
+        "error[D999]: no such thing\n"
+        " --> a.ic:2:3\n"
+        "  |\n"
+        "2 |   this\n"
+        "  |   ^^^^\n"
+        "  = help: leave it out\n"
+        "\n"
+        "1 error\n"
+    )
+
+
+def test_with_format_json_a_problem_is_json_on_stdout(tmp_path: Path) -> None:
+    (tmp_path / "broken.ic").write_text(BROKEN)
+    done = met("check", "broken.ic", "--format", "json", cwd=tmp_path)
+    told = json.loads(done.stdout)
+    assert done.returncode == 2
+    assert done.stderr == ""
+    assert told["errors"] == 1
+    shown = told["diagnostics"][0]["shown"]
+    assert (shown["file"], shown["line"], shown["column"]) == ("broken.ic", 9, 5)
+
+
+def test_wrong_usage_ends_with_2_and_says_how_it_is_used(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["check"]) == 2
+    assert capsys.readouterr().err == (
+        "Usage: met check [OPTIONS] DECK\nTry 'met check --help' for help.\n\nError: Missing argument 'DECK'.\n"
+    )
+
+
+def test_an_interrupt_ends_with_130_and_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stop() -> None:
+        raise KeyboardInterrupt
+
+    offer(monkeypatch, stop=command(stop))
+    assert cli.main(["stop"]) == 130
+    assert capsys.readouterr().err == "\nmet: interrupted\n"
+
+
+def test_a_defect_is_owned_in_one_paragraph_with_the_traceback_in_a_file(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    def divide() -> float:
+        return 1 / 0
+
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    offer(monkeypatch, divide=command(divide))
+    assert cli.main(["divide"]) == cli.DEFECT
+    err = capsys.readouterr().err
+    (report,) = tmp_path.glob("met-defect-*.txt")
+    assert err == (
+        f"met: this is a defect of MET, not of what you gave it: ZeroDivisionError: division by zero. The traceback is in "
+        f"{report}; with -v it is printed. Please report it together with the deck and the command, `met divide`.\n"
+    )
+    assert f"met {VERSION}, Python" in report.read_text()
+    assert "return 1 / 0" in report.read_text()
+
+
+def test_a_file_that_cannot_be_read_is_the_users_to_mend_not_a_defect(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    offer(monkeypatch, read=command(lambda: open("/no/such/file")))
+    assert cli.main(["read"]) == 2
+    assert capsys.readouterr().err == "error[E218]: `/no/such/file`: No such file or directory\n\n1 error\n"
+
+
+def test_a_closed_pipe_ends_quietly() -> None:
+    """`met doc | true`: nobody reads what is printed."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(
+        [sys.executable, "-m", "met.cli", "doc"], cwd=ROOT, stdout=writer, stderr=subprocess.PIPE, text=True
+    )
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (cli.PIPE_CLOSED, "")
+
+
+SLOW_TO_IMPORT = {"llvmlite", "h5py", "h5netcdf", "xarray", "pandas", "dask", "matplotlib", "scipy", "pint"}
+
+
+@pytest.mark.parametrize("words", [["check", "two_link.ic"], ["plan", "two_link.ic"], ["--version"], ["--help"], ["doc"]])
+def test_what_costs_a_tenth_of_a_second_is_not_imported(words: list[str]) -> None:
+    """Each of these packages takes 0.1 to 2 s to import, and none of these commands needs it."""
+    program = (
+        "import sys; from met.cli import main; status = main(sys.argv[1:]);"
+        "print('IMPORTED', *sorted(name for name in sys.modules if '.' not in name)); sys.exit(status)"
+    )
+    done = subprocess.run([sys.executable, "-c", program, *words], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    imported = set(done.stdout.rpartition("IMPORTED")[2].split())
+    assert "click" in imported
+    assert not imported & SLOW_TO_IMPORT
+
+
+def test_check_does_not_import_the_engine() -> None:
+    program = "import sys; from met.cli import main; main(['check', 'two_link.ic', '-q']); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
+    imported = set(done.stdout.split())
+    assert "ic.lower" in imported
+    assert not imported & {"met.kernel", "met.run", "met.program.build", "met.trace.llvm", "batch"}

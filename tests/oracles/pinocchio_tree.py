@@ -1,0 +1,111 @@
+"""The same arm in Pinocchio: bodies in, joint torques and accelerations out, in our order of joints.
+
+`crba` is not used: it is silently wrong where joints were not added depth-first. `aba` and `rnea` are right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from met.dynamics.tree import Body
+
+
+class PinocchioTree:
+    """Pinocchio's model of some bodies (parents before children)."""
+
+    def __init__(self, bodies: Sequence[Body], gravity: Sequence[float], rotor: Sequence[float]) -> None:
+        model = pin.Model()
+        model.gravity.linear = np.array(gravity, float)
+        joint_of: list[int] = []
+        placed: list[pin.SE3] = []
+        self.names = [body.joint for body in bodies if body.kind != "fixed"]
+        for body in bodies:
+            at = pin.SE3(pin.rpy.rpyToMatrix(*map(float, body.rpy)), np.array(body.at, float))
+            joint, pose = (0, pin.SE3.Identity()) if body.parent < 0 else (joint_of[body.parent], placed[body.parent])
+            if body.kind == "fixed":
+                joint_of.append(joint)
+                placed.append(pose * at)
+            else:
+                made = {"revolute": pin.JointModelRevoluteUnaligned, "prismatic": pin.JointModelPrismaticUnaligned}
+                axis = np.array(body.axis, float)
+                joint_of.append(model.addJoint(joint, made[body.kind](axis), pose * at, body.joint))
+                placed.append(pin.SE3.Identity())
+            xx, yy, zz, xy, xz, yz = body.inertia
+            J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], float)
+            model.appendBodyToJoint(
+                joint_of[-1], pin.Inertia(float(body.mass), np.array(body.com, float), J), placed[-1])
+        self.model, self.joint_of, self.placed = model, joint_of, placed
+        self.link = {body.name: b for b, body in enumerate(bodies)}
+        self.at = [model.joints[model.getJointId(name)].idx_v for name in self.names]
+        armature = np.zeros(model.nv)
+        armature[self.at] = rotor
+        model.armature = armature
+        self.data = model.createData()
+
+    def vector(self, ours: Sequence[float]) -> np.ndarray:
+        """Joint numbers in Pinocchio's order."""
+        theirs = np.zeros(self.model.nv)
+        theirs[self.at] = ours
+        return theirs
+
+    def loads(self, wrenches: Mapping[str, tuple[Sequence[float], Sequence[float]]]) -> pin.StdVec_Force:
+        """External wrenches (moment about a link's origin, force, link axes) on Pinocchio's joints."""
+        total = [pin.Force.Zero() for _ in range(self.model.njoints)]
+        for name, (moment, force) in wrenches.items():
+            b = self.link[name]
+            total[self.joint_of[b]] += self.placed[b].act(pin.Force(np.array(force, float), np.array(moment, float)))
+        result = pin.StdVec_Force()
+        result.extend(total)
+        return result
+
+    def accelerations(self, q, qd, tau, wrenches) -> np.ndarray:
+        """Forward dynamics, rotor inertia included."""
+        v = self.vector
+        return pin.aba(self.model, self.data, v(q), v(qd), v(tau), self.loads(wrenches))[self.at]
+
+    def torques(self, q, qd, qdd, wrenches) -> np.ndarray:
+        """Inverse dynamics, rotor inertia included."""
+        v = self.vector
+        return pin.rnea(self.model, self.data, v(q), v(qd), v(qdd), self.loads(wrenches))[self.at]
+
+    def link_pose(self, q, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """R and p of a link's frame in the world."""
+        pin.forwardKinematics(self.model, self.data, self.vector(q))
+        b = self.link[name]
+        pose = self.data.oMi[self.joint_of[b]] * self.placed[b]
+        return pose.rotation, pose.translation
+
+    def link_velocity(self, q, qd, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Angular velocity of a link and velocity of its frame's origin, in the world."""
+        pin.forwardKinematics(self.model, self.data, self.vector(q), self.vector(qd))
+        b = self.link[name]
+        twist = self.placed[b].actInv(self.data.v[self.joint_of[b]])
+        R = (self.data.oMi[self.joint_of[b]] * self.placed[b]).rotation
+        return R @ twist.angular, R @ twist.linear
+
+    def reaction(self, q, qd, qdd, wrenches, joint: str) -> tuple[np.ndarray, np.ndarray]:
+        """Moment about the child link's origin and force that a moving joint transmits, in link axes."""
+        self.torques(q, qd, qdd, wrenches)
+        force = self.data.f[self.model.getJointId(joint)]
+        return np.array(force.angular), np.array(force.linear)
+
+    def energy(self, q, qd) -> tuple[float, float]:
+        """Kinetic energy without rotors, potential energy, J."""
+        v = self.vector
+        armature = self.model.armature.copy()
+        self.model.armature = np.zeros(self.model.nv)
+        kinetic = pin.computeKineticEnergy(self.model, self.data, v(q), v(qd))
+        self.model.armature = armature
+        return float(kinetic), float(pin.computePotentialEnergy(self.model, self.data, v(q)))
+
+    def momentum(self, q, qd) -> tuple[np.ndarray, np.ndarray]:
+        """Angular momentum about the world's origin, linear momentum."""
+        v = self.vector
+        pin.forwardKinematics(self.model, self.data, v(q), v(qd))
+        total = pin.Force.Zero()
+        for j in range(1, self.model.njoints):
+            total += self.data.oMi[j].act(self.model.inertias[j] * self.data.v[j])
+        return np.array(total.angular), np.array(total.linear)

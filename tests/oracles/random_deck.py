@@ -1,0 +1,90 @@
+"""Decks of random arms, as text: trees of revolute and prismatic joints with servos, loads and rates, from a seed."""
+
+from __future__ import annotations
+
+import random
+
+GEARBOX = """servo {name} {{
+    model = rigid_gearbox;
+    ratio = {ratio} {ratio_unit};  kp = {kp} V*s/rad;  ki = {ki} V/rad;  v_max = 20 V;
+    resistance = 2 ohm;  kt = 0.06 N*m/A;  tau_max = {tau_max} N*m;  j_m = 5e-4 kg*m^2;
+    f_c = {f_c} N*m;  f_v = 1e-5 N*m*s/rad;  k_position = 2 Hz;
+    command = {command};
+}}
+"""
+
+
+def random_deck(seed: int, *, friction: bool = True) -> str:
+    """A deck with one run; the same text for the same seed.
+
+    1 to 5 joints on 1 to 5 links (a link may carry several), some without a servo, gravity or none, velocity products
+    on or off, dynamics from 250 Hz to 1 kHz, servos slower or faster; 0.4 s long. The gear and rotor are such that the
+    stability figure stays below 0.5 at 250 Hz.
+    """
+    pick = random.Random(seed)
+
+    def number(low: float, high: float) -> str:
+        return f"{pick.uniform(low, high):.4f}"
+
+    def vector(size: float, unit: str) -> str:
+        return "[" + ", ".join(number(-size, size) for _ in range(3)) + f"] {unit}"
+
+    count = pick.randint(1, 5)
+    arm, servos, uses = [], [], []
+    for i in range(count):
+        prismatic = pick.random() < 0.3
+        parent = "base" if i == 0 else pick.choice([f"link{j}" for j in range(i)])
+        kind = "prismatic" if prismatic else "revolute"
+        shape = pick.choice(
+            [f"rod(length = {number(0.2, 1)} m, along = {pick.choice('xyz')})",
+             f"box(size = [{number(0.1, 1)}, {number(0.1, 1)}, {number(0.1, 1)}] m)",
+             f"cylinder(radius = {number(0.05, 0.2)} m, length = {number(0.2, 1)} m, along = {pick.choice('xyz')})"]
+        )
+        arm.append(f"    link link{i} {{ mass = {number(0.5, 10)} kg; shape = {shape}; }}")
+        arm.append(
+            f"    joint j{i} {kind} {{ parent = {parent}; child = link{i}; axis = {pick.choice(['x', 'y', 'z', '-x'])};"
+            f" at = {vector(0.6, 'm')}; rpy = {vector(3, 'rad')}; }}"
+        )
+        if pick.random() < 0.85:
+            joint, effort = ("m", "N") if prismatic else ("rad", "N*m")
+            kind = pick.choice(["rate", "rate", "position", "torque"])
+            unit = {"rate": f"{joint}/s", "position": joint, "torque": effort}[kind]
+            course = pick.choice(
+                [f"{number(-1, 1)} {unit}",
+                 f"sine(amplitude = {number(0.1, 1)} {unit}, frequency = {number(1, 4)} Hz)",
+                 f"ramp(to = {number(-1, 1)} {unit}, begin = 0.05 s, over = 0.2 s)",
+                 f"step(to = {number(-1, 1)} {unit}, at = 0.1 s)",
+                 f"table(times = [0, 0.1, 0.25] s, values = [0, {number(-1, 1)}, {number(-1, 1)}] {unit})"]
+            )
+            f_c = number(0.001, 0.05) if friction and pick.random() < 0.6 else "0"
+            servos.append(
+                GEARBOX.format(
+                    name=f"servo{i}", ratio=number(60, 150), ratio_unit="rad/m" if prismatic else "",
+                    kp=number(0.02, 0.2), ki=number(0.1, 1), tau_max=number(0.1, 0.5), f_c=f_c,
+                    command=f"{kind}({course})",
+                )
+            )
+            uses.append(f"j{i} = servo{i};")
+    gravity = f"gravity = {vector(9.81, 'm/s^2')};" if pick.random() < 0.7 else ""
+    damping = "drag = joint_damping { damping = 0.3 N*m*s/rad; };" if pick.random() < 0.3 and count == 1 else ""
+    dynamics = pick.choice(["250 Hz", "500 Hz", "1 kHz"])
+    initial = " ".join(
+        f"j{i}.q = {number(-1, 1)} {unit}; j{i}.qd = {number(-1, 1)} {unit}/s;" if pick.random() < 0.5 else ""
+        for i in range(count)
+        for unit in (["m"] if f"joint j{i} prismatic" in "\n".join(arm) else ["rad"])
+    )
+    return "\n".join([
+        *servos,
+        "arm random {", *arm, "}",
+        "run it {",
+        f"    arm = random;  servos {{ {' '.join(uses)} }}",
+        f"    initial {{ {initial} }}",
+        f"    environment {{ {gravity} {damping} velocity_products = {pick.choice(['on', 'on', 'off'])}; }}",
+        f"    rates {{ base = 1 kHz; dynamics = {dynamics}; servos = {pick.choice(['250 Hz', '1 kHz'])};"
+        f" record = 250 Hz; }}",
+        "    duration = 0.4 s;",
+        "    record = [q, qd, qdd, tau];",
+        "    metric peak = max { of = j0.q; }",
+        "    metric size = rms { of = j0.qd; }",
+        "}", "",
+    ])

@@ -1,0 +1,1 @@
+"""Example models for MET, one a file; docs/models.md explains them."""
