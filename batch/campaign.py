@@ -53,7 +53,8 @@ class Part:
 
     @property
     def bytes(self) -> int:
-        return archive_layout.layout(self.experiment, len(self.rows), self.recorded).bytes
+        described = archive_layout.PARAMETER_TEXT * len(self.experiment.parameters)
+        return archive_layout.layout(self.experiment, len(self.rows), self.recorded).bytes + described
 
     @property
     def batch(self) -> int:
@@ -265,6 +266,13 @@ def _rows(experiment: Experiment, case: int | str) -> list[int]:
 
 def check_output(campaign: Campaign) -> None:
     """Refuse an output that could not be written in the end, before anything runs."""
+    try:
+        _check_output(campaign)
+    except OSError as reason:
+        raise Problem(_cannot_write(campaign.output, reason)) from reason
+
+
+def _check_output(campaign: Campaign) -> None:
     from batch.archive.read import is_archive
 
     output = campaign.output
@@ -280,12 +288,9 @@ def check_output(campaign: Campaign) -> None:
         helps = "give another name with `-o`, or remove the file"
         raise Problem(error("E305", f"{output} exists and is no archive of MET: it is not written over", help=helps))
     probe = _temporary(output)
-    try:
-        probe.open("xb").close()
-        probe.unlink()
-        free = shutil.disk_usage(output.parent).free
-    except OSError as reason:
-        raise Problem(_cannot_write(output, reason)) from reason
+    probe.open("xb").close()
+    probe.unlink()
+    free = shutil.disk_usage(output.parent).free
     if campaign.bytes > free:
         message = f"cannot write {output}: it needs about {size_text(campaign.bytes)}, and the disk has {size_text(free)} left"
         helps = "`--histories none` keeps metrics only; fewer signals in `record`, or a slower `rates.record`, take less"
@@ -294,9 +299,6 @@ def check_output(campaign: Campaign) -> None:
 
 def _cannot_write(output: Path, reason: OSError) -> Any:
     why = (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
-    for number, words in ((28, "no space left on device"), (27, "file too large"), (122, "disk quota exceeded")):
-        if f"errno = {number}" in str(reason):
-            why = words
     return error("E305", f"cannot write {output}: {why}", help="nothing was kept; `-o FILE` names another place")
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def program(asked: Asked) -> Iterator[str]:
-    """What is computed when: control, and each straight piece with its operations in order; `%n` is number n's result."""
+    """What is computed when: control, then each straight piece, operation by operation; `%n` is what number n gives."""
     from met.program.build import build
     from met.trace.graph import show
     from met.trace.program import record

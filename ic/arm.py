@@ -112,8 +112,10 @@ def _link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
             needs=(f"{owner.path}.mass",),
             message=f"the inertia of link `{item.name}` is no body's",
             place=place,
-            help="inertia is about the centre of mass, in link axes: [xx, yy, zz] or "
-            "[xx, yy, zz, xy, xz, yz] kg*m^2, products with the sign of -sum(m x y)",
+            help=(
+                "inertia is about the centre of mass, in link axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2",
+                "products have the sign of -sum(m x y)",
+            ),
         )
     shape = None
     if solid is not None:
@@ -202,9 +204,9 @@ def _not_a_body(moments: np.ndarray, strict: bool) -> tuple[np.ndarray, list[str
         if not finite[row]:
             causes.append("it is not finite")
         elif negative[row]:
-            causes.append(f"{shown}: none may be {'zero or negative' if strict else 'negative'}")
+            causes.append(f"{shown}; none may be {'zero or negative' if strict else 'negative'}")
         else:
-            causes.append(f"{shown}: the two smaller make less than the largest, which no mass in space does")
+            causes.append(f"{shown}; no body has one above the sum of the others")
     return bad, causes
 
 

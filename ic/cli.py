@@ -168,7 +168,7 @@ def doc(words: tuple[str, ...], form: str) -> None:
     found = print_models.chosen(words)
     if form == "json":
         _print_json([print_models.model_json(kind, model) for kind, model in found])
-    elif not words or words[0].removesuffix("s") in models.GROUPS and len(words) == 1:
+    elif not words or (words[0].removesuffix("s") in models.GROUPS and len(words) == 1):
         _print(print_models.print_list(found))
     else:
         for position, (kind, model) in enumerate(found):

@@ -31,6 +31,7 @@ END = "END"
 PASTE = "CPP_DPOUND"
 
 NUMBERS = (WHOLE, DECIMAL)
+MOST_JOINED = 200_000
 
 _SYMBOLS = {
     "#": "CPP_POUND", "##": PASTE, "+": "CPP_PLUS", "-": "CPP_MINUS", "*": "CPP_STAR", "/": "CPP_FSLASH",
@@ -183,6 +184,10 @@ def logical_lines(source: Text) -> Iterator[list[Token]]:
             add(Token(SPACE, " ", source, at, len(piece)))
         elif group == "joined":
             add(Token(JOINED, " ", source, at, 1))
+            if len(line) > MOST_JOINED:  # to hold no more than this; no directive may be so long, and text may be cut
+                yield line
+                line = []
+                add = line.append
         elif group == "string":
             add(Token(STRING, piece, source, at, len(piece)))
         elif group == "character":

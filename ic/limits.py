@@ -11,6 +11,7 @@ from met.diagnostic import Diagnostic
 
 MOST_BYTES = 2 << 20  # of one file
 MOST_TOKENS = 500_000  # of all files together, white space included
+LONGEST_LINE = 200_000  # characters
 MOST_INCLUDES = 2_000  # files entered, again and again counted
 INCLUDE_DEPTH = 50
 MOST_MACRO_BODY = 4_096  # tokens

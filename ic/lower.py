@@ -151,7 +151,7 @@ def _experiment(scope: Scope, definition: Definition, resolved: Resolved, sweep:
 
 def _cases(scope: Scope, resolved: Resolved, sweep: Sweep, outputs: list[Scalar], formulas: Formulas) -> Cases:
     for varied in sweep.varied:
-        taken = varied.path in scope.sets or varied.path in scope.names.followed
+        taken = scope.sets.get(varied.path) or varied.path in scope.names.followed
         if taken and varied.path not in formulas.inputs:
             scope.complaints.error("D137", f"`{varied.path}` changes nothing in this run", varied.place,
                                    help="no parameter's value depends on it: leave it out")

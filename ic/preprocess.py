@@ -7,6 +7,7 @@ places it came through), the search for included files, every check, and every m
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +33,7 @@ from ic.lexer import (
 from ic.limits import (
     CONDITION_DEPTH,
     INCLUDE_DEPTH,
+    LONGEST_LINE,
     LONGEST_NAME,
     MOST_CONDITIONS,
     MOST_INCLUDES,
@@ -46,6 +48,7 @@ from met.diagnostic import Diagnostic, Label, Place, Problem
 
 CONDITIONALS = ("if", "ifdef", "ifndef", "elif", "else", "endif")
 DIRECTIVES = (*CONDITIONALS, "define", "undef", "include", "pragma", "error", "warning")
+_LONG_LINE = re.compile(rf"[^\n]{{{LONGEST_LINE + 1}}}")
 TRUTH = "TRUTH"  # the kind of a condition's value
 COMMAND_LINE = "<command line>"
 
@@ -162,6 +165,9 @@ class _Preprocessor(Macros):
     def group_lines(self, _text: str, source: Text) -> Iterable[list[Token]]:
         """The lines that pcpp works on. Those that `#if` leaves out are lexed, since a comment may begin there."""
         ifs = self._ifs[-1]
+        long = _LONG_LINE.search(source.text)
+        if long is not None:
+            self._give_up("D018", f"a line has at most {LONGEST_LINE} characters", source.place(long.start(), 1))
         for line in logical_lines(source):
             self._tokens += len(line)
             if self._tokens > MOST_TOKENS:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os.path
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 from ic.columns import columns, count, number
@@ -54,7 +54,10 @@ def cases_json(experiment: Experiment) -> dict[str, Any]:
 
 def prefixes(names: list[str]) -> list[str]:
     """The shortest beginnings, all of one length, that tell the names apart."""
-    near = sorted(names)
-    shared = (len(os.path.commonprefix(pair)) for pair in zip(near, near[1:], strict=False) if pair[0] != pair[1])
-    length = max(SHORTEST, 1 + max(shared, default=0))
-    return [name[:length] for name in names]
+    length = 1 + max((_shared(a, b) for a, b in pairwise(sorted(names)) if a != b), default=0)
+    return [name[: max(SHORTEST, length)] for name in names]
+
+
+def _shared(a: str, b: str) -> int:
+    """How many characters both begin with."""
+    return next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))

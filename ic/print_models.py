@@ -45,7 +45,8 @@ def chosen(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
     known = [*KINDS, *(model.name for _, model in everything)]
     close = difflib.get_close_matches(words[0], known, n=1)
     helps = [f"did you mean `{close[0]}`?"] if close else []
-    raise Problem(error("D164", f"no kind of model and no model `{words[0]}`", help=[*helps, f"kinds: {', '.join(KINDS)}"]))
+    helps.append(f"kinds: {', '.join(KINDS)}")
+    raise Problem(error("D164", f"no kind of model and no model `{words[0]}`", help=helps))
 
 
 def print_list(found: list[tuple[models.Kind, Any]]) -> Iterator[str]:
@@ -65,7 +66,11 @@ def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
     yield from (f"  {line}".rstrip() for line in textwrap.dedent(model.doc).strip().splitlines())
     yield ""
     yield f"In a deck: {HOW[kind]}"
-    for words, text in (("commands", "Commands it takes"), ("order", "Order"), ("real_limit", "Stable below step times rate constant")):
+    for words, text in (
+        ("commands", "Commands it takes"),
+        ("order", "Order"),
+        ("real_limit", "Stable while step times rate constant is below"),
+    ):
         value = getattr(model, words, None)
         if value:
             yield f"{text}: {', '.join(value) if isinstance(value, tuple) else number(value)}"

@@ -104,7 +104,8 @@ def _arm(experiment: Experiment) -> Iterator[str]:
         branch = f"{stem}{'└─' if last else '├─'} {joint.name}"
         rows.append((branch, _moves(joint, values), place, joint.child, mass, servo))
         waiting += [(child, stem + ("   " if last else "│  ")) for child in reversed(children.get(joint.child, []))]
-    yield f"Arm {structure.arm}: {count(len(structure.links), 'link')}, {count(len(structure.moving), 'joint')} that move"
+    moving = f"{count(len(structure.moving), 'joint')} that move{'s' if len(structure.moving) == 1 else ''}"
+    yield f"Arm {structure.arm}: {count(len(structure.links), 'link')}, {moving}"
     used = [i for i in range(len(rows[0])) if any(i < len(row) and row[i] for row in rows[1:])]
     yield from columns([[row[i] for i in used if i < len(row)] for row in rows])
 
@@ -137,15 +138,16 @@ def _schedule(experiment: Experiment) -> Iterator[str]:
     for (definition, divisor), joints in divisors.items():
         where = f"servo {definition} of {', '.join(joints)}"
         rows.append(row(where, divisor, count(schedule.ticks // divisor + 1, "tick")))
-    step = f"{count(schedule.ticks // schedule.dynamics, 'step')} of {number(schedule.step * 1e3)} ms, {structure.integrator}"
-    rows.append(row("dynamics", schedule.dynamics, step))
+    steps = f"{count(schedule.ticks // schedule.dynamics, 'step')} of {number(schedule.step * 1e3)} ms"
+    rows.append(row("dynamics", schedule.dynamics, f"{steps}, {structure.integrator}"))
     rows.append(row("record", schedule.record, count(schedule.rows, "row")))
-    yield f"Schedule: {number(schedule.duration)} s, {count(schedule.ticks, 'tick')} of the base rate, {number(base)} Hz"
+    ticks = count(schedule.ticks, "tick")
+    yield f"Schedule: {number(schedule.duration)} s, {ticks} of the base rate, {number(base)} Hz"
     yield from columns(rows, right=(1,))
     stability = [note.removeprefix(STABILITY) for note in experiment.notes if note.startswith(STABILITY)]
     if stability:
-        limit = models.find("integrator", structure.integrator).real_limit
-        yield f"Stability: step times the servo's fastest rate constant; {structure.integrator} is stable below {number(limit)}"
+        limit = number(models.find("integrator", structure.integrator).real_limit)
+        yield f"Stability: step times the servo's fastest rate constant; {structure.integrator} is stable below {limit}"
         yield from columns([note.partition(": ")[::2] for note in stability])
 
 
@@ -179,7 +181,9 @@ def _channels(structure: Structure) -> Iterator[str]:
     if not width:
         yield "Recorded: nothing"
         return
-    yield f"Recorded: {count(width, 'channel')} in {count(structure.schedule.rows, 'row')}, {size(width * structure.schedule.rows * NUMBER_BYTES)} a case"
+    rows_ = structure.schedule.rows
+    bytes_ = size(width * rows_ * NUMBER_BYTES)
+    yield f"Recorded: {count(width, 'channel')} in {count(rows_, 'row')}, {bytes_} a case"
     rows = []
     for recorded in structure.record:
         units = list(dict.fromkeys(recorded.unit))

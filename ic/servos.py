@@ -129,8 +129,10 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
                 "D149",
                 f"{owner.label} has no command",
                 used,
-                help=f"write `command = {servo.commands[0]}(...);`, in the definition or for this joint; "
-                f"{servo.name} takes {known}",
+                help=[
+                    f"write `command = {servo.commands[0]}(...);`, in the definition or for this joint",
+                    f"{servo.name} takes {known}",
+                ],
             )
         return None
     call = item.value

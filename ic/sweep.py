@@ -69,6 +69,8 @@ def read_sweep(definitions: Definitions, complaints: Complaints, definition: Def
                 seed = entry
             else:
                 _refuse(entry, words)
+        if math.prod(len(axis[0].values) for axis in axes) > MOST_CASES:
+            break
     sweep = Sweep(tuple(axes), tuple(excludes), seed, definition.place)
     if not axes and not complaints.errors:
         complaints.error("D126", f"sweep `{definition.name}` varies nothing", definition.place,

@@ -18,7 +18,7 @@ from met.trace import Real, Scalar, cos, maximum, minimum, sin, sqrt
 from met.units import PURE, Dimension
 
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
-MOST_POINTS = 1_000_000
+MOST_POINTS = 100_000
 BIGGEST_EXPONENT = 16
 
 FUNCTIONS = ("sqrt", "sin", "cos", "min", "max", "linspace", "logspace")
@@ -94,7 +94,7 @@ def _number(number: Number) -> Value:
         return Value(_sound(number.value, number.place), PURE, number.place, bare=True)
     measure = measure_of(number.unit)
     place = spanned(number.place, number.unit.place)
-    return Value(_sound(number.value * measure.scale, place), measure.dimension, place, unit=number.unit)
+    return Value(_sound(measure.to_si(number.value), place), measure.dimension, place, unit=number.unit)
 
 
 def measure_of(unit: Unit) -> units.Measure:
@@ -129,7 +129,7 @@ def _with_unit(expression: WithUnit, lookup: Lookup) -> Value | Values:
                 "D062", f"a value in {units.text(value.dimension)} inside brackets that have a unit after them",
                 value.place, also=[Label(expression.unit.place, "this unit is for pure numbers")],
                 help="leave the unit after the brackets out, and give each bare number its own"))
-        number = _sound(value.number * measure.scale, value.place)
+        number = _sound(measure.to_si(value.number), value.place)
         return Value(number, measure.dimension, value.place, unit=expression.unit)
 
     return apply(evaluate(expression.inner, lookup))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, TypeVar
 
 import click
@@ -107,7 +108,7 @@ def deck_options(face: Face) -> Face:
         "-I", "include_dirs", multiple=True, metavar="DIR", help="Look for included files here too; may be repeated."
     )(face)
     return click.option(
-        "-D", "defines", multiple=True, metavar="NAME[=VALUE]", help="Define a macro, as #define would; may be repeated."
+        "-D", "defines", multiple=True, metavar="NAME[=VALUE]", help="Define a macro as #define does; may be repeated."
     )(face)
 
 
@@ -140,7 +141,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
-    json = "--format=json" in arguments or ("--format", "json") in zip(arguments, arguments[1:], strict=False)
+    json = "--format=json" in arguments or ("--format", "json") in pairwise(arguments)
     verbose = "-v" in arguments or "--verbose" in arguments
     try:
         if "_MET_COMPLETE" in os.environ:
@@ -208,8 +209,8 @@ def _confess(defect: Exception, arguments: Sequence[str], verbose: bool) -> None
             traceback.print_exception(defect, file=file)
         where = f"The traceback is in {path}; with -v it is printed."
     print(
-        f"met: this is a defect of MET, not of what you gave it: {type(defect).__name__}: {defect}. {where} Please report "
-        f"it together with the deck and the command, `{command}`.",
+        f"met: this is a defect of MET, not of what you gave it: {type(defect).__name__}: {defect}. {where} "
+        f"Please report it together with the deck and the command, `{command}`.",
         file=sys.stderr,
     )
 

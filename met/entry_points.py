@@ -37,7 +37,8 @@ class EntryPoint:
 
 def offered(group: str) -> list[EntryPoint]:
     """All that is offered in this group, MET's own first, in the order written; then others by package."""
-    own, others = [], []
+    own: list[EntryPoint] = []
+    others: list[EntryPoint] = []
     seen: set[str] = set()
     checkout = Path(__file__).parent.parent / "setup.cfg"
     if checkout.is_file():

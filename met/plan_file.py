@@ -82,9 +82,11 @@ def read(path: str | os.PathLike[str]) -> Plan:
 
 def dumps(plan: Plan, refer: Refer | None = None) -> str:
     """A plan as canonical JSON. refer: what to write in place of a large table's coordinate; None: all values."""
-    body = encode(Plan, plan)
-    for experiment, written in zip(plan.experiments, body.get("experiments", ()), strict=True):
-        if refer is not None and experiment.cases.count > INLINE_ROWS:
+    kept_elsewhere = [refer is not None and experiment.cases.count > INLINE_ROWS for experiment in plan.experiments]
+    bare = [_without_values(e) if elsewhere else e for e, elsewhere in zip(plan.experiments, kept_elsewhere, strict=True)]
+    body = encode(Plan, replace(plan, experiments=tuple(bare)))
+    for experiment, written, elsewhere in zip(plan.experiments, body["experiments"], kept_elsewhere, strict=True):
+        if refer is not None and elsewhere:
             for index, coordinate in enumerate(written["cases"].get("coordinates", ())):
                 coordinate["values"] = refer(experiment, index)
     document = {"schema": SCHEMA, "version": VERSION, **body}
@@ -156,6 +158,11 @@ def table(experiment: Experiment) -> np.ndarray:
     for row, coordinate in enumerate(experiment.cases.coordinates):
         out[row] = coordinate.values
     return out
+
+
+def _without_values(experiment: Experiment) -> Experiment:
+    coordinates = tuple(replace(c, values=np.empty(0)) for c in experiment.cases.coordinates)
+    return replace(experiment, cases=replace(experiment.cases, coordinates=coordinates))
 
 
 def _checked(experiment: Experiment) -> Experiment:

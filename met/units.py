@@ -60,6 +60,11 @@ class Measure:
     def __pow__(self, exponent: int) -> Measure:
         return Measure(self.dimension**exponent, self.scale**exponent)
 
+    def to_si(self, number: float) -> float:
+        """So many of this unit, in SI. 700 ms is 700/1000 s, the float that 0.7 is, and not 700 * 0.001."""
+        parts = round(1.0 / self.scale) if 0.0 < self.scale < 1.0 else 1
+        return number / parts if parts > 1 and 1.0 / parts == self.scale else number * self.scale
+
 
 @dataclass(frozen=True)
 class NamedUnit:
@@ -152,8 +157,8 @@ _OTHER_WORDS: Mapping[str, str] = MappingProxyType({
 
 # how a dimension is said, where base units would be hard to read; the first that matches
 _SPOKEN = (
-    "N*m/A", "V*s/rad", "V/rad", "N*m*s/rad", "kg*m^2", "N", "N*m", "W", "V", "ohm", "H", "F", "Pa", "N/m", "N*s/m", "V*s",
-    "V/s", "N*m/s", "N/s", "N/A",
+    "N*m/A", "V*s/rad", "V/rad", "N*m*s/rad", "kg*m^2", "N", "N*m", "W", "V", "ohm", "H", "F", "Pa", "N/m", "N*s/m",
+    "V*s", "V/s", "N*m/s", "N/s", "N/A", "N*m/rad",
 )  # fmt: skip
 
 
@@ -189,8 +194,9 @@ def text(dimension: Dimension) -> str:
     spoken = _spoken().get(dimension)
     if spoken is not None:
         return spoken
-    above = [_power(name, e) for name, e in zip(Dimension._fields, dimension, strict=True) if e > 0]
-    below = [_power(name, -e) for name, e in zip(Dimension._fields, dimension, strict=True) if e < 0]
+    exponents = [(name, getattr(dimension, name)) for name in ("kg", "m", "s", "A", "K", "rad")]
+    above = [_power(name, e) for name, e in exponents if e > 0]
+    below = [_power(name, -e) for name, e in exponents if e < 0]
     if not below:
         return "*".join(above) or "1"
     divisor = below[0] if len(below) == 1 else f"({'*'.join(below)})"

@@ -24,6 +24,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+VERSION = ".".join(map(str, sys.version_info[:3]))
 LOCKS = {"run": "requirements.lock", "test": "requirements-test.lock"}
 NO_CONNECTION = re.compile(
     r"NewConnectionError|NameResolutionError|ConnectTimeout|ProxyError|Network is unreachable|Connection refused"
@@ -46,10 +47,10 @@ def main(root: Path, python: str, purpose: str) -> int:
         import ensurepip
         import venv  # noqa: F401  (both are looked for only: `python -m venv` needs them)
     except ImportError as reason:
-        version = ".".join(map(str, sys.version_info[:3]))
+        package = f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"
         raise Refusal(
-            f"Python {version} ({python}) comes without `{reason.name}`, which makes environments; install it "
-            f"(Debian, Ubuntu: apt install python{sys.version_info[0]}.{sys.version_info[1]}-venv) or name another Python in MET_PYTHON"
+            f"Python {VERSION} ({python}) comes without `{reason.name}`, which makes environments; install it "
+            f"(Debian, Ubuntu: apt install {package}) or name another Python in MET_PYTHON"
         ) from None
     del ensurepip
     with open(__file__) as turn:  # a lock that the kernel takes back from whoever dies
@@ -83,7 +84,7 @@ def make(root: Path, python: str, purpose: str) -> None:
         say(f"making the environment in .venv anew: {reason or 'requirements-test.lock has changed'}")
         purpose = "test" if (marks / LOCKS["test"]).exists() else purpose
     else:
-        say(f"making the environment in .venv with Python {'.'.join(map(str, sys.version_info[:3]))} (once, a minute or so)")
+        say(f"making the environment in .venv with Python {VERSION} (once, a minute or so)")
     clear(venv)
     marks.mkdir(parents=True)
     (marks / "made").write_text(f"{root}\n{python}\n")
@@ -121,7 +122,8 @@ def why_anew(root: Path, venv: Path, python: str) -> str | None:
 
 def holds(root: Path, marks: Path, purpose: str) -> bool:
     """Whether the environment was made from this very lock."""
-    return (marks / LOCKS[purpose]).exists() and filecmp.cmp(root / LOCKS[purpose], marks / LOCKS[purpose], shallow=False)
+    wanted, made = root / LOCKS[purpose], marks / LOCKS[purpose]
+    return made.exists() and filecmp.cmp(wanted, made, shallow=False)
 
 
 def mark(root: Path, marks: Path, purpose: str) -> None:

@@ -37,15 +37,25 @@ Kind = Literal["float64", "int64", "int8", "str"]
 CHUNK_BYTES = 4 << 20
 """A chunk is one case's signal, cut in time beyond this size."""
 
+CHUNK_ENTRY, VARIABLE_HEAD, PARAMETER_TEXT = 56, 1500, 300
+"""Bytes about what is stored, measured: a chunk in its index; a variable's head; a parameter in the plan's JSON."""
+
 FRAME = (
     "joint frame: the parent link's frame moved by `at`, turned by `rpy` (fixed x-y-z); a joint moves about or along "
     "its axis in it; the link's frame is the joint frame at q = 0; the world is the base"
 )
 JOINT_FRAME = "about or along the joint's axis"
 
+EVENTS = {
+    "splits": "steps split where a joint came to rest",
+    "clamped": "crossings of zero rate that were clamped",
+    "undecided": "decisions at rest that the passes left open",
+}
+"""Counts of friction's events in a case (`met.run.Run.events`): variables `friction_...`."""
+
 RESERVED = frozenset({
     "case", "recorded_case", "time", "joint", "requirement", "case_id", "case_key", "repeat", "seed", "status",
-    "cause", "n_valid", "met", "friction_splits", "friction_clamped", "friction_undecided",
+    "cause", "n_valid", "met", *(f"friction_{name}" for name in EVENTS),
 })  # fmt: skip
 
 
@@ -86,7 +96,9 @@ class Layout:
     def bytes(self) -> int:
         """About the size of the group in the file."""
         widths = {"float64": 8, "int64": 8, "int8": 1, "str": 48}
-        return sum(int(np.prod(self.shape(v), dtype=np.int64)) * widths[v.kind] for v in self.variables)
+        values = sum(int(np.prod(self.shape(v), dtype=np.int64)) * widths[v.kind] for v in self.variables)
+        chunks = sum(self.sizes["recorded_case"] for _ in self.role("signal"))
+        return values + CHUNK_ENTRY * chunks + VARIABLE_HEAD * len(self.variables)
 
     def chunks(self, variable: Variable) -> tuple[int, ...] | None:
         """Chunks of a signal: one case each, cut in time where that is too large."""
@@ -165,9 +177,7 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         variable("status", "int8", "how the case ended", flag_values=np.array([0, 1], np.int8), flag_meanings="done failed"),
         variable("cause", "str", "why the case failed; empty where it did not"),
         variable("n_valid", "int64", "recorded rows before the case failed; after them, not-a-number"),
-        variable("friction_splits", "int64", "steps split where a joint came to rest"),
-        variable("friction_clamped", "int64", "crossings of zero rate that were clamped"),
-        variable("friction_undecided", "int64", "decisions at rest that the passes left open"),
+        *(variable(f"friction_{name}", "int64", words) for name, words in EVENTS.items()),
     ]
     taken = RESERVED | {c.path for c in experiment.cases.coordinates} | {r.name for r in experiment.structure.record}
     for use in experiment.structure.metrics:

@@ -51,9 +51,10 @@ class Revision:
 
     def close(self) -> None:
         """Leave no process behind, whether or not it was read."""
-        if self._process is not None and self._process.poll() is None:
+        if self._process is not None:
             self._process.kill()
             self._process.communicate()
+            self._process = None
 
 
 def version(package: str) -> str:

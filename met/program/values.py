@@ -31,7 +31,7 @@ class Values:
             raise AttributeError(name)
         declared = ", ".join(self._numbers) or "nothing"
         message = f"{self._owner} reads `{name}`, which it does not declare"
-        raise Problem(error("E216", message, help=f"declared: {declared}"))
+        raise Problem(error("E211", message, help=f"declared: {declared}"))
 
 
 def parameters(owner: str, prefix: str, declared: Iterable[Parameter], read: Read) -> Values:
@@ -53,5 +53,5 @@ def returned(owner: str, what: str, given: Mapping[str, Real], declared: Iterabl
     unknown = [name for name in given if name not in names]
     if missing or unknown:
         message = f"{owner}: {what} gave back {', '.join(given) or 'nothing'}; declared are {', '.join(names) or 'none'}"
-        raise Problem(error("E217", message, help="give back every declared name and no other"))
+        raise Problem(error("E212", message, help="give back every declared name and no other"))
     return given

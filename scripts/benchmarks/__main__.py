@@ -38,9 +38,11 @@ def main() -> int:
     for name in asked.names or known:
         figure = take(known[name], asked.repeats)
         figures.append(figure)
-        target = "" if figure["target"] is None else f"target {figure['target']:g}: {'met' if figure['met'] else 'MISSED'}"
+        verdict = "met" if figure["met"] else "MISSED"
+        target = "" if figure["target"] is None else f"target {figure['target']:g}: {verdict}"
         spread = f"{figure['least']:.3f} to {figure['largest']:.3f}"
-        print(f"{name:12} {figure['median']:8.3f} {figure['unit']}  {spread:16} {target:20} {figure['doc']}".rstrip(), flush=True)
+        line = f"{name:12} {figure['median']:8.3f} {figure['unit']}  {spread:16} {target:20} {figure['doc']}"
+        print(line.rstrip(), flush=True)
     if asked.output is not None:
         asked.output.write_text(json.dumps({"machine": here, "figures": figures}, indent=1) + "\n")
     return 1 if any(figure["met"] is False for figure in figures) else 0

@@ -13,9 +13,10 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Benchmark:
-    """One figure. measure: does it once and returns the figure, in `unit`; called once to warm up, then again and again.
+    """One figure.
 
-    target: what it should stay at or below; None where it is only watched.
+    measure   does it once and returns the figure, in `unit`; called once to warm up, then again and again
+    target    what it should stay at or below; None where it is only watched
     """
 
     name: str

@@ -183,6 +183,5 @@ def answer(
         metrics=metrics,
         met={r.text: metrics[r.metric] < r.limit for r in experiment.requirements},
         coordinates=values,
-        splits=np.zeros(len(rows), dtype=np.int64),
-        clamped=np.zeros(len(rows), dtype=np.int64),
+        events={name: np.zeros(len(rows), dtype=np.int64) for name in ("splits", "clamped", "undecided")},
     )

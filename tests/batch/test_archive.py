@@ -40,7 +40,7 @@ def test_xarray_opens_a_single_experiment_as_it_is(here: Path, engine_name: str)
         for name, values in expected.metrics.items():
             np.testing.assert_array_equal(data[name], values)
         assert list(data.joint.values) == ["shoulder", "elbow"]
-        np.testing.assert_array_equal(data.time, np.arange(51) * 0.04)
+        np.testing.assert_array_equal(data.time, np.arange(51) * 4 / 100.0)
         assert {"case_id", "case_key", "gearbox.kp", "links.lower.mass"} <= set(data.coords)
         assert list(data.case_id.values) == keys.case_ids(plans.gains(7))
         assert data.qd.sel(joint="elbow", recorded_case=3).attrs["units"] == "rad/s"

@@ -92,7 +92,7 @@ class TestWhatIsKept:
         made = campaign.prepare(plans.plan(plans.gains(400_000)))
         assert not made.parts[0].recorded
         assert made.notes == (
-            "histories would take 1.1 GiB, over 1.0 GiB: metrics only are kept (`--histories all` keeps them; any case "
+            "histories would take 1.2 GiB, over 1.0 GiB: metrics only are kept (`--histories all` keeps them; any case "
             "can be run again alone: `--case '#0'`)",
         )
 
@@ -171,7 +171,7 @@ class TestRefusedBeforeAnythingRuns:
         usage = namedtuple("usage", "total used free")
         monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(10**9, 10**9 - 5000, 5000))
         assert self.run("a.h5") == (
-            "error[E306]: cannot write a.h5: it needs about 9.7 KiB, and the disk has 4.9 KiB left\n"
+            "error[E306]: cannot write a.h5: it needs about 65.7 KiB, and the disk has 4.9 KiB left\n"
             " = help: `--histories none` keeps metrics only; fewer signals in `record`, or a slower `rates.record`, "
             "take less\n"
             "\n1 error\n"
@@ -255,7 +255,7 @@ class TestWhatIsSaid:
         assert without_times(said) == (
             "nominal: 1 case, 2 s in 50 steps of 40 ms, modified_euler\n"
             "  histories: q, qd, tau, shoulder.servo.voltage; 51 rows, 2.8 KiB a case\n"
-            "writing two_link.h5, about 3.6 KiB\n"
+            "writing two_link.h5, about 56.2 KiB\n"
             "\n"
             "the case reached its end, in TIME\n"
             "  settle      5 s  settling_time of shoulder.qd\n"

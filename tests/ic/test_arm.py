@@ -130,7 +130,9 @@ def test_a_link_that_can_be_no_body_is_told_once(tmp_path: Path, link: str, code
 ])
 def test_a_joint_that_can_be_none_is_told(tmp_path: Path, joint: str, code: str) -> None:
     arm = changed(ARM, ("joint hinge revolute { parent = base; child = bar; axis = z; }", joint))
-    assert code in codes(tmp_path, arm, "run still { arm = swing; rates { dynamics = 1 kHz; } duration = 1 s; record = []; }")
+    assert code in codes(
+        tmp_path, arm, "run still { arm = swing; rates { dynamics = 1 kHz; } duration = 1 s; record = []; }"
+    )
 
 
 LINKS = "".join(f"link {name} {{ mass = 1 kg; shape = sphere(radius = 1 cm); }}\n" for name in "abcd")

@@ -63,8 +63,11 @@ def test_coordinates_are_si_and_remember_the_decks_unit(tmp_path: Path) -> None:
 
 
 def test_exclude_drops_rows_and_keeps_the_order(tmp_path: Path) -> None:
-    run = swept(tmp_path, "vary drive.kp = [1, 2] V*s/rad; vary links.bar.mass = [3, 4, 5] kg;"
-                          "exclude when drive.kp > 1.5 V*s/rad and not links.bar.mass < 3500 g or links.bar.mass == 5 kg;")
+    run = swept(
+        tmp_path,
+        "vary drive.kp = [1, 2] V*s/rad; vary links.bar.mass = [3, 4, 5] kg;"
+        "exclude when drive.kp > 1.5 V*s/rad and not links.bar.mass < 3500 g or links.bar.mass == 5 kg;",
+    )
     assert rows(run) == [(1, 3), (1, 4), (2, 3)]
 
 
@@ -95,8 +98,8 @@ def test_a_shapes_size_may_vary(tmp_path: Path) -> None:
 
 
 def test_a_derived_number_may_be_varied_itself(tmp_path: Path) -> None:
-    run = swept(tmp_path, "vary links.bar.inertia.zz = [0.2, 0.3] kg*m^2;")
-    assert values(run, "links.bar.inertia.zz").tolist() == [0.2, 0.3]
+    run = swept(tmp_path, "vary links.bar.inertia.xx = [0.2, 0.3] kg*m^2;")
+    assert values(run, "links.bar.inertia.xx").tolist() == [0.2, 0.3]
     assert run.parameters["links.bar.inertia.yy"].value == 2.0 / 12.0
 
 
@@ -163,7 +166,7 @@ def test_a_definition_and_one_of_its_joints_on_one_parameter_is_an_error(tmp_pat
     ("sample lhs(200) { drive.kp = uniform(1, 2) V*s/rad; }", "D120"),
     ("repeat 5; vary drive.kp = [1, 2] V*s/rad;", "D120"),
     ("duration = 3 s; vary drive.kp = [1, 2] V*s/rad;", "D136"),
-    ("vary drive.kp = linspace(1, 2, 1000000) V*s/rad; vary drive.ki = linspace(1, 2, 1000) V/rad;", "D134"),
+    ("vary drive.kp = linspace(1, 2, 10000) V*s/rad; vary drive.ki = linspace(1, 2, 10000) V/rad;", "D134"),
     ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kp > 0 V*s/rad;", "D139"),
     ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kp > 1.5;", "D063"),
     ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kq > 1 V*s/rad;", "D065"),
@@ -233,5 +236,5 @@ def test_an_exclusion_that_drops_nothing_is_warned_of(tmp_path: Path) -> None:
 
 def test_a_sweep_has_a_seed_of_its_own(tmp_path: Path) -> None:
     assert swept(tmp_path, "seed = 7; vary drive.kp = [1, 2] V*s/rad;").cases.seed == 7
-    assert experiment(tmp_path, ARM, SERVO, changed(RUN, ("record", "seed = 5; record"))).cases.seed == 5
+    assert experiment(tmp_path, ARM, SERVO, changed(RUN, ("duration", "seed = 5; duration"))).cases.seed == 5
     assert swept_codes(tmp_path, "seed = 7.5; vary drive.kp = [1, 2] V*s/rad;") == ["D113"]

@@ -58,20 +58,22 @@ def met(*words: str, **more: object) -> subprocess.CompletedProcess[str]:
 
 def test_help_lists_the_commands_in_the_order_of_work(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--help"]) == 0
-    listed = [line.split()[0] for line in capsys.readouterr().out.split("order of work:")[1].splitlines() if line[:2] == "  "]
+    lines = capsys.readouterr().out.split("order of work:")[1].splitlines()
+    listed = [line.split()[0] for line in lines if line.startswith("  ")]
     assert [word for word in listed if word in cli.ORDER] == [word for word in cli.ORDER if word in listed]
     assert {"check", "plan", "cases", "explain", "run", "show", "plot", "doc", "dump"} <= set(listed)
 
 
 def test_every_command_has_a_line_of_help_of_its_own() -> None:
-    lines = [cli.met.get_command(click.Context(cli.met), name) for name in cli.met.list_commands(click.Context(cli.met))]
-    helps = [line.get_short_help_str(100) for line in lines if line is not None]
+    context = click.Context(cli.met)
+    commands = [cli.met.get_command(context, name) for name in cli.met.list_commands(context)]
+    helps = [each.get_short_help_str(100) for each in commands if each is not None]
     assert all(helps) and len(set(helps)) == len(helps)
     assert all(not text.endswith("...") for text in helps), helps
 
 
 def test_the_table_of_setup_cfg_is_what_an_installed_package_says() -> None:
-    """In a checkout setup.cfg is read; where MET is installed, what the installer made of it. They are the same table."""
+    """In a checkout setup.cfg is read by us, elsewhere what the installer made of it: the same table."""
     setuptools_reads = {}
     from setuptools.config.setupcfg import read_configuration
 
@@ -84,7 +86,8 @@ def test_the_table_of_setup_cfg_is_what_an_installed_package_says() -> None:
 def test_another_package_can_offer_a_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = tmp_path / "my_arm-1.0.dist-info"
     made.mkdir()
-    (made / "entry_points.txt").write_text("[console_scripts]\nx = y:z\n\n[met.commands]\nwave = my_arm.cli:wave\n[other]\na = b:c\n")
+    table = "[console_scripts]\nx = y:z\n\n[met.commands]\nwave = my_arm.cli:wave\n[other]\na = b:c\n"
+    (made / "entry_points.txt").write_text(table)
     monkeypatch.syspath_prepend(str(tmp_path))
     assert EntryPoint("wave", "my_arm.cli:wave", "my_arm") in offered("met.commands")
 
@@ -118,21 +121,15 @@ def test_a_problem_is_rendered_once_on_stderr_and_ends_with_2(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def fail() -> None:
-        raise Problem(error("D999", "no such thing", Place("a.ic", 2, 3, 4), help="leave it out"), {"a.ic": "x\n  this\n"})
+        found = error("D999", "no such thing", Place("a.ic", 2, 3, 4), help="leave it out")
+        raise Problem(found, {"a.ic": "x\n  this\n"})
 
     offer(monkeypatch, fail=command(fail))
     assert cli.main(["fail"]) == 2
     out, err = capsys.readouterr()
     assert out == ""
     assert err == (
-        "error[D999]: no such thing\n"
-        " --> a.ic:2:3\n"
-        "  |\n"
-        "2 |   this\n"
-        "  |   ^^^^\n"
-        "  = help: leave it out\n"
-        "\n"
-        "1 error\n"
+        "error[D999]: no such thing\n --> a.ic:2:3\n  |\n2 |   this\n  |   ^^^^\n  = help: leave it out\n\n1 error\n"
     )
 
 
@@ -177,8 +174,9 @@ def test_a_defect_is_owned_in_one_paragraph_with_the_traceback_in_a_file(
     err = capsys.readouterr().err
     (report,) = tmp_path.glob("met-defect-*.txt")
     assert err == (
-        f"met: this is a defect of MET, not of what you gave it: ZeroDivisionError: division by zero. The traceback is in "
-        f"{report}; with -v it is printed. Please report it together with the deck and the command, `met divide`.\n"
+        "met: this is a defect of MET, not of what you gave it: ZeroDivisionError: division by zero. "
+        f"The traceback is in {report}; with -v it is printed. "
+        "Please report it together with the deck and the command, `met divide`.\n"
     )
     assert f"met {VERSION}, Python" in report.read_text()
     assert "return 1 / 0" in report.read_text()
@@ -187,7 +185,7 @@ def test_a_defect_is_owned_in_one_paragraph_with_the_traceback_in_a_file(
 def test_a_file_that_cannot_be_read_is_the_users_to_mend_not_a_defect(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    offer(monkeypatch, read=command(lambda: open("/no/such/file")))
+    offer(monkeypatch, read=command(lambda: Path("/no/such/file").read_text()))
     assert cli.main(["read"]) == 2
     assert capsys.readouterr().err == "error[E218]: `/no/such/file`: No such file or directory\n\n1 error\n"
 
@@ -206,14 +204,14 @@ def test_a_closed_pipe_ends_quietly() -> None:
 SLOW_TO_IMPORT = {"llvmlite", "h5py", "h5netcdf", "xarray", "pandas", "dask", "matplotlib", "scipy", "pint"}
 
 
-@pytest.mark.parametrize("words", [["check", "two_link.ic"], ["plan", "two_link.ic"], ["--version"], ["--help"], ["doc"]])
-def test_what_costs_a_tenth_of_a_second_is_not_imported(words: list[str]) -> None:
+@pytest.mark.parametrize("words", ["check two_link.ic", "plan two_link.ic", "--version", "--help", "doc"])
+def test_what_costs_a_tenth_of_a_second_is_not_imported(words: str) -> None:
     """Each of these packages takes 0.1 to 2 s to import, and none of these commands needs it."""
     program = (
         "import sys; from met.cli import main; status = main(sys.argv[1:]);"
         "print('IMPORTED', *sorted(name for name in sys.modules if '.' not in name)); sys.exit(status)"
     )
-    done = subprocess.run([sys.executable, "-c", program, *words], cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", program, *words.split()], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     imported = set(done.stdout.rpartition("IMPORTED")[2].split())
     assert "click" in imported

@@ -71,8 +71,8 @@ def test_two_tolerances_agree_so_the_digits_have_converged():
     fine = reference(times, rtol=1e-12, **drive)
     coarse = reference(times, rtol=1e-9, **drive)
     assert len(fine.events) == len(coarse.events) > 4
-    np.testing.assert_allclose(coarse.qd, fine.qd, atol=1e-9)
-    np.testing.assert_allclose(coarse.q, fine.q, atol=1e-9)
+    np.testing.assert_allclose(coarse.qd, fine.qd, atol=1e-12)
+    np.testing.assert_allclose(coarse.q, fine.q, atol=1e-12)
 
 
 def test_a_motion_started_from_a_later_servo_tick_is_the_same_motion():

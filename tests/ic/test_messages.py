@@ -1,0 +1,346 @@
+"""Whole messages, as a terminal without colours shows them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, told
+
+# ruff: noqa: E501 - messages are as wide as they are
+
+
+def shown(folder: Path, *parts: str) -> str:
+    """What is said of a deck, without the counting line."""
+    return told(check(folder, *parts)).rpartition("\n\n")[0] + "\n"
+
+
+def test_an_unknown_key(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, changed(SERVO, ("ratio = 100;", "ratio = 100; kpp = 3;")), RUN) == """\
+error[D141]: servo `drive` has no `kpp`
+ --> deck.ic:7:18
+  |
+7 |     ratio = 100; kpp = 3; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm; kt = 0.05 N*m/A;
+  |                  ^^^
+  = help: did you mean `kp`?
+  = help: it has: ratio, kp, ki, v_max, resistance, kt, tau_max, j_m, f_c, f_v, k_position, model, command, rate
+"""
+
+
+def test_a_wrong_unit(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, changed(SERVO, ("ratio = 100", "ratio = 36 mm")), RUN) == """\
+error[D061]: `ratio` of servo `drive` is a pure number, and this is in m
+ --> deck.ic:7:13
+  |
+7 |     ratio = 36 mm; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm; kt = 0.05 N*m/A;
+  |             ^^^^^
+  = help: leave the unit out; `%` is the only unit of a pure number
+"""
+
+
+def test_hertz_where_an_angular_rate_belongs(tmp_path: Path) -> None:
+    assert shown(tmp_path, "let slow = 0.1 Hz;\n", ARM, changed(SERVO, ("0.1 rad/s", "slow")), RUN) == """\
+error[D061]: the command of servo `drive` is in rad/s, and this is in 1/s
+  --> deck.ic:10:20
+   |
+10 |     command = rate(slow);
+   |                    ^^^^
+  ::: deck.ic:1:5  `slow` is defined here
+   = help: Hz counts cycles without an angle: write rad/s, deg/s, rpm or cycle/s
+"""
+
+
+def test_a_bare_number(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, changed(SERVO, ("0.1 V*s/rad", "0.1")), RUN) == """\
+error[D060]: `kp` of servo `drive` is in V*s/rad, and this is a bare number
+ --> deck.ic:7:23
+  |
+7 |     ratio = 100; kp = 0.1; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm; kt = 0.05 N*m/A;
+  |                       ^^^
+  = help: write `0.1 V*s/rad`
+"""
+
+
+def test_a_unit_inside_brackets_that_have_one(tmp_path: Path) -> None:
+    assert shown(tmp_path, changed(ARM, ("axis = z;", "axis = z; at = [0, 1 mm, 0] m;")), SERVO, RUN) == """\
+error[D062]: a unit inside brackets that have one after them, `m`
+ --> deck.ic:3:77
+  |
+3 |     joint hinge revolute { parent = base; child = bar; axis = z; at = [0, 1 mm, 0] m; }
+  |                                                                             ^^
+ ::: deck.ic:3:84  this one is for all the bare numbers inside
+  = help: give each number its own unit, or none of them
+"""
+
+
+def test_an_unknown_name(tmp_path: Path) -> None:
+    assert shown(tmp_path, changed(ARM, ("2 kg", "mas")), "let mass = 2 kg;\n", SERVO, RUN) == """\
+error[D065]: no value `mas`
+ --> deck.ic:2:23
+  |
+2 |     link bar { mass = mas; shape = rod(length = 1 m, along = x); }
+  |                       ^^^
+  = help: did you mean `mass`?
+"""
+
+
+def test_a_joint_loop(tmp_path: Path) -> None:
+    deck = (changed(ARM, ("parent = base", "parent = tip"), ("axis = z; }", "axis = z; }\n    link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n    joint wrist revolute { parent = bar; child = tip; axis = x; }")), SERVO, RUN)
+    assert shown(tmp_path, *deck) == """\
+error[D086]: these joints make a loop, which hangs on no base: bar -> tip -> bar
+ --> deck.ic:3:5
+  |
+3 |     joint hinge revolute { parent = tip; child = bar; axis = z; }
+  |     ^^^^^^^^^^^^^^^^^^^^ joint `hinge` closes it
+ ::: deck.ic:5:5  joint `wrist`
+  = help: one of them should have `parent = base;`
+"""
+
+
+def test_a_negative_mass_that_came_through_a_macro(tmp_path: Path) -> None:
+    deck = ("#define BAR(MASS) link bar { mass = MASS; shape = sphere(radius = 1 cm); }\n", changed(ARM, ("link bar { mass = 2 kg; shape = rod(length = 1 m, along = x); }", "BAR(-2 kg)")), SERVO, RUN)
+    assert shown(tmp_path, *deck) == """\
+error[D077]: `mass` of link `bar` must be above 0 kg
+ --> deck.ic:3:9
+  |
+3 |     BAR(-2 kg)
+  |         ^^^^^ this is -2 kg
+  = note: in expansion of macro BAR, used at deck.ic:3:5
+"""
+
+
+def test_an_inertia_that_no_body_has(tmp_path: Path) -> None:
+    deck = (changed(ARM, ("shape = rod(length = 1 m, along = x)", "inertia = [1, 1, 3] kg*m^2")), SERVO, RUN)
+    assert shown(tmp_path, *deck) == """\
+error[D087]: the inertia of link `bar` is no body's
+ --> deck.ic:2:29
+  |
+2 |     link bar { mass = 2 kg; inertia = [1, 1, 3] kg*m^2; }
+  |                             ^^^^^^^ principal moments 1, 1 and 3 kg*m^2; no body has one above the sum of the others
+  = help: inertia is about the centre of mass, in link axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2
+  = help: products have the sign of -sum(m x y)
+"""
+
+
+def test_a_link_in_the_air(tmp_path: Path) -> None:
+    deck = (changed(ARM, ("joint hinge", "link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n    joint hinge")), SERVO, RUN)
+    assert shown(tmp_path, *deck) == """\
+error[D099]: link `tip` hangs in the air: no joint of arm `swing` has it for a child
+ --> deck.ic:3:5
+  |
+3 |     link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }
+  |     ^^^^^^^^
+  = help: write `joint NAME revolute { parent = base; child = tip; axis = z; }`
+"""
+
+
+def test_rates_that_do_not_divide(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("servos = 1 kHz", "servos = 300 Hz"))) == """\
+error[D100]: `servos` at 300 Hz does not divide the base rate, 1000 Hz
+  --> deck.ic:14:40
+   |
+14 |     rates { dynamics = 1 kHz; servos = 300 Hz; record = 100 Hz; }
+   |                                        ^^^^^^ 1000/300 = 3.333
+  ::: deck.ic:14:24  base rate set here: the fastest, `dynamics`
+   = help: nearest that fit: 333.333 Hz, written (1000/3) Hz, 250 Hz (1000/4)
+   = help: or a base rate that all divide: `base = 3000 Hz;` in `rates`
+"""
+
+
+def test_a_duration_between_steps(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("1 s", "1.0005 s"))) == """\
+error[D101]: a duration of 1.0005 s is 1000.5 steps of the dynamics
+  --> deck.ic:15:16
+   |
+15 |     duration = 1.0005 s;
+   |                ^^^^^^^^
+  ::: deck.ic:14:24  a step is 0.001 s
+   = help: nearest that fit: 1 s, 1.001 s
+"""
+
+
+def test_an_unstable_step(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, changed(SERVO, ("1e-4", "1e-6")), RUN) == """\
+error[D104]: servo `drive` is unstable with modified_euler at this rate of the dynamics
+  --> deck.ic:14:24
+   |
+14 |     rates { dynamics = 1 kHz; servos = 1 kHz; record = 100 Hz; }
+   |                        ^^^^^ h * lambda = 2.5; the slowest rate that fits is 2000 Hz
+   = help: h * lambda must stay below 2; lambda is the fastest decay under this servo, on any arm
+"""
+
+
+def test_a_servo_on_no_joint(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("hinge = drive", "hing = drive"))) == """\
+error[D144]: no joint `hing` in arm `swing`
+  --> deck.ic:13:14
+   |
+13 |     servos { hing = drive; }
+   |              ^^^^
+   = help: did you mean `hinge`?
+   = help: joints: hinge
+"""
+
+
+def test_a_model_where_a_definition_belongs(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("hinge = drive", "hinge = rigid_gearbox"))) == """\
+error[D147]: `rigid_gearbox` is a servo model; a servo definition is needed here
+  --> deck.ic:13:22
+   |
+13 |     servos { hinge = rigid_gearbox; }
+   |                      ^^^^^^^^^^^^^
+   = help: `servo NAME { model = rigid_gearbox; ... }`, and `hinge = NAME;`
+"""
+
+
+def test_an_unknown_model(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, changed(SERVO, ("rigid_gearbox", "rigid_gearbx")), RUN) == """\
+error[D140]: no servo model `rigid_gearbx`
+ --> deck.ic:6:13
+  |
+6 |     model = rigid_gearbx;
+  |             ^^^^^^^^^^^^
+  = help: did you mean `rigid_gearbox`?
+  = help: servo models: rigid_gearbox
+"""
+
+
+def test_a_servo_without_a_command(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, changed(SERVO, ("    command = rate(0.1 rad/s);\n", "")), RUN) == """\
+error[D149]: servo `drive` has no command
+  --> deck.ic:12:22
+   |
+12 |     servos { hinge = drive; }
+   |                      ^^^^^
+   = help: write `command = rate(...);`, in the definition or for this joint
+   = help: rigid_gearbox takes rate(...), position(...), torque(...)
+"""
+
+
+def test_a_table_whose_times_do_not_rise(tmp_path: Path) -> None:
+    deck = (ARM, changed(SERVO, ("0.1 rad/s", "table(times = [0, 2, 1] s, values = [0, 1, 2] rad/s)")), RUN)
+    assert shown(tmp_path, *deck) == """\
+error[D156]: times of a table rise, and number 3, 1 s, follows 2 s
+ --> deck.ic:9:34
+  |
+9 |     command = rate(table(times = [0, 2, 1] s, values = [0, 1, 2] rad/s));
+  |                                  ^^^^^^^^^^^
+  = help: sort the points; for a jump, two times close together
+"""
+
+
+def test_a_table_with_a_value_too_many(tmp_path: Path) -> None:
+    deck = (ARM, changed(SERVO, ("0.1 rad/s", "table(times = [0, 2] s, values = [0, 1, 2] rad/s)")), RUN)
+    assert shown(tmp_path, *deck) == """\
+error[D154]: a table of 2 times and 3 values
+ --> deck.ic:9:34
+  |
+9 |     command = rate(table(times = [0, 2] s, values = [0, 1, 2] rad/s));
+  |                                  ^^^^^^^^
+ ::: deck.ic:9:53  values
+  = help: each time has its value
+"""
+
+
+def test_a_table_without_values(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, changed(SERVO, ("0.1 rad/s", "table(times = [0, 2] s)")), RUN) == """\
+error[D075]: `table` has no `values`
+ --> deck.ic:9:20
+  |
+9 |     command = rate(table(times = [0, 2] s));
+  |                    ^^^^^
+  = help: write `values = [...] rad/s;` (values at those times, as many)
+"""
+
+
+def test_an_unknown_channel(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("[q]", "[q, hinge.servo.volts]"))) == """\
+error[D125]: no channel `hinge.servo.volts`
+  --> deck.ic:16:18
+   |
+16 |     record = [q, hinge.servo.volts];
+   |                  ^^^^^^^^^^^^^^^^^
+   = help: did you mean `hinge.servo.voltage`?
+   = help: channels of `hinge`: hinge.q, hinge.qd, hinge.qdd, hinge.tau, hinge.servo.command, hinge.servo.voltage, hinge.servo.integral, hinge.servo.motor_rate, hinge.servo.motor_torque
+"""
+
+
+def test_an_unknown_metric(tmp_path: Path) -> None:
+    deck = (ARM, SERVO, changed(RUN, ("duration", "metric top = max { of = hinge.qd; }\n    require tip < 1 rad/s;\n    duration")))
+    assert shown(tmp_path, *deck) == """\
+error[D132]: no metric `tip`
+  --> deck.ic:16:13
+   |
+16 |     require tip < 1 rad/s;
+   |             ^^^
+   = help: did you mean `top`?
+   = help: metrics of this run: top
+"""
+
+
+def test_an_unknown_sweep_path(tmp_path: Path) -> None:
+    deck = (ARM, SERVO, RUN, "default sweep it of hold { vary links.bra.mass = [1, 2] kg; }\n")
+    assert shown(tmp_path, *deck) == """\
+error[D128]: no parameter `links.bra.mass` in this run
+  --> deck.ic:18:33
+   |
+18 | default sweep it of hold { vary links.bra.mass = [1, 2] kg; }
+   |                                 ^^^^^^^^^^^^^^
+   = help: did you mean `links.bar.mass`?
+"""
+
+
+def test_a_parameter_set_twice_in_a_sweep(tmp_path: Path) -> None:
+    deck = (ARM, SERVO, RUN, "default sweep it of hold {\n    vary drive.kp = [1, 2] V*s/rad;\n    vary hinge.servo.kp = [1, 2] V*s/rad;\n}\n")
+    assert shown(tmp_path, *deck) == """\
+error[D123]: `drive.kp` and `hinge.servo.kp` both set `hinge.servo.kp`
+  --> deck.ic:20:10
+   |
+20 |     vary hinge.servo.kp = [1, 2] V*s/rad;
+   |          ^^^^^^^^^^^^^^
+  ::: deck.ic:19:10  the first
+   = help: vary one of them, or different joints
+"""
+
+
+def test_a_sweep_over_structure(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, SERVO, RUN, "default sweep it of hold { vary rates.servos = [1, 2] kHz; }\n") == """\
+error[D122]: `rates.servos` cannot vary
+  --> deck.ic:18:33
+   |
+18 | default sweep it of hold { vary rates.servos = [1, 2] kHz; }
+   |                                 ^^^^^^^^^^^^
+   = help: it decides the program, which is one for the whole sweep in this version
+"""
+
+
+def test_a_bad_case(tmp_path: Path) -> None:
+    deck = (ARM, SERVO, RUN, "default sweep it of hold { vary links.bar.mass = [1000, 0, -1] g; }\n")
+    assert shown(tmp_path, *deck) == """\
+error[D077]: `mass` of link `bar` must be above 0 kg; case #1 breaks it, and 1 more
+  --> deck.ic:18:33
+   |
+18 | default sweep it of hold { vary links.bar.mass = [1000, 0, -1] g; }
+   |                                 ^^^^^^^^^^^^^^ this is 0 kg
+   = help: case #1: links.bar.mass = 0 g
+"""
+
+
+def test_several_runs(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, SERVO, RUN, "run other like hold { duration = 2 s; }\n") == """\
+error[D162]: this deck has 2 runs and sweeps, and none is marked `default`
+::: deck.ic:11:1  hold
+::: deck.ic:18:1  other
+ = help: name one: hold, other
+ = help: or write `default run ...` for one of them
+"""
+
+
+def test_a_fast_servo(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, changed(SERVO, ("1e-4", "2.5e-6")), RUN) == """\
+warning[D105]: servo `drive` is fast for the dynamics' step: h * lambda = 1
+  --> deck.ic:14:24
+   |
+14 |     rates { dynamics = 1 kHz; servos = 1 kHz; record = 100 Hz; }
+   |                        ^^^^^ h = 0.001 s
+   = help: stable below 2 with modified_euler, true to the motion below 0.5: at some 2000 Hz and more
+"""

@@ -1,0 +1,115 @@
+"""Units: pint, which knows them independently, agrees with every row of the table; angles compare as contracts say."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from met import units
+from met.units import UNITS, Dimension, parse_unit, same, suggest, text
+
+# what pint calls those that it names otherwise
+PINT_NAMES = {"%": "percent", "cycle": "turn", "t": "metric_ton", "um": "micrometer", "us": "microsecond",
+              "arcmin": "arcminute", "arcsec": "arcsecond", "mohm": "milliohm", "kohm": "kiloohm"}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def pint_registry():
+    pint = pytest.importorskip("pint", reason="the oracle of this test")
+    return pint.UnitRegistry()
+
+
+@pytest.mark.parametrize("name", [n for n in UNITS if n not in ("rpm", "cycle", "Hz", "kHz")])
+def test_every_unit_has_the_size_and_dimension_that_pint_gives_it(name, pint_registry):
+    quantity = pint_registry.Quantity(1.0, PINT_NAMES.get(name, name)).to_base_units()
+    mine = UNITS[name].measure
+    # pint multiplies the factors in another order than the table's constants do: a few roundings
+    assert mine.scale == pytest.approx(
+        quantity.to(_in_pint(mine.dimension, pint_registry)).magnitude, rel=1e-15 * 8
+    )
+
+
+def _in_pint(dimension: Dimension, registry):
+    # pint takes an angle for a pure number, and pure is also what it must come out as
+    product = registry.Quantity(1.0)
+    for name, exponent in zip(("m", "kg", "s", "A", "K"), dimension[:5], strict=True):
+        product = product * registry.Quantity(1.0, name) ** exponent
+    return product.units
+
+
+def test_turning_units_are_angles_a_time_and_hertz_is_not():
+    # pint is no oracle here: it makes 1 Hz one rad/s
+    assert parse_unit("rpm").scale == pytest.approx(2 * math.pi / 60, rel=1e-15)
+    assert parse_unit("cycle").scale == pytest.approx(2 * math.pi, rel=1e-15)
+    assert 60 * parse_unit("rpm").scale == pytest.approx(6.283185307179586, rel=1e-15)
+    assert same(parse_unit("rpm").dimension, parse_unit("deg/s").dimension)
+    assert not same(parse_unit("Hz").dimension, parse_unit("rpm").dimension)
+    assert same(parse_unit("kHz").dimension, parse_unit("1/ms").dimension)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "alike"),
+    [
+        ("N*m/A", "V*s/rad", True),
+        ("N*m", "J", True),
+        ("N*m/rad", "N*m", True),
+        ("V/rad", "V", True),
+        ("W", "N*m*rad/s", True),
+        ("rad", "1", False),
+        ("rad/s", "1/s", False),
+        ("rad/s^2", "rad/s", False),
+        ("deg", "cycle", True),
+        ("rad/m", "1/m", True),
+        ("m", "1", False),
+        ("%", "1", True),
+    ],
+)
+def test_an_angle_counts_only_where_the_rest_is_time_or_nothing(a, b, alike):
+    assert same(parse_unit(a).dimension, parse_unit(b).dimension) is alike
+
+
+@pytest.mark.parametrize(
+    ("written", "scale"),
+    [
+        ("1", 1.0), ("1/s", 1.0), ("mm^2", 1e-6), ("kg*m^2", 1.0), ("g*cm^2", 1e-7), ("N*m/(A*s)", 1.0),
+        ("N*m/(mA*ms)", 1e6), ("1/(kg*mm^2)", 1e6), ("V / (rad / s)", 1.0), ("m^-2", 1.0), ("mm^-1", 1e3), ("(mm)^2", 1e-6),
+    ],
+)  # fmt: skip
+def test_a_declared_unit_is_read_with_products_powers_and_parentheses(written, scale):
+    # powers and products of the scales: a few roundings
+    assert parse_unit(written).scale == pytest.approx(scale, rel=1e-15 * 8)
+
+
+@pytest.mark.parametrize("written", ["", "foo", "m*", "m/", "(m", "m)", "m^x", "m^99", "2*m", "m m", "m$", "m^", "*m", "()"])
+def test_a_declared_unit_that_cannot_be_read_is_refused_by_name(written):
+    with pytest.raises(ValueError, match="unit"):
+        parse_unit(written)
+
+
+def test_words_that_the_use_decides_can_be_given_a_meaning():
+    joint = {"joint": parse_unit("rad")}
+    assert parse_unit("rad/joint", joint).dimension == units.PURE
+    assert parse_unit("rad/joint", {"joint": parse_unit("m")}).dimension == Dimension(rad=1, m=-1)
+
+
+@pytest.mark.parametrize("name", [n for n in UNITS if n != "%"])
+def test_the_text_of_a_dimension_reads_back_as_that_dimension(name):
+    for exponent in (1, -1, 2):
+        dimension = UNITS[name].measure.dimension ** exponent / Dimension(s=1)
+        assert parse_unit(text(dimension)).dimension == dimension
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [("sec", "s"), ("Nm", "N*m"), ("Ohm", "ohm"), ("degrees", "deg"), ("RPM", "rpm"), ("kgs", "kg"), ("Metre", "m"),
+     ("hz", "Hz"), ("radd", "rad"), ("elephant", None), ("x" * 500, None)],
+)  # fmt: skip
+def test_a_word_that_is_no_unit_gets_the_unit_that_was_meant(wrong, right):
+    assert suggest(wrong) == right
+
+
+def test_a_product_with_a_name_that_is_no_unit_is_refused():
+    assert units.measure([("N", 1), ("m", 1), ("A", -1)]) == parse_unit("N*m/A")
+    with pytest.raises(ValueError, match="foo"):
+        units.measure([("foo", 1)])
