@@ -1,9 +1,9 @@
 """Campaigns: many cases, run into archives that xarray opens as they are.
 
-    import ic, batch
-    archive = batch.run(ic.compile("two_link.ic"))          # -> two_link.h5
-    data = archive.open()                                   # an xarray.Dataset, or a DataTree of several
-    data = batch.open("two_link.h5")                        # the same, later
+import ic, batch
+archive = batch.run(ic.compile("two_link.ic"))          # -> two_link.h5
+data = archive.open()                                   # an xarray.Dataset, or a DataTree of several
+data = batch.open("two_link.h5")                        # the same, later
 """
 
 from __future__ import annotations

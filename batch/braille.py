@@ -53,7 +53,10 @@ def draw(
         if span:
             ends.append((_dot(float(line[np.isfinite(line)][-1]), low, high, 4 * height) / 4, index))
 
-    at = {min(height - 1, _dot(tick, low, high, 4 * height) // 4): number for tick, number in zip(ticks, numbers, strict=True)}
+    at = {
+        min(height - 1, _dot(tick, low, high, 4 * height) // 4): number
+        for tick, number in zip(ticks, numbers, strict=True)
+    }
     beside = _spread(ends, height)
     out = [title]
     for row in range(height):

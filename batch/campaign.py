@@ -99,14 +99,14 @@ def prepare(
 ) -> Campaign:
     """Settle what will be run; raises Problem for anything that would stop it later, and writes nothing.
 
-    output       None: the deck's name with `.h5`, in the current folder
+    output       None: `default_output`, in the current folder
     experiments  names; None: all of the plan's
     cases        rows of the case table, `"#7"` or the beginning of a case_id; None: all
     histories    "default": all while the archive stays below 1 GiB, else none, and a note says so
     """
     chosen = _experiments(plan, experiments)
     selected = _selected(chosen, cases)
-    target = Path(output) if output is not None else default_output(plan, experiments)
+    target = Path(output) if output is not None else default_output(plan, experiments, selected)
     kept = {"default": True, "all": True, "none": False}[histories]
     parts = tuple(Part(e, rows, kept and history_bytes(e) > 0) for e, rows in selected)
     notes: list[str] = []
@@ -123,12 +123,23 @@ def prepare(
     return campaign
 
 
-def default_output(plan: Plan, experiments: Sequence[str] | None = None) -> Path:
-    """`two_link.h5`; `two_link.gains.h5` where runs are named. A deck of the standard library is called `<name>`."""
-    return Path(".".join([Path(plan.deck.strip("<>")).stem, *(experiments or ()), "h5"]))
+def default_output(
+    plan: Plan, experiments: Sequence[str] | None = None, selected: Sequence[tuple[Experiment, np.ndarray]] = ()
+) -> Path:
+    """`two_link.h5`; `two_link.gains.h5` where runs are named; `two_link.gains.case7.h5` for some of the cases.
+
+    So a case that is run again does not take its sweep's place. A deck of the standard library is called `<name>`.
+    """
+    names = [Path(plan.deck.strip("<>")).stem, *(experiments or ())]
+    chosen = [int(row) for _, rows in selected for row in rows]
+    if len(chosen) < sum(experiment.cases.count for experiment, _ in selected):
+        names.append("case" + "-".join(map(str, chosen)) if len(chosen) <= 4 else "cases")
+    return Path(".".join([*names, "h5"]))
 
 
-def perform(campaign: Campaign, *, threads: int | None = None, progress: Progress | None = None) -> list[dict[str, Any]]:
+def perform(
+    campaign: Campaign, *, threads: int | None = None, progress: Progress | None = None
+) -> list[dict[str, Any]]:
     """Run a campaign into its archive. What is unlike from one making to the next (times) is returned, and
     written beside the archive as `<archive>.run.json`. However this ends, no half file is left."""
     from batch.archive.provenance import machine
@@ -139,9 +150,7 @@ def perform(campaign: Campaign, *, threads: int | None = None, progress: Progres
     try:
         writer = Writer(temporary, campaign.plan, [(p.experiment, p.rows, p.recorded) for p in campaign.parts])
         try:
-            timings = [
-                _run_part(writer, index, part, threads, progress) for index, part in enumerate(campaign.parts)
-            ]
+            timings = [_run_part(writer, index, part, threads, progress) for index, part in enumerate(campaign.parts)]
             writer.finish()
             sidecar = {
                 "archive": campaign.output.name,
@@ -175,7 +184,11 @@ def _run_part(writer: Any, index: int, part: Part, threads: int | None, progress
             progress.advance(first + len(rows))
     if progress is not None:
         progress.end()
-    return {"experiment": part.experiment.name, "cases": len(part.rows), "seconds": round(time.perf_counter() - began, 6)}
+    return {
+        "experiment": part.experiment.name,
+        "cases": len(part.rows),
+        "seconds": round(time.perf_counter() - began, 6),
+    }
 
 
 def _from(progress: Progress, first: int) -> Any:
@@ -238,7 +251,8 @@ def _selected(
     for case in cases:
         matches = [(e, row) for e in experiments for row in _rows(e, case)]
         if not matches:
-            counts = ", ".join(f"`{e.name}` has #0 to #{e.cases.count - 1}" for e in experiments)
+            last = [(e.name, e.cases.count - 1) for e in experiments]
+            counts = ", ".join(f"`{name}` has #0 {f'to #{row}' if row else 'alone'}" for name, row in last)
             raise Problem(error("E311", f"no case `{_case_text(case)}`", help=[counts, "`met cases DECK` lists them"]))
         if len(matches) > 1 and not _is_row(case):
             some = ", ".join(f"#{row} of `{e.name}`" for e, row in matches[:4])
@@ -284,6 +298,8 @@ def _check_output(campaign: Campaign) -> None:
         what = "is a file, not a folder" if output.parent.exists() else "does not exist"
         helps = () if output.parent.exists() else f"make it first: `mkdir -p {output.parent}`"
         raise Problem(error("E305", f"cannot write {output}: {output.parent} {what}", help=helps))
+    if output.exists() and not output.is_file():
+        raise Problem(error("E305", f"cannot write {output}: it is not a regular file"))
     if output.exists() and output.stat().st_size > 0 and not is_archive(output):
         helps = "give another name with `-o`, or remove the file"
         raise Problem(error("E305", f"{output} exists and is no archive of MET: it is not written over", help=helps))
@@ -292,8 +308,11 @@ def _check_output(campaign: Campaign) -> None:
     probe.unlink()
     free = shutil.disk_usage(output.parent).free
     if campaign.bytes > free:
-        message = f"cannot write {output}: it needs about {size_text(campaign.bytes)}, and the disk has {size_text(free)} left"
-        helps = "`--histories none` keeps metrics only; fewer signals in `record`, or a slower `rates.record`, take less"
+        needs, has = size_text(campaign.bytes), size_text(free)
+        message = f"cannot write {output}: it needs about {needs}, and the disk has {has} left"
+        helps = (
+            "`--histories none` keeps metrics only; fewer signals in `record`, or a slower `rates.record`, take less"
+        )
         raise Problem(error("E306", message, help=helps))
 
 
@@ -304,10 +323,8 @@ def _cannot_write(output: Path, reason: OSError) -> Any:
 
 def size_text(size: float) -> str:
     """1536 -> `1.5 KiB`."""
-    for unit in ("B", "KiB", "MiB", "GiB"):
-        if size < 1024:
-            break
+    units = ["B", "KiB", "MiB", "GiB", "TiB"]
+    while size >= 1024 and len(units) > 1:
         size /= 1024
-    else:
-        unit = "TiB"
-    return f"{size:.0f} {unit}" if size >= 100 or unit == "B" else f"{size:.1f} {unit}"
+        units.pop(0)
+    return f"{size:.0f} {units[0]}" if size >= 100 or units[0] == "B" else f"{size:.1f} {units[0]}"

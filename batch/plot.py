@@ -26,7 +26,7 @@ FAN_CASES = 2000
 """A fan is drawn from this many cases at most, spread over all."""
 
 INK, FAINT = "#22282e", "#8a939c"
-PANEL_INCHES = 1.85
+PANEL_INCHES, MARKER = 1.85, 14
 SOFTWARE = "MET"
 
 STYLE: dict[str, Any] = {
@@ -87,9 +87,13 @@ def check_picture(output: Path) -> None:
     if output.is_dir():
         raise Problem(error("E305", f"cannot write {output}: it is a folder", help=f"`-o {output / 'plot.png'}`"))
     if output.suffix.lower() != ".png":
-        raise Problem(error("E326", f"cannot write {output}: pictures are PNG files", help=f"`-o {output.with_suffix('.png')}`"))
+        raise Problem(
+            error("E326", f"cannot write {output}: pictures are PNG files", help=f"`-o {output.with_suffix('.png')}`")
+        )
     if not output.parent.is_dir():
-        raise Problem(error("E305", f"cannot write {output}: {output.parent} is no folder", help=f"`mkdir -p {output.parent}`"))
+        raise Problem(
+            error("E305", f"cannot write {output}: {output.parent} is no folder", help=f"`mkdir -p {output.parent}`")
+        )
     if output.exists() and output.stat().st_size and not _own(output):
         message = f"{output} exists and was not drawn by MET: it is not written over"
         raise Problem(error("E305", message, help="give another name with `-o`, or remove the file"))
@@ -203,7 +207,11 @@ def _line(ax: Any, time: np.ndarray, y: np.ndarray, **style: Any) -> None:
 
 def _fan(ax: Any, time: np.ndarray, group: Group, panel: Panel, positions: list[int], line: int, colour: str) -> None:
     """Median, nine in ten, all."""
-    some = positions if len(positions) <= FAN_CASES else [positions[i] for i in np.linspace(0, len(positions) - 1, FAN_CASES).astype(int)]
+    some = (
+        positions
+        if len(positions) <= FAN_CASES
+        else [positions[i] for i in np.linspace(0, len(positions) - 1, FAN_CASES).astype(int)]
+    )
     values = np.stack([history(group, panel, position)[:, line] for position in some])
     good = np.isfinite(values).any(axis=0)
     time, values = time[good], values[:, good]
@@ -255,7 +263,9 @@ def _metrics(archive: ArchiveFile, group: Group) -> Any:
     metrics = group.role("metric")
     if not metrics:
         helps = "`--histories all` keeps histories; a `metric` in the deck gives a number a case"
-        raise Problem(error("E327", f"nothing to draw in `{group.name}`: it has neither histories nor metrics", help=helps))
+        raise Problem(
+            error("E327", f"nothing to draw in `{group.name}`: it has neither histories nor metrics", help=helps)
+        )
     varied = sorted(group.role("coordinate"), key=lambda v: -len(np.unique(group.values(v.name))))
     figure, axes = _grid(len(metrics), 1)
     x, x_label = group.values("case"), "case"
@@ -273,7 +283,9 @@ def _metrics(archive: ArchiveFile, group: Group) -> Any:
     if len(varied) > 1:
         handles, labels = axes[0][0].get_legend_handles_labels()
         if handles:
-            figure.legend(handles, labels, loc="outside right upper", fontsize=8)
+            figure.legend(
+                handles, labels, loc="outside right upper", fontsize=8, markerscale=_marker_scale(group.count)
+            )
     _title(figure, archive, group, f"{group.count:,} cases")
     return figure
 
@@ -285,8 +297,13 @@ def _shown(group: Group, variable: Stored) -> tuple[np.ndarray, str]:
     return group.values(variable.name) / scale, variable.name if unit == "1" else f"{variable.name}  ({unit})"
 
 
+def _marker_scale(count: int) -> float:
+    """How much smaller than alone a marker is among so many; the legend's are not."""
+    return 1.0 if count < 400 else 1.7 if count < 20_000 else 3.7
+
+
 def _scatter(ax: Any, group: Group, x: np.ndarray, y: np.ndarray, by: Stored | None) -> None:
-    size = 14 if len(x) < 400 else 5 if len(x) < 20_000 else 1
+    size = MARKER / _marker_scale(len(x)) ** 2
     if by is None:
         ax.scatter(x, y, s=size, color=COLOURS[0], linewidths=0, rasterized=True)
         return
@@ -311,10 +328,11 @@ def _scatter(ax: Any, group: Group, x: np.ndarray, y: np.ndarray, by: Stored | N
 def _grid(rows: int, columns: int) -> tuple[Any, list[list[Any]]]:
     """Panels under and beside one another, time shared."""
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     width = 8.6 if columns == 1 else 3.6 * columns + 2.2
-    figure = Figure(figsize=(width, PANEL_INCHES * max(rows, 1.5) + 1.0), layout="constrained")
-    figure.get_layout_engine().set(h_pad=0.05, w_pad=0.06, hspace=0.02)
+    engine = ConstrainedLayoutEngine(h_pad=0.05, w_pad=0.06, hspace=0.02)
+    figure = Figure(figsize=(width, PANEL_INCHES * max(rows, 1.5) + 1.0), layout=engine)
     axes = figure.subplots(rows, columns, sharex=True, sharey="row", squeeze=False)
     return figure, [list(row) for row in axes]
 
@@ -365,4 +383,3 @@ def _title(figure: Any, archive: ArchiveFile, group: Group, below: str) -> None:
     if below:
         height = figure.get_figheight()
         figure.text(0.012, 1.0 - 0.42 / height, below, fontsize=8.5, color=FAINT, ha="left", va="center")
-

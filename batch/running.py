@@ -34,9 +34,12 @@ def run_and_tell(
 ) -> bool:
     """Run a deck or a plan; True where every case reached its end and met its requirements."""
     say = (lambda *_: None) if quiet or json else print
-    plan = read_plan(source, names, everything=everything, defines=defines, include_dirs=include_dirs, quiet=quiet or json)
-    target = output or str(default_output(plan, ("all",) if everything else names))
-    campaign = prepare(plan, output=target, experiments=names or None, cases=cases or None, histories=histories)
+    plan = read_plan(
+        source, names, everything=everything, defines=defines, include_dirs=include_dirs, quiet=quiet or json
+    )
+    if everything and output is None:
+        output = str(default_output(plan, ("all",)))
+    campaign = prepare(plan, output=output, experiments=names or None, cases=cases or None, histories=histories)
     say("\n".join(announcement(campaign, verbose, notes=verbose or is_plan(source))))
     timings = perform(campaign, threads=threads, progress=None if quiet or json else Bar())
     with ArchiveFile(campaign.output) as file:
@@ -46,7 +49,7 @@ def run_and_tell(
     if json:
         print(verdict_json(campaign, summaries, picture, timings, ok))
     else:
-        say("\n".join(told(campaign, summaries, picture, excuse, timings, ok)))
+        say("\n".join(told(source, campaign, summaries, picture, excuse, timings, ok)))
     return ok
 
 
@@ -133,7 +136,7 @@ def _part_lines(part: Part, verbose: bool) -> list[str]:
 
 
 def told(
-    campaign: Campaign, summaries: tuple[Summary, ...], picture: Path | None, excuse: str,
+    source: str, campaign: Campaign, summaries: tuple[Summary, ...], picture: Path | None, excuse: str,
     timings: list[dict[str, Any]], ok: bool,
 ) -> list[str]:  # fmt: skip
     """The verdict, and where everything is."""
@@ -150,7 +153,7 @@ def told(
         out.append(f"picture  none: {excuse}")
     out.append(f"next     met show {_quoted(path)}")
     if not any(summary.recorded for summary in summaries) and campaign.parts[0].experiment.structure.record:
-        out.append(f"         met run {_quoted(campaign.plan.deck.strip('<>'))} {summaries[0].name} --case '#0'")
+        out.append(f"         met run {_quoted(source)} {summaries[0].name} --case '#0'")
     if not ok:
         out.append(f"exit 1: {_why_not(summaries)}")
     return out
@@ -181,7 +184,8 @@ def verdict_json(
         "picture": None if picture is None else str(picture),
         "notes": list(campaign.notes),
         "experiments": [
-            {**as_json(summary), "seconds": timing["seconds"]} for summary, timing in zip(summaries, timings, strict=True)
+            {**as_json(summary), "seconds": timing["seconds"]}
+            for summary, timing in zip(summaries, timings, strict=True)
         ],
     }
     return json_module.dumps(data, indent=1)

@@ -49,7 +49,9 @@ def as_json(archive: ArchiveFile, experiments: Sequence[str] = ()) -> str:
         {
             **outcomes.as_json(summary_of(group)),
             "attributes": group.attributes,
-            "variables": [{"name": v.name, "role": v.role, "dims": v.dims, "unit": v.unit} for v in group.variables.values()],
+            "variables": [
+                {"name": v.name, "role": v.role, "dims": v.dims, "unit": v.unit} for v in group.variables.values()
+            ],
         }
         for group in chosen(archive, experiments)
     ]
@@ -114,7 +116,9 @@ def _counts(summary: Summary) -> str:
     if summary.cases == 1:
         return "the case failed" if summary.failed else "the case reached its end"
     done = summary.cases - summary.failed
-    return f"{done:,} of {summary.cases:,} cases reached their end" + (f", {summary.failed:,} failed" if summary.failed else "")
+    return f"{done:,} of {summary.cases:,} cases reached their end" + (
+        f", {summary.failed:,} failed" if summary.failed else ""
+    )
 
 
 def _metric_table(summary: Summary) -> list[str]:
@@ -122,7 +126,9 @@ def _metric_table(summary: Summary) -> list[str]:
     head = ("", "", "") if single else ("min", "median", "max")
     rows = [("", *(head[:1] if single else head), "", "")]
     for metric in summary.metrics:
-        rows.append((metric.name, *_metric_numbers(metric, single), pretty_unit(metric.unit), _metric_words(metric, single)))
+        rows.append(
+            (metric.name, *_metric_numbers(metric, single), pretty_unit(metric.unit), _metric_words(metric, single))
+        )
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     out = []
     for row in rows[1:] if single else rows:

@@ -37,7 +37,9 @@ def panels(group: Group, names: Sequence[str] = ()) -> list[Panel]:
     signals = {variable.name: variable for variable in group.role("signal")}
     if not signals:
         message = f"no histories of `{group.name}` are in the archive"
-        raise Problem(error("E323", message, help="run it again with `--histories all`, or one case alone: `--case '#0'`"))
+        raise Problem(
+            error("E323", message, help="run it again with `--histories all`, or one case alone: `--case '#0'`")
+        )
     out: list[Panel] = []
     for name in names or signals:
         if name in signals:
@@ -96,7 +98,7 @@ def pretty_unit(unit: str) -> str:
 
 
 def number_text(value: float) -> str:
-    """Four digits that mean something, without an exponent where it can be read without: `20100`, `0.0025`, `1.2e-05`."""
+    """Four digits that mean something, without an exponent where it reads well without: `20100`, `0.0025`."""
     if not math.isfinite(value) or value == 0.0:
         return f"{value + 0.0:g}"
     size = math.floor(math.log10(abs(value)) + 1e-12)

@@ -20,7 +20,7 @@ __all__ = ["check", "compile"]
 
 def check(path: str | PathLike[str], *, include_dirs: Iterable[str | PathLike[str]] = (), defines: Iterable[str] = (),
           select: Sequence[str] | Literal["all"] | None = "all") -> Compiled:
-    """The plan of all runs and sweeps, or None, with all diagnostics and every file's text. A mistake raises nothing."""
+    """The plan of all runs and sweeps or None, all diagnostics, every file's text. A mistake raises nothing."""
     from ic.lower import check as lowered
 
     return lowered(path, include_dirs=tuple(include_dirs), defines=tuple(defines), select=select)

@@ -50,7 +50,7 @@ class Explanation:
 
 def explain(path: str | PathLike[str], target: str, *, include_dirs: Sequence[str | PathLike[str]] = (),
             defines: Sequence[str] = (), select: Select = None) -> tuple[Explanation, ...]:
-    """Every parameter that `target` names: a parameter's own path, or a definition's (`gearbox.kp`: all that follow it).
+    """Every parameter that `target` names: by its own path, or by a definition's (`gearbox.kp`: all that follow it).
 
     Raises Problem with the deck's errors, or D163 where the path names nothing.
     """

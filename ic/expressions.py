@@ -153,7 +153,8 @@ class Expressions(Cursor):
             return None
         start = self.at
         product = self.unit_product(start, 1, 0)
-        assert product is not None
+        if product is None:  # a path or a block begins with this name
+            return None
         factors, self.at = product
         if self.token.text == "^":
             self.fail("D030", "a unit's exponent is a whole number from -9 to 9", self.following,

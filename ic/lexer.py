@@ -222,6 +222,8 @@ class Lexer:
     def input(self, text: str) -> None:
         lines = list(logical_lines(Text("", text)))
         self._left = [token for line in lines for token in line if token.text != "\n"][::-1]
+        if not self._left:  # two empty arguments pasted
+            self._left = [Token(SPACE, " ", Text("", text), 0, 1)]
         self.made.append((text, len(self._left)))
 
     def token(self) -> Token | None:

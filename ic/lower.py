@@ -96,7 +96,7 @@ def chosen(definitions: Definitions, complaints: Complaints, select: Select) -> 
         names = [select] if isinstance(select, str) else list(dict.fromkeys(select))
         for name in names:
             if name not in known:
-                complaints.error("D160", f"no run or sweep `{name}` in this deck",
+                complaints.error("D164", f"no run or sweep `{name}` in this deck",
                                  help=[*did_you_mean(name, known), known_words("it has", known)])
         return [known[name] for name in names if name in known]
     defaults = [definition for definition in known.values() if definition.default]

@@ -325,8 +325,9 @@ class Macros(Pcpp):
         made: list[Token] = self.macro_expand_args(macro, arguments)
         for text, count in self.lexer.made:
             if count != 1:
-                self.findings.error("D019", f"`##` makes `{text[:LONGEST_NAME]}`, which is not one token", token.place,
-                                    also=(self._defined_at(macro),))  # fmt: skip
+                message = f"`##` makes `{text[:LONGEST_NAME]}`, which is not one token"
+                self.findings.error("D019", message, token.place, also=(self._defined_at(macro),))
+                return [Token(BAD, "", token.source, token.offset, token.length)]
         return made
 
     def _check_made(self, token: Token, made: list[Token]) -> None:

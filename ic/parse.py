@@ -190,8 +190,8 @@ class _Parser(Expressions):
         """`require settle < 10 s;`: which of the names belong to the value is seen from what follows them."""
         token = self.token
         count = _words_before_value(names, bool(tail), token)
-        if count == len(names) and not (self.begins_value() or token.text in ("-", "+", "!")):
-            self.no_statement(names, token)
+        if count == 0 or (count == len(names) and not (self.begins_value() or token.text in ("-", "+", "!"))):
+            self.no_statement([*names, *tail], token)
         self.at = start + count
         words = names[:count]
         value = self.value()

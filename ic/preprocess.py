@@ -115,6 +115,7 @@ class _Preprocessor(Macros):
         self.output: list[Token] = []
         self.command_line: tuple[SourceText, ...] = ()
         self._including: list[tuple[FoundFile, Text]] = []
+        self._entered: list[Place] = []
         self._ifs: list[list[_If]] = []
         self._once: set[str] = set()
         self._included = 0
@@ -139,12 +140,13 @@ class _Preprocessor(Macros):
             self.define(self.tokenstrip(line))
 
     def read_deck(self, file: FoundFile) -> None:
-        self._read(file, Text(file.name, self.files.text(file)))
         source = Text(file.name, self.files.text(file))
+        self._read(file, source, source.place(0, 1))
         self.output.append(Token(END, "", source, len(source.text.rstrip()), 1))
 
-    def _read(self, file: FoundFile, source: Text) -> None:
+    def _read(self, file: FoundFile, source: Text, at: Place) -> None:
         self._including.append((file, source))
+        self._entered.append(at)
         self._ifs.append([])
         for token in self.parsegen("", source):
             kind = token.kind
@@ -161,6 +163,7 @@ class _Preprocessor(Macros):
                 help=f"`{source.name}` ends without its `#endif`",
             )  # fmt: skip
         self._including.pop()
+        self._entered.pop()
 
     def group_lines(self, _text: str, source: Text) -> Iterable[list[Token]]:
         """The lines that pcpp works on. Those that `#if` leaves out are lexed, since a comment may begin there."""
@@ -205,7 +208,7 @@ class _Preprocessor(Macros):
             return ()
         self._included += 1
         if len(self._including) > INCLUDE_DEPTH:
-            self._too_deep(file, at)
+            self._too_deep(at)
         if self._included > MOST_INCLUDES:
             self._give_up("D018", f"more than {MOST_INCLUDES} files are included", at)
         try:
@@ -215,7 +218,7 @@ class _Preprocessor(Macros):
                 *(d if d.at else Diagnostic(d.code, d.message, Label(at), d.also, d.help) for d in problem.diagnostics)
             )
             return ()
-        self._read(file, Text(file.name, text, ((source.name, directive.line), *source.included)))
+        self._read(file, Text(file.name, text, ((source.name, directive.line), *source.included)), at)
         return ()
 
     def _header(self, tokens: list[Token], directive: Token) -> tuple[str, bool, Place] | None:
@@ -246,15 +249,15 @@ class _Preprocessor(Macros):
         self._nothing_after(rest, "#include")
         return name, angled, at
 
-    def _too_deep(self, file: FoundFile, at: Place) -> None:
-        chain = [found.identity for found, _ in self._including]
-        if file.identity in chain:
-            names = [found.name for found, _ in self._including]
-            loop = [*names[len(chain) - 1 - chain[::-1].index(file.identity) :], file.name]
-            self._give_up(
-                "D006", f"circular include: {' -> '.join(loop)}", at,
-                help="`#pragma once` at the head of a file lets it be read only once",
-            )  # fmt: skip
+    def _too_deep(self, at: Place) -> None:
+        """Tells the circle that includes go in, at the include that closes it, or just that they go too deep."""
+        chain = [file.identity for file, _ in self._including]
+        for last, identity in enumerate(chain):
+            first = chain.index(identity)
+            if first < last:
+                loop = " -> ".join(file.name for file, _ in self._including[first : last + 1])
+                help = "`#pragma once` at the head of a file lets it be read only once"
+                self._give_up("D006", f"circular include: {loop}", self._entered[last], help=help)
         self._give_up("D006", f"includes go deeper than {INCLUDE_DEPTH} files", at)
 
     # directives

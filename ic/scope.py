@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,12 +18,12 @@ from ic.complaints import Complaints, did_you_mean
 from ic.names import Names
 from ic.resolve import Definitions, Item
 from ic.syntax import Call, Expression, Name
+from ic.unit_words import in_deck, unit_here
 from ic.values import Value, Values, place_of
 from met import units
-from met.channel import joint_unit
 from met.diagnostic import Label, Place, Problem, error
 from met.parameter import Parameter
-from met.plan import Joint, JointKind, Origin, Quantity
+from met.plan import JointKind, Origin, Quantity
 from met.trace import Graph, Real, Scalar
 from met.units import PURE, Dimension
 
@@ -274,7 +273,7 @@ class Scope:
         self.checks.fail(owner.join(wanted.name))
         unit = self.unit(owner, wanted)[0]
         shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
-        shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {unit}"
+        shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {in_deck(unit)}"
         self.complaints.error("D075", f"{owner.label} has no `{wanted.name}`", owner.place,
                               help=f"write `{wanted.name} = {shown};` ({wanted.doc})")
 
@@ -344,7 +343,7 @@ class Scope:
 
     def unit(self, owner: Owner, wanted: Parameter) -> tuple[str, Dimension]:
         """The unit wanted here, in SI, as text and dimension."""
-        return _unit(wanted.unit, owner.joint, owner.command, owner.of)
+        return unit_here(wanted.unit, owner.joint, owner.command, owner.of)
 
     def check_dimension(self, owner: Owner, wanted: Parameter, value: Value) -> None:
         """Raises D060 for a bare number where there is a dimension, D061 for a wrong one."""
@@ -354,7 +353,9 @@ class Scope:
         what = owner.what(wanted)
         also = self.names.label(value)
         if value.dimension == PURE:
-            shown = f"`{value.number:g} {text}`" if not isinstance(value.number, Scalar) else f"a number in {text}"
+            shown = (
+                f"`{value.number:g} {in_deck(text)}`" if not isinstance(value.number, Scalar) else f"a number in {text}"
+            )
             raise Problem(error(
                 "D060", f"{what} is in {text}, and this is a {'bare' if value.bare else 'pure'} number", value.place,
                 also=also, help=f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}"))
@@ -402,14 +403,3 @@ class Scope:
 def _origin(item: Item, place: Place) -> Origin:
     note = f"from `{item.value.text}`" if isinstance(item.value, Name) else ""
     return Origin("deck", place, item.overrides, note)
-
-
-@lru_cache(maxsize=4096)
-def _unit(written: str, joint: JointKind, command: str | None, of: str | None) -> tuple[str, Dimension]:
-    text = joint_unit(written, Joint("", joint, "", ""), command)
-    names = {} if of is None else {"of": units.parse_unit(of)}
-    measure = units.parse_unit(text, names)
-    if measure.dimension == PURE:
-        return "1", PURE
-    simple = measure.scale == 1.0 and not names.keys() & set(text.replace("*", " ").replace("/", " ").split())
-    return (text if simple else of if text == "of" and of else units.text(measure.dimension)), measure.dimension

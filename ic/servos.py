@@ -13,6 +13,7 @@ from ic.resolve import Block, Item, open_call, overlay
 from ic.schedule import Rate
 from ic.scope import Owner, Scope
 from ic.syntax import Call, Name, Word
+from ic.unit_words import in_deck
 from ic.values import place_of
 from met import models
 from met.channel import COMMAND_UNIT
@@ -98,11 +99,28 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
         return None
     parameters = use_model(scope, owner, servo.parameters, block, NOT_PARAMETERS)
     command = _command(scope, owner, servo, block.get("command"), place)
+    if command is not None:
+        _check_needed(scope, owner, servo, command, block, place)
     rate = None
     if block.get("rate") is not None:
         rate = fixed_rate(scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`")
     scope.whole[f"{item.name}.servo.model"] = "decides the program, which is one for the whole sweep in this version"
     return Use(item.name, name, servo, command, rate, parameters, item.place)
+
+
+def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, block: Block, used: Place) -> None:
+    """What this kind of command needs is written."""
+    item = block.get("command")
+    place = place_of(item.value) if item is not None and item.value is not None else used
+    for parameter in servo.parameters:
+        if command.kind in parameter.needed_for and block.get(parameter.name) is None:
+            message = f"{owner.label} needs `{parameter.name}` under a {command.kind} command"
+            scope.complaints.error(
+                "D160",
+                message,
+                place,
+                help=f"write `{parameter.name} = ... {in_deck(scope.unit(owner, parameter)[0])};`: {parameter.doc}",
+            )
 
 
 def fixed_rate(scope: Scope, owner: Owner, item: Item, label: str, name: str = "rate") -> Rate | None:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import cast
 
 from ic.complaints import did_you_mean, known_words
 from ic.syntax import Binary, Call, Expression, List, Name, Number, String, Unary, Unit, WithUnit
@@ -129,7 +130,7 @@ def _with_unit(expression: WithUnit, lookup: Lookup) -> Value | Values:
                 "D062", f"a value in {units.text(value.dimension)} inside brackets that have a unit after them",
                 value.place, also=[Label(expression.unit.place, "this unit is for pure numbers")],
                 help="leave the unit after the brackets out, and give each bare number its own"))
-        number = _sound(measure.to_si(value.number), value.place)
+        number = _sound(measure.to_si(cast(float, value.number)), value.place)  # a scalar divides and multiplies too
         return Value(number, measure.dimension, value.place, unit=expression.unit)
 
     return apply(evaluate(expression.inner, lookup))

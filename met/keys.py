@@ -29,7 +29,7 @@ SILENT_FIELDS = frozenset({"place", "definition", "shape", "doc", "unit"})
 
 
 def structure_key(structure: Structure, inputs: Iterable[str] = ()) -> str:
-    """Key of the program that a structure makes. inputs: what is brought by each case instead of folded in, in order."""
+    """Key of the program that a structure makes. inputs: what each case brings instead of being folded in."""
     return _digest(["structure", _described(structure), list(inputs)])
 
 

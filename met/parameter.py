@@ -22,6 +22,7 @@ class Parameter:
 
     `default` None means that the deck must write it. The bounds are in SI: `above` and `below` exclude their
     value, `at_least` and `at_most` include it. `words` lists what a word may be. A list or a word cannot vary in a sweep.
+    `needed_for` names the kinds of command of a servo under which a parameter with a default must be written all the same.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Parameter:
     at_most: float | None = None
     shape: Shape = "number"
     words: tuple[str, ...] = ()
+    needed_for: tuple[str, ...] = ()
     source: str = ""
 
 

@@ -189,5 +189,3 @@ def _array(data: Any, where: str, fetch: Fetch | None) -> np.ndarray:
 def _expect(truth: bool, where: str, what: str) -> None:
     if not truth:
         raise Damaged(where, f"it should be {what}")
-
-

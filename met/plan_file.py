@@ -83,7 +83,9 @@ def read(path: str | os.PathLike[str]) -> Plan:
 def dumps(plan: Plan, refer: Refer | None = None) -> str:
     """A plan as canonical JSON. refer: what to write in place of a large table's coordinate; None: all values."""
     kept_elsewhere = [refer is not None and experiment.cases.count > INLINE_ROWS for experiment in plan.experiments]
-    bare = [_without_values(e) if elsewhere else e for e, elsewhere in zip(plan.experiments, kept_elsewhere, strict=True)]
+    bare = [
+        _without_values(e) if elsewhere else e for e, elsewhere in zip(plan.experiments, kept_elsewhere, strict=True)
+    ]
     body = encode(Plan, replace(plan, experiments=tuple(bare)))
     for experiment, written, elsewhere in zip(plan.experiments, body["experiments"], kept_elsewhere, strict=True):
         if refer is not None and elsewhere:
@@ -203,7 +205,9 @@ def _read_table(plan: Path, name: str) -> tuple[np.ndarray, str]:
     try:
         data = plan.with_name(name).read_bytes()
     except OSError as reason:
-        raise Damaged("", f"its case table {name}, which should lie beside it, cannot be read: {_why(reason)}") from reason
+        raise Damaged(
+            "", f"its case table {name}, which should lie beside it, cannot be read: {_why(reason)}"
+        ) from reason
     try:
         array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
     except (ValueError, EOFError, OSError) as reason:

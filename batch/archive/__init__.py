@@ -1,1 +1,1 @@
-"""Archives: results as HDF5 files that xarray opens as they are (docs/archive.md)."""
+"""Archives: results as HDF5 files that xarray opens as they are."""

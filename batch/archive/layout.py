@@ -174,7 +174,9 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
     ]
     out += [_coordinate(experiment, coordinate) for coordinate in experiment.cases.coordinates]
     out += [
-        variable("status", "int8", "how the case ended", flag_values=np.array([0, 1], np.int8), flag_meanings="done failed"),
+        variable(
+            "status", "int8", "how the case ended", flag_values=np.array([0, 1], np.int8), flag_meanings="done failed"
+        ),
         variable("cause", "str", "why the case failed; empty where it did not"),
         variable("n_valid", "int64", "recorded rows before the case failed; after them, not-a-number"),
         *(variable(f"friction_{name}", "int64", words) for name, words in EVENTS.items()),
@@ -184,12 +186,21 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         name = use.name if use.name not in taken else f"metrics.{use.name}"
         unit = metric_unit(experiment, use)
         words = f"{use.model} of {use.of}"
-        out.append(Variable(name, "float64", ("case",), "metric", words, unit, {"model": use.model, "of": use.of}, use.name))
+        out.append(
+            Variable(name, "float64", ("case",), "metric", words, unit, {"model": use.model, "of": use.of}, use.name)
+        )
     if experiment.requirements:
         flags = {"flag_values": np.array([1, 0, -1], np.int8), "flag_meanings": "met missed unknown"}
         out += [
             Variable("requirement", "str", ("requirement",), "dimension", "the requirement, as the deck wrote it"),
-            Variable("met", "int8", ("case", "requirement"), "requirement", "whether the requirement is met", attributes=flags),
+            Variable(
+                "met",
+                "int8",
+                ("case", "requirement"),
+                "requirement",
+                "whether the requirement is met",
+                attributes=flags,
+            ),
         ]
     return out
 

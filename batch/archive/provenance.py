@@ -29,7 +29,12 @@ class Revision:
         quiet = {**os.environ, "GIT_OPTIONAL_LOCKS": "0"}
         try:
             self._process = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=quiet
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                text=True,
+                env=quiet,
             )
         except OSError:
             self._process = None

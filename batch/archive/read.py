@@ -91,7 +91,9 @@ class Group:
             helps = f"cases here: #{rows[0]} to #{rows[-1]}, {len(rows)} of them; or the beginning of a case_id"
             raise Problem(error("E321", f"no case `{wanted}` in `{self.name}`", help=helps))
         some = ", ".join(self.values("case_id")[found[:4]])
-        raise Problem(error("E322", f"case `{wanted}` may be any of {len(found)}: {some} ...", help="give more of its id"))
+        raise Problem(
+            error("E322", f"case `{wanted}` may be any of {len(found)}: {some} ...", help="give more of its id")
+        )
 
 
 class ArchiveFile:
@@ -111,7 +113,9 @@ class ArchiveFile:
             raise Problem(error("E302", f"{path} is an HDF5 file, but no archive of MET"))
         if attributes["schema_version"] > VERSION:
             self._file.close()
-            message = f"{path} was written by a newer MET: schema {attributes['schema_version']}, known here is {VERSION}"
+            message = (
+                f"{path} was written by a newer MET: schema {attributes['schema_version']}, known here is {VERSION}"
+            )
             raise Problem(error("E303", message, help="update MET; xarray can open the file meanwhile"))
         self.deck = str(attributes["deck"])
 

@@ -166,7 +166,9 @@ class Writer:
         if count:
             for name, attribute in sources.items():
                 dataset = group.create_dataset(name, (count,), dtype=text, track_order=True)
-                dataset[...] = np.array([_text(getattr(source, attribute)) for source in self.plan.sources], dtype=object)
+                dataset[...] = np.array(
+                    [_text(getattr(source, attribute)) for source in self.plan.sources], dtype=object
+                )
             group["source"].make_scale("source")
             for name in list(sources)[1:]:
                 group[name].dims[0].attach_scale(group["source"])

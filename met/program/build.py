@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from met.integrators.integrator import Motion, Slope
+from met.parameter import Memory, State
 from met.plan import Experiment
 from met.program import friction
 from met.program.evaluation import Derivative, derivative, drive_of, state_names
@@ -103,7 +104,8 @@ class Builder:
             for name in ("q", "qd"):
                 tape.write(f"{joint}.{name}", self.machine.value(f"initial.{joint}.{name}", tape.read))
         for actuator in self.machine.working:
-            for part in (*actuator.servo.memory, *actuator.servo.states):
+            parts: tuple[Memory | State, ...] = (*actuator.servo.memory, *actuator.servo.states)
+            for part in parts:
                 tape.write(f"{actuator.path}.{part.name}", part.start)
         for name, metric, _ in self.machine.metrics:
             for memory in metric.memory:

@@ -154,7 +154,7 @@ class Machine:
         numbers = {link.name: index for index, link in enumerate(self._link_order())}
 
         def vector(path: str) -> tuple[Real, Real, Real]:
-            return tuple(self.value(f"{path}.{axis}", read) for axis in "xyz")  # type: ignore[return-value]
+            return tuple(self.value(f"{path}.{axis}", read) for axis in "xyz")
 
         joints = {joint.child: joint for joint in self.structure.joints}
         bodies = []
@@ -174,7 +174,7 @@ class Machine:
                     axis=(0.0, 0.0, 1.0) if joint.kind == "fixed" else vector(f"{joint.name}.axis"),
                     mass=self.value(f"links.{link.name}.mass", read),
                     com=vector(f"links.{link.name}.com"),
-                    inertia=inertia,  # type: ignore[arg-type]
+                    inertia=inertia,
                 )
             )
         return Tree.build(tuple(bodies), tuple(joint.name for joint in self.joints))

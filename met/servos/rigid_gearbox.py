@@ -82,7 +82,7 @@ SERVO = Servo(
         Parameter(name="f_c", unit="N*m", default=0.0, at_least=0.0, doc="Coulomb friction at the motor", source=TABLE_1),
         Parameter(name="f_v", unit="N*m*s/rad", default=0.0, at_least=0.0, doc="viscous friction at the motor", source=TABLE_1),
         Parameter(
-            name="k_position", unit="1/s", default=0.0, at_least=0.0,
+            name="k_position", unit="1/s", default=0.0, at_least=0.0, needed_for=("position",),
             doc="gain from position error to rate asked, used under a position command alone",
         ),
     ),

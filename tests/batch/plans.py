@@ -59,7 +59,9 @@ def structure(ticks: int = 200, record: int = 4) -> Structure:
         record=(
             Recorded("q", tuple(f"{joint}.q" for joint in both), both, ("rad",), "joint position"),
             Recorded("qd", tuple(f"{joint}.qd" for joint in both), both, ("rad/s",), "joint rate"),
-            Recorded("tau", tuple(f"{joint}.tau" for joint in both), both, ("N*m",), "torque of the servo on the joint"),
+            Recorded(
+                "tau", tuple(f"{joint}.tau" for joint in both), both, ("N*m",), "torque of the servo on the joint"
+            ),
             Recorded("shoulder.servo.voltage", ("shoulder.servo.voltage",), (), ("V",), "voltage on the drive motor"),
         ),
     )

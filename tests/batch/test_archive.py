@@ -142,7 +142,14 @@ def test_the_plan_and_the_deck_are_inside(here: Path) -> None:
     with ArchiveFile("a.h5") as file:
         assert plan_file.dumps(file.plan()) == plan_file.dumps(plan)
         assert file.sources() == {"two_link.ic": plan.sources[0].text}
-        assert set(file.provenance) == {"version_met", "version_llvmlite", "version_numpy", "git_commit", "git_dirty", "defines"}
+        assert set(file.provenance) == {
+            "version_met",
+            "version_llvmlite",
+            "version_numpy",
+            "git_commit",
+            "git_dirty",
+            "defines",
+        }
 
 
 def test_the_plan_of_a_large_sweep_comes_back_from_some_of_its_cases(here: Path) -> None:
@@ -175,7 +182,9 @@ def test_a_signal_of_some_joints_has_a_dimension_of_its_own(here: Path) -> None:
     experiment = plans.gains(3)
     one = Recorded("servo.voltage", ("shoulder.servo.voltage",), ("shoulder",), ("V",), "voltage")
     structure = replace(experiment.structure, record=(experiment.structure.record[0], one))
-    with ArchiveFile(run_with(replace(experiment, structure=structure), {"servo.voltage": "shoulder.servo.voltage"})) as file:
+    with ArchiveFile(
+        run_with(replace(experiment, structure=structure), {"servo.voltage": "shoulder.servo.voltage"})
+    ) as file:
         group = file.groups[0]
         assert group.variables["servo.voltage"].dims == ("recorded_case", "time", "joint_of_servo_voltage")
         assert group.joints(group.variables["servo.voltage"]) == ("shoulder",)

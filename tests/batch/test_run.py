@@ -132,7 +132,9 @@ class TestRefusedBeforeAnythingRuns:
     def test_a_folder(self, here: Path) -> None:
         (here / "out").mkdir()
         assert self.run("out") == (
-            "error[E305]: cannot write out: it is a folder\n = help: name a file in it: `-o out/two_link.h5`\n\n1 error\n"
+            "error[E305]: cannot write out: it is a folder\n"
+            " = help: name a file in it: `-o out/two_link.h5`\n"
+            "\n1 error\n"
         )
 
     def test_no_such_folder(self, here: Path) -> None:
@@ -160,6 +162,10 @@ class TestRefusedBeforeAnythingRuns:
             " = help: nothing was kept; `-o FILE` names another place\n"
             "\n1 error\n"
         )  # fmt: skip
+
+    def test_what_is_no_file_is_not_replaced_by_one(self, here: Path) -> None:
+        os.mkfifo("pipe")
+        assert self.run("pipe") == "error[E305]: cannot write pipe: it is not a regular file\n\n1 error\n"
 
     def test_a_name_too_long(self, here: Path) -> None:
         assert "file name too long" in self.run("x" * 300 + ".h5")
@@ -216,6 +222,15 @@ class TestHowItEnds:
         named = campaign.prepare(plans.plan(plans.nominal(), plans.gains()), experiments=["gains"])
         assert named.output == Path("two_link.gains.h5")
 
+    def test_a_case_that_is_run_again_does_not_take_its_sweeps_place(self, here: Path) -> None:
+        def output(*cases: str | int) -> str:
+            return campaign.prepare(plans.plan(plans.gains(9)), experiments=["gains"], cases=cases).output.name
+
+        assert output("#7") == "two_link.gains.case7.h5"
+        assert output("#7", 2) == "two_link.gains.case2-7.h5"
+        assert output(*range(8)) == "two_link.gains.cases.h5"
+        assert output(*range(9)) == "two_link.gains.h5"
+
 
 def test_a_disk_that_fills_up_leaves_nothing(tmp_path: Path) -> None:
     """A limit on the file's size stands for a full disk; in a process of its own, where HDF5 may fail as it likes."""
@@ -240,6 +255,30 @@ with mock.patch.object(run, "run", plans.answer), mock.patch.object(run, "prepar
     assert said.stdout.strip() == f"cannot write {tmp_path}/a.h5: file too large"
     assert said.returncode == 0, said.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_control_c_ends_a_real_run_and_leaves_nothing(tmp_path: Path) -> None:
+    """Through the command line: kernels run outside Python, and must let it go."""
+    import signal
+    import time
+
+    plan_file.write(plans.plan(plans.gains(3_000_000, ticks=20_000)), tmp_path / "p.json")
+    (tmp_path / "out").mkdir()
+    command = [sys.executable, "-m", "met.cli", "run", str(tmp_path / "p.json"), "-o", str(tmp_path / "out" / "a.h5")]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    ) as process:
+        for _ in range(600):  # until it writes: a minute is enough for any machine
+            if list((tmp_path / "out").iterdir()):
+                break
+            time.sleep(0.1)
+        time.sleep(1.0)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert said.endswith("met: interrupted\n")
+    assert list((tmp_path / "out").iterdir()) == []
 
 
 @pytest.mark.usefixtures("engine")
@@ -283,7 +322,12 @@ class TestWhatIsSaid:
         assert said["ok"] is False
         assert said["archive"] == "two_link.h5"
         assert said["experiments"][0]["metrics"][0]["infinite"] == 1
-        assert said["experiments"][0]["requirements"][0] == {"text": "settle < 10 s", "met": 19, "missed": 1, "unknown": 0}
+        assert said["experiments"][0]["requirements"][0] == {
+            "text": "settle < 10 s",
+            "met": 19,
+            "missed": 1,
+            "unknown": 0,
+        }
 
     def test_the_picture_lies_beside_the_archive(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         run_and_tell(self.plan(here, plans.nominal()))
@@ -293,7 +337,10 @@ class TestWhatIsSaid:
     def test_a_picture_of_somebody_elses_is_left_alone(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (here / "two_link.png").write_bytes(b"\x89PNG mine")
         run_and_tell(self.plan(here, plans.nominal()))
-        assert "picture  none: two_link.png exists and was not drawn by MET: it is not written over\n" in capsys.readouterr().out
+        assert (
+            "picture  none: two_link.png exists and was not drawn by MET: it is not written over\n"
+            in capsys.readouterr().out
+        )
         assert (here / "two_link.png").read_bytes() == b"\x89PNG mine"
 
 
@@ -380,6 +427,9 @@ class TestTheRealEngine:
 
     def test_a_case_run_alone_is_the_case_of_the_sweep(self, here: Path) -> None:
         plan = plans.plan(plans.gains(9))
-        with batch.run(plan, output="all.h5").open() as whole, batch.run(plan, output="one.h5", cases=["#5"]).open() as one:
+        with (
+            batch.run(plan, output="all.h5").open() as whole,
+            batch.run(plan, output="one.h5", cases=["#5"]).open() as one,
+        ):
             np.testing.assert_array_equal(one.qd.values[0], whole.qd.values[5])
             assert one.case_id.values[0] == whole.case_id.values[5]

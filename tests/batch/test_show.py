@@ -71,7 +71,7 @@ def test_a_plot_in_the_terminal(sweep: ArchiveFile) -> None:
 def test_a_plot_fits_the_width(sweep: ArchiveFile) -> None:
     for width in (60, 80, 100):
         lines = show(sweep, ["q", "tau"], width=width).splitlines()
-        assert max(len(line) for line in lines if "⠀" <= line[:1] or "│" in line or "┤" in line) <= width
+        assert max(len(line) for line in lines if line[:1] >= "⠀" or "│" in line or "┤" in line) <= width
 
 
 def test_failed_cases_are_named_with_their_cause(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -95,7 +95,9 @@ def test_json_has_what_the_text_has(sweep: ArchiveFile) -> None:
     said = json.loads(as_json(sweep))
     assert said["experiments"][0]["cases"] == 20
     assert said["experiments"][0]["metrics"][0]["infinite"] == 1
-    assert {"name": "qd", "role": "signal", "dims": ["recorded_case", "time", "joint"], "unit": "rad/s"} in said["experiments"][0]["variables"]
+    assert {"name": "qd", "role": "signal", "dims": ["recorded_case", "time", "joint"], "unit": "rad/s"} in said[
+        "experiments"
+    ][0]["variables"]
 
 
 def test_a_signal_that_is_not_there(sweep: ArchiveFile) -> None:
@@ -133,7 +135,10 @@ def test_joints_of_unlike_unit_are_drawn_apart(here: Path) -> None:
     experiment = replace(experiment, structure=replace(experiment.structure, record=(q,)))
     batch.run(plans.plan(experiment), output="a.h5")
     with ArchiveFile("a.h5") as file:
-        assert [(p.axis, p.lines) for p in panels(file.groups[0])] == [("q  (rad)", ("shoulder",)), ("q  (m)", ("elbow",))]
+        assert [(p.axis, p.lines) for p in panels(file.groups[0])] == [
+            ("q  (rad)", ("shoulder",)),
+            ("q  (m)", ("elbow",)),
+        ]
 
 
 class TestBraille:

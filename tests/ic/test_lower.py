@@ -88,7 +88,8 @@ def test_gravity_is_a_vector_in_the_environment(tmp_path: Path) -> None:
             RUN,
             (
                 "duration",
-                "environment { gravity = [0, 0, -9.81] m/s^2; grease = joint_damping { damping = 2 N*m*s/rad; } }\nduration",
+                "environment { gravity = [0, 0, -9.81] m/s^2; grease = joint_damping { damping = 2 N*m*s/rad; } }\n"
+                "duration",
             ),
         ),
     )
@@ -111,7 +112,9 @@ def test_an_initial_state_is_for_all_joints_or_one(tmp_path: Path) -> None:
 
 def test_a_prismatic_joint_is_in_metres_and_newtons(tmp_path: Path) -> None:
     servo = changed(
-        SERVO, ("ratio = 100;", "ratio = 100 rad/m;"), ("rate(0.1 rad/s)", "position(ramp(to = 2 cm, over = 1 s))")
+        SERVO,
+        ("ratio = 100;", "ratio = 100 rad/m; k_position = 1 s^-1;"),
+        ("rate(0.1 rad/s)", "position(ramp(to = 2 cm, over = 1 s))"),
     )
     run = experiment(tmp_path, changed(ARM, ("revolute", "prismatic")), servo, changed(RUN, ("[q]", "[q, tau]")))
     assert run.parameters["hinge.servo.ratio"].unit == "rad/m"
@@ -191,7 +194,7 @@ def test_several_without_a_default_are_listed(tmp_path: Path) -> None:
 
 def test_an_unknown_run_is_told_with_the_nearest(tmp_path: Path) -> None:
     (diagnostic,) = check(tmp_path, ARM, SERVO, RUN, SECOND, select=["secnd"]).diagnostics
-    assert (diagnostic.code, diagnostic.help[0]) == ("D160", "did you mean `second`?")
+    assert (diagnostic.code, diagnostic.help[0]) == ("D164", "did you mean `second`?")
 
 
 def test_a_deck_without_a_run_says_so(tmp_path: Path) -> None:

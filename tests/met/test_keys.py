@@ -13,7 +13,6 @@ from met.diagnostic import Place
 from met.plan import Cases, Experiment, Quantity, Structure
 from tests.batch import plans
 
-
 ROOT = Path(__file__).resolve().parents[2]
 CASE_KEYS = ["d9f6d43def9ece78", "5c0b17f28b717e62", "2f0bcebdefa8c834"]
 CASE_IDS = ["a152d04dcd853ed6", "14c98b2ecb75da00", "6b7fa51b851fcffd"]

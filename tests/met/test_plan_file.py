@@ -22,7 +22,9 @@ def same(a: Plan, b: Plan) -> bool:
     """Equality field by field; a coordinate's values are an array."""
     for mine, theirs in zip(a.experiments, b.experiments, strict=True):
         for one, other in zip(mine.cases.coordinates, theirs.cases.coordinates, strict=True):
-            if one.values.tobytes() != other.values.tobytes() or replace(one, values=None) != replace(other, values=None):
+            if one.values.tobytes() != other.values.tobytes() or replace(one, values=None) != replace(
+                other, values=None
+            ):
                 return False
         bare = [replace(e, cases=replace(e.cases, coordinates=())) for e in (mine, theirs)]
         if bare[0] != bare[1]:
@@ -99,8 +101,8 @@ def test_another_case_table_is_noticed(tmp_path: Path) -> None:
     with pytest.raises(Problem) as caught:
         plan_file.read(tmp_path / "p.json")
     assert messages(caught) == [
-        f"E302: the plan {tmp_path}/p.json is damaged: the case table p.gains.cases.npy beside it is not the one it was "
-        "written with (SHA-256 differs)"
+        f"E302: the plan {tmp_path}/p.json is damaged: the case table p.gains.cases.npy beside it is not the one it "
+        "was written with (SHA-256 differs)"
     ]
 
 
@@ -184,7 +186,9 @@ def test_a_parameter_that_an_older_plan_lacks_takes_its_default_and_is_listed() 
     experiment = plan_file.loads(json.dumps(document)).experiments[0]
     assert experiment.parameters["elbow.servo.k_position"].value == 0.0
     assert experiment.parameters["elbow.servo.k_position"].origin.kind == "default"
-    assert experiment.notes == ("`elbow.servo.k_position` is not in the plan (schema 1): its default, 0.0 1/s, is taken",)
+    assert experiment.notes == (
+        "`elbow.servo.k_position` is not in the plan (schema 1): its default, 0.0 1/s, is taken",
+    )
 
 
 def test_a_missing_parameter_without_a_default_is_an_error() -> None:

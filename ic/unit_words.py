@@ -1,0 +1,29 @@
+"""Units as declarations write them, `joint/s`, put in the words of one use, `rad/s`; and as a deck can write them."""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+
+from met import units
+from met.channel import joint_unit
+from met.plan import Joint, JointKind
+from met.units import PURE, Dimension
+
+
+def in_deck(unit: str) -> str:
+    """A unit as a deck can write it after a number: `1/s` is `s^-1` there."""
+    match = re.fullmatch(r"1/(\w+)(?:\^(\d+))?", unit)
+    return f"{match[1]}^-{match[2] or 1}" if match else unit
+
+
+@lru_cache(maxsize=4096)
+def unit_here(written: str, joint: JointKind, command: str | None, of: str | None) -> tuple[str, Dimension]:
+    """A declared unit where `joint`, `effort`, `command` and `of` mean this: in SI, as text and as dimension."""
+    text = joint_unit(written, Joint("", joint, "", ""), command)
+    names = {} if of is None else {"of": units.parse_unit(of)}
+    measure = units.parse_unit(text, names)
+    if measure.dimension == PURE:
+        return "1", PURE
+    simple = measure.scale == 1.0 and not names.keys() & set(text.replace("*", " ").replace("/", " ").split())
+    return (text if simple else of if text == "of" and of else units.text(measure.dimension)), measure.dimension
