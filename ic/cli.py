@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 from met.cli import BAD_INPUT, YES, complain, deck_options, format_option, loudness_options
-from met.diagnostic import Problem
+from met.diagnostic import Label, Problem
 
 if TYPE_CHECKING:
     from ic.lower import Compiled
@@ -142,14 +142,22 @@ def explain(
 
     PATH is a parameter (elbow.servo.kt), the beginning of several (elbow.servo), or one of a definition (gearbox.kp).
     """
+    from ic.explain import explained
     from ic.print_explain import explain_json, print_explain
 
-    made = _plan(deck, include_dirs, defines, (name,) if name else (), False, True)
+    names = (name,) if name else ()
+    compiled = None if deck.endswith(".json") else _compiled(deck, include_dirs, defines, names or None)
+    made = _plan_in_file(deck, names) if compiled is None else compiled.plan
+    assert made is not None
+
+    def names_of(path: str) -> tuple[Label, ...]:
+        return () if compiled is None else next((found.names for found in explained(compiled, path)), ())
+
     experiment = made.experiments[0]
     if form == "json":
         _print_json(explain_json(experiment, path))
         return
-    _print(print_explain(experiment, path, {source.name: source.text for source in made.sources}))
+    _print(print_explain(experiment, path, {source.name: source.text for source in made.sources}, names_of))
 
 
 @click.command()
@@ -205,17 +213,25 @@ def _plan(
     """The plan of a deck, or of a plan file; its warnings are printed on the way."""
     if deck.endswith(".json"):
         return _plan_in_file(deck, names)
+    compiled = _compiled(deck, include_dirs, defines, "all" if everything else names or None)
+    if compiled.diagnostics and not quiet:
+        complain(compiled.diagnostics, compiled.sources)
+    assert compiled.plan is not None
+    return compiled.plan
+
+
+def _compiled(
+    deck: str, include_dirs: tuple[str, ...], defines: tuple[str, ...], select: tuple[str, ...] | Literal["all"] | None
+) -> Compiled:
+    """A deck with its plan. Raises Problem where it has none."""
     import ic
     from ic.find import find
 
     find(deck)
-    select = "all" if everything else names or None
-    compiled: Compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, select=select)
+    compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, select=select)
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)
-    if compiled.diagnostics and not quiet:
-        complain(compiled.diagnostics, compiled.sources)
-    return compiled.plan
+    return compiled
 
 
 def _plan_in_file(path: str, names: tuple[str, ...]) -> Plan:
@@ -230,7 +246,7 @@ def _plan_in_file(path: str, names: tuple[str, ...]) -> Plan:
     for name in names:
         if name not in known:
             helps = [*did_you_mean(name, known), known_words("it has", known)]
-            raise Problem(error("D160", f"no run or sweep `{name}` in this plan", help=helps))
+            raise Problem(error("D174", f"no run or sweep `{name}` in this plan", help=helps))
     return replace(made, experiments=tuple(known[name] for name in names)) if names else made
 
 

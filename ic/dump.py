@@ -53,13 +53,13 @@ def stage_names() -> list[str]:
 
 
 def find_stage(name: str) -> Stage:
-    """The function of a stage. Raises Problem D165 with what was probably meant."""
+    """The function of a stage. Raises Problem D172 with what was probably meant."""
     point = next((point for point in offered(GROUP) if point.name == name), None)
     if point is None:
         names = stage_names()
         close = difflib.get_close_matches(name, names, n=1)
         helps = [f"did you mean `{close[0]}`?"] if close else []
-        raise Problem(error("D165", f"no stage `{name}`", help=[*helps, f"stages: {', '.join(names)}"]))
+        raise Problem(error("D172", f"no stage `{name}`", help=[*helps, f"stages: {', '.join(names)}"]))
     stage: Stage = point.load()
     return stage
 

@@ -11,7 +11,7 @@ from met.diagnostic import Problem, error
 
 
 def find(name: str) -> Path:
-    """The file of the deck of that name. Raises Problem D166 with what was probably meant and the standard decks."""
+    """The file of the deck of that name. Raises Problem D173 with what was probably meant and the standard decks."""
     found = Files().deck(name)
     if Path(found.path).exists():
         return Path(found.path)
@@ -21,7 +21,7 @@ def find(name: str) -> Path:
     known = [f"{folder}{each}" for each in here] + standard
     close = difflib.get_close_matches(name, known, n=1) or difflib.get_close_matches(f"{name}.ic", known, n=1)
     helps = [f"did you mean `{close[0]}`?"] if close else []
-    raise Problem(error("D166", f"no deck `{name}`", help=[*helps, f"standard decks: {', '.join(standard)}"]))
+    raise Problem(error("D173", f"no deck `{name}`", help=[*helps, f"standard decks: {', '.join(standard)}"]))
 
 
 def standard_decks() -> list[str]:

@@ -386,16 +386,18 @@ def _come_through(token: Token, made: list[Token], hidden: frozenset[str]) -> li
     around = token.expansions
     step = (Expansion(token.text, token.source.place(token.offset, token.length)),)
     through = step + around
-    steps: dict[tuple[Expansion, ...], tuple[Expansion, ...]] = {(): through, around: through}
+    # by identity: to hash or compare chains of places would cost more than all the rest
+    steps: dict[int, tuple[Expansion, ...]] = {id(()): through, id(around): through}
     hides: dict[frozenset[str], frozenset[str]] = {frozenset(): hidden}
     copies = []
     for piece in made:
         copy = Token(piece.kind, piece.text, piece.source, piece.offset, piece.length)
         came = piece.expansions
-        if came not in steps:
-            inner = came[: -len(around)] if around and came[-len(around) :] == around else came
-            steps[came] = inner + through
-        copy.expansions = steps[came]
+        if id(came) not in steps:
+            inner = len(came) - len(around)
+            within = inner >= 0 and all(a is b for a, b in zip(came[inner:], around, strict=True))
+            steps[id(came)] = (came[:inner] if within else came) + through
+        copy.expansions = steps[id(came)]
         if piece.hidden not in hides:
             hides[piece.hidden] = piece.hidden | hidden
         copy.hidden = hides[piece.hidden]

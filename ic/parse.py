@@ -17,7 +17,7 @@ from contextlib import suppress
 from ic.cursor import Ended, Unreadable, span
 from ic.expressions import Expressions
 from ic.lexer import BAD, END, NAME, NUMBERS, STRING, Token
-from ic.limits import Findings, GiveUp
+from ic.limits import Findings, GiveUp, without_collection
 from ic.syntax import Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
 from met import units
 from met.diagnostic import Diagnostic, Label
@@ -32,7 +32,7 @@ def parse(
     findings = findings if findings is not None else Findings()
     parser = _Parser(tokens, findings)
     entries: list[Entry] = []
-    with suppress(GiveUp, Ended):
+    with without_collection(), suppress(GiveUp, Ended):
         parser.entries(entries)
     return tuple(entries), findings.all
 

@@ -40,6 +40,7 @@ from ic.limits import (
     MOST_TOKENS,
     Findings,
     GiveUp,
+    without_collection,
 )
 from ic.macros import Macros
 from ic.strays import complain_of_stray
@@ -82,8 +83,9 @@ def preprocess(
     run = _Preprocessor(files, findings)
     whole = True
     try:
-        run.define_from_command_line(defines)
-        run.read_deck(files.deck(path))
+        with without_collection():
+            run.define_from_command_line(defines)
+            run.read_deck(files.deck(path))
     except GiveUp:
         whole = False
     except Problem as problem:

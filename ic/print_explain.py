@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ MOST_IN_FULL = 3  # parameters; of more a line each
 
 
 def find_paths(experiment: Experiment, path: str) -> list[str]:
-    """The parameters that a deck's path means. Raises Problem D163 with what was probably meant.
+    """The parameters that a deck's path means. Raises Problem D170 with what was probably meant.
 
     A path is one parameter (`elbow.servo.kt`), a vector of three (`elbow.at`), a servo's definition with one of its
     parameters (`gearbox.kp`, then each joint that uses it), or the head of several (`elbow.servo`).
@@ -52,22 +52,29 @@ def find_paths(experiment: Experiment, path: str) -> list[str]:
     if not helps:
         heads = dict.fromkeys(name.partition(".")[0] for name in known)
         helps.append(f"paths begin with {', '.join(heads)}")
-    raise Problem(error("D163", f"no parameter `{path}` in `{experiment.name}`", help=helps))
+    raise Problem(error("D170", f"no parameter `{path}` in `{experiment.name}`", help=helps))
 
 
-def print_explain(experiment: Experiment, path: str, sources: Mapping[str, str]) -> Iterator[str]:
-    """Line by line, parameter by parameter. sources: text of each file by name."""
+Names = Callable[[str], tuple[Label, ...]]
+
+
+def print_explain(experiment: Experiment, path: str, sources: Mapping[str, str], names_of: Names) -> Iterator[str]:
+    """Line by line, parameter by parameter.
+
+    sources    text of each file by name
+    names_of   of a parameter, the names that its value is written with, each with what it stands for
+    """
     names = find_paths(experiment, path)
     if len(names) > MOST_IN_FULL:
         yield from columns([_in_short(experiment, name) for name in names], indent="")
         return
     if _is_vector(experiment, names):
-        yield from _one(experiment, names, sources)
+        yield from _one(experiment, names, sources, names_of(names[0]))
         return
     for position, name in enumerate(names):
         if position:
             yield ""
-        yield from _one(experiment, [name], sources)
+        yield from _one(experiment, [name], sources, names_of(name))
 
 
 def explain_json(experiment: Experiment, path: str) -> list[dict[str, Any]]:
@@ -105,7 +112,9 @@ def _is_vector(experiment: Experiment, names: list[str]) -> bool:
     return together and all(isinstance(q.value, float) and q.origin == found[0].origin for q in found)
 
 
-def _one(experiment: Experiment, names: list[str], sources: Mapping[str, str]) -> Iterator[str]:
+def _one(
+    experiment: Experiment, names: list[str], sources: Mapping[str, str], used: tuple[Label, ...]
+) -> Iterator[str]:
     """A parameter, or the three of a vector."""
     name = names[0]
     found = experiment.parameters[name]
@@ -127,7 +136,7 @@ def _one(experiment: Experiment, names: list[str], sources: Mapping[str, str]) -
     if origin.place is None:
         yield f"  {said}"
         return
-    also = tuple(Label(place, "overrides this") for place in origin.overrides)
+    also = (*used, *(Label(place, "overrides this") for place in origin.overrides))
     yield from _with_source(origin.place, said, also, sources)
 
 

@@ -30,7 +30,7 @@ WORDS = {
 
 
 def chosen(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
-    """What `met doc` is about: all models, those of a kind, one of a kind, or all of one name. Raises Problem D164."""
+    """What `met doc` is about: all models, those of a kind, one of a kind, or all of one name. Raises Problem D171."""
     everything = [(kind, model) for kind in KINDS for model in models.available(kind).values()]
     if not words:
         return everything
@@ -46,7 +46,7 @@ def chosen(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
     close = difflib.get_close_matches(words[0], known, n=1)
     helps = [f"did you mean `{close[0]}`?"] if close else []
     helps.append(f"kinds: {', '.join(KINDS)}")
-    raise Problem(error("D164", f"no kind of model and no model `{words[0]}`", help=helps))
+    raise Problem(error("D171", f"no kind of model and no model `{words[0]}`", help=helps))
 
 
 def print_list(found: list[tuple[models.Kind, Any]]) -> Iterator[str]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from ic.files import LIBRARY
@@ -13,6 +12,7 @@ from ic.parse import parse
 from ic.preprocess import preprocess
 from ic.syntax import Deck, Entry, SourceText
 from met.diagnostic import Diagnostic, Problem
+from met.render import shown_place
 
 
 def read(
@@ -29,30 +29,17 @@ def read(
 
     Raises Problem with every error and warning found, in the order of the text, and the text of every file read.
     """
-    with _no_collection():
-        seen = preprocess(path, include_dirs, defines, library=library)
-        findings = Findings()
-        entries: tuple[Entry, ...] = ()
-        with suppress(GiveUp):
-            findings.add(*seen.diagnostics)
-            if seen.whole:
-                entries, _ = parse(seen.tokens, findings)
+    seen = preprocess(path, include_dirs, defines, library=library)
+    findings = Findings()
+    entries: tuple[Entry, ...] = ()
+    with suppress(GiveUp):
+        findings.add(*seen.diagnostics)
+        if seen.whole:
+            entries, _ = parse(seen.tokens, findings)
     found = in_order(findings.all, seen.sources)
     if findings.errors or not seen.whole:
         raise Problem(found, {source.name: source.text for source in seen.sources})
     return Deck(seen.sources[0].name, entries, seen.sources, found)
-
-
-@contextmanager
-def _no_collection() -> Iterator[None]:
-    """Without the cyclic garbage collector: a large deck makes many objects, no cycles, and half the time was its."""
-    collecting = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collecting:
-            gc.enable()
 
 
 def in_order(diagnostics: Iterable[Diagnostic], sources: Sequence[SourceText]) -> tuple[Diagnostic, ...]:
@@ -62,9 +49,7 @@ def in_order(diagnostics: Iterable[Diagnostic], sources: Sequence[SourceText]) -
     def key(diagnostic: Diagnostic) -> tuple[int, int, int]:
         if diagnostic.at is None:
             return (len(number) + 1, 0, 0)
-        place = diagnostic.at.place
-        if place.expansions:
-            place = place.expansions[-1].use
+        place = shown_place(diagnostic.at.place)
         return (number.get(place.file, len(number)), place.line, place.column)
 
     return tuple(sorted(diagnostics, key=key))

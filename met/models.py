@@ -93,13 +93,14 @@ def available(kind: Kind) -> dict[str, Any]:
     for point in sorted(importlib.metadata.entry_points(group=group.entry_points), key=lambda point: point.value):
         found_at = f"entry point `{point.name} = {point.value}` in group `{group.entry_points}`"
         try:
-            model: Any = point.load()
+            loaded = point.load()
         except Exception as reason:  # another package's code: whatever it raises is its user's to read
             message = f"cannot load the {kind} of {found_at}: {type(reason).__name__}: {reason}"
             raise Problem(error("E215", message, help="mend or uninstall the package that offers it")) from reason
-        if not isinstance(model, declaration):
-            message = f"{found_at} is a {type(model).__name__}, not a {declaration.__module__}.{declaration.__name__}"
+        if not isinstance(loaded, declaration):
+            message = f"{found_at} is a {type(loaded).__name__}, not a {declaration.__module__}.{declaration.__name__}"
             raise Problem(error("E215", message, help=f"let it name the {declaration.__name__} that the file declares"))
+        model: Any = loaded
         _check_names(model, found_at)
         if model.name in found and found[model.name] is not model:
             message = f"{found_at} offers {kind} `{model.name}`, which exists already"

@@ -26,7 +26,9 @@ class Desk:
         path.write_bytes(text if isinstance(text, bytes) else text.encode())
         return name
 
-    def read(self, text: str | bytes, include_dirs: Sequence[str] = (), defines: Sequence[str] = (), **others: str) -> Deck:
+    def read(
+        self, text: str | bytes, include_dirs: Sequence[str] = (), defines: Sequence[str] = (), **others: str
+    ) -> Deck:
         for name, other in others.items():
             self.write(other, f"{name}.ic")
         return read(self.write(text), include_dirs, defines, library=self.library)
@@ -40,7 +42,9 @@ class Desk:
         assert not [d for d in made.diagnostics if d.severity == "error"], made.diagnostics
         return " ".join(token.text for token in made.tokens[:-1])
 
-    def told(self, text: str | bytes, include_dirs: Sequence[str] = (), files: Mapping[str, str | bytes] | None = None) -> str:
+    def told(
+        self, text: str | bytes, include_dirs: Sequence[str] = (), files: Mapping[str, str | bytes] | None = None
+    ) -> str:
         """What the user is shown: the errors and warnings, rendered; "" for none."""
         for name, other in (files or {}).items():
             self.write(other, name)

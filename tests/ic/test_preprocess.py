@@ -51,7 +51,8 @@ def test_macros_do_what_a_c_programmer_expects(desk: Desk, text: str, made: str)
     ("condition", "truth"),
     [
         ("1", True), ("0", False), ("!0", True), ("X == 3", True), ("defined(X) && !defined Y", True), ("Y", False),
-        ("(1 + 2) * 3 == 9", True), ("-7 / 2 == -3", True), ("1 << 4 == 16", True), ("0x10 == 16", True), ("010 == 8", True),
+        ("(1 + 2) * 3 == 9", True), ("-7 / 2 == -3", True), ("1 << 4 == 16", True), ("0x10 == 16", True),
+        ("010 == 8", True),
         ("'a' == 97", True), ("1 ? 0 : 1", False), ("0 && 1 / 0", False), ("FN(2) == 4", True),
     ],
 )  # fmt: skip
@@ -95,46 +96,41 @@ def test_a_token_of_an_included_file_knows_the_includes_that_led_there(desk: Des
 # gcc's preprocessor, where there is one, is the oracle for macros: random definitions, random uses
 
 
-def _random_macros(rng: random.Random) -> str:
-    names = [f"M{i}" for i in range(6)]
-    lines = []
+def _random_macros(rng: random.Random, count: int, recursive: bool) -> str:
+    """Macros that use each other (in any way, or only those before them), and a line that uses them."""
+    takes = {f"M{i}": rng.randint(0, 2) for i in range(count)}
 
-    def piece(words: list[str], depth: int) -> str:
-        what = rng.random()
-        if what < 0.55 or depth > 3:
+    def piece(words: list[str], callable_: list[str], depth: int) -> str:
+        if rng.random() < 0.5 or depth > 1 or not callable_:
             return rng.choice(words)
-        if what < 0.7:
-            return rng.choice(["(", ")"]) if rng.random() < 0.1 else f"({piece(words, depth + 1)})"
-        arguments = ", ".join(piece(words, depth + 1) for _ in range(rng.randint(1, 2)))
-        return f"{rng.choice(names)}({arguments})"
+        name = rng.choice(callable_)
+        arguments = [piece(words, callable_, depth + 1) if rng.random() < 0.9 else "" for _ in range(takes[name])]
+        return f"{name}{rng.choice(['', ' '])}({', '.join(arguments)})"
 
-    for name in names:
-        kind = rng.randint(0, 2)
-        parameters = ["p", "q"][:kind]
-        body = " ".join(piece([*names, *parameters, *parameters, "x", "1"], 0) for _ in range(rng.randint(0, 4)))
-        lines.append(f"#define {name}{'(' + ', '.join(parameters) + ')' if kind else ''} {body}")
-    lines += [" ".join(piece([*names, "z"], 0) for _ in range(4)) + ";" for _ in range(4)]
+    lines = []
+    for i, (name, parameters) in enumerate((name, ["p", "q"][:n]) for name, n in takes.items()):
+        known = list(takes) if recursive else list(takes)[:i]
+        body = " ".join(piece([*known, *parameters, *parameters, "x"], known, 0) for _ in range(rng.randint(0, 3)))
+        lines.append(f"#define {name}{'(' + ', '.join(parameters) + ')' if parameters else ''} {body}")
+    lines.append(" ".join(piece([*takes, "z"], list(takes), 0) for _ in range(3)) + ";")
     return "\n".join(lines) + "\n"
 
 
-@pytest.mark.parametrize("seed", range(60))
-def test_random_macros_expand_as_gcc_expands_them(desk: Desk, seed: int):
+@pytest.mark.parametrize("recursive", [True, False])
+@pytest.mark.parametrize("seed", range(20))
+def test_random_macros_expand_as_gcc_expands_them(desk: Desk, seed: int, recursive: bool):
     cpp = shutil.which("cpp")
     if cpp is None:
         pytest.skip("gcc's preprocessor is the oracle of this test")
     rng = random.Random(seed)
-    compared = 0
-    for _ in range(8):
-        text = _random_macros(rng)
-        theirs = subprocess.run([cpp, "-P", "-"], input=text, capture_output=True, text=True, check=False)
+    for _ in range(10):
+        # of more macros that use each other in circles C does not say all, and some uses outgrow our limits
+        text = _random_macros(rng, rng.randint(1, 3) if recursive else 6, recursive)
+        theirs = subprocess.run([cpp, "-P", "-"], input=text, capture_output=True, text=True, check=True)
         mine = desk.tokens(text)
-        if theirs.returncode or any(d.severity == "error" for d in mine.diagnostics):
-            assert theirs.returncode, (text, mine.diagnostics)
-            continue
+        assert not mine.diagnostics
         expected = [t.text for line in logical_lines(Text("", theirs.stdout)) for t in line if t.text.strip()]
         assert [t.text for t in mine.tokens[:-1]] == expected, text
-        compared += 1
-    assert compared or seed >= 0
 
 
 # files
@@ -151,7 +147,15 @@ def test_a_quoted_include_looks_beside_the_including_file_and_then_where_all_loo
     monkeypatch.setenv("MET_DECK_PATH", os.pathsep.join(["env", "nowhere"]))
     made = desk.tokens('#include "sub/b.ic"', ["given"])
     assert [t.text for t in made.tokens[:-1]] == ["from_sub", "from_given", "only_given", "env_not_library", "last"]
-    assert [s.name for s in made.sources] == ["a.ic", "sub/b.ic", "sub/x.ic", "given/x.ic", "given/y.ic", "env/z.ic", "<w.ic>"]
+    assert [s.name for s in made.sources] == [
+        "a.ic",
+        "sub/b.ic",
+        "sub/x.ic",
+        "given/x.ic",
+        "given/y.ic",
+        "env/z.ic",
+        "<w.ic>",
+    ]
 
 
 def test_an_angled_include_does_not_look_beside_the_including_file(desk: Desk):
@@ -182,7 +186,12 @@ def test_pragma_once_reads_a_file_once_by_whatever_name(desk: Desk):
 def test_an_include_may_be_named_by_a_macro_and_may_hold_two_slashes(desk: Desk):
     desk.write("x", "sub/b.ic")
     desk.write("y", "library/c.ic")
-    assert desk.texts('#define B "sub/b.ic"\n#define C <c.ic>\n#include B\n#include C\n#include "sub//b.ic"\n#include <.//c.ic>') == "x y x y"
+    assert (
+        desk.texts(
+            '#define B "sub/b.ic"\n#define C <c.ic>\n#include B\n#include C\n#include "sub//b.ic"\n#include <.//c.ic>'
+        )
+        == "x y x y"
+    )
 
 
 def test_an_include_guard_works(desk: Desk):
@@ -203,7 +212,9 @@ def test_a_missing_include_says_where_it_looked_and_what_there_is(desk: Desk):
         '#include "sub/b.ic"\n', ["extra"],
         {"sub/b.ic": "\n#include <servos/rigid_gearbx.ic>  // table 1\n", "library/servos/rigid_gearbox.ic": ""},
     )  # fmt: skip
-    assert told == """\
+    assert (
+        told
+        == """\
 error[D005]: cannot find <servos/rigid_gearbx.ic>
  --> sub/b.ic:2:10
   |
@@ -215,10 +226,13 @@ error[D005]: cannot find <servos/rigid_gearbx.ic>
 
 1 error
 """
+    )
 
 
 def test_units_as_macros_and_parameters_are_errors_that_say_why(desk: Desk):
-    assert desk.told("#define N 6\n#define ROD(name, m) link name { mass = 0.5 m; }\nx = 1 N;\n") == """\
+    assert (
+        desk.told("#define N 6\n#define ROD(name, m) link name { mass = 0.5 m; }\nx = 1 N;\n")
+        == """\
 error[D011]: a macro cannot be called `N`: that is the unit newton
  --> a.ic:1:9
   |
@@ -235,10 +249,13 @@ error[D011]: a macro's parameter cannot be called `m`: that is the unit metre
 
 2 errors
 """
+    )
 
 
 def test_a_macro_that_is_a_quantity_gets_a_warning_that_proposes_let(desk: Desk):
-    assert desk.told("#define LENGTH 2.0 m\nx = LENGTH;\n") == """\
+    assert (
+        desk.told("#define LENGTH 2.0 m\nx = LENGTH;\n")
+        == """\
 warning[D017]: macro `LENGTH` is a quantity
  --> a.ic:1:9
   |
@@ -248,11 +265,14 @@ warning[D017]: macro `LENGTH` is a quantity
 
 1 warning
 """
+    )
     assert desk.told("#define COUNT 2\n#define AREA (2.0 m)\n#define ROD 2 m; x = 3 kg\nx = COUNT;\n") == ""
 
 
 def test_a_wrong_number_of_arguments_says_how_many_and_shows_the_definition(desk: Desk):
-    assert desk.told("#define ROD(NAME, MASS) link NAME { mass = MASS; }\narm a {\n  ROD(upper)\n  ROD(lower, 1 kg)\n}\n") == """\
+    assert (
+        desk.told("#define ROD(NAME, MASS) link NAME { mass = MASS; }\narm a {\n  ROD(upper)\n  ROD(lower, 1 kg)\n}\n")
+        == """\
 error[D012]: macro `ROD` takes 2 arguments, but 1 is given
  --> a.ic:3:3
   |
@@ -262,10 +282,13 @@ error[D012]: macro `ROD` takes 2 arguments, but 1 is given
 
 1 error
 """
+    )
 
 
 def test_a_circular_include_is_told_as_the_circle_it_is(desk: Desk):
-    assert desk.told('#include "b.ic"\n', (), {"b.ic": '// b\n  #include "c.ic"\n', "c.ic": '#include "b.ic"\n'}) == """\
+    assert (
+        desk.told('#include "b.ic"\n', (), {"b.ic": '// b\n  #include "c.ic"\n', "c.ic": '#include "b.ic"\n'})
+        == """\
 error[D006]: circular include: b.ic -> c.ic -> b.ic
  --> c.ic:1:10
   |
@@ -277,10 +300,13 @@ error[D006]: circular include: b.ic -> c.ic -> b.ic
 
 1 error
 """
+    )
 
 
 def test_a_redefinition_shows_both_places(desk: Desk):
-    assert desk.told("#define SIZE 1\n\n#define SIZE 2\n") == """\
+    assert (
+        desk.told("#define SIZE 1\n\n#define SIZE 2\n")
+        == """\
 error[D010]: macro `SIZE` is defined again, differently
  --> a.ic:3:9
   |
@@ -291,10 +317,13 @@ error[D010]: macro `SIZE` is defined again, differently
 
 1 error
 """
+    )
 
 
 def test_comparing_decimals_or_strings_in_if_is_refused_kindly(desk: Desk):
-    assert desk.told('#if 0.5 > 0.1\n#endif\n#define X "a"\n#if X == "a"\n#endif\n') == """\
+    assert (
+        desk.told('#if 0.5 > 0.1\n#endif\n#define X "a"\n#if X == "a"\n#endif\n')
+        == """\
 error[D009]: `#if` compares whole numbers only, as in C, and `0.5` is not whole
  --> a.ic:1:5
   |
@@ -313,10 +342,13 @@ error[D009]: `#if` compares whole numbers only, as in C: a string has no value h
 
 2 errors
 """
+    )
 
 
 def test_error_and_warning_directives_become_diagnostics_in_their_words(desk: Desk):
-    assert desk.told("#error don't use this // yet\n#warning careful\n") == """\
+    assert (
+        desk.told("#error don't use this // yet\n#warning careful\n")
+        == """\
 error[D014]: don't use this // yet
  --> a.ic:1:2
   |
@@ -331,6 +363,7 @@ warning[D015]: careful
 
 1 error, 1 warning
 """
+    )
 
 
 @pytest.mark.parametrize(
@@ -441,6 +474,9 @@ def test_the_clock_is_refused_with_a_reason(desk: Desk):
 # hostile decks: a diagnostic within seconds, in bounded memory
 
 
+DOUBLING = "#define A0 x x\n" + "".join(f"#define A{i} A{i - 1} A{i - 1}\n" for i in range(1, 50)) + "A49"
+
+
 def _nested(name: str, count: int) -> str:
     return f"{name}(" * count + "1" + ")" * count
 
@@ -448,16 +484,15 @@ def _nested(name: str, count: int) -> str:
 @pytest.mark.parametrize(
     ("text", "code"),
     [
-        pytest.param("#define A0 x x\n" + "".join(f"#define A{i} A{i - 1} A{i - 1}\n" for i in range(1, 50)) + "A49", "D013",
-                     id="doubling names"),
+        pytest.param(DOUBLING, "D013", id="doubling names"),
         pytest.param("#define D(x) x x\n" + _nested("D", 50), "D013", id="doubling arguments"),
         pytest.param("#define P(x) x##x\n#define Q(x) P(x)\n" + _nested("Q", 50), "D013", id="doubling by pasting"),
         pytest.param("#define S(x) #x\n#define Q(x) S(x)\n" + _nested("Q", 50), "D013", id="doubling by quoting"),
         pytest.param("#define D(x) x\n" + _nested("D", 5000), "D013", id="deep arguments"),
-        pytest.param("".join(f"#define A{i} A{i + 1}\n" for i in range(200)) + "A0", "D013", id="a long chain"),
-        pytest.param("#define B(x) " + "x " * 2000 + "\nB(" + "1 " * 9000 + ")", "D013", id="a long body of long arguments"),
+        pytest.param("".join(f"#define A{i} A{i + 1}\n" for i in range(20)) + "A0", "D013", id="a long chain"),
+        pytest.param("#define B(x) " + "x " * 2000 + "\nB(" + "1 " * 9000 + ")", "D013", id="a long body"),
         pytest.param("#define B(x) x\nB(" + "1 " * 30000 + ")", "D018", id="long arguments"),
-        pytest.param("#define B " + "x " * 5000, "D018", id="a long body"),
+        pytest.param("#define B " + "x " * 5000, "D018", id="a very long body"),
         pytest.param("#if 1\n" * 5000, "D018", id="deep conditions"),
         pytest.param("#if " + "1+" * 5000 + "1\n#endif", "D018", id="a long condition"),
         pytest.param("#if 1\n#endif\n" * 12000, "D018", id="many conditions"),

@@ -297,7 +297,7 @@ def test_explain_says_where_a_value_comes_from(
 
 def test_explain_of_an_unknown_path_says_what_was_meant(capsys: pytest.CaptureFixture[str]) -> None:
     assert complained(capsys, "explain", "swing.ic", "knee.servo.kq") == (
-        "error[D163]: no parameter `knee.servo.kq` in `free`\n"
+        "error[D170]: no parameter `knee.servo.kq` in `free`\n"
         " = help: did you mean `knee.servo.kt`, `knee.servo.kp`, `knee.servo.ki`?\n"
         "\n"
         "1 error\n"
@@ -325,7 +325,7 @@ def test_doc_lists_every_model_with_a_line_of_its_own(capsys: pytest.CaptureFixt
 
 def test_doc_of_no_model_says_what_was_meant(capsys: pytest.CaptureFixture[str]) -> None:
     err = complained(capsys, "doc", "rigid_gearbx")
-    assert err.startswith("error[D164]: no kind of model and no model `rigid_gearbx`\n")
+    assert err.startswith("error[D171]: no kind of model and no model `rigid_gearbx`\n")
     assert " = help: did you mean `rigid_gearbox`?\n" in err
 
 
@@ -350,7 +350,7 @@ def test_dump_of_the_kernel_is_code_for_llvm(capsys: pytest.CaptureFixture[str])
 def test_dump_knows_every_stage_of_the_way_in_order(capsys: pytest.CaptureFixture[str]) -> None:
     assert tuple(stage_names()) == ORDER
     assert complained(capsys, "dump", "modl", "swing.ic") == (
-        "error[D165]: no stage `modl`\n"
+        "error[D172]: no stage `modl`\n"
         " = help: did you mean `model`?\n"
         f" = help: stages: {', '.join(ORDER)}\n"
         "\n"
@@ -394,3 +394,10 @@ def test_prefixes_are_the_shortest_of_one_length_that_tell_names_apart() -> None
     assert prefixes(["8f3a11", "8f3a22", "1c8100"]) == ["8f3a1", "8f3a2", "1c810"]
     assert prefixes(["8f3a11", "1c8100"]) == ["8f3a", "1c81"]
     assert prefixes(["8f3a11"]) == ["8f3a"]
+
+
+def test_explain_follows_the_names_that_a_value_is_written_with(deck: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    deck.write_text(DECK.replace("rate(0.5 rad/s)", "rate(quick)") + "let quick = 0.5 rad/s;\n")
+    lines = printed(capsys, "explain", "swing.ic", "pivot.servo.command.value").splitlines()
+    assert lines[0] == "pivot.servo.command.value = 0.5 rad/s"
+    assert lines[-1] == "  ::: swing.ic:36:5  quick = 0.5 rad/s"

@@ -187,7 +187,7 @@ def test_a_file_that_cannot_be_read_is_the_users_to_mend_not_a_defect(
 ) -> None:
     offer(monkeypatch, read=command(lambda: Path("/no/such/file").read_text()))
     assert cli.main(["read"]) == 2
-    assert capsys.readouterr().err == "error[E218]: `/no/such/file`: No such file or directory\n\n1 error\n"
+    assert capsys.readouterr().err == "error[E338]: `/no/such/file`: No such file or directory\n\n1 error\n"
 
 
 def test_a_closed_pipe_ends_quietly() -> None:

@@ -25,9 +25,7 @@ def test_every_unit_has_the_size_and_dimension_that_pint_gives_it(name, pint_reg
     quantity = pint_registry.Quantity(1.0, PINT_NAMES.get(name, name)).to_base_units()
     mine = UNITS[name].measure
     # pint multiplies the factors in another order than the table's constants do: a few roundings
-    assert mine.scale == pytest.approx(
-        quantity.to(_in_pint(mine.dimension, pint_registry)).magnitude, rel=1e-15 * 8
-    )
+    assert mine.scale == pytest.approx(quantity.to(_in_pint(mine.dimension, pint_registry)).magnitude, rel=1e-15 * 8)
 
 
 def _in_pint(dimension: Dimension, registry):
@@ -73,7 +71,8 @@ def test_an_angle_counts_only_where_the_rest_is_time_or_nothing(a, b, alike):
     ("written", "scale"),
     [
         ("1", 1.0), ("1/s", 1.0), ("mm^2", 1e-6), ("kg*m^2", 1.0), ("g*cm^2", 1e-7), ("N*m/(A*s)", 1.0),
-        ("N*m/(mA*ms)", 1e6), ("1/(kg*mm^2)", 1e6), ("V / (rad / s)", 1.0), ("m^-2", 1.0), ("mm^-1", 1e3), ("(mm)^2", 1e-6),
+        ("N*m/(mA*ms)", 1e6), ("1/(kg*mm^2)", 1e6), ("V / (rad / s)", 1.0), ("m^-2", 1.0),
+        ("mm^-1", 1e3), ("(mm)^2", 1e-6),
     ],
 )  # fmt: skip
 def test_a_declared_unit_is_read_with_products_powers_and_parentheses(written, scale):
@@ -81,7 +80,9 @@ def test_a_declared_unit_is_read_with_products_powers_and_parentheses(written, s
     assert parse_unit(written).scale == pytest.approx(scale, rel=1e-15 * 8)
 
 
-@pytest.mark.parametrize("written", ["", "foo", "m*", "m/", "(m", "m)", "m^x", "m^99", "2*m", "m m", "m$", "m^", "*m", "()"])
+@pytest.mark.parametrize(
+    "written", ["", "foo", "m*", "m/", "(m", "m)", "m^x", "m^99", "2*m", "m m", "m$", "m^", "*m", "()"]
+)
 def test_a_declared_unit_that_cannot_be_read_is_refused_by_name(written):
     with pytest.raises(ValueError, match="unit"):
         parse_unit(written)
