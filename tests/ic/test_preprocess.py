@@ -123,14 +123,20 @@ def test_random_macros_expand_as_gcc_expands_them(desk: Desk, seed: int, recursi
     if cpp is None:
         pytest.skip("gcc's preprocessor is the oracle of this test")
     rng = random.Random(seed)
+    compared = 0
     for _ in range(10):
         # of more macros that use each other in circles C does not say all, and some uses outgrow our limits
         text = _random_macros(rng, rng.randint(1, 3) if recursive else 6, recursive)
-        theirs = subprocess.run([cpp, "-P", "-"], input=text, capture_output=True, text=True, check=True)
+        theirs = subprocess.run([cpp, "-P", "-"], input=text, capture_output=True, text=True, check=False)
         mine = desk.tokens(text)
-        assert not mine.diagnostics
+        # a function-like name may meet parentheses with a wrong number of arguments: wrong for both
+        assert bool(mine.diagnostics) == bool(theirs.returncode), text
+        if mine.diagnostics:
+            continue
+        compared += 1
         expected = [t.text for line in logical_lines(Text("", theirs.stdout)) for t in line if t.text.strip()]
         assert [t.text for t in mine.tokens[:-1]] == expected, text
+    assert compared >= 3
 
 
 # files

@@ -18,19 +18,11 @@ from hypothesis import strategies as st
 from met import kernel
 from met.diagnostic import Problem
 from met.trace import (
-    Every,
-    Phase,
-    Program,
-    Record,
-    Run,
-    Unless0,
-    WhileAny,
     atan2,
     both,
     clip,
     cos,
     either,
-    execute,
     exp,
     floor,
     fma,
@@ -50,7 +42,8 @@ from met.trace import (
 )
 from met.trace.cache import folder
 from met.trace.graph import evaluate, live
-from met.trace.program import record
+from met.trace.program import Every, Phase, Program, Record, Run, Unless0, WhileAny, record
+from met.trace.reference import execute
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -11,7 +11,7 @@ import ic
 from met import run as engine
 from met.plan import Experiment
 from met.program import build
-from met.trace import execute
+from met.trace.reference import execute
 from tests.oracles.random_deck import random_deck
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from met.trace import Every, Phase, Program, Record, Run, Unless0, WhileAny, execute, sin, where
+from met.trace import sin, where
 from met.trace.graph import OPERANDS
 from met.trace.pieces import cut, operations
-from met.trace.program import record
+from met.trace.program import Every, Phase, Program, Record, Run, Unless0, WhileAny, record
+from met.trace.reference import execute
 
 
 def run(*bodies):
