@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from ic.dump import Asked
+from ic.printing.dump import Asked
 
 if TYPE_CHECKING:
     from met.plan import Experiment

@@ -12,7 +12,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from ic.lower import Compiled
+    from ic.meaning.lower import Compiled
     from met.plan import Plan
 
 __all__ = ["check", "compile"]
@@ -21,7 +21,7 @@ __all__ = ["check", "compile"]
 def check(path: str | PathLike[str], *, include_dirs: Iterable[str | PathLike[str]] = (), defines: Iterable[str] = (),
           select: Sequence[str] | Literal["all"] | None = "all") -> Compiled:
     """The plan of all runs and sweeps or None, all diagnostics, every file's text. A mistake raises nothing."""
-    from ic.lower import check as lowered
+    from ic.meaning.lower import check as lowered
 
     return lowered(path, include_dirs=tuple(include_dirs), defines=tuple(defines), select=select)
 

@@ -11,7 +11,7 @@ from met.cli import BAD_INPUT, YES, complain, deck_options, format_option, loudn
 from met.diagnostic import Label, Problem
 
 if TYPE_CHECKING:
-    from ic.lower import Compiled
+    from ic.meaning.lower import Compiled
     from met.plan import Plan
 
 DECK = click.argument("deck")
@@ -42,7 +42,7 @@ def check(
     if compiled.plan is None:
         return BAD_INPUT
     if not quiet:
-        from ic.print_check import verdict
+        from ic.printing.check import verdict
 
         click.echo(verdict(compiled.plan, compiled.diagnostics))
     return YES
@@ -82,7 +82,7 @@ def plan(
     elif form == "json":
         click.echo(plan_file.dumps(made), nl=False)
     elif not quiet:
-        from ic.print_plan import print_plan
+        from ic.printing.plan import print_plan
 
         _print(print_plan(made))
 
@@ -108,7 +108,7 @@ def cases(
 
     Of SWEEP, or else of all sweeps of the deck. `met run --case` takes a position (`#3`) or the beginning of an id.
     """
-    from ic.print_cases import cases_json, print_cases
+    from ic.printing.cases import cases_json, print_cases
 
     made = _plan(deck, include_dirs, defines, names, not names, True)
     shown = [e for e in made.experiments if names or e.cases.coordinates] or list(made.experiments)
@@ -142,8 +142,8 @@ def explain(
 
     PATH is a parameter (elbow.servo.kt), the beginning of several (elbow.servo), or one of a definition (gearbox.kp).
     """
-    from ic.explain import explained
-    from ic.print_explain import explain_json, print_explain
+    from ic.meaning.explain import explained
+    from ic.printing.explain import explain_json, print_explain
 
     names = (name,) if name else ()
     compiled = None if deck.endswith(".json") else _compiled(deck, include_dirs, defines, names or None)
@@ -168,7 +168,7 @@ def doc(words: tuple[str, ...], form: str) -> None:
 
     KIND is servo, command, environment, metric or integrator; MODEL one of them by name.
     """
-    from ic import print_models
+    from ic.printing import models as print_models
     from met import models
 
     if len(words) > 2:
@@ -197,7 +197,7 @@ def dump(
 
     STAGE is tokens, syntax, model, plan, program, kernel or assembly.
     """
-    from ic.dump import Asked, find_stage
+    from ic.printing.dump import Asked, find_stage
 
     _print(find_stage(stage)(Asked(deck, include_dirs, defines, names or None)))
 
@@ -237,7 +237,7 @@ def _compiled(
 def _plan_in_file(path: str, names: tuple[str, ...]) -> Plan:
     from dataclasses import replace
 
-    from ic.complaints import did_you_mean, known_words
+    from ic.meaning.complaints import did_you_mean, known_words
     from met import plan_file
     from met.diagnostic import error
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from ic.files import LIBRARY, Files
+from ic.text.files import LIBRARY, Files
 from met.diagnostic import Problem, error
 
 

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from ic.files import LIBRARY
-from ic.limits import Findings, GiveUp
-from ic.parse import parse
-from ic.preprocess import preprocess
-from ic.syntax import Deck, Entry, SourceText
+from ic.grammar.parse import parse
+from ic.grammar.syntax import Deck, Entry, SourceText
+from ic.text.files import LIBRARY
+from ic.text.limits import Findings, GiveUp
+from ic.text.preprocess import preprocess
 from met.diagnostic import Diagnostic, Problem
 from met.render import shown_place
 

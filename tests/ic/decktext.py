@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ic.preprocess import Tokens, preprocess
+from ic.grammar.syntax import Deck
 from ic.read import read
-from ic.syntax import Deck
+from ic.text.preprocess import Tokens, preprocess
 from met.diagnostic import Problem
 from met.render import render
 

@@ -1,0 +1,1 @@
+"""Tokens -> syntax tree: what was written, in the order written."""

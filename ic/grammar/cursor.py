@@ -1,0 +1,192 @@
+"""Where the parser stands in the tokens, how it complains, and how it finds its feet again.
+
+A mistake is noted and raises Unreadable; the list of entries that holds the one in trouble catches it, skips to its
+end and goes on, so that one run tells several mistakes and none of them twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NoReturn
+
+from ic.text.lexer import BAD, END, NAME, NUMBERS, STRING, Token
+from ic.text.limits import DEPTH, MOST_OPERATORS, Findings, GiveUp
+from met.diagnostic import Label, Place
+
+OPENING = {"(": ")", "[": "]", "{": "}"}
+SHOWN = 40  # characters of a token in a message
+
+
+class Unreadable(Exception):
+    """This entry cannot be read, and that has been said."""
+
+
+class Ended(Exception):
+    """The tokens ended inside a block, and that has been said."""
+
+
+def found(token: Token) -> str:
+    if token.kind == END:
+        return "the end of the deck"
+    text = token.text if len(token.text) <= SHOWN else token.text[: SHOWN - 3] + "..."
+    return f"`{text}`" if token.kind != STRING else f"the string {text}"
+
+
+def span(first: Token, last: Token) -> Place:
+    """From the first token to the last where they stand on one line and came the same way; else the first alone."""
+    together = first.source is last.source and first.expansions == last.expansions
+    if first is last:
+        return first.place
+    if together and first.offset < last.offset and "\n" not in first.source.text[first.offset : last.offset]:
+        return first.source.place(first.offset, last.end - first.offset, first.expansions)
+    return first.place
+
+
+class Cursor:
+    def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
+        last = tokens[-1]
+        assert last.kind == END
+        # looking two tokens ahead never needs a check
+        self.tokens = [*tokens, last, last]
+        self.findings = findings
+        self.at = 0
+        self.open: list[Token] = []
+        self.operators = 0
+        self.peak = 0
+        self.misindented: tuple[Token, Token] | None = None
+
+    @property
+    def token(self) -> Token:
+        return self.tokens[self.at]
+
+    @property
+    def following(self) -> Token:
+        return self.tokens[self.at + 1]
+
+    @property
+    def previous(self) -> Token:
+        return self.tokens[max(0, self.at - 1)]
+
+    def advance(self) -> Token:
+        token = self.tokens[self.at]
+        if token.kind != END:
+            self.at += 1
+        return token
+
+    # complaints
+
+    def tell(self, code: str, message: str, at: Token | Place | Label, *, also: Iterable[Label] = (),
+             help: str | Iterable[str] = ()) -> None:  # fmt: skip
+        self.findings.error(code, message, at.place if isinstance(at, Token) else at, also=also, help=help or ())
+
+    def fail(self, code: str, message: str, at: Token | Place | Label, *, also: Iterable[Label] = (),
+             help: str | Iterable[str] = ()) -> NoReturn:  # fmt: skip
+        if self.token.kind != BAD:  # of such a token enough has been said
+            self.tell(code, message, at, also=also, help=help)
+        raise Unreadable
+
+    def unexpected(self, wanted: str, help: str | Iterable[str] = ()) -> NoReturn:
+        self.fail("D020", f"expected {wanted}, found {found(self.token)}", self.token, help=help)
+
+    def behind(self, token: Token) -> Place:
+        """The place just behind a token, where something is missing."""
+        return token.source.place(token.end, 1, token.expansions)
+
+    # brackets
+
+    def enter(self) -> Token:
+        """Takes an opening brace, bracket or parenthesis."""
+        opening = self.advance()
+        if len(self.open) >= DEPTH:
+            self.tell("D029", f"braces, brackets and parentheses go deeper than {DEPTH}", opening)
+            raise GiveUp
+        self.open.append(opening)
+        return opening
+
+    def leave(self, wanted: str = "") -> Token:
+        """Takes the matching closing one."""
+        opening = self.open[-1]
+        closing = OPENING[opening.text]
+        if self.token.text != closing:
+            expected = f"{wanted}`{closing}`"
+            label = Label(opening.place, f"to close this `{opening.text}`")
+            self.fail("D022", f"expected {expected}, found {found(self.token)}", self.token, also=(label,))
+        self.open.pop()
+        return self.advance()
+
+    def count_operator(self) -> None:
+        self.operators += 1
+        if self.operators > MOST_OPERATORS:
+            self.tell(
+                "D029",
+                f"an expression has at most {MOST_OPERATORS} operators",
+                self.token,
+                help="give its parts names with `let`",
+            )
+            raise GiveUp
+
+    # items do not nest in each other, so each may use the operators that are left; what holds them counts the most
+    # that one used: so the depth of the tree is bounded, and with it that of every function that walks it
+
+    def begin_items(self) -> int:
+        outer, self.peak = self.peak, self.operators
+        return outer
+
+    def end_items(self, outer: int) -> None:
+        self.operators = self.peak
+        self.peak = max(outer, self.peak)
+
+    # lines, as the reader of the deck sees them
+
+    def line_of(self, token: Token) -> tuple[str, int]:
+        if token.expansions:
+            use = token.expansions[-1].use
+            return use.file, use.line
+        return token.source.name, token.line
+
+    def on_new_line(self, at: int) -> bool:
+        return at > 0 and self.line_of(self.tokens[at]) != self.line_of(self.tokens[at - 1])
+
+    def begins_entry(self, at: int) -> bool:
+        """Whether a new line begins here, and looks like an entry: the one before lacks its semicolon."""
+        token, after = self.tokens[at], self.tokens[at + 1]
+        if token.kind != NAME:
+            return False
+        entry = after.text in ("=", "+=", "{", ".") or (after.kind == NAME and after.text not in ("and", "or"))
+        return entry and self.on_new_line(at)
+
+    def begins_value(self) -> bool:
+        token = self.token
+        return token.kind in (*NUMBERS, NAME, STRING) or token.text in ("[", "(")
+
+    # recovery
+
+    def recover(self, start: int, depth: int) -> None:
+        """Skips the rest of an entry that began at `start`, when `depth` brackets were open."""
+        unclosed = len(self.open) - depth
+        braces = sum(token.text == "{" for token in self.open[depth:])
+        rounds = unclosed - braces
+        del self.open[depth:]
+        while self.token.kind != END:
+            text = self.token.text
+            if text == "{":
+                braces += 1
+            elif text == "}":
+                if braces == 0:
+                    return
+                braces -= 1
+                if braces == 0:
+                    self.advance()
+                    if self.token.text == ";":
+                        self.advance()
+                    return
+            elif text in ("(", "["):
+                rounds += 1
+            elif text in (")", "]"):
+                rounds -= 1
+            elif text == ";" and braces == 0:
+                self.advance()
+                return
+            elif braces == 0 and rounds <= 0 and self.at > start and self.begins_entry(self.at):
+                return
+            self.advance()

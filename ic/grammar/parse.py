@@ -1,0 +1,269 @@
+"""Tokens to the tree of `ic.grammar.syntax`, by recursive descent.
+
+The parser knows no word of the language but `let`, `like`, `of`, `and`, `or`, `not` and `when`, and those only where
+they stand: what a run of names means is decided by what comes behind it, so a joint may be called `at`, `let` or
+`sample`.
+
+    names =  or  +=      a setting; all names but the last are words
+    names {              a group
+    names value ;        a statement
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+
+from ic.grammar.cursor import Ended, Unreadable, span
+from ic.grammar.expressions import Expressions
+from ic.grammar.syntax import Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
+from ic.text.lexer import BAD, END, NAME, NUMBERS, STRING, Token
+from ic.text.limits import Findings, GiveUp, without_collection
+from met import units
+from met.diagnostic import Diagnostic, Label
+
+COMPARE = ("require", "exclude")
+
+
+def parse(
+    tokens: Sequence[Token], findings: Findings | None = None
+) -> tuple[tuple[Entry, ...], tuple[Diagnostic, ...]]:
+    """The entries of a deck, and what is wrong with it; where something is, the entries are not all there."""
+    findings = findings if findings is not None else Findings()
+    parser = _Parser(tokens, findings)
+    entries: list[Entry] = []
+    with without_collection(), suppress(GiveUp, Ended):
+        parser.entries(entries)
+    return tuple(entries), findings.all
+
+
+class _Parser(Expressions):
+    def entries(self, into: list[Entry]) -> None:
+        """Entries up to the closing brace of the block they stand in, or to the end."""
+        depth = len(self.open)
+        while True:
+            token = self.token
+            if token.kind == END:
+                if self.open:
+                    self.never_closed()
+                return
+            if token.text == "}":
+                if depth:
+                    return
+                self.closes_nothing()
+                continue
+            if token.text == ";":
+                self.advance()
+                continue
+            start = self.at
+            try:
+                operators = self.operators
+                into.append(self.entry())
+                self.operators = operators
+            except Unreadable:
+                self.operators = operators
+                self.recover(start, depth)
+
+    def block(self) -> tuple[Entry, ...]:
+        opening = self.enter()
+        body: list[Entry] = []
+        outer = self.begin_items()
+        self.entries(body)
+        self.end_items(outer)
+        closing = self.leave()
+        if self.misindented is None and not (opening.expansions or closing.expansions):
+            before, after = opening.source.indent(opening.offset), closing.source.indent(closing.offset)
+            if after < before and opening.line != closing.line:
+                self.misindented = (opening, closing)
+        return tuple(body)
+
+    def never_closed(self) -> None:
+        also = [Label(self.behind(self.previous), "the deck ends here")]
+        opening = self.open[-1]
+        if self.misindented is not None:
+            inner, closing = self.misindented
+            also = [
+                Label(inner.place, f"perhaps this one: the `}}` on line {closing.line} that closes it is indented less")
+            ]
+        self.tell("D022", f"this `{opening.text}` is not closed", opening, also=also)
+        raise Ended
+
+    def closes_nothing(self) -> None:
+        token = self.advance()
+        self.tell("D022", f"this `{token.text}` closes nothing", token)
+
+    # entries
+
+    def entry(self) -> Entry:
+        start = self.at
+        first = self.token
+        if first.kind != NAME:
+            self.not_an_entry()
+        names = [self.advance()]
+        while self.token.kind == NAME and not (len(names) > 0 and self.line_break_in(names)):
+            names.append(self.advance())
+        tail: list[Token] = []
+        if self.token.text == ".":
+            self.at -= 1
+            tail = self.path()[1:]
+        text = self.token.text
+        if text in ("=", "+="):
+            if names[0].text == "let" and len(names) == 2:
+                return self.let(names, tail)
+            return self.setting(names, tail)
+        if text == "{" or (text == ";" and _base_at(names) is not None):
+            return self.group(names, tail)
+        if text == "," and _base_at(names) is not None:
+            self.fail("D032", "there is one base only", self.token, help="a definition takes after one other")
+        if text in ("-=", "*=", "/="):
+            self.fail("D023", f"there is no `{text}`", self.token, help="`=` sets a value, `+=` appends to a list")
+        if text == ":":
+            self.unexpected("`=`", help="a deck writes `name = value;`")
+        if text == "==" and len(names) == 1 and not tail:
+            self.fail("D023", "`==` compares", self.token, help="to set a value, write `=`")
+        return self.statement(start, names, tail)
+
+    def line_break_in(self, names: list[Token]) -> bool:
+        """Whether a new line breaks a run of names that cannot be one entry: `q` and, below it, `mass = 3;`."""
+        return self.begins_entry(self.at) and self.following.text in ("=", "+=")
+
+    def not_an_entry(self) -> None:
+        token = self.token
+        if token.text in (")", "]"):
+            self.fail("D022", f"this `{token.text}` closes nothing", token)
+        if token.text == "{":
+            self.unexpected("a name before the block", help="a block is written `kind name { ... }`")
+        self.unexpected("an entry, such as `name = value;`")
+
+    def let(self, names: list[Token], tail: list[Token]) -> Let:
+        name = names[1]
+        if tail:
+            self.fail("D020", "`let` gives a value to one name, without points", span(name, tail[-1]))
+        if units.is_unit(name.text):
+            message = f"`{name.text}` is the unit {units.UNITS[name.text].word}, so it cannot name a value"
+            self.tell("D026", message, name, help="choose another name: after a number it would be read as the unit")
+        if self.token.text == "+=":
+            self.fail("D023", "`let` gives a value once", self.token, help="write `=`")
+        self.advance()
+        value = self.value()
+        self.semicolon(value)
+        return Let(_word(name), value, span(names[0], name))
+
+    def setting(self, names: list[Token], tail: list[Token]) -> Setting:
+        operator = self.advance()
+        words, path = names[:-1], [names[-1], *tail]
+        if words and words[0].text in COMPARE and operator.text == "=":
+            self.fail("D023", "`=` sets a value", operator, help="to compare, write `==`")
+        value = self.value()
+        self.semicolon(value)
+        named = _words(path)
+        place = named[0].place if len(named) == 1 else span(path[0], path[-1])
+        return Setting(_words(words), named, operator.text, value, place)
+
+    def group(self, names: list[Token], tail: list[Token]) -> Group:
+        base = _base_at(names)
+        if tail and (base is None or base + 2 != len(names)):
+            self.fail("D020", "a block's name has no points", span(names[-1], tail[-1]),
+                      help=f"write `{names[-1].text} {{ {tail[0].text} {{ ... }} }}`")  # fmt: skip
+        like = of = None
+        words = names
+        while base is not None:
+            path = [words[base + 1], *(tail if base + 2 == len(names) else [])]
+            name = Name(_words(path), span(path[0], path[-1]))
+            if words[base].text == "like":
+                like = name
+            else:
+                of = name
+            words = words[:base]
+            further = _base_at(words)
+            if further is not None and words[further].text == names[base].text:
+                self.fail("D032", f"`{names[base].text}` is there twice", names[base], help="there is one base only")
+            base = further
+        body: tuple[Entry, ...] = ()
+        if self.token.text == ";":
+            self.advance()
+        else:
+            body = self.block()
+        return Group(_words(words), like, of, body, span(words[0], words[-1]))
+
+    def statement(self, start: int, names: list[Token], tail: list[Token]) -> Statement:
+        """`require settle < 10 s;`: which of the names belong to the value is seen from what follows them."""
+        token = self.token
+        count = _words_before_value(names, bool(tail), token)
+        if count == 0 or (count == len(names) and not (self.begins_value() or token.text in ("-", "+", "!"))):
+            self.no_statement([*names, *tail], token)
+        self.at = start + count
+        words = names[:count]
+        value = self.value()
+        self.semicolon(value)
+        return Statement(_words(words), value, span(words[0], words[-1]))
+
+    def no_statement(self, names: list[Token], token: Token) -> None:
+        last = names[-1]
+        wanted = "`=`, `{` or a value"
+        if self.on_new_line(self.at) or token.kind == END or token.text in (";", "}"):
+            if token.kind == BAD:
+                raise Unreadable
+            self.fail("D020", f"expected {wanted} after `{last.text[:40]}`", self.behind(last))
+        self.unexpected(f"{wanted} after `{last.text[:40]}`")
+
+    def semicolon(self, value: Expression) -> None:
+        """The end of an entry. A missing semicolon at a line's end is noted and forgiven."""
+        token = self.token
+        if token.text == ";":
+            self.advance()
+            return
+        if isinstance(value, Call) and value.body is not None:
+            return
+        if token.kind == BAD:
+            raise Unreadable
+        if token.text == "}" or token.kind == END or self.on_new_line(self.at):
+            self.tell("D021", "expected `;`", self.behind(self.previous))
+            return
+        if token.text == "," and (self.on_new_line(self.at + 1) or self.following.text == "}"):
+            self.tell("D024", "`,` at the end of an entry", token, help="write `;`")
+            self.advance()
+            return
+        if token.text in (")", "]"):
+            self.fail("D022", f"this `{token.text}` closes nothing", token)
+        if token.kind == NAME and self.following.text in ("=", "+=", "{", "."):
+            self.tell("D021", "expected `;`", self.behind(self.previous))
+            return
+        helps = {
+            "=": "to compare, write `==`; to set two things, write two entries",
+            "..": "ranges are not in the language yet: write `linspace(first, last, count)`",
+            ",": "a list stands in brackets: `[a, b]`",
+            "?": "there is no `?:` in a deck; `#if` chooses between builds",
+        }
+        self.unexpected(
+            "`;`" if token.kind in (*NUMBERS, STRING, NAME) else "`;` or an operator", help=helps.get(token.text, ())
+        )
+
+
+def _word(token: Token) -> Word:
+    return Word(token.text, token.place)
+
+
+def _words(tokens: Sequence[Token]) -> tuple[Word, ...]:
+    return tuple(Word(token.text, token.place) for token in tokens)
+
+
+def _base_at(names: Sequence[Token]) -> int | None:
+    """Where `like X` or `of X` stands at the end of a definition's names; kind and name come first."""
+    at = len(names) - 2
+    return at if at >= 2 and names[at].text in ("like", "of") else None
+
+
+def _words_before_value(names: Sequence[Token], dotted: bool, following: Token) -> int:
+    """How many of a statement's names come before its value."""
+    texts = [name.text for name in names]
+    for i in range(1, len(texts)):
+        if texts[i] == "not":
+            return i
+        if texts[i] in ("and", "or") and i > 1:
+            return i - 1
+    if dotted or len(names) == 1:
+        return len(names) - dotted
+    if texts[-1] == "when" or following.kind in (*NUMBERS, STRING) or following.text == "[":
+        return len(names)
+    return len(names) - 1

@@ -1,0 +1,38 @@
+"""Expressions as text again, for messages and for what a plan quotes of its deck."""
+
+from __future__ import annotations
+
+from ic.grammar.syntax import Binary, Call, Expression, List, Name, Number, String, Unary, WithUnit
+
+LOOSE = {"or": 1, "and": 2, "<": 3, "<=": 3, ">": 3, ">=": 3, "==": 3, "!=": 3, "+": 4, "-": 4, "*": 5, "/": 5, "^": 7}
+
+
+def spell(expression: Expression, within: int = 0) -> str:
+    """The expression as a deck would write it. within: how tightly what is around it binds."""
+    match expression:
+        case Number():
+            if expression.unit is None:
+                return expression.text
+            gap = "" if expression.text.endswith(expression.unit.text) else f" {expression.unit.text}"
+            return expression.text + gap
+        case String():
+            return f'"{expression.value}"'
+        case Name():
+            return expression.text
+        case List():
+            return "[" + ", ".join(spell(item) for item in expression.items) + "]"
+        case WithUnit():
+            inner = spell(expression.inner)
+            closed = isinstance(expression.inner, (List, Call))
+            return f"{inner if closed else f'({inner})'} {expression.unit.text}"
+        case Call():
+            named = (f"{word.text} = {spell(value)}" for word, value in expression.named)
+            return f"{expression.name.text}({', '.join([*(spell(value) for value in expression.positional), *named])})"
+        case Unary():
+            gap = " " if expression.operator == "not" else ""
+            return f"{expression.operator}{gap}{spell(expression.operand, 6)}"
+        case Binary():
+            binds = LOOSE[expression.operator]
+            text = f"{spell(expression.left, binds)} {expression.operator} {spell(expression.right, binds + 1)}"
+            return f"({text})" if binds < within else text
+    raise AssertionError(expression)

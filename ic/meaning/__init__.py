@@ -1,0 +1,1 @@
+"""Syntax tree -> plan: what is meant, in SI, with the origin of every value."""

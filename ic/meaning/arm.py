@@ -1,0 +1,348 @@
+"""Arms: links with their inertia, joints with their frames, and whether they make a tree that could exist."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ic.grammar.syntax import Expression, Name, Unary
+from ic.meaning.complaints import did_you_mean, known_words
+from ic.meaning.models import check_keys, word_of
+from ic.meaning.resolve import Block, Definition, Item
+from ic.meaning.scope import Owner, Scope
+from ic.meaning.shapes import SHAPES, Solid
+from met.diagnostic import Label, Place
+from met.parameter import Parameter
+from met.plan import Joint, Link
+from met.trace import Real, Scalar, sqrt
+
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
+JOINT_KINDS = ("revolute", "prismatic", "fixed")
+
+MASS = Parameter(name="mass", unit="kg", above=0.0, doc="mass of the link")
+COM = Parameter(name="com", unit="m", shape="vector", doc="centre of mass, link frame")
+INERTIA = Parameter(name="inertia", unit="kg*m^2", shape="list", doc="inertia about the centre of mass, link axes")
+AT = Parameter(name="at", unit="m", shape="vector", doc="origin of the joint frame, parent link's frame")
+RPY = Parameter(name="rpy", unit="rad", shape="vector", doc="turn of the joint frame, fixed x-y-z")
+AXIS = Parameter(name="axis", unit="1", shape="vector", doc="axis of motion, joint frame")
+
+LINK_KEYS = ("mass", "com", "inertia", "shape")
+JOINT_KEYS = ("parent", "child", "at", "rpy", "axis")
+
+
+@dataclass(frozen=True)
+class Arm:
+    name: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+
+    def kind(self, joint: str) -> str | None:
+        return next((j.kind for j in self.joints if j.name == joint), None)
+
+    @property
+    def moving(self) -> tuple[Joint, ...]:
+        return tuple(joint for joint in self.joints if joint.kind != "fixed")
+
+
+def resolve_arm(scope: Scope, definition: Definition) -> Arm | None:
+    """The arm, with its numbers entered as parameters; None where its definition could not be merged."""
+    block = scope.definitions.block(definition)
+    if block is None:
+        return None
+    homes = scope.definitions.homes(definition)
+    for item in block.items.values():
+        if item.kind not in ("link", "joint"):
+            _stray(scope, item, block)
+    for statement in block.statements:
+        scope.complaints.error("D080", "an arm holds links and joints; this is neither", statement.place,
+                               help="move it to the run")
+    links = [link for item in block.of_kind("link") if (link := _link(scope, item, homes)) is not None]
+    made = [_joint(scope, item, homes, block) for item in block.of_kind("joint")]
+    joints = [joint for joint in made if joint is not None]
+    if not any(True for _ in block.of_kind("link")):
+        scope.complaints.error("D081", f"arm `{definition.name}` has no links", definition.place,
+                               help="write `link NAME { ... }` and a joint to hold it")
+    check_tree(scope, definition.name, links, joints, complete=len(joints) == len(made))
+    return Arm(definition.name, tuple(links), tuple(joints))
+
+
+def _stray(scope: Scope, item: Item, block: Block) -> None:
+    known = [other.name for other in block.items.values() if other.kind in ("link", "joint")]
+    if item.kind:
+        scope.complaints.error("D082", f"no `{item.kind}` in an arm", item.place,
+                               help=[*did_you_mean(item.kind, ("link", "joint")), "an arm holds links and joints"])
+    else:
+        scope.complaints.error(
+            "D083", f"nothing named `{item.name}` to change in this arm", item.place,
+            help=[*did_you_mean(item.name, known), f"`link {item.name} {{ ... }}` or `joint {item.name} revolute "
+                  "{ ... }` would add one"])
+
+
+# Links
+
+
+def _link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
+    owner = Owner(f"link `{item.name}`", item.place, f"links.{item.name}", homes=homes)
+    if item.name == "base":
+        scope.complaints.error("D084", "`base` is the ground that the arm stands on, so no link may be called so",
+                               item.place, help="give the link another name")
+        return None
+    if item.detail:
+        scope.complaints.error("D085", f"`{item.detail[0].text}` after the name of a link", item.detail[0].place,
+                               help=f"write `link {item.name} {{ ... }}`")
+    if item.body is None:
+        scope.complaints.error("D085", f"link `{item.name}` needs a block", item.place,
+                               help=f"write `link {item.name} {{ mass = ...; shape = ...; }}`")
+        return None
+    body = item.body
+    check_keys(scope, body, LINK_KEYS, owner)
+    mass = scope.number(owner, MASS, body.get("mass"))
+    solid = _shape(scope, owner, body.get("shape"))
+    _com(scope, owner, body.get("com"), solid)
+    inertia = _inertia(scope, owner, body.get("inertia"), solid, mass)
+    if inertia is not None:
+        strict = body.get("inertia") is not None
+        place = body.items["inertia"].place if strict else item.place
+        scope.checks.hold(
+            inertia,
+            lambda moments: _not_a_body(moments, strict),
+            code="D087",
+            needs=(f"{owner.path}.mass",),
+            message=f"the inertia of link `{item.name}` is no body's",
+            place=place,
+            help=(
+                "inertia is about the centre of mass, in link axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2",
+                "products have the sign of -sum(m x y)",
+            ),
+        )
+    shape = None
+    if solid is not None:
+        shape = (solid.kind, tuple((name, scope.checks.first(value)) for name, value in solid.numbers))
+    return Link(item.name, item.place, shape)
+
+
+def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
+    if item is None:
+        return None
+    name = word_of(item.value)
+    if name is None or name not in SHAPES:
+        helps = did_you_mean(name, SHAPES) if name else ()
+        scope.complaints.error("D088", f"no shape `{name}`" if name else "a shape is needed here", item.place,
+                               help=[*helps, "shapes: rod(length, along), box(size, along), cylinder(radius, length, "
+                                     "along), sphere(radius)"])
+        scope.checks.fail(f"{owner.path}.shape")
+        return None
+    kind = SHAPES[name]
+    inner = Owner(f"the {name} of {owner.label}", item.place, f"{owner.path}.shape", homes=owner.homes)
+    body = item.body or Block()
+    check_keys(scope, body, [p.name for p in kind.parameters], inner)
+    numbers: dict[str, Real] = {}
+    along, good = "x", True
+    for wanted in kind.parameters:
+        given = body.get(wanted.name)
+        if wanted.shape == "word":
+            word = scope.word(inner, wanted, given)
+            along, good = word or along, good and word is not None
+        elif wanted.shape == "vector":
+            vector = scope.vector(inner, wanted, given, record=False)
+            good = good and vector is not None
+            numbers |= {f"{wanted.name}_{axis}": x for axis, x in zip("xyz", vector or (), strict=False)}
+        else:
+            number = scope.number(inner, wanted, given, record=False)
+            good = good and number is not None
+            if number is not None:
+                numbers[wanted.name] = number
+    return kind.solid(numbers, "xyz".index(along)) if good else None
+
+
+def _com(scope: Scope, owner: Owner, item: Item | None, solid: Solid | None) -> None:
+    if item is not None or solid is None:
+        default = Parameter(name="com", unit="m", shape="vector", doc=COM.doc, default=(0.0, 0.0, 0.0))
+        scope.vector(owner, default, item)
+        return
+    scope.whole[owner.join("com")] = "is made of 3 numbers; vary one of them, such as `" + owner.join("com.x`")
+    for axis, value in zip("xyz", solid.com, strict=True):
+        scope.derived(owner, f"com.{axis}", value, "m", f"middle of the {solid.kind}")
+
+
+def _inertia(scope: Scope, owner: Owner, item: Item | None, solid: Solid | None,
+             mass: Real | None) -> tuple[Real, ...] | None:
+    if item is not None:
+        return scope.vector(owner, INERTIA, item, names=MOMENTS, short=3)
+    if solid is None:
+        if not scope.checks.failed(f"{owner.path}.shape"):
+            scope.complaints.error(
+                "D089", f"{owner.label} has no inertia", owner.place,
+                help=["write a shape, such as `shape = rod(length = 1 m, along = x);`",
+                      "or `inertia = [xx, yy, zz] kg*m^2;`, about the centre of mass"])
+        return None
+    if mass is None:
+        return None
+    scope.whole[owner.join("inertia")] = "is made of 6 numbers; vary one of them, such as `" + owner.join("inertia.xx`")
+    return tuple(scope.derived(owner, f"inertia.{name}", value, "kg*m^2", f"uniform {solid.kind} of the link's mass")
+                 for name, value in zip(MOMENTS, solid.inertia(mass), strict=True))
+
+
+def _not_a_body(moments: np.ndarray, strict: bool) -> tuple[np.ndarray, list[str]]:
+    """Which rows [n, 6] are no rigid body's inertia, and why, in words.
+
+    The tolerance, 1e-9 of the largest moment, is for rounding alone: published tables have ten digits at most.
+    """
+    xx, yy, zz, xy, xz, yz = moments.T
+    matrices = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=-1).reshape(-1, 3, 3)
+    finite = np.isfinite(matrices).all(axis=(1, 2))
+    least, middle, most = np.linalg.eigvalsh(np.where(finite[:, None, None], matrices, np.eye(3))).T
+    slack = 1e-9 * np.abs(most)
+    negative = least <= slack * 1e-3 if strict else least < -slack
+    triangle = least + middle < most - slack
+    bad = ~finite | negative | triangle
+    causes = []
+    for row in np.flatnonzero(bad)[:1]:
+        shown = f"principal moments {least[row]:.6g}, {middle[row]:.6g} and {most[row]:.6g} kg*m^2"
+        if not finite[row]:
+            causes.append("it is not finite")
+        elif negative[row]:
+            causes.append(f"{shown}; none may be {'zero or negative' if strict else 'negative'}")
+        else:
+            causes.append(f"{shown}; no body has one above the sum of the others")
+    return bad, causes
+
+
+# Joints
+
+
+def _joint(scope: Scope, item: Item, homes: tuple[str, ...], arm: Block) -> Joint | None:
+    owner = Owner(f"joint `{item.name}`", item.place, item.name, homes=homes)
+    kind = item.detail[0].text if item.detail else None
+    if kind not in JOINT_KINDS:
+        place = item.detail[0].place if item.detail else item.place
+        message = f"no kind of joint `{kind}`" if kind else f"joint `{item.name}` has no kind"
+        scope.complaints.error("D090", message, place,
+                               help=[*(did_you_mean(kind, JOINT_KINDS) if kind else ()),
+                                     f"write `joint {item.name} revolute {{ ... }}`, or prismatic, or fixed"])
+        return None
+    if item.body is None:
+        scope.complaints.error("D091", f"joint `{item.name}` needs a block", item.place,
+                               help=f"write `joint {item.name} {kind} {{ parent = base; child = ...; axis = z; }}`")
+        return None
+    body = item.body
+    check_keys(scope, body, JOINT_KEYS, owner)
+    links = [link.name for link in arm.of_kind("link")]
+    parent = _end(scope, owner, "parent", body.get("parent"), ["base", *links])
+    child = _end(scope, owner, "child", body.get("child"), links)
+    for wanted in (AT, RPY):
+        default = Parameter(name=wanted.name, unit=wanted.unit, shape="vector", doc=wanted.doc, default=(0.0, 0.0, 0.0))
+        scope.vector(owner, default, body.get(wanted.name))
+    _axis(scope, owner, kind, body.get("axis"))
+    if parent is None or child is None:
+        return None
+    return Joint(item.name, kind, parent, child, item.place)  # type: ignore[arg-type]
+
+
+def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: list[str]) -> str | None:
+    if item is None:
+        scope.complaints.error("D092", f"{owner.label} has no {key}", owner.place, help=f"write `{key} = LINK;`")
+        return None
+    name = word_of(item.value)
+    if name in known:
+        return name
+    if name == "base":
+        scope.complaints.error("D093", "the base cannot be a child", item.place,
+                               help="turn the joint round: `parent = base;`")
+    elif name is None:
+        scope.complaints.error(
+            "D094", f"a link's name is needed for {key}", item.place, help=known_words("links", known)
+        )
+    else:
+        scope.complaints.error("D094", f"no link `{name}` in this arm", item.place,
+                               help=[*did_you_mean(name, known), known_words("links", known)])
+    return None
+
+
+def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
+    if kind == "fixed":
+        if item is not None:
+            scope.complaints.error("D095", "a fixed joint has no axis", item.place, help="leave `axis` out")
+        return
+    if item is None:
+        scope.complaints.error("D096", f"{owner.label} has no axis", owner.place,
+                               help="write `axis = z;`, or x, y, -x, ... or [0, 0.6, 0.8]")
+        return
+    named = _named_axis(item.value)
+    if named is not None:
+        scope.vector(owner, AXIS, replace(item, value=None), given=named)
+        return
+    written = scope.vector(owner, AXIS, item, record=False)
+    if written is None:
+        return
+    x, y, z = written
+    length = sqrt(x * x + y * y + z * z)
+    if not isinstance(length, Scalar) and not length > 0.0:
+        scope.complaints.error("D097", f"the axis of {owner.label} has no direction", item.place,
+                               help="one of its numbers must not be zero")
+        return
+    scope.vector(owner, AXIS, item, given=(x / length, y / length, z / length))
+
+
+def _named_axis(value: Expression | None) -> tuple[float, float, float] | None:
+    sign = 1.0
+    if isinstance(value, Unary) and value.operator in ("-", "+"):
+        sign, value = (-1.0 if value.operator == "-" else 1.0), value.operand
+    if isinstance(value, Name) and value.text in AXES:
+        x, y, z = AXES[value.text]
+        return (sign * x + 0.0, sign * y + 0.0, sign * z + 0.0)
+    return None
+
+
+# The tree
+
+
+def check_tree(scope: Scope, name: str, links: list[Link], joints: list[Joint], *, complete: bool = True) -> None:
+    """Every link has one joint to its parent, and every chain of parents ends at the base.
+
+    complete  all joints are there; else a link without one says nothing
+    """
+    holder: dict[str, Joint] = {}
+    for joint in joints:
+        if joint.child in holder:
+            first = holder[joint.child]
+            scope.complaints.error(
+                "D098", f"link `{joint.child}` has two parents", Label(_place(joint), f"`{joint.parent}`"),
+                also=[Label(_place(first), f"`{first.parent}`, by joint `{first.name}`")],
+                help="a closed chain is not in this version; a branch is a parent with two children")
+            continue
+        holder[joint.child] = joint
+    failed = {link.name for link in links} - set(holder)
+    settled = {"base"} | failed
+    for link in links:
+        chain: list[Joint] = []
+        at = link.name
+        passed: dict[str, int] = {}
+        while at in holder and at not in settled and at not in passed:
+            passed[at] = len(chain)
+            chain.append(holder[at])
+            at = holder[at].parent
+        if at in passed:
+            _complain_loop(scope, chain[passed[at]:][::-1])
+        settled.update(passed)
+    for link in links:
+        if link.name in failed and complete:
+            scope.complaints.error(
+                "D099", f"link `{link.name}` hangs in the air: no joint of arm `{name}` has it for a child",
+                link.place, help=f"write `joint NAME revolute {{ parent = base; child = {link.name}; axis = z; }}`")
+
+
+def _complain_loop(scope: Scope, loop: list[Joint]) -> None:
+    path = " -> ".join([loop[0].parent, *(joint.child for joint in loop)])
+    scope.complaints.error(
+        "D086", "these joints make a loop, which hangs on no base: " + path,
+        Label(_place(loop[-1]), f"joint `{loop[-1].name}` closes it"),
+        also=[Label(_place(joint), f"joint `{joint.name}`") for joint in loop[:-1]],
+        help="one of them should have `parent = base;`")
+
+
+def _place(joint: Joint) -> Place:
+    assert joint.place is not None  # joints that come from a deck have one
+    return joint.place

@@ -1,0 +1,70 @@
+"""Uses of models checked against their declarations: keys, what is missing, units, ranges, words, lists."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from ic.grammar.syntax import Call, Expression, Name
+from ic.meaning.complaints import did_you_mean, known_words
+from ic.meaning.resolve import Block
+from ic.meaning.scope import Owner, Scope
+from met import models
+from met.diagnostic import Place, Problem
+from met.parameter import Parameter
+
+
+def word_of(expression: Expression | None) -> str | None:
+    """The one word that an expression is, or calls; None where it is something else."""
+    if isinstance(expression, Call):
+        expression = expression.name
+    if isinstance(expression, Name) and len(expression.path) == 1:
+        return expression.path[0].text
+    return None
+
+
+def check_keys(scope: Scope, body: Block, known: Iterable[str], owner: Owner) -> None:
+    """Tells every entry of the body that is none of the known plain keys."""
+    known = list(known)
+    for item in body.items.values():
+        if item.kind:
+            scope.complaints.error("D141", f"no `{item.kind}` in {owner.label}", item.place,
+                                   help=known_words("it has", known))
+        elif item.name not in known:
+            scope.complaints.error("D141", f"{owner.label} has no `{item.name}`", item.place,
+                                   help=[*did_you_mean(item.name, known), known_words("it has", known)])
+    for statement in body.statements:
+        scope.complaints.error("D142", f"`{statement.words[0].text}` inside {owner.label}", statement.place,
+                               help="it belongs to a run or a sweep")
+
+
+def find_model(scope: Scope, kind: models.Kind, name: str | None, place: Place) -> Any:
+    """The declaration; None where there is none, which was told."""
+    if name is None:
+        scope.complaints.error("D143", f"the name of a {kind} model is needed here", place,
+                               help=known_words(f"{kind} models", sorted(models.available(kind))))
+        return None
+    try:
+        return models.find(kind, name, place)
+    except Problem as problem:
+        scope.complaints.add(*problem.diagnostics)
+        return None
+
+
+def use_model(scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: Block,
+              extra: Iterable[str] = ()) -> dict[str, Any] | None:
+    """Every parameter of a model used with this body, entered in the scope; None where one is missing or wrong."""
+    parameters = tuple(parameters)
+    check_keys(scope, body, [*(p.name for p in parameters), *extra], owner)
+    values: dict[str, Any] = {}
+    for wanted in parameters:
+        item = body.get(wanted.name)
+        if wanted.shape == "vector":
+            values[wanted.name] = scope.vector(owner, wanted, item)
+        elif wanted.shape == "list":
+            values[wanted.name] = scope.numbers(owner, wanted, item)
+        elif wanted.shape == "word":
+            values[wanted.name] = scope.word(owner, wanted, item, record=True)
+        else:
+            values[wanted.name] = scope.number(owner, wanted, item)
+    return None if any(value is None for value in values.values()) else values

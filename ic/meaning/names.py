@@ -1,0 +1,125 @@
+"""What names in expressions are worth: `let`s in any order, parameters of servo definitions, what a sweep varies."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from ic.grammar.syntax import Expression, Name
+from ic.meaning.complaints import did_you_mean, known_words
+from ic.meaning.resolve import Definitions
+from ic.meaning.values import CONSTANTS, FUNCTIONS, Value, Values, evaluate
+from met import units
+from met.diagnostic import Label, Place, Problem, error
+
+DEEPEST = 64  # lets that need lets: far more than a deck has, far less than Python's recursion bears
+
+
+class Names:
+    """Evaluates expressions in a deck; what a name is worth is found once.
+
+    varied   paths that a sweep varies, with the value that stands for them
+    watched  paths whose being named is to be seen in `followed`, like that of the varied
+    """
+
+    def __init__(self, definitions: Definitions, varied: Mapping[str, Value], watched: Collection[str] = ()) -> None:
+        self.definitions = definitions
+        self.varied = varied
+        self.watched = watched
+        self.followed: dict[str, None] = {}  # coordinates that an expression named
+        self._worth: dict[str, Value | Values | Problem] = {}
+        self._open: dict[str, Place] = {}
+
+    def evaluate(self, expression: Expression) -> Value | Values:
+        return evaluate(expression, self.find)
+
+    def find(self, name: Name) -> Value | Values:
+        """The value of a name. Raises Problem D065 where there is none, D073 where it needs itself."""
+        text = name.text
+        if text in self.varied:
+            self.followed[text] = None
+            return self.varied[text]
+        if text in self.watched:
+            self.followed[text] = None
+        worth = self._worth.get(text)
+        if isinstance(worth, Problem):
+            raise worth  # which is told once, however often the name is used
+        if worth is not None:
+            return worth
+        if text in self._open:
+            loop = [*list(self._open)[list(self._open).index(text):], text]
+            raise Problem(
+                error(
+                    "D073",
+                    f"`{text}` needs itself: " + " needs ".join(f"`{each}`" for each in loop),
+                    name.place,
+                    also=[Label(self._open[each], f"`{each}`") for each in loop[1:-1]],
+                    help="write one of them as a number",
+                )
+            )
+        if len(self._open) >= DEEPEST:
+            raise Problem(error("D073", f"`{text}` is at the end of a chain of {DEEPEST} names", name.place,
+                                help="define values before their uses"))
+        self._open[text] = name.place
+        try:
+            found = self.evaluate(self._expression(name))
+        except Problem as problem:
+            if text in self.definitions.lets:
+                self._worth[text] = problem
+            raise
+        finally:
+            self._open.pop(text, None)
+        self._worth[text] = found
+        return found
+
+    def label(self, value: Value) -> list[Label]:
+        """Where the name that was written for this value is defined, for messages about it."""
+        for text, let in self.definitions.lets.items():
+            worth = self._worth.get(text)
+            if isinstance(worth, Value) and worth.number is value.number and worth.dimension == value.dimension \
+                    and worth.place != value.place and value.place.length == len(text):
+                return [Label(let.name.place, f"`{text}` is defined here")]
+        return []
+
+    def _expression(self, name: Name) -> Expression:
+        first, *rest = (word.text for word in name.path)
+        if not rest and first in self.definitions.lets:
+            return self.definitions.lets[first].value
+        servo = self.definitions.of_kind("servo").get(first)
+        if servo is not None and rest:
+            block = self.definitions.block(servo)
+            items = block.items if block is not None else {}
+            item = items.get(".".join(rest))
+            if item is not None and item.value is not None:
+                return item.value
+            raise Problem(error("D065", f"servo `{first}` writes no `{'.'.join(rest)}`", name.place,
+                                help=[*did_you_mean(".".join(rest), items), known_words("it writes", items)]))
+        helps = list(did_you_mean(name.text, (*self.definitions.lets, *CONSTANTS)))
+        if name.text in FUNCTIONS:
+            helps = [f"`{name.text}` is a function: write `{name.text}(...)`"]
+        elif not rest and units.is_unit(first):
+            helps = [f"`{first}` is a unit: it follows a number, or closing brackets"]
+        elif not helps:
+            helps = [f"define it: `let {first} = ...;`"]
+        raise Problem(error("D065", f"no value `{name.text}`", name.place, help=helps))
+
+    def check_lets(self) -> list[Problem]:
+        """What is wrong with the deck's lets, used or not."""
+        problems = []
+        for text, let in self.definitions.lets.items():
+            try:
+                if units.is_unit(text):
+                    raise Problem(
+                        error(
+                            "D079",
+                            f"`{text}` is a unit ({units.UNITS[text].word}), so no value may bear it",
+                            let.name.place,
+                            help="give the value another name",
+                        )
+                    )
+                if text in CONSTANTS or text in FUNCTIONS:
+                    raise Problem(error("D079", f"`{text}` has a meaning already", let.name.place,
+                                        help="give the value another name"))
+                self.find(Name((let.name,), let.name.place))
+            except Problem as problem:
+                problems.append(problem)
+        return problems

@@ -1,0 +1,233 @@
+"""What a run tells: recorded channels, metrics, and requirements on metrics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from ic.grammar.spell import spell
+from ic.grammar.syntax import Binary, Expression, List, Name, Statement
+from ic.meaning.complaints import did_you_mean, known_words
+from ic.meaning.models import find_model, use_model, word_of
+from ic.meaning.resolve import Block, Item
+from ic.meaning.scope import Owner, Scope
+from ic.meaning.values import place_of
+from met import models
+from met.channel import Channel, channels
+from met.diagnostic import Label, Place
+from met.parameter import Parameter
+from met.plan import MetricUse, Recorded, Requirement, Structure
+from met.trace import Scalar
+
+FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+
+
+# Record
+
+
+def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Structure) -> tuple[Recorded, ...]:
+    """The variables that are recorded, in the deck's order."""
+    scope.whole["record"] = "decides the program, which is one for the whole sweep in this version"
+    if item is None:
+        scope.complaints.error("D124", f"{run.label} records nothing", run.place,
+                               help="write `record = [q, qd, tau];`, or `record = [];` where metrics are all you want")
+        return ()
+    known = channels(structure)
+    groups = _groups(structure, known)
+    found: dict[str, tuple[Recorded, Place]] = {}
+    for expression in (item.value, *item.appended):
+        for name in _names(scope, item, expression):
+            made = _recorded(structure, known, groups, name.text)
+            if made is None and scope.lost and "servo" in [word.text for word in name.path]:
+                continue
+            if made is None:
+                scope.complaints.error(
+                    "D125", f"no channel `{name.text}`", name.place, help=_nearest(name, known, groups)
+                )
+            elif made.name in found:
+                scope.complaints.error("D040", f"`{made.name}` is recorded twice", name.place,
+                                       also=[Label(found[made.name][1], "first")], help="leave one out")
+            else:
+                found[made.name] = (made, name.place)
+    return tuple(recorded for recorded, _ in found.values())
+
+
+def _names(scope: Scope, item: Item, expression: Expression | None) -> Iterator[Name]:
+    if isinstance(expression, Name) and expression.text == "none":
+        return
+    items: Iterable[Expression] = expression.items if isinstance(expression, List) else ()
+    if not isinstance(expression, List):
+        scope.complaints.error(
+            "D124",
+            "a record is a list of channels",
+            place_of(expression) if expression else item.place,
+            help="write `record = [q, qd, tau];`",
+        )
+    for each in items:
+        if isinstance(each, Name):
+            yield each
+        else:
+            scope.complaints.error("D124", "a record is a list of channels; this is none", place_of(each),
+                                   help="write `record = [q, qd, tau];`")
+
+
+def _groups(structure: Structure, known: dict[str, Channel]) -> dict[str, list[str]]:
+    """Channels that several joints may have, by what follows the joint's name."""
+    groups: dict[str, list[str]] = {}
+    for joint in structure.moving:
+        for path in known:
+            if path.startswith(joint.name + "."):
+                groups.setdefault(path.removeprefix(joint.name + "."), []).append(joint.name)
+    return groups
+
+
+def _recorded(structure: Structure, known: dict[str, Channel], groups: dict[str, list[str]],
+              name: str) -> Recorded | None:
+    if name in known:
+        return Recorded(name, (name,), (), (known[name].unit,), known[name].doc)
+    if name in groups:
+        joints = tuple(groups[name])
+        paths = tuple(f"{joint}.{name}" for joint in joints)
+        return Recorded(name, paths, joints, tuple(known[path].unit for path in paths), known[paths[0]].doc)
+    return None
+
+
+def _nearest(name: Name, known: dict[str, Channel], groups: dict[str, list[str]]) -> list[str]:
+    text = name.text
+    nearest = list(did_you_mean(text, (*groups, *known)))
+    first = name.path[0].text
+    own = [path for path in known if path.startswith(first + ".")]
+    return [
+        *nearest,
+        known_words(f"channels of `{first}`", own) if own else known_words("channels of all joints", groups),
+    ]
+
+
+# Metrics
+
+
+def resolve_metrics(scope: Scope, block: Block, structure: Structure) -> tuple[MetricUse, ...]:
+    known = channels(structure)
+    return tuple(use for item in block.of_kind("metric") if (use := _metric(scope, item, known)) is not None)
+
+
+def _metric(scope: Scope, item: Item, known: dict[str, Channel]) -> MetricUse | None:
+    if item.detail:
+        scope.complaints.error("D129", f"`{item.detail[0].text}` after the name of a metric", item.detail[0].place,
+                               help=f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`")
+    if item.value is None:
+        scope.complaints.error("D129", f"metric `{item.name}` has no model", item.place,
+                               help=[f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`",
+                                     known_words("metric models", sorted(models.available("metric")))])
+        return None
+    metric = find_model(scope, "metric", word_of(item.value), place_of(item.value))
+    if metric is None:
+        return None
+    body = item.body or Block()
+    of = body.get("of")
+    channel = None
+    if of is None:
+        scope.complaints.error("D125", f"metric `{item.name}` watches no channel", item.place,
+                               help="write `of = CHANNEL;`, such as `of = shoulder.qd;`")
+    elif not isinstance(of.value, Name) or of.value.text not in known:
+        name = of.value if isinstance(of.value, Name) else None
+        if name is not None and name.path[0].text in scope.lost:
+            return None
+        helps = _nearest(name, known, {}) if name is not None else []
+        of_all = name is not None and any(path.endswith("." + name.text) for path in known)
+        if of_all and name is not None:
+            helps = ["a metric watches one joint's: " + ", ".join(
+                f"`{path}`" for path in known if path.endswith("." + name.text))]
+        scope.complaints.error("D125", f"no channel `{name.text}`" if name else "a channel is needed here",
+                               place_of(of.value) if of.value is not None else of.place, help=helps)
+    else:
+        channel = known[of.value.text]
+    if channel is None:
+        return None
+    owner = Owner(f"metric `{item.name}`", item.place, f"metrics.{item.name}", of=channel.unit)
+    use_model(scope, owner, metric.parameters, body, ("of",))
+    return MetricUse(item.name, metric.name, channel.path, item.place)
+
+
+def metric_unit(use: MetricUse, known: dict[str, Channel]) -> str:
+    """Unit of a metric's result."""
+    metric: Any = models.find("metric", use.model)
+    return known[use.of].unit if metric.unit == "of" else str(metric.unit)
+
+
+# Requirements
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A `require` with its metric on the left."""
+
+    statement: Statement
+    metric: str
+    operator: Literal["<", "<=", ">", ">="]
+    limit: Expression
+
+
+def read_requirements(scope: Scope, block: Block) -> list[Comparison]:
+    """Every `require` that compares a metric of the run with a limit; tells of the others."""
+    written = {item.name for item in block.of_kind("metric")}
+    removed = {key.removeprefix("metric ") for key, _ in block.removed if key.startswith("metric ")} - written
+    found = []
+    for statement in block.statements:
+        if [word.text for word in statement.words] != ["require"]:
+            continue
+        comparison = statement.value
+        if not isinstance(comparison, Binary) or comparison.operator not in FLIPPED:
+            scope.complaints.error("D131", "a requirement compares a metric with a limit", place_of(comparison),
+                                   help="write `require METRIC < LIMIT;`, or <=, >, >=")
+            continue
+        operator, metric, limit = comparison.operator, comparison.left, comparison.right
+        if not _is_metric(metric, written | removed) and _is_metric(limit, written | removed):
+            operator, metric, limit = FLIPPED[operator], limit, metric
+        if not _is_metric(metric, written | removed):
+            name = spell(metric)
+            scope.complaints.error(
+                "D132",
+                f"no metric `{name}`",
+                place_of(metric),
+                help=[*did_you_mean(name, written), known_words("metrics of this run", sorted(written))],
+            )
+        elif spell(metric) in removed:
+            scope.notes.append(
+                f"`require {spell(comparison)}` went with the metric `{spell(metric)}`, which is removed"
+            )
+        else:
+            found.append(Comparison(statement, spell(metric), operator, limit))  # type: ignore[arg-type]
+    return found
+
+
+def _is_metric(expression: Expression, metrics: set[str]) -> bool:
+    return isinstance(expression, Name) and expression.text in metrics
+
+
+def resolve_requirements(scope: Scope, read: list[Comparison], structure: Structure) -> tuple[Requirement, ...]:
+    """The requirements with their limits in SI."""
+    known = channels(structure)
+    uses = {use.name: use for use in structure.metrics}
+    found = []
+    for each in read:
+        if each.metric not in uses:
+            continue  # the metric failed, which was told
+        owner = Owner("", each.statement.place, "require", called=f"the limit on `{each.metric}`")
+        wanted = Parameter(name="limit", unit=metric_unit(uses[each.metric], known), doc="limit")
+        number = _limit(scope, owner, wanted, each.limit)
+        if number is not None:
+            text = spell(each.statement.value)
+            found.append(Requirement(text, each.metric, each.operator, number, each.statement.place))
+    return tuple(found)
+
+
+def _limit(scope: Scope, owner: Owner, wanted: Parameter, expression: Expression) -> float | None:
+    item = Item("", "limit", (), expression, None, place_of(expression))
+    number = scope.number(owner, wanted, item, record=False)
+    if isinstance(number, Scalar):
+        scope.complaints.error("D122", "the limit of a requirement varies with the sweep", place_of(expression),
+                               help="it is the same for all cases: write a number that stands still")
+        return None
+    return number

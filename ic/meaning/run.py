@@ -1,0 +1,309 @@
+"""A run resolved: arm, servos, environment, initial state, schedule, metrics and record, in SI, ready for a plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from ic.grammar.syntax import Call, Name, Word
+from ic.meaning.arm import Arm, resolve_arm
+from ic.meaning.complaints import did_you_mean, known_words
+from ic.meaning.models import find_model, use_model, word_of
+from ic.meaning.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
+from ic.meaning.resolve import Block, Definition, Item
+from ic.meaning.schedule import Rate, base_rate, check_stability, divisor, make_schedule
+from ic.meaning.scope import Owner, Scope
+from ic.meaning.servos import RATE, Use, fixed_rate, resolve_servos
+from ic.meaning.values import Values, place_of
+from met import models
+from met.diagnostic import Place
+from met.parameter import Parameter
+from met.plan import EnvironmentUse, Requirement, Schedule, ServoUse, Structure
+from met.trace import Real
+
+KEYS = ("arm", "servos", "initial", "environment", "rates", "integrator", "duration", "record", "seed")
+RATES = ("dynamics", "servos", "record", "base")
+DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
+SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")
+ON_OFF = Parameter(name="velocity_products", shape="word", words=("on", "off"), default="on",
+                   doc="Coriolis, centrifugal and gyroscopic torques")
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """A run's structure and requirements; its parameters are in the scope.
+
+    stability  h * lambda of every joint whose servo knows it
+    """
+
+    structure: Structure
+    requirements: tuple[Requirement, ...]
+    seed: int
+    stability: tuple[tuple[str, Real], ...]
+    place: Place
+
+
+def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
+    """The run; None where something of it is wrong, which was told."""
+    block = scope.definitions.block(definition)
+    if block is None:
+        return None
+    run = Owner(f"run `{definition.name}`", definition.place, "")
+    _check_entries(scope, block, definition)
+    comparisons = read_requirements(scope, block)
+    arm = _arm(scope, run, block.get("arm"))
+    integrator = _integrator(scope, block.get("integrator"))
+    seed = _seed(scope, run, block.get("seed"))
+    rates = _rates(scope, run, block.get("rates"))
+    duration = scope.constant(run, DURATION, block.items["duration"]) if "duration" in block.items else None
+    if "duration" not in block.items:
+        scope.complaints.error(
+            "D107", f"{run.label} has no duration", definition.place, help="write `duration = 10 s;`"
+        )
+    if arm is None:
+        return None
+    uses, scope.lost = resolve_servos(scope, _body(scope, block.get("servos")), arm)
+    environment, products = _environment(scope, _body(scope, block.get("environment")), arm)
+    _initial(scope, _body(scope, block.get("initial")), arm)
+    schedule, divisors = _schedule(scope, run, block, rates, uses, duration)
+    if schedule is None or integrator is None:
+        return None
+    stability = []
+    for use in uses:
+        if use.parameters is not None:
+            x = check_stability(
+                scope, f"servo `{use.definition}`", use.servo, use.parameters, schedule, integrator, rates["dynamics"]
+            )
+            if x is not None:
+                stability.append((use.joint, x))
+    servos = tuple(ServoUse(use.joint, use.definition, use.servo.name, use.command, divisors[use.joint], use.place)
+                   for use in uses)
+    structure = Structure(
+        arm.name, arm.links, arm.joints, servos, environment, (), products, integrator.name, schedule, ()
+    )
+    metrics = resolve_metrics(scope, block, structure)
+    record = resolve_record(scope, run, block.get("record"), structure)
+    structure = replace(structure, metrics=metrics, record=record)
+    requirements = resolve_requirements(scope, comparisons, structure)
+    return Resolved(structure, requirements, seed, tuple(stability), definition.place)
+
+
+def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
+    metrics = [item.name for item in block.of_kind("metric")]
+    for item in block.items.values():
+        if item.kind == "metric" or (not item.kind and item.name in KEYS):
+            continue
+        if item.kind:
+            scope.complaints.error("D108", f"no `{item.kind}` in a run", item.place,
+                                   help=[*did_you_mean(item.kind, ("metric", *KEYS)),
+                                         known_words("a run has", (*KEYS, "metric NAME", "require"))]
+                                   if item.kind != "substitute" else "motor substitution is not in this version")
+        elif item.body is not None:
+            scope.complaints.error(
+                "D109", f"nothing named `{item.name}` in run `{definition.name}` to change", item.place,
+                help=[*did_you_mean(item.name, (*metrics, *KEYS)), f"`metric {item.name} = ...` would add a metric"])
+        else:
+            scope.complaints.error("D109", f"a run has no `{item.name}`", item.place,
+                                   help=[*did_you_mean(item.name, (*KEYS, *metrics)), known_words("a run has", KEYS)])
+    for statement in block.statements:
+        words = " ".join(word.text for word in statement.words)
+        if words != "require":
+            scope.complaints.error(
+                "D110",
+                f"`{words}` in a run",
+                statement.place,
+                help=["`exclude when` stands in a sweep"]
+                if words == "exclude when"
+                else [*did_you_mean(words, ("require", "remove")), "statements of a run: require, remove"],
+            )
+
+
+def _body(scope: Scope, item: Item | None) -> Block:
+    if item is None:
+        return Block()
+    if item.body is None:
+        scope.complaints.error("D111", f"`{item.name}` is a block, not a value", item.place,
+                               help=f"write `{item.name} {{ ... }}`")
+        return Block()
+    return item.body
+
+
+def _arm(scope: Scope, run: Owner, item: Item | None) -> Arm | None:
+    if item is None:
+        scope.complaints.error(
+            "D112",
+            f"{run.label} has no arm",
+            run.place,
+            help=["write `arm = ARM;`", known_words("arms of this deck", scope.definitions.of_kind("arm"))],
+        )
+        return None
+    name = word_of(item.value)
+    if name is None or not isinstance(item.value, Name):
+        scope.complaints.error("D112", "the name of an arm is needed here", item.place, help="write `arm = ARM;`")
+        return None
+    with scope.complaints.gather():
+        return resolve_arm(scope, scope.definitions.find("arm", Word(name, item.value.place)))
+    return None
+
+
+def _integrator(scope: Scope, item: Item | None):  # type: ignore[no-untyped-def]  # any package's declaration
+    scope.whole["integrator"] = "decides the program, which is one for the whole sweep in this version"
+    if item is None:
+        return models.find_own("integrator")["modified_euler"]
+    return find_model(scope, "integrator", word_of(item.value), place_of(item.value) if item.value else item.place)
+
+
+def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
+    if item is None:
+        return 0
+    number = scope.constant(run, SEED, item)
+    if number is not None and not number.is_integer():
+        scope.complaints.error("D113", "a seed is a whole number", place_of(item.value) if item.value else item.place)
+        return 0
+    return int(number or 0)
+
+
+# Environment and initial state
+
+
+def _environment(scope: Scope, body: Block, arm: Arm) -> tuple[tuple[EnvironmentUse, ...], bool]:
+    uses = []
+    products = True
+    for item in body.items.values():
+        if item.kind:
+            scope.complaints.error(
+                "D157", f"no `{item.kind}` in an environment", item.place, help="write `NAME = MODEL { ... }`"
+            )
+        elif item.name == "velocity_products":
+            owner = Owner("the environment", item.place, "environment")
+            products = scope.word(owner, ON_OFF, item) != "off"
+        else:
+            use = _environment_use(scope, item, arm)
+            if use is not None:
+                uses.append(use)
+    for statement in body.statements:
+        scope.complaints.error("D142", f"`{statement.words[0].text}` inside the environment", statement.place,
+                               help="it belongs to a run or a sweep")
+    return tuple(uses), products
+
+
+def _environment_use(scope: Scope, item: Item, arm: Arm) -> EnvironmentUse | None:
+    owner = Owner(f"environment `{item.name}`", item.place, f"environment.{item.name}", homes=item.homes)
+    name = word_of(item.value)
+    is_value = item.name == "gravity" and (name is None or name in scope.definitions.lets)
+    if item.value is not None and is_value:
+        gravity = models.find_own("environment")["gravity"]
+        scope.vector(replace(owner, label="gravity"), gravity.parameters[0], item)
+        return EnvironmentUse(item.name, gravity.name, None, item.place)
+    if item.value is None:
+        scope.complaints.error("D158", f"no environment model `{item.name}` to change", item.place,
+                               help=[f"`{item.name} = MODEL {{ ... }}` would add one",
+                                     known_words("models", sorted(models.available("environment")))])
+        return None
+    environment = find_model(scope, "environment", name, place_of(item.value))
+    if environment is None:
+        return None
+    values = use_model(scope, owner, environment.parameters, item.body or Block())
+    if values is not None:
+        names = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
+        for wanted in environment.parameters:
+            known = names.get(wanted.name)
+            if wanted.shape == "word" and known is not None and values[wanted.name] not in known:
+                given = (item.body or Block()).get(wanted.name)
+                place = given.place if given is not None else item.place
+                scope.complaints.error("D159", f"no {wanted.name} `{values[wanted.name]}` in arm `{arm.name}`", place,
+                                       help=[*did_you_mean(values[wanted.name], known),
+                                             known_words(f"{wanted.name}s", known)])
+    return EnvironmentUse(item.name, environment.name, None, item.place)
+
+
+def _initial(scope: Scope, body: Block, arm: Arm) -> None:
+    known = dict.fromkeys(("q", "qd"), "")
+    known |= {f"{joint.name}.{name}": "" for joint in arm.moving for name in ("q", "qd")}
+    for item in body.items.values():
+        if item.kind or item.name not in known:
+            scope.complaints.error("D114", f"no initial `{item.name}`", item.place,
+                                   help=[*did_you_mean(item.name, known), known_words("there is", known)])
+    for name, unit in (("q", "joint"), ("qd", "joint/s")):
+        wanted = Parameter(name=name, unit=unit, default=0.0, doc=f"initial {name}")
+        general = body.get(name)
+        listed: Values | None = None
+        if general is not None:
+            with scope.complaints.gather():
+                found = scope.written(general)
+                listed = found if isinstance(found, Values) else None
+            if listed is not None and len(listed.items) != len(arm.moving):
+                scope.complaints.error(
+                    "D071",
+                    f"{len(listed.items)} numbers for {len(arm.moving)} joints",
+                    listed.place,
+                    help="one for each moving joint, in the arm's order, or one for all: "
+                    + ", ".join(joint.name for joint in arm.moving),
+                )
+                continue
+        for n, joint in enumerate(arm.moving):
+            own = body.get(f"{joint.name}.{name}")
+            owner = Owner(f"joint `{joint.name}`", (own or general).place if own or general else joint.place,  # type: ignore
+                          f"initial.{joint.name}", joint=joint.kind)
+            value = listed.items[n] if listed is not None and own is None else None
+            if isinstance(value, Values):
+                scope.complaints.error("D071", "a list inside a list", value.place)
+                continue
+            scope.number(owner, wanted, own or general, value=value)
+
+
+# Rates
+
+
+def _rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate]:
+    rates: dict[str, Rate] = {}
+    if item is None:
+        scope.complaints.error("D115", f"{run.label} has no rates", run.place,
+                               help="write `rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }`")
+        return rates
+    body = _body(scope, item)
+    owner = Owner("`rates`", item.place, "rates")
+    for part in body.items.values():
+        if part.kind or part.name not in RATES:
+            scope.complaints.error("D116", f"no rate `{part.name}`", part.place,
+                                   help=[*did_you_mean(part.name, RATES), known_words("rates", RATES)])
+            continue
+        rate = fixed_rate(scope, owner, part, f"`{part.name}`", part.name)
+        if rate is not None:
+            rates[part.name] = rate
+    if "dynamics" not in body.items and item.body is not None:
+        scope.complaints.error("D117", "no rate of the dynamics", item.place, help="write `dynamics = 1 kHz;`")
+    return rates
+
+
+def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], uses: list[Use],
+              duration: float | None) -> tuple[Schedule | None, dict[str, int]]:
+    dynamics = rates.get("dynamics")
+    rates_item = block.get("rates")
+    for use in uses:
+        if use.rate is None and use.servo.tick is not None and "servos" not in rates and rates_item is not None:
+            body = rates_item.body or Block()
+            if "servos" not in body.items:
+                scope.complaints.error("D118", "no rate of the servos", rates_item.place,
+                                       help="write `servos = 1 kHz;`, or a `rate` in each servo's definition")
+    if dynamics is None or duration is None:
+        return None, {}
+    shared = rates.get("servos")
+    own = [use.rate for use in uses if use.rate is not None]
+    others = [rate for rate in (shared, *own) if rate is not None]
+    record = rates.get("record") or dynamics
+    base = base_rate([dynamics, record, *others], rates.get("base"))
+    written = "base" in rates
+    schedule = make_schedule(scope.complaints, dynamics, record, base, others, duration,
+                             place_of(block.items["duration"].value or Name((), block.items["duration"].place)),
+                             base_written=written)
+    divisors = {}
+    everyone = [dynamics, record, *others]
+    for use in uses:
+        rate = use.rate or shared or dynamics
+        divisors[use.joint] = divisor(scope.complaints, rate, base, everyone, written=written)
+    if shared is not None and shared.hz and not uses:
+        divisor(scope.complaints, shared, base, everyone, written=written)
+    return schedule, divisors
+
+
+__all__ = ["KEYS", "RATE", "RATES", "Call", "Resolved", "resolve_run"]

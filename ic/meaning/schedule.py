@@ -1,0 +1,186 @@
+"""Rates as whole divisors of one base rate, exactly, and what they mean for stability.
+
+Rates are taken as fractions, so that 1000/3 Hz divides 1 kHz and 333.3 Hz does not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from ic.meaning.complaints import Complaints
+from ic.meaning.scope import Scope
+from met.diagnostic import Label, Place
+from met.plan import Schedule
+from met.trace import Real
+
+MOST_TICKS = 2**53  # a tick's number is a double
+WARN_ABOVE = 0.5  # of h lambda: above it, a step sees less than the decay it should follow
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A rate as written: whose it is, in words, how often (Hz), and where."""
+
+    label: str
+    hz: float
+    place: Place
+
+
+def exact(value: float) -> Fraction:
+    """The simplest fraction that is this number to a part in 1e12: 333.33333333333331 is 1000/3."""
+    for most in (1, 1000, 1_000_000):
+        simple = Fraction(value).limit_denominator(most)
+        if simple > 0 and abs(float(simple) - value) <= 1e-12 * value:
+            return simple
+    return Fraction(value)
+
+
+def base_rate(rates: list[Rate], written: Rate | None) -> Rate:
+    """The base: as written, else the fastest of the rates (the first of those)."""
+    if written is not None:
+        return written
+    return max(rates, key=lambda rate: rate.hz)
+
+
+def divisor(complaints: Complaints, rate: Rate, base: Rate, others: list[Rate], *, written: bool) -> int:
+    """Base ticks a tick of this rate; tells where that is not a whole number, and gives 1 then."""
+    ratio = exact(base.hz) / exact(rate.hz)
+    if ratio.denominator == 1:
+        return int(ratio)
+    label = Label(rate.place, f"{_hz(base.hz)}/{_hz(rate.hz)} = {float(ratio):.4g}")
+    also = [Label(base.place, "base rate set here" if written else f"base rate set here: the fastest, {base.label}")]
+    helps = []
+    if ratio < 1:
+        message = f"{rate.label} at {_hz(rate.hz)} Hz is faster than the base rate, {_hz(base.hz)} Hz"
+    else:
+        message = f"{rate.label} at {_hz(rate.hz)} Hz does not divide the base rate, {_hz(base.hz)} Hz"
+        fits = dict.fromkeys((max(1, math.floor(ratio)), math.ceil(ratio)))
+        helps.append("nearest that fit: " + ", ".join(_fitting(base.hz, n) for n in fits))
+    common = _common([exact(each.hz) for each in (rate, base, *others)])
+    if common is not None:
+        helps.append(f"or a base rate that all divide: `base = {common};` in `rates`")
+    complaints.error("D100", message, label, also=also, help=helps)
+    return 1
+
+
+def _fitting(base_hz: float, n: int) -> str:
+    exactly = exact(base_hz) / n
+    if exactly.denominator == 1 or float(exactly) == float(f"{float(exactly):.6g}"):
+        return f"{_hz(float(exactly))} Hz ({_hz(base_hz)}/{n})"
+    return f"{_hz(float(exactly))} Hz, written ({_hz(base_hz)}/{n}) Hz"
+
+
+def _common(rates: list[Fraction]) -> str | None:
+    """The slowest rate that all divide, where it is not absurd."""
+    common = Fraction(math.lcm(*(rate.numerator for rate in rates)), math.gcd(*(rate.denominator for rate in rates)))
+    if common > 100_000:
+        return None
+    return f"{_hz(float(common))} Hz"
+
+
+def make_schedule(complaints: Complaints, dynamics: Rate, record: Rate, base: Rate, others: list[Rate],
+                  duration: float, duration_place: Place, *, base_written: bool) -> Schedule:
+    """The schedule. Tells what does not fit."""
+    all_rates = [dynamics, record, *others]
+    step = divisor(complaints, dynamics, base, all_rates, written=base_written)
+    row = step if record == dynamics else divisor(complaints, record, base, all_rates, written=base_written)
+    length = exact(duration)
+    ticks = length * exact(base.hz)
+    whole = round(ticks)
+    if ticks.denominator != 1 or whole % step:
+        per_step = Fraction(step) / exact(base.hz)
+        count = max(1, math.floor(length / per_step))
+        near = [f"{float(n * per_step):.9g} s" for n in (count, count + 1)]
+        complaints.error(
+            "D101",
+            f"a duration of {duration:g} s is {float(length / per_step):.6g} steps of the dynamics",
+            duration_place,
+            also=[Label(dynamics.place, f"a step is {float(per_step):g} s")],
+            help="nearest that fit: " + ", ".join(near),
+        )
+        whole = count * step
+    elif whole % row:
+        last = Fraction(whole // row * row) / exact(base.hz)
+        complaints.remark(
+            "D102",
+            f"the last row is recorded at {float(last):g} s, before the run's end at {duration:g} s",
+            record.place,
+            also=[Label(duration_place, "the end")],
+            help="a duration that is a whole number of rows records both ends",
+        )
+    if whole >= MOST_TICKS:
+        complaints.error("D103", f"a run of {float(ticks):.3g} ticks of the base rate", duration_place,
+                         also=[Label(base.place, "the base rate")], help="at most 9e15 are possible: shorten the run")
+        whole = 1
+    return Schedule(base.hz, step, row, whole)
+
+
+def check_stability(scope: Scope, label: str, servo: Any, parameters: Mapping[str, Any], schedule: Schedule,
+                    integrator: Any, dynamics: Rate) -> Real | None:
+    """h lambda of a joint under its servo (`Servo.fastest`): given back, and warned of or told as an error.
+
+    label  the servo in words; joints with the same servo and the same figure are told of once
+    """
+    if servo.fastest is None:
+        return None
+    from types import SimpleNamespace
+
+    with scope.complaints.gather():
+        fastest = servo.fastest(SimpleNamespace(**parameters))
+        limit, h = integrator.real_limit, schedule.step
+        slowest = _slowest_that_fits(schedule, limit)
+
+        def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+            x = h * values[:, 0]
+            bad = ~(x < limit)
+            worst = float(np.max(values[:, 0])) if bad.any() else 0.0
+            return bad, [
+                f"h * lambda = {float(np.max(x)):.3g}; the slowest rate that fits is {slowest(worst)}"
+            ] if bad.any() else []
+
+        def warn(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+            x = h * values[:, 0]
+            if WARN_ABOVE < float(np.max(x)) < limit:
+                better = _hz(float(f"{float(np.max(values[:, 0])) / WARN_ABOVE:.2g}"))
+                scope.complaints.remark(
+                    "D105", f"{label} is fast for the dynamics' step: h * lambda = "
+                    f"{float(np.max(x)):.3g}", Label(dynamics.place, f"h = {h:g} s"),
+                    help=f"stable below {limit:g} with {integrator.name}, true to the motion below {WARN_ABOVE:g}: at "
+                         f"some {better} Hz and more")
+            return np.zeros(len(values), bool), []
+
+        scope.checks.hold(
+            (fastest,),
+            test,
+            code="D104",
+            place=dynamics.place,
+            message=f"{label} is unstable with {integrator.name} at this rate of the dynamics",
+            help=f"h * lambda must stay below {limit:g}; lambda is the fastest decay under this servo, on any arm",
+        )
+        scope.checks.hold((fastest,), warn, code="D105", place=dynamics.place, message="")
+        return fastest * h
+    return None
+
+
+def _slowest_that_fits(schedule: Schedule, limit: float) -> Any:
+    def name(fastest: float) -> str:
+        if not math.isfinite(fastest):
+            return "none"
+        most = min(schedule.dynamics, math.ceil(limit * schedule.base_hz / fastest) - 1, 100_000)
+        for n in range(most, 0, -1):
+            if schedule.ticks % n == 0:
+                return f"{_hz(schedule.base_hz / n)} Hz"
+        times = math.floor(fastest / limit / schedule.base_hz) + 1
+        return f"{_hz(schedule.base_hz * times)} Hz"
+
+    return name
+
+
+def _hz(value: float) -> str:
+    return f"{value:.6g}"

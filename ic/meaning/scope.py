@@ -1,0 +1,405 @@
+"""One run under resolution: its parameters as they are settled, and what a sweep varies in them.
+
+A parameter is settled once, at one spot, from three sources in this order: a sweep's coordinate that names it, what
+the deck wrote, the declaration's default. It is named by its canonical path (`elbow.servo.kp`) and by the path of every
+definition that hands it down without its being overridden (`gearbox.kp`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ic.grammar.syntax import Call, Expression, Name
+from ic.meaning.checks import Checks, Varied
+from ic.meaning.complaints import Complaints, did_you_mean
+from ic.meaning.names import Names
+from ic.meaning.resolve import Definitions, Item
+from ic.meaning.unit_words import in_deck, unit_here
+from ic.meaning.values import Value, Values, place_of
+from met import units
+from met.diagnostic import Label, Place, Problem, error
+from met.parameter import Parameter
+from met.plan import JointKind, Origin, Quantity
+from met.trace import Graph, Real, Scalar
+from met.units import PURE, Dimension
+
+XYZ = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Owner:
+    """What parameters belong to: in words, where it is, and the first part of their paths.
+
+    homes    definitions under which a parameter that nobody wrote is reached
+    local    first part of the path under a definition's name
+    joint, command, of   what the words `joint`, `effort`, `command`, `of` in declared units mean here
+    """
+
+    label: str
+    place: Place
+    path: str
+    homes: tuple[str, ...] = ()
+    local: str | None = None
+    joint: JointKind = "revolute"
+    command: str | None = None
+    of: str | None = None
+    called: str | None = None  # what to call its one parameter, which has no name in the deck
+
+    def what(self, wanted: Parameter) -> str:
+        return self.called or f"`{wanted.name}` of {self.label}"
+
+    def join(self, name: str) -> str:
+        return f"{self.path}.{name}"
+
+    def join_local(self, home: str, name: str) -> str:
+        local = self.path if self.local is None else self.local
+        return ".".join(part for part in (home, local, name) if part)
+
+
+@dataclass
+class Settled:
+    """A parameter as it goes to the plan, but with a recorded scalar where the plan has a formula; and what it means.
+
+    expression  what the deck wrote, None where it wrote nothing
+    """
+
+    value: Real | tuple[float, ...] | str
+    unit: str
+    origin: Origin
+    doc: str = ""
+    expression: Expression | None = None
+
+
+@dataclass
+class Scope:
+    """The definitions of a deck, and the parameters of one run as they are settled."""
+
+    definitions: Definitions
+    complaints: Complaints
+    varied: dict[str, Varied] = field(default_factory=dict)
+    graph: Graph = field(default_factory=Graph)
+    parameters: dict[str, Settled] = field(default_factory=dict)
+    known: dict[str, list[str]] = field(default_factory=dict)  # every path that would set something -> parameters
+    sets: dict[str, list[str]] = field(default_factory=dict)  # coordinate -> parameters that took it directly
+    whole: dict[str, str] = field(default_factory=dict)  # paths that cannot vary -> why
+    notes: list[str] = field(default_factory=list)
+    lost: frozenset[str] = frozenset()  # joints whose servo failed: nothing can be said of its channels
+
+    def __post_init__(self) -> None:
+        self.checks = Checks(self.complaints, self.graph, self.varied)
+        self.names = Names(self.definitions, {path: varied.value for path, varied in self.varied.items()})
+
+    # Numbers
+
+    def number(self, owner: Owner, wanted: Parameter, item: Item | None, *, expression: Expression | None = None,
+               value: Value | None = None, record: bool = True) -> Real | None:
+        """The parameter's number; None where it could not be had, which was told.
+
+        expression, value  what to take in the stead of the item's expression
+        """
+        written = value
+        if item is not None and value is None:
+            with self.complaints.gather():
+                found = self.written(item, expression)
+                if isinstance(found, Values):
+                    raise Problem(error("D071", f"`{wanted.name}` of {owner.label} is one number, and this is a list",
+                                        found.place, help="leave the brackets out"))
+                written = found
+        default = wanted.default if isinstance(wanted.default, (int, float)) else None
+        return self._settle(owner, wanted, wanted.name, item, written, default, record)
+
+    def vector(self, owner: Owner, wanted: Parameter, item: Item | None, *, names: Sequence[str] = XYZ, short: int = 0,
+               given: Sequence[Real] | None = None, record: bool = True) -> tuple[Real, ...] | None:
+        """The parameter's numbers, `names` of them, or the first `short`, the rest zero.
+
+        given  numbers made of what the item says, in its stead
+        """
+        self.whole.setdefault(owner.join(wanted.name), f"is made of {len(names)} numbers; vary one of them: "
+                              + ", ".join(f"`{owner.join(wanted.name)}.{name}`" for name in names))
+        values: list[Value | None] = [None] * len(names)
+        if item is not None and given is None:
+            with self.complaints.gather():
+                values = list(self._components(owner, wanted, item, len(names), short))
+            if all(value is None for value in values):
+                self.checks.fail(owner.join(wanted.name))
+                return None
+        elif given is not None and item is not None:
+            place = place_of(item.value) if item.value is not None else item.place
+            values = [Value(x, PURE, place) for x in given]
+        elif wanted.default is None:
+            self._missing(owner, wanted)
+            return None
+        defaults = wanted.default if isinstance(wanted.default, tuple) else (None,) * len(names)
+        numbers = [self._settle(owner, wanted, f"{wanted.name}.{name}", item, value, default, record)
+                   for name, value, default in zip(names, values, defaults, strict=True)]
+        return None if any(number is None for number in numbers) else tuple(numbers)  # type: ignore[arg-type]
+
+    def _components(self, owner: Owner, wanted: Parameter, item: Item, count: int, short: int) -> Iterable[Value]:
+        found = self.written(item)
+        expected = f"{short} or {count}" if short else f"{count}"
+        if isinstance(found, Value):
+            raise Problem(
+                error(
+                    "D071",
+                    f"`{wanted.name}` of {owner.label} is a list of {expected} numbers",
+                    found.place,
+                    help=f"write `{wanted.name} = [...] {self.unit(owner, wanted)[0]};`",
+                )
+            )
+        if len(found.items) not in (short, count):
+            raise Problem(error("D071", f"`{wanted.name}` of {owner.label} has {expected} numbers, not "
+                                f"{len(found.items)}", found.place))
+        numbers = []
+        for value in found.items:
+            if isinstance(value, Values):
+                raise Problem(error("D071", "a list inside a list", value.place))
+            numbers.append(value)
+        text, dimension = self.unit(owner, wanted)
+        if dimension != PURE and len(numbers) > 1 and all(value.bare for value in numbers):
+            raise Problem(error("D060", f"{owner.what(wanted)} is in {text}, and these are bare numbers", found.place,
+                                help=f"write `[...] {text}`: a unit after the bracket is for all of them"))
+        numbers += [Value(0.0, dimension, found.place)] * (count - len(numbers))
+        return numbers
+
+    def constant(self, owner: Owner, wanted: Parameter, item: Item) -> float | None:
+        """A number that decides the program, so that no sweep can vary it."""
+        path = owner.join(wanted.name)
+        reason = "decides the program, which is one for the whole sweep in this version"
+        for known in (path, *(owner.join_local(home, wanted.name) for home in item.homes)):
+            self.whole[known] = reason
+        number = None
+        with self.complaints.gather():
+            found = self.written(item)
+            if isinstance(found, Values):
+                raise Problem(error("D071", f"`{wanted.name}` of {owner.label} is one number, and this is a list",
+                                    found.place, help="leave the brackets out"))
+            self.check_dimension(owner, wanted, found)
+            if isinstance(found.number, Scalar):
+                raise Problem(error("D122", f"`{wanted.name}` of {owner.label} varies with the sweep", found.place,
+                                    help=f"it {reason}"))
+            before = len(self.complaints.all)
+            self._check_range(owner, wanted, found.number, found.place)
+            number = float(found.number) if len(self.complaints.all) == before else None
+        if number is None:
+            self.checks.fail(path)
+        return number
+
+    def numbers(self, owner: Owner, wanted: Parameter, item: Item | None) -> tuple[float, ...] | None:
+        """A list of any length, the same in all cases."""
+        path = owner.join(wanted.name)
+        self.whole[path] = "is a list, which cannot vary in this version"
+        if item is None:
+            self._missing(owner, wanted)
+            return None
+        numbers: tuple[float, ...] | None = None
+        with self.complaints.gather():
+            found = self.written(item)
+            if isinstance(found, Value):
+                raise Problem(error("D071", f"`{wanted.name}` of {owner.label} is a list", found.place,
+                                    help=f"write `{wanted.name} = [...] {self.unit(owner, wanted)[0]};`"))
+            made = []
+            for value in found.items:
+                if isinstance(value, Values):
+                    raise Problem(error("D071", "a list inside a list", value.place))
+                self.check_dimension(owner, wanted, value)
+                if isinstance(value.number, Scalar):
+                    raise Problem(error("D122", f"`{wanted.name}` of {owner.label} varies with the sweep", value.place,
+                                        help="a list cannot vary in this version"))
+                self._check_range(owner, wanted, value.number, value.place)
+                made.append(float(value.number))
+            numbers = tuple(made)
+            self.parameters[path] = Settled(numbers, self.unit(owner, wanted)[0], _origin(item, found.place),
+                                            wanted.doc, item.value)
+        if numbers is None:
+            self.checks.fail(path)
+        return numbers
+
+    def word(self, owner: Owner, wanted: Parameter, item: Item | None, *, record: bool = False) -> str | None:
+        """A word, one of `wanted.words` where it has any."""
+        path = owner.join(wanted.name)
+        self.whole[path] = "is a word, which cannot vary in this version"
+        if item is None:
+            if not isinstance(wanted.default, str):
+                self._missing(owner, wanted)
+                return None
+            word, origin = wanted.default, Origin("default", None, (), wanted.source)
+        else:
+            named = item.value.text if isinstance(item.value, Name) else None
+            if named is None or (wanted.words and named not in wanted.words):
+                place = place_of(item.value) if item.value is not None else item.place
+                helps = [*(did_you_mean(named, wanted.words) if named else ()),
+                         "one of: " + ", ".join(wanted.words) if wanted.words else "write a name, without quotes"]
+                message = f"`{wanted.name}` of {owner.label} is a word"
+                if named:
+                    message = f"`{wanted.name}` of {owner.label} cannot be `{named}`"
+                self.complaints.error("D076", message, place, help=helps)
+                self.checks.fail(path)
+                return None
+            word = named
+            origin = _origin(item, place_of(item.value) if item.value else item.place)
+        if record:
+            self.parameters[path] = Settled(word, "", origin, wanted.doc, item.value if item else None)
+        return word
+
+    def derived(self, owner: Owner, name: str, value: Real, unit: str, note: str) -> Real:
+        """A parameter that follows from others, unless a sweep varies it itself."""
+        wanted = Parameter(name=name, unit=unit, doc=note)
+        origin = Origin("derived", owner.place, (), note)
+        return self._finish(owner, wanted, name, owner.homes, self._plain(value), origin, owner.place, True)
+
+    def written(self, item: Item, expression: Expression | None = None) -> Value | Values:
+        """What the item's expression is worth, lists with what `+=` appended. Raises Problem."""
+        expression = item.value if expression is None else expression
+        if expression is None or (item.body is not None and not isinstance(expression, Call)):
+            raise Problem(error("D054", f"`{item.name}` is a value, not a block", item.place,
+                                help=f"write `{item.name} = ...;`"))
+        found = self.names.evaluate(expression)
+        if not item.appended:
+            return found
+        if isinstance(found, Value):
+            raise Problem(error("D056", f"`{item.name}` is one number, and `+=` appends to a list",
+                                place_of(item.appended[0]), help=f"write `{item.name} = ...;`"))
+        items = list(found.items)
+        for more in item.appended:
+            value = self.names.evaluate(more)
+            items.extend(value.items if isinstance(value, Values) else (value,))
+        return Values(tuple(items), found.place, found.unit)
+
+    def _missing(self, owner: Owner, wanted: Parameter) -> None:
+        self.checks.fail(owner.join(wanted.name))
+        unit = self.unit(owner, wanted)[0]
+        shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
+        shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {in_deck(unit)}"
+        self.complaints.error("D075", f"{owner.label} has no `{wanted.name}`", owner.place,
+                              help=f"write `{wanted.name} = {shown};` ({wanted.doc})")
+
+    def _settle(self, owner: Owner, wanted: Parameter, name: str, item: Item | None, written: Value | None,
+                default: float | None, record: bool) -> Real | None:
+        homes = owner.homes if item is None else item.homes
+        place = owner.place if item is None else item.place
+        value: Real | None = None
+        origin = Origin("default", None, (), wanted.source)
+        if item is None:
+            value = default
+        elif written is not None:
+            place = written.place
+            with self.complaints.gather():
+                self.check_dimension(owner, wanted, written)
+                value = self._plain(written.number)
+            origin = _origin(item, place)
+        coordinate = self._coordinate(owner, name, homes)
+        if value is None and (item is not None or coordinate is None):
+            if item is None:
+                self._missing(owner, wanted)
+            self.checks.fail(owner.join(name))
+            return None
+        return self._finish(owner, wanted, name, homes, value, origin, place, record, item.value if item else None)
+
+    def _finish(self, owner: Owner, wanted: Parameter, name: str, homes: tuple[str, ...], value: Real | None,
+                origin: Origin, place: Place, record: bool, expression: Expression | None = None) -> Real:
+        path = owner.join(name)
+        for known in (path, *(owner.join_local(home, name) for home in homes)):
+            self.known.setdefault(known, []).append(path)
+        coordinate = self._coordinate(owner, name, homes)
+        if coordinate is not None:
+            places = (origin.place,) if origin.place is not None else ()
+            origin = Origin("case", coordinate.place, (*places, *origin.overrides), origin.note)
+            place = coordinate.place
+            self.sets.setdefault(coordinate.path, []).append(path)
+            value = coordinate.value.number
+            try:
+                self.check_dimension(owner, wanted, coordinate.value)
+            except Problem as problem:
+                self.complaints.add(*problem.diagnostics)
+                self.checks.fail(coordinate.path)
+        assert value is not None
+        self._check_range(owner, wanted, value, place, path)
+        if record:
+            self.parameters[path] = Settled(value, self.unit(owner, wanted)[0], origin, wanted.doc, expression)
+        return value
+
+    def _coordinate(self, owner: Owner, name: str, homes: tuple[str, ...]) -> Varied | None:
+        paths = {owner.join(name), *(owner.join_local(home, name) for home in homes)}
+        found = [varied for path, varied in self.varied.items() if path in paths]
+        for other in found[1:]:
+            self.sets.setdefault(other.path, [])
+            self.complaints.error(
+                "D123", f"`{found[0].path}` and `{other.path}` both set `{owner.join(name)}`", other.place,
+                also=[Label(found[0].place, "the first")], help="vary one of them, or different joints")
+        return found[0] if found else None
+
+    def _plain(self, number: Real) -> Real:
+        """A recorded number that turned out to be a constant is one."""
+        if isinstance(number, Scalar):
+            known = self.graph.value(number.ref)
+            return number if known is None else known
+        return float(number)
+
+    # Units
+
+    def unit(self, owner: Owner, wanted: Parameter) -> tuple[str, Dimension]:
+        """The unit wanted here, in SI, as text and dimension."""
+        return unit_here(wanted.unit, owner.joint, owner.command, owner.of)
+
+    def check_dimension(self, owner: Owner, wanted: Parameter, value: Value) -> None:
+        """Raises D060 for a bare number where there is a dimension, D061 for a wrong one."""
+        text, dimension = self.unit(owner, wanted)
+        if units.same(value.dimension, dimension):
+            return
+        what = owner.what(wanted)
+        also = self.names.label(value)
+        if value.dimension == PURE:
+            shown = (
+                f"`{value.number:g} {in_deck(text)}`" if not isinstance(value.number, Scalar) else f"a number in {text}"
+            )
+            raise Problem(error(
+                "D060", f"{what} is in {text}, and this is a {'bare' if value.bare else 'pure'} number", value.place,
+                also=also, help=f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}"))
+        found = units.text(value.dimension)
+        message = f"{what} is " + ("a pure number" if dimension == PURE else f"in {text}") + f", and this is in {found}"
+        helps = []
+        if value.dimension == Dimension(s=-1) and dimension == Dimension(s=-1, rad=1):
+            helps = ["Hz counts cycles without an angle: write rad/s, deg/s, rpm or cycle/s"]
+        elif dimension == PURE:
+            helps = ["leave the unit out; `%` is the only unit of a pure number"]
+        raise Problem(error("D061", message, value.place, also=also, help=helps))
+
+    def _check_range(self, owner: Owner, wanted: Parameter, value: Real, place: Place, path: str = "") -> None:
+        bounds = [(bound, word, sign) for bound, word, sign in (
+            (wanted.above, "above", np.greater), (wanted.at_least, "at least", np.greater_equal),
+            (wanted.below, "below", np.less), (wanted.at_most, "at most", np.less_equal)) if bound is not None]
+        text = self.unit(owner, wanted)[0]
+        unit = "" if text == "1" else f" {text}"
+
+        def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+            bad = ~np.isfinite(values[:, 0])
+            for bound, _, holds in bounds:
+                bad |= ~holds(values[:, 0], bound)
+            return bad, [f"this is {x:g}{unit}" for x in values[bad, 0][:1]]
+
+        limits = " and ".join(f"{word} {bound:g}" for bound, word, _ in bounds) or "finite"
+        self.checks.hold((value,), test, code="D077", message=f"{owner.what(wanted)} must be {limits}{unit}",
+                         place=place, path=path)
+
+    def quantities(self) -> tuple[dict[str, Any], list[Scalar]]:
+        """The parameters as a plan holds them, and the scalars of its formulas, in order."""
+        from met.plan import Formula
+
+        outputs: list[Scalar] = []
+        made = {}
+        for path, settled in self.parameters.items():
+            value: Any = settled.value
+            if isinstance(value, Scalar):
+                outputs.append(value)
+                value = Formula(len(outputs) - 1)
+            made[path] = Quantity(value, settled.unit, settled.origin)
+        return made, outputs
+
+
+def _origin(item: Item, place: Place) -> Origin:
+    note = f"from `{item.value.text}`" if isinstance(item.value, Name) else ""
+    return Origin("deck", place, item.overrides, note)

@@ -1,0 +1,247 @@
+"""Servos on joints: the definition with what the use overrides, its model's parameters, its command and rate."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ic.grammar.syntax import Call, Name, Word
+from ic.meaning.arm import Arm
+from ic.meaning.complaints import did_you_mean, known_words
+from ic.meaning.models import check_keys, find_model, use_model, word_of
+from ic.meaning.resolve import Block, Item, open_call, overlay
+from ic.meaning.schedule import Rate
+from ic.meaning.scope import Owner, Scope
+from ic.meaning.unit_words import in_deck
+from ic.meaning.values import place_of
+from met import models
+from met.channel import COMMAND_UNIT
+from met.diagnostic import Label, Place, Problem
+from met.parameter import Parameter
+from met.plan import Command
+
+RATE = Parameter(name="rate", unit="Hz", above=0.0, doc="how often the servo's computer ticks")
+NOT_PARAMETERS = ("model", "command", "rate")
+
+
+@dataclass(frozen=True)
+class Use:
+    """A servo on a joint. rate None: the run's `rates.servos`. parameters None: some failed, which was told."""
+
+    joint: str
+    definition: str
+    servo: Any
+    command: Command | None
+    rate: Rate | None
+    parameters: dict[str, Any] | None
+    place: Place
+
+
+def resolve_servos(scope: Scope, body: Block, arm: Arm) -> tuple[list[Use], frozenset[str]]:
+    """Every servo of the run, in the order of the arm's joints, and the joints whose servo failed, which was told."""
+    uses = {}
+    for item in body.items.values():
+        with scope.complaints.gather():
+            use = _use(scope, item, arm)
+            if use is not None:
+                uses[use.joint] = use
+    lost = frozenset(item.name for item in body.items.values()) - set(uses)
+    return [uses[joint.name] for joint in arm.joints if joint.name in uses], lost
+
+
+def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
+    kind = arm.kind(item.name)
+    moving = [joint.name for joint in arm.moving]
+    if item.kind or kind is None:
+        scope.complaints.error("D144", f"no joint `{item.name}` in arm `{arm.name}`", item.place,
+                               help=[*did_you_mean(item.name, moving), known_words("joints", moving)])
+        return None
+    if kind == "fixed":
+        scope.complaints.error("D145", f"joint `{item.name}` is fixed, so no servo can move it", item.place,
+                               also=[Label(place, "fixed here") for j in arm.joints if j.name == item.name
+                                     and (place := j.place)], help="make the joint revolute or prismatic")
+        return None
+    name = word_of(item.value)
+    if name is None or (isinstance(item.value, Call) and item.value.positional):
+        scope.complaints.error("D146", f"the servo of joint `{item.name}` is the name of a servo definition",
+                               place_of(item.value) if item.value else item.place,
+                               help=f"write `{item.name} = SERVO;` or `{item.name} = SERVO {{ kp = ...; }}`")
+        return None
+    assert item.value is not None
+    place = item.value.name.place if isinstance(item.value, Call) else item.value.place
+    if name not in scope.definitions.of_kind("servo") and name in models.find_own("servo"):
+        scope.complaints.error("D147", f"`{name}` is a servo model; a servo definition is needed here", place,
+                               help=f"`servo NAME {{ model = {name}; ... }}`, and `{item.name} = NAME;`")
+        return None
+    definition = scope.definitions.find("servo", Word(name, place))
+    block = scope.definitions.block(definition)
+    if block is None:
+        return None
+    overridden = item.body is not None and bool(item.body.items)
+    if item.body is not None:
+        block = overlay(block, item.body)
+    label = f"servo `{name}` on joint `{item.name}`" if overridden else f"servo `{name}`"
+    owner = Owner(label, definition.place, f"{item.name}.servo", homes=scope.definitions.homes(definition), local="",
+                  joint=kind)  # type: ignore[arg-type]
+    model = block.get("model")
+    if model is None:
+        scope.complaints.error(
+            "D148",
+            f"{label} has no model",
+            definition.place,
+            also=[Label(place, "used here")],
+            help=["write `model = MODEL;`", known_words("servo models", sorted(models.find_own("servo")))],
+        )
+        return None
+    servo = find_model(scope, "servo", word_of(model.value), place_of(model.value) if model.value else model.place)
+    if servo is None:
+        return None
+    parameters = use_model(scope, owner, servo.parameters, block, NOT_PARAMETERS)
+    command = _command(scope, owner, servo, block.get("command"), place)
+    if command is not None:
+        _check_needed(scope, owner, servo, command, block, place)
+    rate = None
+    if block.get("rate") is not None:
+        rate = fixed_rate(scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`")
+    scope.whole[f"{item.name}.servo.model"] = "decides the program, which is one for the whole sweep in this version"
+    return Use(item.name, name, servo, command, rate, parameters, item.place)
+
+
+def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, block: Block, used: Place) -> None:
+    """What this kind of command needs is written."""
+    item = block.get("command")
+    place = place_of(item.value) if item is not None and item.value is not None else used
+    for parameter in servo.parameters:
+        if command.kind in parameter.needed_for and block.get(parameter.name) is None:
+            message = f"{owner.label} needs `{parameter.name}` under a {command.kind} command"
+            scope.complaints.error(
+                "D160",
+                message,
+                place,
+                help=f"write `{parameter.name} = ... {in_deck(scope.unit(owner, parameter)[0])};`: {parameter.doc}",
+            )
+
+
+def fixed_rate(scope: Scope, owner: Owner, item: Item, label: str, name: str = "rate") -> Rate | None:
+    """A rate in Hz, which no sweep can vary."""
+    if word_of(item.value) == "continuous":
+        scope.complaints.error(
+            "D106",
+            "a continuous rate is not in this version",
+            place_of(item.value or Name((), item.place)),
+            help="write a rate in Hz, up to that of the dynamics",
+        )
+        return None
+    wanted = replace(RATE, name=name)
+    hz = scope.constant(owner, wanted, item)
+    place = place_of(item.value) if item.value is not None else item.place
+    return None if hz is None else Rate(label, hz, place)
+
+
+def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Place) -> Command | None:
+    known = ", ".join(f"{kind}(...)" for kind in servo.commands)
+    if item is None:
+        if servo.commands:
+            scope.complaints.error(
+                "D149",
+                f"{owner.label} has no command",
+                used,
+                help=[
+                    f"write `command = {servo.commands[0]}(...);`, in the definition or for this joint",
+                    f"{servo.name} takes {known}",
+                ],
+            )
+        return None
+    call = item.value
+    place = place_of(call) if call is not None else item.place
+    if not servo.commands:
+        scope.complaints.error("D150", f"a {servo.name} takes no command", place, help="leave `command` out")
+        return None
+    if not isinstance(call, Call) or item.body is not None or len(call.positional) != 1:
+        scope.complaints.error("D151", "a command is its kind and one value or course in time", place,
+                               help=f"{servo.name} takes {known}: `{servo.commands[0]}(0.03 rad/s)` or "
+                                    f"`{servo.commands[0]}(step(to = ...))`")
+        return None
+    kind = call.name.text
+    if kind not in servo.commands:
+        scope.complaints.error("D152", f"a {servo.name} takes no command `{kind}`", call.name.place,
+                               help=[*did_you_mean(kind, servo.commands), f"it takes {known}"])
+        return None
+    inner = call.positional[0]
+    told = f"the command of {owner.label}"
+    spot = replace(owner, label=told, called=told, place=place, path=f"{owner.path}.command", local="command",
+                   homes=item.homes, command=kind)
+    assert kind in COMMAND_UNIT
+    name = word_of(inner) if isinstance(inner, Call) else None
+    if name is None or name in ("sqrt", "sin", "cos", "min", "max"):
+        constant = models.find_own("command")["constant"]
+        (value,) = constant.parameters
+        scope.number(spot, replace(value, doc=f"{kind} asked"), replace(item, name="command"), expression=inner)
+        return Command(kind, "constant")
+    assert isinstance(inner, Call)
+    profile = find_model(scope, "command", name, inner.name.place)
+    if profile is None:
+        return None
+    if inner.positional:
+        scope.complaints.error("D153", f"`{name}` takes its values by name", place_of(inner.positional[0]),
+                               help=f"write `{name}({', '.join(f'{p.name} = ...' for p in profile.parameters)})`")
+        return None
+    _, body = open_call(inner, None, scope.complaints)
+    opened = Block({key: replace(part, homes=item.homes, overrides=item.overrides)
+                    for key, part in (body or Block()).items.items()}, (body or Block()).statements)
+    course = replace(spot, label=f"`{name}`", called=None, place=inner.name.place)
+    values = use_model(scope, course, profile.parameters, opened)
+    if values is not None and profile.name == "table":
+        _check_table(scope, opened, values)
+    return Command(kind, profile.name)
+
+
+def _check_table(scope: Scope, body: Block, values: dict[str, Any]) -> None:
+    """Times rise, and there are as many values."""
+    times, heights = values["times"], values["values"]
+    at, also = body.items["times"], body.items["values"]
+    at_place = place_of(at.value) if at.value is not None else at.place
+    also_place = place_of(also.value) if also.value is not None else also.place
+    if len(times) != len(heights):
+        scope.complaints.error("D154", f"a table of {len(times)} times and {len(heights)} values", at_place,
+                               also=[Label(also_place, "values")], help="each time has its value")
+    elif not times:
+        scope.complaints.error("D155", "a table with no points", at_place, help="a table has one point at least")
+    for n, (before, after) in enumerate(itertools.pairwise(times)):
+        if not after > before:
+            scope.complaints.error(
+                "D156",
+                f"times of a table rise, and number {n + 2}, {after:g} s, follows {before:g} s",
+                at_place,
+                help="sort the points; for a jump, two times close together",
+            )
+            break
+
+
+def check_servo_definition(scope: Scope, name: str) -> None:
+    """What can be told of a definition that no run uses: its model and its keys."""
+    definition = scope.definitions.of_kind("servo")[name]
+    block = scope.definitions.block(definition)
+    if block is None:
+        return
+    with scope.complaints.gather():
+        model = block.get("model")
+        owner = Owner(f"servo `{name}`", definition.place, "")
+        if model is None:
+            return
+        servo = find_model(scope, "servo", word_of(model.value), place_of(model.value) if model.value else model.place)
+        if servo is not None:
+            check_keys(scope, block, [*(p.name for p in servo.parameters), *NOT_PARAMETERS], owner)
+            command = block.get("command")
+            if command is not None and isinstance(command.value, Call) and len(command.value.positional) == 1 \
+                    and not isinstance(command.value.positional[0], Call):
+                scope.names.evaluate(command.value.positional[0])
+            for key, item in block.items.items():
+                if key in NOT_PARAMETERS or item.value is None:
+                    continue
+                try:
+                    scope.written(item)
+                except Problem as problem:
+                    if not (isinstance(item.value, Name) and servo.parameters):
+                        scope.complaints.add(*problem.diagnostics)

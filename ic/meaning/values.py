@@ -1,0 +1,359 @@
+"""Expressions to quantities: SI numbers with their dimension, each knowing where it was written.
+
+A number may be a recorded scalar, where a sweep varies what it depends on; then what comes of it is recorded too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import cast
+
+from ic.grammar.syntax import Binary, Call, Expression, List, Name, Number, String, Unary, Unit, WithUnit
+from ic.meaning.complaints import did_you_mean, known_words
+from met import units
+from met.diagnostic import Label, Place, Problem, error
+from met.trace import Real, Scalar, cos, maximum, minimum, sin, sqrt
+from met.units import PURE, Dimension
+
+COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
+MOST_POINTS = 100_000
+BIGGEST_EXPONENT = 16
+
+FUNCTIONS = ("sqrt", "sin", "cos", "min", "max", "linspace", "logspace")
+CONSTANTS = {"pi": math.pi}
+
+
+@dataclass(frozen=True)
+class Value:
+    """A quantity: number in SI, dimension. bare: a number written with no unit. unit: the one it was written in."""
+
+    number: Real
+    dimension: Dimension
+    place: Place
+    bare: bool = False
+    unit: Unit | None = None
+
+
+@dataclass(frozen=True)
+class Values:
+    """A list of quantities."""
+
+    items: tuple[Value | Values, ...]
+    place: Place
+    unit: Unit | None = None
+
+
+Lookup = Callable[[Name], Value | Values]
+
+
+def evaluate(expression: Expression, lookup: Lookup) -> Value | Values:
+    """What the expression is worth; `lookup` gives names their values. Raises Problem, placed."""
+    spine: list[Binary] = []
+    while isinstance(expression, Binary):  # a long sum leans to the left: no recursion along it
+        spine.append(expression)
+        expression = expression.left
+    value = _leaf(expression, lookup)
+    for node in reversed(spine):
+        value = _binary(node, value, lookup)
+    return value
+
+
+def evaluate_number(expression: Expression, lookup: Lookup) -> Value:
+    """The expression's value, which must be one number."""
+    value = evaluate(expression, lookup)
+    if isinstance(value, Values):
+        raise Problem(error("D071", "one number is needed here, and this is a list", place_of(expression)))
+    return value
+
+
+def _leaf(expression: Expression, lookup: Lookup) -> Value | Values:
+    match expression:
+        case Number():
+            return _number(expression)
+        case Name():
+            if expression.text in CONSTANTS:
+                return Value(CONSTANTS[expression.text], PURE, expression.place)
+            return replace(lookup(expression), place=expression.place)
+        case List():
+            return Values(tuple(evaluate(item, lookup) for item in expression.items), expression.place)
+        case WithUnit():
+            return _with_unit(expression, lookup)
+        case Unary():
+            return _unary(expression, lookup)
+        case Call():
+            return _call(expression, lookup)
+        case String():
+            raise Problem(error("D064", "a number is needed here, not text", expression.place))
+    raise AssertionError(expression)
+
+
+def _number(number: Number) -> Value:
+    if number.unit is None:
+        return Value(_sound(number.value, number.place), PURE, number.place, bare=True)
+    measure = measure_of(number.unit)
+    place = spanned(number.place, number.unit.place)
+    return Value(_sound(measure.to_si(number.value), place), measure.dimension, place, unit=number.unit)
+
+
+def measure_of(unit: Unit) -> units.Measure:
+    """What a unit means. Raises D074 where a factor is no unit."""
+    for word, _ in unit.factors:
+        if not units.is_unit(word.text):
+            near = units.suggest(word.text)
+            raise Problem(error("D074", f"`{word.text}` is not a unit", word.place,
+                                help=f"did you mean `{near}`?" if near else ()))
+    try:
+        measure = units.measure((word.text, exponent) for word, exponent in unit.factors)
+        _sound(measure.scale, unit.place)
+    except (OverflowError, ZeroDivisionError):
+        raise Problem(error("D067", "this unit is beyond what a number can hold", unit.place)) from None
+    return measure
+
+
+def _with_unit(expression: WithUnit, lookup: Lookup) -> Value | Values:
+    inner = _written_unit(expression.inner)
+    if inner is not None:
+        raise Problem(error(
+            "D062", f"a unit inside brackets that have one after them, `{expression.unit.text}`", inner,
+            also=[Label(expression.unit.place, "this one is for all the bare numbers inside")],
+            help="give each number its own unit, or none of them"))
+    measure = measure_of(expression.unit)
+
+    def apply(value: Value | Values) -> Value | Values:
+        if isinstance(value, Values):
+            return Values(tuple(apply(item) for item in value.items), value.place, expression.unit)
+        if value.dimension != PURE:
+            raise Problem(error(
+                "D062", f"a value in {units.text(value.dimension)} inside brackets that have a unit after them",
+                value.place, also=[Label(expression.unit.place, "this unit is for pure numbers")],
+                help="leave the unit after the brackets out, and give each bare number its own"))
+        number = _sound(measure.to_si(cast(float, value.number)), value.place)  # a scalar divides and multiplies too
+        return Value(number, measure.dimension, value.place, unit=expression.unit)
+
+    return apply(evaluate(expression.inner, lookup))
+
+
+def _written_unit(expression: Expression) -> Place | None:
+    """Where a unit is written inside, None where there is none."""
+    stack: list[Expression] = [expression]
+    while stack:
+        match stack.pop():
+            case Number(unit=unit) if unit is not None:
+                return unit.place
+            case WithUnit(unit=unit):
+                return unit.place
+            case List(items=items):
+                stack.extend(reversed(items))
+            case Unary(operand=operand):
+                stack.append(operand)
+            case Binary(left=left, right=right):
+                stack.extend((right, left))
+            case Call(positional=positional, named=named):
+                stack.extend(reversed((*positional, *(value for _, value in named))))
+    return None
+
+
+def _unary(expression: Unary, lookup: Lookup) -> Value:
+    if expression.operator == "not":
+        raise Problem(error("D064", "`not` stands only in `exclude when`", expression.place))
+    value = evaluate_number(expression.operand, lookup)
+    place = spanned(expression.place, value.place)
+    return replace(value, number=-value.number if expression.operator == "-" else value.number, place=place)
+
+
+def _binary(node: Binary, left: Value | Values, lookup: Lookup) -> Value:
+    operator = node.operator
+    if operator in COMPARISONS or operator in ("and", "or"):
+        raise Problem(error("D064", f"`{operator}` is not arithmetic: a number is needed here", node.place,
+                            help="comparisons stand in `exclude when` and `require`"))
+    if isinstance(left, Values):
+        raise Problem(error("D071", f"`{operator}` needs one number on its left, and this is a list", left.place))
+    right = evaluate_number(node.right, lookup)
+    place = spanned(left.place, right.place)
+    bare = left.bare and right.bare
+    if operator in ("+", "-"):
+        if not units.same(left.dimension, right.dimension):
+            raise Problem(error(
+                "D063", f"`{operator}` of {_named(left)} and {_named(right)}", node.place,
+                also=[Label(left.place, _named(left)), Label(right.place, _named(right))],
+                help="both must be of one dimension"))
+        number = left.number + right.number if operator == "+" else left.number - right.number
+        return Value(_sound(number, place), left.dimension, place, bare, left.unit)
+    if operator == "*":
+        unit = left.unit if right.dimension == PURE else right.unit if left.dimension == PURE else None
+        return Value(_sound(left.number * right.number, place), left.dimension * right.dimension, place, bare, unit)
+    if operator == "/":
+        if not isinstance(right.number, Scalar) and right.number == 0.0:
+            raise Problem(error("D066", "division by zero", Label(right.place, "this is zero")))
+        unit = left.unit if right.dimension == PURE else None
+        return Value(_sound(left.number / right.number, place), left.dimension / right.dimension, place, bare, unit)
+    return replace(_power(node, left, right), place=place, bare=bare)
+
+
+def _power(node: Binary, base: Value, exponent: Value) -> Value:
+    power = exponent.number
+    if exponent.dimension != PURE:
+        raise Problem(error("D068", f"an exponent in {units.text(exponent.dimension)}", exponent.place,
+                            help="an exponent is a pure number"))
+    if isinstance(power, Scalar):
+        raise Problem(error("D068", "a varied exponent is not in this version", exponent.place))
+    whole = float(power).is_integer() and abs(power) <= BIGGEST_EXPONENT
+    if base.dimension == PURE:
+        dimension = PURE
+    elif whole:
+        dimension = base.dimension ** int(power)
+    else:
+        raise Problem(error("D068", f"a quantity in {units.text(base.dimension)} to the power {power:g}", node.place,
+                            help=f"whole exponents up to {BIGGEST_EXPONENT}; sqrt(...) for roots"))
+    if isinstance(base.number, Scalar):
+        if not whole:
+            raise Problem(error("D068", f"a varied value to the power {power:g}", node.place,
+                                help=f"whole exponents up to {BIGGEST_EXPONENT}; sqrt(...) for roots"))
+        return Value(base.number ** int(power), dimension, base.place)
+    try:
+        result = float(base.number) ** (int(power) if whole else power)
+    except ZeroDivisionError:
+        raise Problem(error("D066", "zero to a negative power", node.place)) from None
+    except OverflowError:
+        raise _too_large(node.place) from None
+    if isinstance(result, complex):
+        raise Problem(error("D068", "a negative number to a broken power", node.place))
+    return Value(_sound(result, node.place), dimension, base.place)
+
+
+# Functions
+
+
+def _call(call: Call, lookup: Lookup) -> Value | Values:
+    name = call.name.text
+    if name not in FUNCTIONS:
+        raise Problem(error("D069", f"no function `{name}`", call.name.place,
+                            help=[*did_you_mean(name, FUNCTIONS), known_words("functions", (*FUNCTIONS, "pi"))]))
+    if call.named or call.body is not None:
+        raise Problem(error("D070", f"`{name}` takes its arguments in order, without names", call.name.place,
+                            help=f"write `{name}({', '.join(_USAGE[name])})`"))
+    if len(call.positional) != len(_USAGE[name]) and not (name in ("min", "max") and call.positional):
+        raise Problem(error("D070", f"`{name}` takes {len(_USAGE[name])} arguments, not {len(call.positional)}",
+                            call.name.place, help=f"write `{name}({', '.join(_USAGE[name])})`"))
+    arguments = [evaluate_number(argument, lookup) for argument in call.positional]
+    if name in ("linspace", "logspace"):
+        return _spaced(call, arguments)
+    first = arguments[0]
+    if name == "sqrt":
+        return _sqrt(call, first)
+    if name in ("min", "max"):
+        result = first
+        for other in arguments[1:]:
+            if not units.same(first.dimension, other.dimension):
+                raise Problem(error("D063", f"`{name}` of {_named(first)} and {_named(other)}", other.place,
+                                    help="both must be of one dimension"))
+            number = minimum(result.number, other.number) if name == "min" else maximum(result.number, other.number)
+            result = Value(_plain(number), first.dimension, call.place, result.bare and other.bare, first.unit)
+        return replace(result, place=call.place)
+    if first.dimension not in (PURE, Dimension(rad=1)):
+        raise Problem(error("D061", f"`{name}` of {_named(first)}", first.place, help="an angle is needed, as 30 deg"))
+    return Value(_plain(sin(first.number) if name == "sin" else cos(first.number)), PURE, call.place)
+
+
+_USAGE = {"sqrt": ("x",), "sin": ("x",), "cos": ("x",), "min": ("a", "b"), "max": ("a", "b"),
+          "linspace": ("from", "to", "count"), "logspace": ("from", "to", "count")}
+
+
+def _sqrt(call: Call, value: Value) -> Value:
+    if any(exponent % 2 for exponent in value.dimension):
+        raise Problem(error("D068", f"the root of {_named(value)} is of no dimension", value.place))
+    if not isinstance(value.number, Scalar) and value.number < 0.0:
+        raise Problem(error("D066", "the root of a negative number", value.place))
+    dimension = Dimension(*(exponent // 2 for exponent in value.dimension))
+    return Value(_plain(sqrt(value.number)), dimension, call.place)
+
+
+def _spaced(call: Call, arguments: list[Value]) -> Values:
+    """Points from `from` to `to`, both included: evenly (of the decimal numbers as written), or by one ratio."""
+    name = call.name.text
+    start, end, count = arguments
+    if count.dimension != PURE or isinstance(count.number, Scalar) or not float(count.number).is_integer():
+        raise Problem(error("D072", f"the count of a {name} is a whole number", count.place,
+                            help=f"write `{name}(from, to, count) unit`"))
+    n = int(count.number)
+    if not 2 <= n <= MOST_POINTS:
+        raise Problem(error("D072", f"a {name} of {n} points", count.place, help=f"2 to {MOST_POINTS} are possible"))
+    if not units.same(start.dimension, end.dimension):
+        raise Problem(error("D063", f"a {name} from {_named(start)} to {_named(end)}", end.place,
+                            help="both must be of one dimension"))
+    if isinstance(start.number, Scalar) or isinstance(end.number, Scalar):
+        raise Problem(error("D121", "the values of a sweep depend on what the sweep varies", call.place,
+                            help="write numbers that stand still"))
+    a, b = float(start.number), float(end.number)
+    if name == "logspace" and not a * b > 0.0:
+        raise Problem(error("D072", "the ends of a logspace are both above or both below zero", call.place,
+                            help="linspace(...) has no such limit"))
+    points = _even(a, b, n) if name == "linspace" else _by_ratio(a, b, n)
+    made = (Value(x, start.dimension, call.place, start.bare and end.bare, start.unit) for x in points)
+    return Values(tuple(made), call.place, start.unit)
+
+
+def _even(a: float, b: float, n: int) -> Iterable[float]:
+    """Each point is the double nearest to what the ends' shortest decimals give: 0.01 to 0.04 in 7 has 0.015 in it."""
+    first, last = Fraction(repr(a)), Fraction(repr(b))
+    below = first.denominator * last.denominator
+    p, q = first.numerator * last.denominator, last.numerator * first.denominator
+    try:
+        return [(p * (n - 1 - i) + q * i) / (below * (n - 1)) for i in range(n)]
+    except OverflowError:
+        return [a + (b - a) * (i / (n - 1)) for i in range(n)]
+
+
+def _by_ratio(a: float, b: float, n: int) -> Iterable[float]:
+    low, high = math.log(abs(a)), math.log(abs(b))
+    inner = (math.copysign(math.exp(low + (high - low) * i / (n - 1)), a) for i in range(1, n - 1))
+    return [a, *inner, b]
+
+
+# Places and numbers
+
+
+def place_of(expression: Expression) -> Place:
+    """The stretch that an expression takes up, as far as it is on one line."""
+    match expression:
+        case Number(unit=unit) if unit is not None:
+            return spanned(expression.place, unit.place)
+        case Unary():
+            return spanned(expression.place, place_of(expression.operand))
+        case Binary():
+            left = expression.left
+            while isinstance(left, Binary):
+                left = left.left
+            return spanned(place_of(left), place_of(expression.right))
+        case WithUnit():
+            return spanned(place_of(expression.inner), expression.unit.place)
+    return expression.place
+
+
+def spanned(first: Place, last: Place) -> Place:
+    """From the first place to the end of the last, where both are on one line and by one way there."""
+    if (first.file, first.line, first.expansions) != (last.file, last.line, last.expansions):
+        return first
+    end = last.column + last.length
+    return replace(first, length=end - first.column) if end > first.column else first
+
+
+def _named(value: Value) -> str:
+    return "a pure number" if value.dimension == PURE else units.text(value.dimension)
+
+
+def _plain(number: Real) -> Real:
+    return number if isinstance(number, Scalar) else float(number)
+
+
+def _sound(number: Real, place: Place) -> Real:
+    if not isinstance(number, Scalar) and not math.isfinite(number):
+        raise _too_large(place)
+    return number
+
+
+def _too_large(place: Place) -> Problem:
+    return Problem(error("D067", "this number is too large: the largest is 1.8e308", place))

@@ -1,0 +1,1 @@
+"""What the terminal shows of a deck, a plan and the models."""

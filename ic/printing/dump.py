@@ -1,0 +1,191 @@
+"""What each stage of the way hands to the next, as text: `met dump STAGE deck.ic`.
+
+A stage is a function from `Asked` to lines, offered as an entry point in the group `met.stages` by the lowest package
+that may import all it needs: tokens, syntax, model and plan from here, program, kernel and assembly from batch/dump.py.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from met.diagnostic import Place, Problem, error
+from met.entry_points import offered
+
+if TYPE_CHECKING:
+    from ic.grammar.syntax import Entry
+    from ic.meaning.resolve import Block, Item
+    from met.plan import Plan
+
+GROUP = "met.stages"
+ORDER = ("tokens", "syntax", "model", "plan", "program", "kernel", "assembly")  # that of the way; others come after
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Which deck is to be shown, and of its plan which runs (None: the only one, else the default)."""
+
+    deck: str
+    include_dirs: tuple[str, ...] = ()
+    defines: tuple[str, ...] = ()
+    select: Sequence[str] | None = None
+
+    def plan(self) -> Plan:
+        """The plan, compiled, or read where the deck is a plan file. Raises Problem."""
+        import ic
+
+        if self.deck.endswith(".json"):
+            from met import plan_file
+
+            return plan_file.read(self.deck)
+        return ic.compile(self.deck, include_dirs=self.include_dirs, defines=self.defines, select=self.select)
+
+
+Stage = Callable[[Asked], Iterator[str]]
+
+
+def stage_names() -> list[str]:
+    """All stages, in the order of the way."""
+    names = {point.name for point in offered(GROUP)}
+    return [name for name in ORDER if name in names] + sorted(names - set(ORDER))
+
+
+def find_stage(name: str) -> Stage:
+    """The function of a stage. Raises Problem D172 with what was probably meant."""
+    point = next((point for point in offered(GROUP) if point.name == name), None)
+    if point is None:
+        names = stage_names()
+        close = difflib.get_close_matches(name, names, n=1)
+        helps = [f"did you mean `{close[0]}`?"] if close else []
+        raise Problem(error("D172", f"no stage `{name}`", help=[*helps, f"stages: {', '.join(names)}"]))
+    stage: Stage = point.load()
+    return stage
+
+
+def tokens(asked: Asked) -> Iterator[str]:
+    """Tokens behind the preprocessor: place, kind, text, and the macros that a token came through."""
+    from ic.text.preprocess import preprocess
+
+    read = preprocess(asked.deck, asked.include_dirs, asked.defines)
+    if not read.whole or any(diagnostic.severity == "error" for diagnostic in read.diagnostics):
+        raise Problem(read.diagnostics, {source.name: source.text for source in read.sources})
+    for token in read.tokens:
+        place = token.place
+        through = "".join(f"  from {step.macro} at {step.use}" for step in place.expansions)
+        yield f"{place!s:32} {token.kind:14} {token.text}{through}"
+
+
+def syntax(asked: Asked) -> Iterator[str]:
+    """The tree of what was written, entry by entry."""
+    from ic.read import read
+
+    for entry in read(asked.deck, asked.include_dirs, asked.defines).entries:
+        yield from _entry(entry, "")
+
+
+def model(asked: Asked) -> Iterator[str]:
+    """Definitions with `like`, overrides, `+=` and `remove` carried out, each entry with the places it overrode."""
+    from ic.grammar.spell import spell
+    from ic.meaning.complaints import Complaints
+    from ic.meaning.resolve import KINDS, Definitions
+    from ic.read import read
+
+    deck = read(asked.deck, asked.include_dirs, asked.defines)
+    complaints = Complaints(deck.warnings)
+    definitions = Definitions(deck, complaints)
+    for name, let in definitions.lets.items():
+        yield f"let {name} = {spell(let.value)}{_written(let.place)}"
+    for kind in KINDS:
+        for definition in definitions.of_kind(kind).values():
+            head = f"{'default ' if definition.default else ''}{kind} {definition.name}"
+            if definition.group.of is not None:  # a sweep is not merged: its entries are as written
+                yield f"{head} of {definition.group.of.text} {{{_written(definition.place)}"
+                for entry in definition.group.body:
+                    yield from _entry(entry, "    ")
+                yield "}"
+                continue
+            block = definitions.block(definition)
+            if block is not None:
+                yield f"{head} {{{_written(definition.place)}"
+                yield from _block(block, "    ")
+                yield "}"
+    if complaints.errors:
+        raise Problem(complaints.all, {source.name: source.text for source in deck.sources})
+
+
+def plan(asked: Asked) -> Iterator[str]:
+    """The run plan, as `met plan -o` writes it, its case tables inside."""
+    from met import plan_file
+
+    yield plan_file.dumps(asked.plan()).rstrip("\n")
+
+
+def _entry(entry: Entry, indent: str) -> Iterator[str]:
+    from ic.grammar import syntax as tree
+    from ic.grammar.spell import spell
+
+    match entry:
+        case tree.Let():
+            yield f"{indent}Let {entry.name.text} = {spell(entry.value)}{_written(entry.place)}"
+        case tree.Setting():
+            words = "".join(f"{word.text} " for word in entry.words)
+            path = ".".join(word.text for word in entry.path)
+            head, body = _value(entry.value)
+            yield f"{indent}Setting {words}{path} {entry.operator} {head}{_written(entry.place)}"
+            yield from _entries(body, indent)
+        case tree.Statement():
+            words = " ".join(word.text for word in entry.words)
+            yield f"{indent}Statement {words} {spell(entry.value)}{_written(entry.place)}"
+        case tree.Group():
+            words = " ".join(word.text for word in entry.words)
+            like = f" like {entry.like.text}" if entry.like is not None else ""
+            of = f" of {entry.of.text}" if entry.of is not None else ""
+            yield f"{indent}Group {words}{like}{of}{_written(entry.place)}"
+            yield from _entries(entry.body, indent)
+
+
+def _entries(body: Sequence[Entry], indent: str) -> Iterator[str]:
+    for inner in body:
+        yield from _entry(inner, indent + "    ")
+
+
+def _value(value: Any, named_apart: bool = False) -> tuple[str, Sequence[Entry]]:
+    """A value as text, and the body that it may have: `settling_time { of = shoulder.qd; }`.
+
+    named_apart: what a call names is shown elsewhere.
+    """
+    from ic.grammar.spell import spell
+    from ic.grammar.syntax import Call
+
+    if isinstance(value, Call) and (value.body is not None or named_apart):
+        bare = not value.positional and (named_apart or not value.named)
+        return (value.name.text if bare else spell(value)), value.body or ()
+    return spell(value), ()
+
+
+def _block(block: Block, indent: str) -> Iterator[str]:
+    from ic.grammar.spell import spell
+
+    for item in block.items.values():
+        yield from _item(item, indent)
+    for statement in block.statements:
+        words = " ".join(word.text for word in statement.words)
+        yield f"{indent}{words} {spell(statement.value)}{_written(statement.place)}"
+
+
+def _item(item: Item, indent: str) -> Iterator[str]:
+    words = " ".join([*([item.kind] if item.kind else []), item.name, *(word.text for word in item.detail)])
+    value = "" if item.value is None else f" = {_value(item.value, item.body is not None)[0]}"
+    more = "".join(f" += {_value(each)[0]}" for each in item.appended)
+    opens = " {" if item.body is not None else ""
+    overrides = "".join(f", overrides {place}" for place in item.overrides)
+    yield f"{indent}{words}{value}{more}{opens}{_written(item.place)}{overrides}"
+    if item.body is not None:
+        yield from _block(item.body, indent + "    ")
+        yield f"{indent}}}"
+
+
+def _written(place: Place) -> str:
+    return f"    // {place}"

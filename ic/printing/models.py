@@ -1,0 +1,145 @@
+"""What models declare of themselves: their kinds, one kind's models, one model with all of its numbers."""
+
+from __future__ import annotations
+
+import difflib
+import textwrap
+from collections.abc import Iterator
+from typing import Any, get_args
+
+from ic.printing.columns import columns, number, vector
+from met import models
+from met.diagnostic import Problem, error
+from met.parameter import Parameter
+
+KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
+HOW = {
+    "servo": "servo NAME { model = MODEL; ... }",
+    "command": "command = rate(MODEL(...)), position(MODEL(...)) or torque(MODEL(...)), in a servo",
+    "environment": "environment { NAME = MODEL { ... } }, in a run",
+    "metric": "metric NAME = MODEL { of = CHANNEL; ... }, in a run",
+    "integrator": "integrator = MODEL, in a run",
+}
+
+WORDS = {
+    "joint": "rad, or m on a prismatic joint",
+    "effort": "N*m, or N on a prismatic joint",
+    "of": "the unit of the channel that the metric watches",
+    "command": "the unit of what is commanded",
+}
+
+
+def chosen(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
+    """What `met doc` is about: all models, those of a kind, one of a kind, or all of one name. Raises Problem D171."""
+    everything = [(kind, model) for kind in KINDS for model in models.available(kind).values()]
+    if not words:
+        return everything
+    kind = next((kind for kind in KINDS if words[0] in (kind, f"{kind}s")), None)
+    if kind is not None and len(words) > 1:
+        return [(kind, models.find(kind, words[1]))]
+    if kind is not None:
+        return [(kind, model) for k, model in everything if k == kind]
+    found = [(k, model) for k, model in everything if model.name == words[0]]
+    if found and len(words) == 1:
+        return found
+    known = [*KINDS, *(model.name for _, model in everything)]
+    close = difflib.get_close_matches(words[0], known, n=1)
+    helps = [f"did you mean `{close[0]}`?"] if close else []
+    helps.append(f"kinds: {', '.join(KINDS)}")
+    raise Problem(error("D171", f"no kind of model and no model `{words[0]}`", help=helps))
+
+
+def print_list(found: list[tuple[models.Kind, Any]]) -> Iterator[str]:
+    """One line a model, kind by kind."""
+    for kind in KINDS:
+        rows = [(model.name, summary(model)) for k, model in found if k == kind]
+        if rows:
+            yield f"{kind}: {HOW[kind]}"
+            yield from columns(rows)
+            yield ""
+    yield "`met doc MODEL` says all that one declares."
+
+
+def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
+    """All that a model declares."""
+    yield f"{kind} {model.name}"
+    yield from (f"  {line}".rstrip() for line in textwrap.dedent(model.doc).strip().splitlines())
+    yield ""
+    yield f"In a deck: {HOW[kind]}"
+    for words, text in (
+        ("commands", "Commands it takes"),
+        ("order", "Order"),
+        ("real_limit", "Stable while step times rate constant is below"),
+    ):
+        value = getattr(model, words, None)
+        if value:
+            yield f"{text}: {', '.join(value) if isinstance(value, tuple) else number(value)}"
+    if kind == "metric":
+        yield f"Unit of the result: {WORDS.get(model.unit, unit_in_words(model.unit))}"
+    parameters = getattr(model, "parameters", ())
+    if parameters:
+        yield ""
+        yield "Parameters"
+        rows = [("name", "unit", "default", "range", "meaning")]
+        rows += [(p.name, unit_in_words(p.unit), default(p), range_(p), meaning(p)) for p in parameters]
+        yield from columns(rows)
+    words_used = {word for p in parameters for word in WORDS if word in p.unit.replace("*", "/").split("/")}
+    yield from (f"  {word}: {WORDS[word]}" for word in WORDS if word in words_used)
+    for words, text in (
+        ("memory", "Held by its computer from tick to tick"),
+        ("states", "Integrated with the motion"),
+        ("signals", "Shown at every instant"),
+    ):
+        parts = getattr(model, words, ())
+        if parts and kind == "servo":
+            yield ""
+            yield f"{text}; recorded as JOINT.servo.NAME"
+            yield from columns([(part.name, unit_in_words(part.unit), part.doc) for part in parts])
+
+
+def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
+    """All that a model declares, for programs."""
+    fields = ("name", "unit", "doc", "default", "above", "at_least", "below", "at_most", "shape", "words", "source")
+    told: dict[str, Any] = {"kind": kind, "name": model.name, "doc": textwrap.dedent(model.doc).strip()}
+    told["parameters"] = [{field: getattr(p, field) for field in fields} for p in getattr(model, "parameters", ())]
+    for words in ("commands", "unit", "order", "real_limit"):
+        if hasattr(model, words):
+            told[words] = getattr(model, words)
+    for words in ("memory", "states", "signals"):
+        told[words] = [{"name": p.name, "unit": p.unit, "doc": p.doc} for p in getattr(model, words, ())]
+    return told
+
+
+def summary(model: Any) -> str:
+    """The first sentence of a model's own words."""
+    first = " ".join(model.doc.strip().split("\n\n")[0].split())
+    return first.split(". ")[0].rstrip(".:")
+
+
+def unit_in_words(unit: str) -> str:
+    """A declared unit; a dash for a pure number."""
+    return "-" if unit == "1" else unit
+
+
+def default(parameter: Parameter) -> str:
+    """The default; `needed` where the deck must write the parameter."""
+    value = parameter.default
+    if value is None:
+        return "needed"
+    if isinstance(value, str):
+        return value
+    return vector(value, "1") if isinstance(value, tuple) else number(value)
+
+
+def range_(parameter: Parameter) -> str:
+    """The bounds in SI, or the words that are possible."""
+    if parameter.words:
+        return " | ".join(parameter.words)
+    bounds = (("> ", parameter.above), (">= ", parameter.at_least), ("< ", parameter.below), ("<= ", parameter.at_most))
+    return ", ".join(f"{sign}{number(bound)}" for sign, bound in bounds if bound is not None)
+
+
+def meaning(parameter: Parameter) -> str:
+    """What it is, and where its number comes from."""
+    shape = {"vector": "three numbers; ", "list": "a list; ", "word": ""}.get(parameter.shape, "")
+    return f"{shape}{parameter.doc}" + (f" ({parameter.source})" if parameter.source else "")

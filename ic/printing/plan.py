@@ -1,0 +1,220 @@
+"""A plan in words: the arm as a tree, what runs when, what is recorded, how many cases, how much is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ic.printing.columns import columns, count, number, quantity, size, vector
+from met import models
+from met.plan import Experiment, Formula, Joint, Plan, Structure
+
+NUMBER_BYTES = 8
+STABILITY = "stability of "  # how the compiler's notes on it begin
+
+
+class _Values:
+    """The parameters of an experiment, those that vary over all cases."""
+
+    def __init__(self, experiment: Experiment) -> None:
+        self._parameters = experiment.parameters
+        inputs = {coordinate.path: coordinate.values for coordinate in experiment.cases.coordinates}
+        self._outputs = experiment.formulas.replay(inputs) if experiment.formulas.outputs else []
+
+    def array(self, path: str) -> np.ndarray | None:
+        """The value, of one case or all; None where the plan has no number of that name."""
+        found = self._parameters.get(path)
+        if found is None or isinstance(found.value, (str, tuple)):
+            return None
+        if isinstance(found.value, Formula):
+            return np.asarray(self._outputs[found.value.output], dtype=float)
+        return np.asarray(found.value, dtype=float)
+
+    def shown(self, path: str) -> str:
+        """The value with its unit, or its range over the cases."""
+        values = self.array(path)
+        if values is None or values.size == 0:
+            return ""
+        unit = self._parameters[path].unit
+        low, high = float(values.min()), float(values.max())
+        return quantity(low, unit) if low == high else f"{number(low)} to {quantity(high, unit)}"
+
+    def vector(self, path: str) -> tuple[float, ...] | None:
+        """Three numbers `.x .y .z`; None where one of them varies."""
+        parts = [self.array(f"{path}.{axis}") for axis in "xyz"]
+        if any(part is None or part.size != 1 for part in parts):
+            return None
+        return tuple(float(part) for part in parts if part is not None)
+
+
+def print_plan(plan: Plan) -> Iterator[str]:
+    """Every experiment of the plan, line by line."""
+    for position, experiment in enumerate(plan.experiments):
+        if position:
+            yield ""
+        yield from print_experiment(plan.deck, experiment)
+
+
+def print_experiment(deck: str, experiment: Experiment) -> Iterator[str]:
+    """One run or sweep, line by line."""
+    structure = experiment.structure
+    yield f"{deck}: {experiment.name}"
+    yield ""
+    yield from _arm(experiment)
+    yield ""
+    yield from _schedule(experiment)
+    yield ""
+    yield from _environment(experiment)
+    yield ""
+    yield from _channels(structure)
+    if structure.metrics:
+        yield ""
+        yield from _metrics(experiment)
+    yield ""
+    yield from _cases(experiment)
+    notes = [note for note in experiment.notes if not note.startswith(STABILITY)]
+    if notes:
+        yield ""
+        yield "Notes"
+        yield from (f"  {note}" for note in notes)
+
+
+def _arm(experiment: Experiment) -> Iterator[str]:
+    structure = experiment.structure
+    values = _Values(experiment)
+    servos = {use.joint: use for use in structure.servos}
+    rows: list[tuple[str, ...]] = [("joint", "moves", "at", "link", "mass", "servo"), ("base",)]
+
+    children: dict[str, list[Joint]] = {}
+    for joint in structure.joints:
+        children.setdefault(joint.parent, []).append(joint)
+    waiting = [(joint, "") for joint in reversed(children.get("base", []))]
+    while waiting:
+        joint, stem = waiting.pop()
+        last = joint is children[joint.parent][-1]
+        use = servos.get(joint.name)
+        servo = "" if joint.kind == "fixed" else "passive"
+        if use is not None:
+            asked = f": {use.command.kind}, {use.command.model}" if use.command else ""
+            servo = f"{use.definition} ({use.model}){asked}"
+        at = values.vector(f"{joint.name}.at")
+        place = "varies" if at is None else vector(at, "m") if any(at) else ""
+        mass = values.shown(f"links.{joint.child}.mass")
+        branch = f"{stem}{'└─' if last else '├─'} {joint.name}"
+        rows.append((branch, _moves(joint, values), place, joint.child, mass, servo))
+        waiting += [(child, stem + ("   " if last else "│  ")) for child in reversed(children.get(joint.child, []))]
+    moving = f"{count(len(structure.moving), 'joint')} that move{'s' if len(structure.moving) == 1 else ''}"
+    yield f"Arm {structure.arm}: {count(len(structure.links), 'link')}, {moving}"
+    used = [i for i in range(len(rows[0])) if any(i < len(row) and row[i] for row in rows[1:])]
+    yield from columns([[row[i] for i in used if i < len(row)] for row in rows])
+
+
+def _moves(joint: Joint, values: _Values) -> str:
+    if joint.kind == "fixed":
+        return "fixed"
+    axis = values.vector(f"{joint.name}.axis")
+    named = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
+    word = "an axis that varies"
+    if axis is not None:
+        opposite = tuple(-part + 0.0 for part in axis)
+        word = named.get(axis, "") or (f"-{named[opposite]}" if opposite in named else vector(axis, "1"))  # type: ignore
+    return f"{joint.kind} {'along' if joint.kind == 'prismatic' else 'about'} {word}"
+
+
+def _schedule(experiment: Experiment) -> Iterator[str]:
+    structure = experiment.structure
+    schedule = structure.schedule
+    base = schedule.base_hz
+
+    def row(what: str, divisor: int, times: str) -> tuple[str, ...]:
+        return what, f"{number(base / divisor)} Hz", "every tick" if divisor == 1 else f"every {divisor} ticks", times
+
+    rows = []
+    divisors: dict[tuple[str, int], list[str]] = {}
+    for use in structure.servos:
+        if models.find("servo", use.model).tick is not None:
+            divisors.setdefault((use.definition, use.divisor), []).append(use.joint)
+    for (definition, divisor), joints in divisors.items():
+        where = f"servo {definition} of {', '.join(joints)}"
+        rows.append(row(where, divisor, count(schedule.ticks // divisor + 1, "tick")))
+    steps = f"{count(schedule.ticks // schedule.dynamics, 'step')} of {number(schedule.step * 1e3)} ms"
+    rows.append(row("dynamics", schedule.dynamics, f"{steps}, {structure.integrator}"))
+    rows.append(row("record", schedule.record, count(schedule.rows, "row")))
+    ticks = count(schedule.ticks, "tick")
+    yield f"Schedule: {number(schedule.duration)} s, {ticks} of the base rate, {number(base)} Hz"
+    yield from columns(rows, right=(1,))
+    stability = [note.removeprefix(STABILITY) for note in experiment.notes if note.startswith(STABILITY)]
+    if stability:
+        limit = number(models.find("integrator", structure.integrator).real_limit)
+        yield f"Stability: step times the servo's fastest rate constant; {structure.integrator} is stable below {limit}"
+        yield from columns([note.partition(": ")[::2] for note in stability])
+
+
+def _environment(experiment: Experiment) -> Iterator[str]:
+    structure = experiment.structure
+    values = _Values(experiment)
+    products = "with" if structure.velocity_products else "without"
+    yield f"Environment: {products} velocity products (Coriolis, centrifugal, gyroscopic)" + (
+        "" if structure.environment else "; no gravity, no other loads"
+    )
+    rows: list[tuple[str, str, str]] = []
+    for use in structure.environment:
+        shown: list[str] = []
+        for parameter in models.find("environment", use.model).parameters:
+            path = f"environment.{use.name}.{parameter.name}"
+            if parameter.shape == "vector":
+                found = values.vector(path)
+                shown.append(f"{parameter.name} = {'varies' if found is None else vector(found, parameter.unit)}")
+            elif path in experiment.parameters:
+                given = experiment.parameters[path].value
+                shown.append(f"{parameter.name} = {given if isinstance(given, str) else values.shown(path)}")
+        rows.append((use.name, use.model, ", ".join(shown)))
+    if all(name == model for name, model, _ in rows):
+        yield from columns([(name, shown) for name, _, shown in rows])
+    else:
+        yield from columns(rows)
+
+
+def _channels(structure: Structure) -> Iterator[str]:
+    width = sum(len(recorded.channels) for recorded in structure.record)
+    if not width:
+        yield "Recorded: nothing"
+        return
+    rows_ = structure.schedule.rows
+    bytes_ = size(width * rows_ * NUMBER_BYTES)
+    yield f"Recorded: {count(width, 'channel')} in {count(rows_, 'row')}, {bytes_} a case"
+    rows = []
+    for recorded in structure.record:
+        units = list(dict.fromkeys(recorded.unit))
+        joints = ", ".join(recorded.joints)
+        rows.append((recorded.name, ", ".join(units), recorded.doc, f"of {joints}" if joints else ""))
+    yield from columns(rows)
+
+
+def _metrics(experiment: Experiment) -> Iterator[str]:
+    yield "Metrics and what is required of them"
+    rows = []
+    for use in experiment.structure.metrics:
+        required = [requirement.text for requirement in experiment.requirements if requirement.metric == use.name]
+        rows.append((use.name, f"{use.model} of {use.of}", ", ".join(f"require {text}" for text in required)))
+    yield from columns(rows)
+
+
+def _cases(experiment: Experiment) -> Iterator[str]:
+    cases, structure = experiment.cases, experiment.structure
+    width = sum(len(recorded.channels) for recorded in structure.record)
+    total = cases.count * width * structure.schedule.rows * NUMBER_BYTES
+    written = f"{size(total)} of histories" if width else "metrics alone are written"
+    yield f"Cases: {cases.count}, {written}"
+    rows = []
+    for coordinate in cases.coordinates:
+        shown = np.unique(coordinate.values) / coordinate.scale
+        if shown.size == 0:
+            continue
+        if shown.size <= 4:
+            several = f"{', '.join(number(float(value)) for value in shown)}"
+        else:
+            several = f"{shown.size} values from {number(float(shown[0]))} to {number(float(shown[-1]))}"
+        rows.append((coordinate.path, f"{several} {coordinate.unit}" if coordinate.unit != "1" else several))
+    yield from columns(rows)

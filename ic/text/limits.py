@@ -1,0 +1,71 @@
+"""How much a deck may ask for: a hostile or broken one ends in a diagnostic, soon and in little memory.
+
+Each limit is far above what a deck written by hand needs (the standard library's largest file has some thousand
+tokens) and far below what would hurt.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from ic.meaning.complaints import Complaints
+from met.diagnostic import Diagnostic
+
+MOST_BYTES = 2 << 20  # of one file
+MOST_TOKENS = 500_000  # of all files together, white space included
+LONGEST_LINE = 200_000  # characters
+MOST_INCLUDES = 2_000  # files entered, again and again counted
+INCLUDE_DEPTH = 50
+MOST_MACRO_BODY = 4_096  # tokens
+MOST_ARGUMENTS = 20_000  # tokens in one macro call
+MACRO_DEPTH = 64  # macros through which one token may come; calls within arguments of calls
+MOST_FROM_ONE_USE = 100_000  # tokens
+MOST_EXPANDED = 500_000  # tokens
+MOST_CONDITIONS = 10_000  # that are evaluated
+CONDITION_DEPTH = 100  # of `#if` within each other in one file
+LONGEST_NAME = 256  # characters
+LONGEST_STRING = 4_096
+LONGEST_NUMBER = 64
+DEPTH = 40  # braces, brackets and parentheses within each other
+MOST_OPERATORS = 100  # in one expression
+MOST_ERRORS = 30  # then reading stops: the rest would seldom say more
+
+
+class GiveUp(Exception):
+    """Ends the reading of a deck at once; what is to be said has been noted."""
+
+
+class Findings(Complaints):
+    """Diagnostics of one reading. A mistake in a macro's body is told once, not at every use."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._told: set[tuple[object, ...]] = set()
+        self._errors = 0
+
+    def add(self, *diagnostics: Diagnostic) -> None:
+        for diagnostic in diagnostics:
+            place = diagnostic.at.place if diagnostic.at else None
+            key = (diagnostic.code, diagnostic.message, place and (place.file, place.line, place.column))
+            if key in self._told:
+                continue
+            self._told.add(key)
+            super().add(diagnostic)
+            self._errors += diagnostic.severity == "error"
+            if self._errors >= MOST_ERRORS:
+                super().add(Diagnostic("D018", f"more than {MOST_ERRORS} errors: the rest of the deck was not read"))
+                raise GiveUp
+
+
+@contextmanager
+def without_collection() -> Iterator[None]:
+    """Without the cyclic garbage collector: a large deck makes many objects, no cycles, and half the time was its."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()

@@ -1,0 +1,384 @@
+"""The preprocessor: pcpp reads the directives; tokens go in and come out, never text.
+
+pcpp keeps the conditionals, parses and stores the macros, puts arguments into bodies (with `#` and `##`) and evaluates
+`#if`. Ours are the tokens, the scan that finds what to expand (linear, with C's hide sets, each token keeping the
+places it came through), the search for included files, every check, and every message.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pcpp import Action, OutputDirective
+
+from ic.grammar.syntax import SourceText
+from ic.meaning.complaints import Complaints, did_you_mean
+from ic.text.conditions import Refused, evaluate, well_formed
+from ic.text.files import LIBRARY, Files, FoundFile
+from ic.text.lexer import (
+    BAD,
+    CHARACTER,
+    END,
+    NAME,
+    SPACE,
+    STRING,
+    WHOLE,
+    Text,
+    Token,
+    logical_lines,
+)
+from ic.text.limits import (
+    CONDITION_DEPTH,
+    INCLUDE_DEPTH,
+    LONGEST_LINE,
+    LONGEST_NAME,
+    MOST_CONDITIONS,
+    MOST_INCLUDES,
+    MOST_TOKENS,
+    Findings,
+    GiveUp,
+    without_collection,
+)
+from ic.text.macros import Macros
+from ic.text.strays import complain_of_stray
+from met.diagnostic import Diagnostic, Label, Place, Problem
+
+CONDITIONALS = ("if", "ifdef", "ifndef", "elif", "else", "endif")
+DIRECTIVES = (*CONDITIONALS, "define", "undef", "include", "pragma", "error", "warning")
+_LONG_LINE = re.compile(rf"[^\n]{{{LONGEST_LINE + 1}}}")
+TRUTH = "TRUTH"  # the kind of a condition's value
+COMMAND_LINE = "<command line>"
+
+
+@dataclass(frozen=True)
+class Tokens:
+    """A deck after the preprocessor.
+
+    tokens       those of the deck, without white space; the last is of kind END
+    sources      every file that was read, in order
+    diagnostics  errors and warnings so far
+    whole        whether all was read; where not, the tokens are not worth parsing
+    """
+
+    tokens: tuple[Token, ...]
+    sources: tuple[SourceText, ...]
+    diagnostics: tuple[Diagnostic, ...]
+    whole: bool
+
+
+def preprocess(
+    path: str | Path,
+    include_dirs: Sequence[str | Path] = (),
+    defines: Sequence[str] = (),
+    *,
+    library: Path = LIBRARY,
+) -> Tokens:
+    """Reads a deck and all that it includes. `defines` are as after `-D`: `NAME` or `NAME=VALUE`."""
+    files = Files(include_dirs, library)
+    findings = Findings()
+    run = _Preprocessor(files, findings)
+    whole = True
+    try:
+        with without_collection():
+            run.define_from_command_line(defines)
+            run.read_deck(files.deck(path))
+    except GiveUp:
+        whole = False
+    except Problem as problem:
+        whole = False
+        Complaints.add(findings, *problem.diagnostics)
+    sources = (*files.read_so_far.values(), *run.command_line)
+    return Tokens(tuple(run.output), sources, findings.all, whole)
+
+
+class _If:
+    """A conditional that is open: the directive, whether what surrounds it counts, whether its present part does."""
+
+    __slots__ = ("active", "done", "otherwise", "outer", "token")
+
+    def __init__(self, token: Token, outer: bool, active: bool) -> None:
+        self.token = token
+        self.outer = outer
+        self.active = active
+        self.done = active
+        self.otherwise: Token | None = None
+
+
+_REMOVE = OutputDirective(Action.IgnoreAndRemove)
+
+
+class _Preprocessor(Macros):
+    def __init__(self, files: Files, findings: Findings) -> None:
+        self.files = files
+        self.output: list[Token] = []
+        self.command_line: tuple[SourceText, ...] = ()
+        self._including: list[tuple[FoundFile, Text]] = []
+        self._entered: list[Place] = []
+        self._ifs: list[list[_If]] = []
+        self._once: set[str] = set()
+        self._included = 0
+        self._tokens = 0
+        self._directive: Token | None = None
+        self._evaluated = False
+        self._conditions = 0
+        super().__init__(findings)
+        self._pcpp_evaluator: Any = self.evaluator
+        self.evaluator: Any = self._evaluate
+
+    # reading
+
+    def define_from_command_line(self, defines: Sequence[str]) -> None:
+        if not defines:
+            return
+        written = "".join(
+            f"{name} {value if equals else 1}\n" for name, equals, value in (d.partition("=") for d in defines)
+        )
+        self.command_line = (SourceText(COMMAND_LINE, written, ""),)
+        for line in logical_lines(Text(COMMAND_LINE, written)):
+            self.define(self.tokenstrip(line))
+
+    def read_deck(self, file: FoundFile) -> None:
+        source = Text(file.name, self.files.text(file))
+        self._read(file, source, source.place(0, 1))
+        self.output.append(Token(END, "", source, len(source.text.rstrip()), 1))
+
+    def _read(self, file: FoundFile, source: Text, at: Place) -> None:
+        self._including.append((file, source))
+        self._entered.append(at)
+        self._ifs.append([])
+        for token in self.parsegen("", source):
+            kind = token.kind
+            if kind == SPACE:
+                continue
+            if kind in (BAD, CHARACTER) or token.text[:1] == "#":
+                if token.text:
+                    complain_of_stray(token, self.findings)
+                token.kind, token.text = BAD, ""
+            self.output.append(token)
+        for left in self._ifs.pop():
+            self.findings.error(
+                "D008", f"`#{left.token.text}` is not closed", left.token.place,
+                help=f"`{source.name}` ends without its `#endif`",
+            )  # fmt: skip
+        self._including.pop()
+        self._entered.pop()
+
+    def group_lines(self, _text: str, source: Text) -> Iterable[list[Token]]:
+        """The lines that pcpp works on. Those that `#if` leaves out are lexed, since a comment may begin there."""
+        ifs = self._ifs[-1]
+        long = _LONG_LINE.search(source.text)
+        if long is not None:
+            self._give_up("D018", f"a line has at most {LONGEST_LINE} characters", source.place(long.start(), 1))
+        for line in logical_lines(source):
+            self._tokens += len(line)
+            if self._tokens > MOST_TOKENS:
+                self._give_up("D018", f"more than {MOST_TOKENS} tokens", line[0].place)
+            if len(line) > 1 and line[-2].kind == BAD and line[-2].text == "/*":
+                complain_of_stray(line.pop(-2), self.findings)
+            first = next((token for token in line if token.kind != SPACE), line[-1])
+            if first.text != "#":
+                if ifs and not ifs[-1].active:
+                    continue
+                for token in line:
+                    if token.kind == BAD:
+                        complain_of_stray(token, self.findings)
+                        token.text = ""
+            yield line
+
+    def include(self, tokens: list[Token], _line: object) -> Iterable[Token]:
+        """Reads an included file. Its tokens go straight to the output: pcpp has handed over all before them."""
+        directive = self._directive
+        assert directive is not None
+        header = self._header(tokens, directive)
+        if header is None:
+            return ()
+        name, angled, at = header
+        includer, source = self._including[-1]
+        directories = self.files.where(includer, angled)
+        file = self.files.find(name, directories)
+        if file is None:
+            quoted = f"<{name}>" if angled else f'"{name}"'
+            near = did_you_mean(name, self.files.listed(directories))
+            looked = f"looked in {', '.join(dict.fromkeys(d.said for d in directories))}"
+            self.findings.error("D005", f"cannot find {quoted}", at, help=(*near, looked))
+            return ()
+        if file.identity in self._once:
+            return ()
+        self._included += 1
+        if len(self._including) > INCLUDE_DEPTH:
+            self._too_deep(at)
+        if self._included > MOST_INCLUDES:
+            self._give_up("D018", f"more than {MOST_INCLUDES} files are included", at)
+        try:
+            text = self.files.text(file)
+        except Problem as problem:
+            self.findings.add(
+                *(d if d.at else Diagnostic(d.code, d.message, Label(at), d.also, d.help) for d in problem.diagnostics)
+            )
+            return ()
+        self._read(file, Text(file.name, text, ((source.name, directive.line), *source.included)), at)
+        return ()
+
+    def _header(self, tokens: list[Token], directive: Token) -> tuple[str, bool, Place] | None:
+        """The name that an `#include` asks for, whether in < >, and its place."""
+        if tokens and tokens[0].kind == STRING:
+            name, angled, at, rest = tokens[0].text[1:-1], False, tokens[0].place, tokens[1:]
+        elif tokens and tokens[0].text == "<":
+            first = tokens[0]
+            close = next((i for i, token in enumerate(tokens) if token.text[:1] == ">"), None)
+            written = (
+                first.source.rest_of_line(first.offset) if not first.expansions else "".join(t.text for t in tokens)
+            )
+            end = written.find(">")
+            if end < 0:
+                self.findings.error("D005", "`#include <` without its `>`", first.place)
+                return None
+            name, angled, at = written[1:end], True, first.source.place(first.offset, end + 1, first.expansions)
+            rest = tokens[close + 1 :] if close is not None else []
+        else:
+            self.findings.error(
+                "D005", "`#include` needs a file", tokens[0].place if tokens else directive.place,
+                help='write `#include "beside.ic"` or `#include <servos/rigid_gearbox.ic>`',
+            )  # fmt: skip
+            return None
+        if not name.strip():
+            self.findings.error("D005", "`#include` needs a file, and this name is empty", at)
+            return None
+        self._nothing_after(rest, "#include")
+        return name, angled, at
+
+    def _too_deep(self, at: Place) -> None:
+        """Tells the circle that includes go in, at the include that closes it, or just that they go too deep."""
+        chain = [file.identity for file, _ in self._including]
+        for last, identity in enumerate(chain):
+            first = chain.index(identity)
+            if first < last:
+                loop = " -> ".join(file.name for file, _ in self._including[first : last + 1])
+                help = "`#pragma once` at the head of a file lets it be read only once"
+                self._give_up("D006", f"circular include: {loop}", self._entered[last], help=help)
+        self._give_up("D006", f"includes go deeper than {INCLUDE_DEPTH} files", at)
+
+    # directives
+
+    def on_directive_handle(self, directive: Token, args: list[Token], _passing: bool, _before: object) -> bool:
+        """Every directive comes through here before pcpp acts on it; what it must not see is taken away."""
+        self._directive = directive
+        ifs = self._ifs[-1]
+        name = directive.text
+        if name in CONDITIONALS:
+            self._conditional(name, directive, args, ifs)
+            return True
+        if ifs and not ifs[-1].active:
+            raise _REMOVE
+        if name in ("define", "undef", "include"):
+            if not args and name != "include":
+                self.findings.error("D007", f"`#{name}` needs a name", directive.place)
+                raise _REMOVE
+            return True
+        if name in ("error", "warning"):
+            self._announce(name, directive, args)
+        elif name == "pragma" and args and args[0].text == "once":
+            self._once.add(self._including[-1][0].identity)
+        elif name == "pragma":
+            self.findings.error("D007", "the only `#pragma` is `once`", directive.place)
+        elif name == "line":
+            self.findings.error(
+                "D007", "a deck cannot have `#line`: messages say where a thing really stands", directive.place
+            )
+        else:
+            self.findings.error(
+                "D007", f"`#{name}` is not a directive", directive.place, help=did_you_mean(name, DIRECTIVES)
+            )
+        raise _REMOVE
+
+    def _announce(self, name: str, directive: Token, args: list[Token]) -> None:
+        said = directive.source.rest_of_line(args[0].offset).strip() if args else f"`#{name}`"
+        tell = self.findings.error if name == "error" else self.findings.warn
+        tell("D014" if name == "error" else "D015", said[:LONGEST_NAME], directive.place)
+
+    def _conditional(self, name: str, directive: Token, args: list[Token], ifs: list[_If]) -> None:
+        """Follows the conditionals beside pcpp, which is given only what it can digest: a name, 0 or 1."""
+        if name in ("if", "ifdef", "ifndef"):
+            outer = not ifs or ifs[-1].active
+            truth = False
+            if name == "if":
+                truth = outer and self._condition(directive, args)
+                args[:] = [_constant(truth, directive)]
+            elif outer:
+                truth = self._known(name, directive, args) == (name == "ifdef")
+            ifs.append(_If(directive, outer, truth))
+            if len(ifs) > CONDITION_DEPTH:
+                self._give_up("D018", f"`#if` goes deeper than {CONDITION_DEPTH}", directive.place)
+            return
+        if not ifs:
+            self.findings.error("D007", f"`#{name}` without an `#if`", directive.place)
+            raise _REMOVE
+        opened = ifs[-1]
+        if name == "endif":
+            ifs.pop()
+            self._nothing_after(args, "#endif")
+        elif opened.otherwise is not None:
+            label = Label(opened.otherwise.place, "the `#else` is here")
+            self.findings.error("D007", f"`#{name}` after `#else`", directive.place, also=(label,))
+            raise _REMOVE
+        elif name == "else":
+            opened.otherwise = directive
+            opened.active = opened.outer and not opened.done
+            self._nothing_after(args, "#else")
+        elif opened.outer and opened.active:
+            opened.active = False
+        elif opened.outer and not opened.done:
+            opened.active = opened.done = self._condition(directive, args)
+            args[:] = [_constant(opened.active, directive)]
+
+    def _known(self, name: str, directive: Token, args: list[Token]) -> bool:
+        if not args or args[0].kind != NAME:
+            self.findings.error("D007", f"`#{name}` needs a name", args[0].place if args else directive.place)
+            args[:] = [Token(NAME, "__nothing__", directive.source, directive.offset, directive.length)]
+            return False
+        self._nothing_after(args[1:], f"#{name} {args[0].text}")
+        return args[0].text in self.macros
+
+    def _condition(self, directive: Token, args: list[Token]) -> bool:
+        """Whether the condition of an `#if` or `#elif` holds; False, and a message, where it has no meaning."""
+        if not well_formed(directive, args, self.findings):
+            return False
+        self._conditions += 1
+        if self._conditions > MOST_CONDITIONS:
+            self._give_up("D018", f"more than {MOST_CONDITIONS} conditions", directive.place)
+        self._evaluated = False
+        result = bool(self.evalexpr([token.__copy__() for token in args])[0])
+        if not self._evaluated:
+            self.findings.error("D009", f"the condition of this `#{directive.text}` expands to nothing", args[0].place)
+        return result
+
+    def evalexpr(self, tokens: list[Token]) -> tuple[Any, Any]:
+        """pcpp's, but for what has been evaluated already."""
+        if len(tokens) == 1 and tokens[0].kind == TRUTH:
+            return (tokens[0].text == "1", None)
+        result: tuple[Any, Any] = super().evalexpr(tokens)
+        return result
+
+    def _evaluate(self, tokens: list[Token], functions: Any, identifiers: Any) -> Any:
+        """pcpp's evaluator between our checks."""
+        self._evaluated = True
+        try:
+            return evaluate(tokens, self.findings, lambda: self._pcpp_evaluator(tokens, functions, identifiers))
+        except Refused:
+            return self._pcpp_evaluator([Token(WHOLE, "0", tokens[0].source, tokens[0].offset, 1)])
+
+    def on_unknown_macro_function_in_expr(self, name: str) -> Any:
+        raise SyntaxError(f"`{name}` is not a macro with arguments")
+
+    def on_error(self, _file: object, _line: object, message: str) -> None:
+        """pcpp's own complaints: those that ours have not forestalled."""
+        if not message.startswith("Unterminated") and self._directive is not None:
+            self.findings.error("D007", f"the preprocessor cannot read this: {message}", self._directive.place)
+
+
+def _constant(truth: bool, at: Token) -> Token:
+    return Token(TRUTH, "1" if truth else "0", at.source, at.offset, at.length)

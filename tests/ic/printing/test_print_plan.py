@@ -1,0 +1,403 @@
+"""What the commands print, whole: a deck in, the text that a user reads out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from ic.find import find, standard_decks
+from ic.printing.cases import prefixes
+from ic.printing.columns import columns, number, size
+from ic.printing.dump import ORDER, stage_names
+from met import cli, plan_file
+from met.diagnostic import Problem
+
+DECK = """\
+#define BAR(NAME, MASS) link NAME { mass = MASS; shape = rod(length = 1 m, along = x); }
+
+arm swing {
+    BAR(first, 2 kg)
+    BAR(second, 1 kg)
+    link camera { mass = 0.5 kg; inertia = [0.01, 0.01, 0.01] kg*m^2; }
+    link slider { mass = 3 kg; shape = box(size = [0.1, 0.1, 0.1] m, along = z); }
+    joint pivot  revolute  { parent = base;   child = first;  axis = z; }
+    joint knee   revolute  { parent = first;  child = second; axis = -y; at = [1, 0, 0] m; }
+    joint mount  fixed     { parent = first;  child = camera; at = [0.5, 0, 0.1] m; }
+    joint rail   prismatic { parent = second; child = slider; axis = [0, 3, 4]; at = [1, 0, 0] m; }
+}
+
+servo motor {
+    model = rigid_gearbox;  command = rate(0.5 rad/s);
+    ratio = 100;  kp = 0.05 V*s/rad;  ki = 0.2 V/rad;  v_max = 24 V;  resistance = 1 ohm;
+    kt = 0.05 N*m/A;  tau_max = 1 N*m;  j_m = 1e-4 kg*m^2;
+}
+servo slow like motor { rate = 100 Hz; kp = 0.02 V*s/rad; }
+
+default run free {
+    arm = swing;
+    servos { pivot = motor; knee = slow; }
+    environment { gravity = [0, 0, -9.81] m/s^2; grease = joint_damping { damping = 0.1 N*m*s/rad; } }
+    rates { dynamics = 1 kHz; servos = 500 Hz; record = 100 Hz; }
+    duration = 2 s;
+    record = [q, qd, pivot.servo.voltage];
+    metric top = max { of = pivot.qd; }
+    require top < 0.6 rad/s;
+}
+
+sweep load of free {
+    vary links.slider.mass = linspace(1, 5, 30) kg;
+    vary motor.kp = [50, 60] mV*s/rad;
+}
+"""
+
+PLAN = """\
+swing.ic: free
+
+Arm swing: 4 links, 3 joints that move
+  joint          moves                          at               link    mass    servo
+  base
+  └─ pivot       revolute about z                                first   2 kg    motor (rigid_gearbox): rate, constant
+     ├─ knee     revolute about -y              [1, 0, 0] m      second  1 kg    slow (rigid_gearbox): rate, constant
+     │  └─ rail  prismatic along [0, 0.6, 0.8]  [1, 0, 0] m      slider  3 kg    passive
+     └─ mount    fixed                          [0.5, 0, 0.1] m  camera  0.5 kg
+
+Schedule: 2 s, 2000 ticks of the base rate, 1000 Hz
+  servo motor of pivot   500 Hz  every 2 ticks   1001 ticks
+  servo slow of knee     100 Hz  every 10 ticks  201 ticks
+  dynamics              1000 Hz  every tick      2000 steps of 1 ms, modified_euler
+  record                 100 Hz  every 10 ticks  201 rows
+Stability: step times the servo's fastest rate constant; modified_euler is stable below 2
+  joint pivot  h * lambda = 0.025
+  joint knee   h * lambda = 0.025
+
+Environment: with velocity products (Coriolis, centrifugal, gyroscopic)
+  gravity  gravity        g = [0, 0, -9.81] m/s^2
+  grease   joint_damping  damping = 0.1 N*m*s/rad
+
+Recorded: 7 channels in 201 rows, 11.3 kB a case
+  q                    rad, m      joint position              of pivot, knee, rail
+  qd                   rad/s, m/s  joint rate                  of pivot, knee, rail
+  pivot.servo.voltage  V           voltage on the drive motor
+
+Metrics and what is required of them
+  top  max of pivot.qd  require top < 0.6 rad/s
+
+Cases: 1, 11.3 kB of histories
+"""
+
+EXPLAIN_OVERRIDDEN = """\
+knee.servo.kp = 0.02 V*s/rad
+  gain on the motor's rate error (rigid_gearbox; Hill, Hopping, Price 1989, table 1)
+  --> swing.ic:19:45
+   |
+19 | servo slow like motor { rate = 100 Hz; kp = 0.02 V*s/rad; }
+   |                                             ^^^^^^^^^^^^ written here
+  ::: swing.ic:16:19  overrides this
+"""
+
+EXPLAIN_VARIED = """\
+pivot.servo.kp = 0.05 to 0.06 V*s/rad, varies with the case
+  gain on the motor's rate error (rigid_gearbox; Hill, Hopping, Price 1989, table 1)
+  varied by motor.kp: 50, 60 mV*s/rad
+  --> swing.ic:34:10
+   |
+34 |     vary motor.kp = [50, 60] mV*s/rad;
+   |          ^^^^^^^^ a sweep varies it, here
+  ::: swing.ic:16:24  overrides this
+"""
+
+EXPLAIN_MACRO = """\
+links.first.mass = 2 kg
+ --> swing.ic:4:16
+  |
+4 |     BAR(first, 2 kg)
+  |                ^^^^ written here
+  = note: in expansion of macro BAR, used at swing.ic:4:5
+"""
+
+EXPLAIN_VECTOR = """\
+rail.axis = [0, 0.6, 0.8]
+  --> swing.ic:11:70
+   |
+11 |     joint rail   prismatic { parent = second; child = slider; axis = [0, 3, 4]; at = [1, 0, 0] m; }
+   |                                                                      ^^^^^^^^^ written here
+"""
+
+EXPLAIN_DEFAULT = """\
+knee.servo.f_c = 0 N*m
+  Coulomb friction at the motor (rigid_gearbox; Hill, Hopping, Price 1989, table 1)
+  the default
+"""
+
+EXPLAIN_MANY = """\
+links.camera.mass        = 0.5 kg       written      swing.ic:6:26
+links.camera.com.x       = 0 m          the default
+links.camera.com.y       = 0 m          the default
+links.camera.com.z       = 0 m          the default
+links.camera.inertia.xx  = 0.01 kg*m^2  written      swing.ic:6:45
+links.camera.inertia.yy  = 0.01 kg*m^2  written      swing.ic:6:51
+links.camera.inertia.zz  = 0.01 kg*m^2  written      swing.ic:6:57
+links.camera.inertia.xy  = 0 kg*m^2     written      swing.ic:6:44
+links.camera.inertia.xz  = 0 kg*m^2     written      swing.ic:6:44
+links.camera.inertia.yz  = 0 kg*m^2     written      swing.ic:6:44
+"""
+
+DOC_METRIC = """\
+metric settling_time
+  The time from which the channel stays within a band about its target, to the end of the run.
+
+  Infinite where it is outside at the end. The band is `band` of the target's size, plus `within`.
+
+In a deck: metric NAME = MODEL { of = CHANNEL; ... }, in a run
+Unit of the result: s
+
+Parameters
+  name    unit  default  range  meaning
+  target  of    needed          value to be reached
+  band    -     0.02     >= 0   half width of the band, share of the target
+  within  of    0        >= 0   half width of the band, added to it
+  of: the unit of the channel that the metric watches
+"""
+
+
+@pytest.fixture(autouse=True)
+def deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """swing.ic in a directory of its own, which is the current one."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("MET_DECK_PATH", raising=False)
+    path = tmp_path / "swing.ic"
+    path.write_text(DECK)
+    return path
+
+
+def printed(capsys: pytest.CaptureFixture[str], *words: str, status: int = 0) -> str:
+    """What `met` with these words prints on stdout."""
+    assert cli.main(list(words)) == status, capsys.readouterr().err
+    return capsys.readouterr().out
+
+
+def complained(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    """What `met` with these words, which are wrong, prints on stderr; it prints nothing else."""
+    assert cli.main(list(words)) == cli.BAD_INPUT
+    out, err = capsys.readouterr()
+    assert out == ""
+    return err
+
+
+def test_check_says_what_it_checked(capsys: pytest.CaptureFixture[str]) -> None:
+    assert printed(capsys, "check", "swing.ic") == "swing.ic: 1 run, 1 sweep, 61 cases: no errors\n"
+    assert printed(capsys, "check", "swing.ic", "-q") == ""
+
+
+def test_check_finds_a_mistake_in_a_sweep_that_is_not_the_default(
+    deck: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    deck.write_text(DECK.replace("vary motor.kp", "vary motor.kq"))
+    err = complained(capsys, "check", "swing.ic")
+    assert err.startswith("error[")
+    assert " --> swing.ic:34:10\n" in err
+    assert err.endswith("\n1 error\n")
+
+
+def test_plan_shows_the_arm_the_schedule_the_channels_and_the_size(capsys: pytest.CaptureFixture[str]) -> None:
+    assert printed(capsys, "plan", "swing.ic") == PLAN
+
+
+def test_plan_of_a_sweep_shows_what_varies_and_how_much_is_written(capsys: pytest.CaptureFixture[str]) -> None:
+    out = printed(capsys, "plan", "swing.ic", "load")
+    assert out.startswith("swing.ic: load\n")
+    assert "slider  1 to 5 kg" in out
+    # 60 cases, 201 rows, 7 channels, 8 bytes: 675,360
+    assert out.endswith(
+        "Cases: 60, 675 kB of histories\n"
+        "  links.slider.mass  30 values from 1 to 5 kg\n"
+        "  motor.kp           50, 60 mV*s/rad\n"
+    )
+
+
+def test_all_plans_of_a_deck_are_shown_one_below_the_other(capsys: pytest.CaptureFixture[str]) -> None:
+    out = printed(capsys, "plan", "swing.ic", "--all")
+    assert out.startswith(PLAN + "\nswing.ic: load\n")
+
+
+def test_a_plan_that_was_written_shows_as_its_deck_does(capsys: pytest.CaptureFixture[str]) -> None:
+    assert printed(capsys, "plan", "swing.ic", "-o", "p.json") == "wrote p.json\n"
+    assert printed(capsys, "plan", "p.json") == PLAN
+
+
+def test_plan_as_json_is_the_plan_file(capsys: pytest.CaptureFixture[str]) -> None:
+    out = printed(capsys, "plan", "swing.ic", "--format", "json")
+    printed(capsys, "plan", "swing.ic", "-o", "p.json")
+    assert out == Path("p.json").read_text()
+    assert plan_file.loads(out).experiments[0].name == "free"
+
+
+def test_an_arm_of_a_thousand_joints_is_drawn(deck: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Deeper than Python's stack."""
+    links = "".join(f"link l{i} {{ mass = 1 kg; shape = sphere(radius = 1 m); }}\n" for i in range(1200))
+    parents = ["base", *(f"l{i}" for i in range(1199))]
+    joints = "".join(
+        f"joint j{i} revolute {{ parent = {parent}; child = l{i}; axis = z; }}\n" for i, parent in enumerate(parents)
+    )
+    run = "run r { arm = long; rates { dynamics = 1 kHz; } duration = 1 s; record = []; }\n"
+    deck.write_text(f"arm long {{\n{links}{joints}}}\n{run}")
+    out = printed(capsys, "plan", "swing.ic")
+    assert "   └─ j1199  revolute about z" in out
+    assert "Recorded: nothing" in out
+
+
+def test_cases_lists_position_id_and_coordinates_in_the_units_of_the_deck(capsys: pytest.CaptureFixture[str]) -> None:
+    ids = [case["id"] for case in json.loads(printed(capsys, "cases", "swing.ic", "--format", "json"))[0]["cases"]]
+    near = prefixes(ids)
+    width = len(near[0])
+    lines = printed(capsys, "cases", "swing.ic").splitlines()
+    assert lines[:5] == [
+        "load: 60 cases",
+        f"       {'id':{width}}  links.slider.mass  motor.kp",
+        f"       {'':{width}}                 kg  mV*s/rad",
+        f"   #0  {near[0]}                  1        50",
+        f"   #1  {near[1]}                  1        60",
+    ]
+    assert lines[-1] == f"  #59  {near[59]}                  5        60"
+
+
+def test_a_long_table_shows_head_and_tail_and_all_of_it_when_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    short = printed(capsys, "cases", "swing.ic").splitlines()
+    whole = printed(capsys, "cases", "swing.ic", "--all").splitlines()
+    gap = short.index("  ... 20 more; --all prints them")
+    assert len(whole) == 3 + 60
+    assert short[:gap] + whole[gap : gap + 20] + short[gap + 1 :] == whole
+
+
+def test_cases_as_json_are_in_si(capsys: pytest.CaptureFixture[str]) -> None:
+    (told,) = json.loads(printed(capsys, "cases", "swing.ic", "--format", "json"))
+    assert (told["experiment"], told["count"], len(told["cases"])) == ("load", 60, 60)
+    assert told["cases"][1]["values"] == [1.0, pytest.approx(0.06, rel=1e-15)]  # 60 mV: one rounding
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["knee.servo.kp"], EXPLAIN_OVERRIDDEN),
+        (["slow.kp"], EXPLAIN_OVERRIDDEN),
+        (["motor.kp", "--run", "load"], EXPLAIN_VARIED),
+        (["links.first.mass"], EXPLAIN_MACRO),
+        (["rail.axis"], EXPLAIN_VECTOR),
+        (["knee.servo.f_c"], EXPLAIN_DEFAULT),
+        (["links.camera"], EXPLAIN_MANY),
+    ],
+)
+def test_explain_says_where_a_value_comes_from(
+    words: list[str], expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert printed(capsys, "explain", "swing.ic", *words) == expected
+
+
+def test_explain_of_an_unknown_path_says_what_was_meant(capsys: pytest.CaptureFixture[str]) -> None:
+    assert complained(capsys, "explain", "swing.ic", "knee.servo.kq") == (
+        "error[D170]: no parameter `knee.servo.kq` in `free`\n"
+        " = help: did you mean `knee.servo.kt`, `knee.servo.kp`, `knee.servo.ki`?\n"
+        "\n"
+        "1 error\n"
+    )
+
+
+def test_explain_as_json_has_the_places(capsys: pytest.CaptureFixture[str]) -> None:
+    (told,) = json.loads(printed(capsys, "explain", "swing.ic", "knee.servo.kp", "--format", "json"))
+    assert (told["path"], told["value"], told["unit"], told["origin"]) == ("knee.servo.kp", 0.02, "V*s/rad", "deck")
+    assert (told["place"]["line"], [place["line"] for place in told["overrides"]]) == (19, [16])
+
+
+def test_doc_prints_what_a_model_declares(capsys: pytest.CaptureFixture[str]) -> None:
+    assert printed(capsys, "doc", "settling_time") == DOC_METRIC
+    assert printed(capsys, "doc", "metric", "settling_time") == DOC_METRIC
+
+
+def test_doc_lists_every_model_with_a_line_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    out = printed(capsys, "doc")
+    for name in ("rigid_gearbox", "gravity", "sine", "rms", "modified_euler"):
+        assert f"\n  {name} " in out
+    assert "rms" in printed(capsys, "doc", "metrics")
+    assert "gravity" not in printed(capsys, "doc", "metrics")
+
+
+def test_doc_of_no_model_says_what_was_meant(capsys: pytest.CaptureFixture[str]) -> None:
+    err = complained(capsys, "doc", "rigid_gearbx")
+    assert err.startswith("error[D171]: no kind of model and no model `rigid_gearbx`\n")
+    assert " = help: did you mean `rigid_gearbox`?\n" in err
+
+
+@pytest.mark.parametrize(
+    ("stage", "line"),
+    [
+        ("tokens", "swing.ic:1:37                    CPP_ID         mass  from BAR at swing.ic:4:5"),
+        ("syntax", "Group default run free    // swing.ic:21:1"),
+        ("model", "    kp = 0.02 V*s/rad    // swing.ic:19:40, overrides swing.ic:16:19"),
+        ("program", "program of free: base rate 1000 Hz"),
+    ],
+)
+def test_dump_shows_what_a_stage_hands_on(stage: str, line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = printed(capsys, "dump", stage, "swing.ic").splitlines()
+    assert line in lines
+
+
+def test_dump_of_the_kernel_is_code_for_llvm(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "define " in printed(capsys, "dump", "kernel", "swing.ic")
+
+
+def test_dump_knows_every_stage_of_the_way_in_order(capsys: pytest.CaptureFixture[str]) -> None:
+    assert tuple(stage_names()) == ORDER
+    assert complained(capsys, "dump", "modl", "swing.ic") == (
+        "error[D172]: no stage `modl`\n"
+        " = help: did you mean `model`?\n"
+        f" = help: stages: {', '.join(ORDER)}\n"
+        "\n"
+        "1 error\n"
+    )
+
+
+def test_a_deck_is_a_file_first_and_then_one_of_the_standard_library(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "two_link.ic" in standard_decks()
+    assert printed(capsys, "check", "two_link.ic").endswith("no errors, 1 warning\n")
+    Path("two_link.ic").write_text(DECK)
+    assert printed(capsys, "check", "two_link.ic") == "two_link.ic: 1 run, 1 sweep, 61 cases: no errors\n"
+    assert find("two_link.ic") == Path("two_link.ic")
+
+
+def test_a_deck_that_is_nowhere_is_answered_with_what_was_meant() -> None:
+    with pytest.raises(Problem) as raised:
+        find("tow_link.ic")
+    (diagnostic,) = raised.value.diagnostics
+    assert diagnostic.message == "no deck `tow_link.ic`"
+    assert diagnostic.help == ("did you mean `two_link.ic`?", f"standard decks: {', '.join(standard_decks())}")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.1 + 0.2, "0.3"), (-0.0, "0"), (1e-5, "1e-05"), (1570.0, "1570"), (1 / 3, "0.333333")]
+)
+def test_a_number_is_shown_without_its_last_binary_digits(value: float, text: str) -> None:
+    assert number(value) == text
+
+
+@pytest.mark.parametrize(("count", "text"), [(0, "0 B"), (999, "999 B"), (999_600, "1 MB"), (1_234_567_890, "1.23 GB")])
+def test_a_size_has_three_digits(count: int, text: str) -> None:
+    assert size(count) == text
+
+
+def test_columns_are_as_wide_as_what_a_terminal_shows() -> None:
+    assert columns([("a", "1"), ("重い", "22")], right=(1,)) == ["  a      1", "  重い  22"]
+
+
+def test_prefixes_are_the_shortest_of_one_length_that_tell_names_apart() -> None:
+    assert prefixes(["8f3a11", "8f3a22", "1c8100"]) == ["8f3a1", "8f3a2", "1c810"]
+    assert prefixes(["8f3a11", "1c8100"]) == ["8f3a", "1c81"]
+    assert prefixes(["8f3a11"]) == ["8f3a"]
+
+
+def test_explain_follows_the_names_that_a_value_is_written_with(deck: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    deck.write_text(DECK.replace("rate(0.5 rad/s)", "rate(quick)") + "let quick = 0.5 rad/s;\n")
+    lines = printed(capsys, "explain", "swing.ic", "pivot.servo.command.value").splitlines()
+    assert lines[0] == "pivot.servo.command.value = 0.5 rad/s"
+    assert lines[-1] == "  ::: swing.ic:36:5  quick = 0.5 rad/s"
