@@ -142,17 +142,20 @@ class Expressions(Cursor):
             self.fail("D027", f"`{first.text}{token.text}` is not a number", span(first, token))
 
     def unit(self) -> Unit | None:
-        """The unit that follows, if one does."""
+        """The unit that follows, if one does. `15 1/s`: a bare 1 may stand over the line, since no number follows one."""
         token = self.token
-        if token.kind != NAME and token.text != "%":
+        over = None
+        if token.kind == WHOLE and token.text == "1" and self.following.text == "/":
+            over = self.unit_factor(self.at + 2, -1, 0)
+        if token.kind != NAME and token.text != "%" and over is None:
             return None
         if self.begins_entry(self.at):
             return None
-        if not units.is_unit(token.text):
+        if over is None and not units.is_unit(token.text):
             self.unknown_unit()
             return None
         start = self.at
-        product = self.unit_product(start, 1, 0)
+        product = self.unit_product(start, 1, 0, over)
         if product is None:  # a path or a block begins with this name
             return None
         factors, self.at = product
@@ -165,9 +168,11 @@ class Expressions(Cursor):
         taken = self.tokens[start : self.at]
         return Unit(tuple(factors), span(taken[0], taken[-1]), "".join(t.text for t in taken))
 
-    def unit_product(self, at: int, sign: int, depth: int) -> tuple[list[tuple[Word, int]], int] | None:
-        """Factors from token `at` on, and the token behind them; None where no unit begins there."""
-        first = self.unit_factor(at, sign, depth)
+    def unit_product(
+        self, at: int, sign: int, depth: int, first: tuple[list[tuple[Word, int]], int] | None = None
+    ) -> tuple[list[tuple[Word, int]], int] | None:
+        """Factors from token `at` on, and the token behind them; None where no unit begins there. first: already read."""
+        first = self.unit_factor(at, sign, depth) if first is None else first
         if first is None:
             return None
         factors, at = first

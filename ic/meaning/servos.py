@@ -21,7 +21,8 @@ from met.diagnostic import Label, Place, Problem
 from met.parameter import Parameter
 from met.plan import Command
 
-RATE = Parameter(name="rate", unit="Hz", above=0.0, doc="how often the servo's computer ticks")
+SLOWEST, FASTEST = 1e-3, 1e9
+RATE = Parameter(name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, doc="how often the servo's computer ticks")
 NOT_PARAMETERS = ("model", "command", "rate")
 
 
@@ -136,7 +137,7 @@ def fixed_rate(scope: Scope, owner: Owner, item: Item, label: str, name: str = "
     wanted = replace(RATE, name=name)
     hz = scope.constant(owner, wanted, item)
     place = place_of(item.value) if item.value is not None else item.place
-    return None if hz is None else Rate(label, hz, place)
+    return Rate(label, hz, place) if hz is not None and SLOWEST <= hz <= FASTEST else None
 
 
 def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Place) -> Command | None:
