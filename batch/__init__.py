@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from met.frozen import frozen
 
 if TYPE_CHECKING:
     from batch.campaign import Histories, Progress
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from met.plan import Plan
 
 
-@dataclass(frozen=True)
+@frozen
 class Archive:
     """An archive on the disk, and what came of its cases, one summary an experiment."""
 

@@ -12,7 +12,6 @@ import os
 import shutil
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -21,6 +20,7 @@ import numpy as np
 from batch.archive import layout as archive_layout
 from met import keys
 from met.diagnostic import Problem, error
+from met.frozen import frozen
 from met.plan import Experiment, Plan
 
 Histories = Literal["default", "all", "none"]
@@ -43,7 +43,7 @@ class Progress(Protocol):
     def end(self) -> None: ...
 
 
-@dataclass(frozen=True)
+@frozen
 class Part:
     """The cases of one experiment that are run: rows of its case table, and whether their histories are kept."""
 
@@ -65,7 +65,7 @@ class Part:
         return cases if cases < 64 else cases // 32 * 32
 
 
-@dataclass(frozen=True)
+@frozen
 class Campaign:
     """What will be run, all of it checked."""
 

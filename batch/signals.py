@@ -5,17 +5,17 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from batch.archive.read import Group, Stored
 from met.diagnostic import Problem, error
+from met.frozen import frozen
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-@dataclass(frozen=True)
+@frozen
 class Panel:
     """Lines of one signal that share an axis. columns: where each line lies along the signal's joint dimension."""
 

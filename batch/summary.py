@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group
+from met.frozen import frozen
 
 
-@dataclass(frozen=True)
+@frozen
 class Failure:
     """A case that did not reach its end."""
 
@@ -20,7 +20,7 @@ class Failure:
     cause: str
 
 
-@dataclass(frozen=True)
+@frozen
 class MetricSummary:
     """A metric over the cases that have one: how many, and the spread of the finite ones (SI).
 
@@ -37,7 +37,7 @@ class MetricSummary:
     unknown: int
 
 
-@dataclass(frozen=True)
+@frozen
 class RequirementSummary:
     """How many cases meet a requirement, miss it, and leave it open because they failed."""
 
@@ -47,7 +47,7 @@ class RequirementSummary:
     unknown: int
 
 
-@dataclass(frozen=True)
+@frozen
 class Summary:
     """One experiment's outcome. failures: a few of them, unlike ones first."""
 

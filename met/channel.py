@@ -8,9 +8,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from met import models
+from met.frozen import frozen
 from met.plan import Joint, Structure
 
 MOTION = (
@@ -23,7 +22,7 @@ MOTION = (
 COMMAND_UNIT = {"rate": "joint/s", "position": "joint", "torque": "effort"}
 
 
-@dataclass(frozen=True)
+@frozen
 class Channel:
     """One number that changes in time. divisor: base ticks between its samples; between them it is held."""
 

@@ -8,13 +8,14 @@ it once and exits with 2. Nothing else is an acceptable way to refuse input.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Literal
+
+from met.frozen import frozen
 
 Severity = Literal["error", "warning", "note"]
 
 
-@dataclass(frozen=True)
+@frozen
 class Place:
     """A stretch of one line of a source file.
 
@@ -35,7 +36,7 @@ class Place:
         return f"{self.file}:{self.line}:{self.column}"
 
 
-@dataclass(frozen=True)
+@frozen
 class Expansion:
     """One step of macro expansion: the macro's name and the place where it was used."""
 
@@ -43,7 +44,7 @@ class Expansion:
     use: Place
 
 
-@dataclass(frozen=True)
+@frozen
 class Label:
     """A place and a few words about it, printed beside its caret."""
 
@@ -51,7 +52,7 @@ class Label:
     text: str = ""
 
 
-@dataclass(frozen=True)
+@frozen
 class Diagnostic:
     """What is wrong, where, why, and what to do."""
 

@@ -10,15 +10,16 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from met.frozen import frozen
+
 PACKAGE = "met_arm"
 
 
-@dataclass(frozen=True)
+@frozen
 class EntryPoint:
     """A named object of an installed package: `value` is `module:object`, `package` who offers it."""
 

@@ -12,12 +12,12 @@ import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from met.diagnostic import Problem, error
+from met.frozen import frozen
 from met.trace import cache
 from met.trace.ir import emit
 from met.trace.pieces import operations
@@ -79,7 +79,7 @@ def _refuse_or_warn(machine: Machine) -> None:
                   stacklevel=4)
 
 
-@dataclass(frozen=True)
+@frozen
 class Kernel:
     """Machine code of a program. `cached` says whether it was found rather than made."""
 

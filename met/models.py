@@ -13,12 +13,12 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal, Protocol
 
 from met.diagnostic import Place, Problem, error
 from met.entry_points import offered
+from met.frozen import frozen
 from met.parameter import Parameter
 
 Kind = Literal["servo", "environment", "command", "metric", "integrator"]
@@ -33,7 +33,7 @@ class Model(Protocol):
     def doc(self) -> str: ...
 
 
-@dataclass(frozen=True)
+@frozen
 class Group:
     """One kind of model: the entry-point group, MET's own declarations, and the type they must have."""
 

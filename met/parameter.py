@@ -10,13 +10,14 @@ and `of` (the unit of the channel that a metric watches).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
+
+from met.frozen import frozen
 
 Shape = Literal["number", "vector", "list", "word"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@frozen(kw_only=True)
 class Parameter:
     """One number (or vector of three, list, or word) that a deck may set on a model.
 
@@ -39,7 +40,7 @@ class Parameter:
     source: str = ""
 
 
-@dataclass(frozen=True, kw_only=True)
+@frozen(kw_only=True)
 class Memory:
     """A number that a model's computer holds from one of its ticks to the next; recorded under its name."""
 
@@ -49,7 +50,7 @@ class Memory:
     start: float = 0.0
 
 
-@dataclass(frozen=True, kw_only=True)
+@frozen(kw_only=True)
 class State:
     """A number that nature integrates for a model, with the motion of the arm; recorded under its name."""
 
@@ -59,7 +60,7 @@ class State:
     start: float = 0.0
 
 
-@dataclass(frozen=True, kw_only=True)
+@frozen(kw_only=True)
 class Signal:
     """A number that a model shows at every instant, computed from the rest; recorded under its name."""
 

@@ -24,18 +24,19 @@ A vector parameter of a model is three numbers, `.x .y .z`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
 import numpy as np
 
 from met.diagnostic import Place
+from met.frozen import frozen
 from met.trace.graph import Formulas
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
 
 
-@dataclass(frozen=True)
+@frozen
 class Origin:
     """Where a value comes from: the place that wrote it, the places it overrode (latest first), and in words.
 
@@ -49,14 +50,14 @@ class Origin:
     note: str = ""
 
 
-@dataclass(frozen=True)
+@frozen
 class Formula:
     """A value that varies with the case: output number `output` of the structure's `formulas`."""
 
     output: int
 
 
-@dataclass(frozen=True)
+@frozen
 class Quantity:
     """A resolved parameter: SI value (or formula, list or word), its SI unit as text, its origin."""
 
@@ -65,7 +66,7 @@ class Quantity:
     origin: Origin
 
 
-@dataclass(frozen=True)
+@frozen
 class Link:
     """A rigid body; its numbers are parameters. `shape` is what to draw, in words of `ic` (kind, numbers in SI)."""
 
@@ -74,7 +75,7 @@ class Link:
     shape: tuple[str, tuple[tuple[str, float], ...]] | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class Joint:
     """Connects `parent` (a link, or "base") to `child`, along or about its axis."""
 
@@ -85,7 +86,7 @@ class Joint:
     place: Place | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class Command:
     """What a servo is told: kind "rate", "position" or "torque", and the model of its course in time."""
 
@@ -93,7 +94,7 @@ class Command:
     model: str
 
 
-@dataclass(frozen=True)
+@frozen
 class ServoUse:
     """A servo on a joint: the definition's name in the deck, the model, the command, ticks of base rate a tick."""
 
@@ -105,7 +106,7 @@ class ServoUse:
     place: Place | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class EnvironmentUse:
     """An environment model under a name of the deck's. divisor None: evaluated at every stage."""
 
@@ -115,7 +116,7 @@ class EnvironmentUse:
     place: Place | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class MetricUse:
     """A metric under a name of the deck's, watching one channel (`Channel.path`)."""
 
@@ -125,7 +126,7 @@ class MetricUse:
     place: Place | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class Requirement:
     """A condition on a metric that a case meets or misses, in SI; `text` as the deck wrote it."""
 
@@ -136,7 +137,7 @@ class Requirement:
     place: Place | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class Schedule:
     """Rates as integer divisors of one base rate. A run of `ticks` base ticks has both ends, 0 and `ticks`.
 
@@ -166,7 +167,7 @@ class Schedule:
         return self.ticks // self.record + 1
 
 
-@dataclass(frozen=True)
+@frozen
 class Recorded:
     """One variable of the archive: a channel of one thing, or of all joints (`joints` then names them in order).
 
@@ -181,7 +182,7 @@ class Recorded:
     doc: str = ""
 
 
-@dataclass(frozen=True)
+@frozen
 class Structure:
     """All that decides which program is compiled, values apart."""
 
@@ -202,7 +203,7 @@ class Structure:
         return tuple(joint for joint in self.joints if joint.kind != "fixed")
 
 
-@dataclass(frozen=True)
+@frozen
 class Coordinate:
     """One varied parameter of a sweep, as the deck wrote its path; values are in SI, one a case.
 
@@ -218,7 +219,7 @@ class Coordinate:
     place: Place | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class Cases:
     """The case table: `count` rows of coordinates, in the order that `met cases` prints."""
 
@@ -227,7 +228,7 @@ class Cases:
     seed: int = 0
 
 
-@dataclass(frozen=True)
+@frozen
 class Experiment:
     """A run or sweep: structure, parameters, cases.
 
@@ -244,7 +245,7 @@ class Experiment:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@frozen
 class Source:
     """A deck file as it was read: name as messages print it, whole text, SHA-256 of its bytes."""
 
@@ -253,7 +254,7 @@ class Source:
     sha256: str
 
 
-@dataclass(frozen=True)
+@frozen
 class Plan:
     """What a deck means. `deck` names the root file; `sources` holds every file that was read."""
 

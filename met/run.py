@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 
+from met.frozen import frozen
 from met.plan import Experiment
 from met.program.build import EVENTS, NOT_FINITE, OUTPUTS, SINGULAR, build
 from met.trace.program import Program
@@ -16,7 +17,7 @@ from met.trace.program import Program
 DONE, FAILED = 0, 1
 
 
-@dataclass(frozen=True)
+@frozen
 class Run:
     """What the engine gives back for some cases of one experiment; the first axis of every array is the case.
 
@@ -44,7 +45,7 @@ class Run:
     events: dict[str, np.ndarray]
 
 
-@dataclass(frozen=True)
+@frozen
 class Prepared:
     """An experiment with its program; the kernel is compiled, or fetched from the cache, when first used."""
 

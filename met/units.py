@@ -14,10 +14,11 @@ import difflib
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
+
+from met.frozen import frozen
 
 BIGGEST_EXPONENT = 9
 
@@ -47,7 +48,7 @@ class Dimension(NamedTuple):
         return text(self)
 
 
-@dataclass(frozen=True)
+@frozen
 class Measure:
     """What a unit means: its dimension, and how many SI units one of it is."""
 
@@ -66,7 +67,7 @@ class Measure:
         return number / parts if parts > 1 and 1.0 / parts == self.scale else number * self.scale
 
 
-@dataclass(frozen=True)
+@frozen
 class NamedUnit:
     """A row of the table: the name that decks write, the word that messages say, and the meaning."""
 

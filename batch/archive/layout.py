@@ -21,11 +21,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 import numpy as np
 
+from met.frozen import frozen
 from met.plan import Coordinate, Experiment, MetricUse, Plan, Recorded
 
 SCHEMA = "met.archive"
@@ -59,7 +60,7 @@ RESERVED = frozenset({
 })  # fmt: skip
 
 
-@dataclass(frozen=True)
+@frozen
 class Variable:
     """One variable of a group. dims: names of its dimensions; attributes: units, long_name and the like, in order."""
 
@@ -78,7 +79,7 @@ class Variable:
         return self.source or self.name
 
 
-@dataclass(frozen=True)
+@frozen
 class Layout:
     """The group of one experiment: sizes of its dimensions, and its variables in the order they are written."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,10 +12,11 @@ import numpy as np
 from batch.archive.hdf5 import SIGNATURE, h5py
 from batch.archive.layout import SCHEMA, VERSION
 from met.diagnostic import Problem, error
+from met.frozen import frozen
 from met.plan import Plan
 
 
-@dataclass(frozen=True)
+@frozen
 class Stored:
     """One variable as it lies in the file."""
 

@@ -18,12 +18,11 @@ what may stand where is decided when the tree is resolved. So a joint may be cal
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from met.diagnostic import Diagnostic, Place
+from met.frozen import frozen
 
 
-@dataclass(frozen=True)
+@frozen
 class Word:
     """An identifier and where it stands."""
 
@@ -31,7 +30,7 @@ class Word:
     place: Place
 
 
-@dataclass(frozen=True)
+@frozen
 class Unit:
     """A unit as written: factors (name, exponent) in order. `%` is a unit of 0.01."""
 
@@ -40,7 +39,7 @@ class Unit:
     text: str
 
 
-@dataclass(frozen=True)
+@frozen
 class Number:
     """A number with the unit that follows it, None where it is bare."""
 
@@ -50,13 +49,13 @@ class Number:
     text: str
 
 
-@dataclass(frozen=True)
+@frozen
 class String:
     value: str
     place: Place
 
 
-@dataclass(frozen=True)
+@frozen
 class Name:
     """A reference: `slow`, `gearbox.kp`, `shoulder.servo.voltage`, `on`."""
 
@@ -68,13 +67,13 @@ class Name:
         return ".".join(word.text for word in self.path)
 
 
-@dataclass(frozen=True)
+@frozen
 class List:
     items: tuple[Expression, ...]
     place: Place
 
 
-@dataclass(frozen=True)
+@frozen
 class Call:
     """`rod(length = reach, along = x)`, `linspace(0, 1, 5)`, `settling_time { of = q; }` (then `body` is not None)."""
 
@@ -85,7 +84,7 @@ class Call:
     place: Place
 
 
-@dataclass(frozen=True)
+@frozen
 class WithUnit:
     """`[...] unit` or `(...) unit` or `linspace(...) unit`: the unit applies to all bare numbers inside."""
 
@@ -94,14 +93,14 @@ class WithUnit:
     place: Place
 
 
-@dataclass(frozen=True)
+@frozen
 class Unary:
     operator: str  # "-" "+" "not"
     operand: Expression
     place: Place
 
 
-@dataclass(frozen=True)
+@frozen
 class Binary:
     """operator: + - * / ^ < <= > >= == != and or"""
 
@@ -114,14 +113,14 @@ class Binary:
 Expression = Number | String | Name | List | Call | WithUnit | Unary | Binary
 
 
-@dataclass(frozen=True)
+@frozen
 class Let:
     name: Word
     value: Expression
     place: Place
 
 
-@dataclass(frozen=True)
+@frozen
 class Setting:
     words: tuple[Word, ...]
     path: tuple[Word, ...]
@@ -130,14 +129,14 @@ class Setting:
     place: Place  # of the path
 
 
-@dataclass(frozen=True)
+@frozen
 class Statement:
     words: tuple[Word, ...]
     value: Expression
     place: Place
 
 
-@dataclass(frozen=True)
+@frozen
 class Group:
     """`words { body }`, or with `like`/`of` a base. At the top level a definition, inside one a block."""
 
@@ -151,7 +150,7 @@ class Group:
 Entry = Let | Setting | Statement | Group
 
 
-@dataclass(frozen=True)
+@frozen
 class SourceText:
     """A file that was read: the name messages print, its text, SHA-256 of its bytes."""
 
@@ -160,7 +159,7 @@ class SourceText:
     sha256: str
 
 
-@dataclass(frozen=True)
+@frozen
 class Deck:
     """A whole deck after the preprocessor: its entries in order, the files they came from, and warnings so far."""
 

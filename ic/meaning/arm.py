@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ic.meaning.resolve import Block, Definition, Item
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.shapes import SHAPES, Solid
 from met.diagnostic import Label, Place
+from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Joint, Link
 from met.trace import Real, Scalar, sqrt
@@ -32,7 +33,7 @@ LINK_KEYS = ("mass", "com", "inertia", "shape")
 JOINT_KEYS = ("parent", "child", "at", "rpy", "axis")
 
 
-@dataclass(frozen=True)
+@frozen
 class Arm:
     name: str
     links: tuple[Link, ...]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,13 +10,14 @@ from ic.grammar.syntax import Unit
 from ic.meaning.complaints import Complaints
 from ic.meaning.values import Value
 from met.diagnostic import Label, Place
+from met.frozen import frozen
 from met.trace import Formulas, Graph, Real, Scalar
 
 Test = Callable[[np.ndarray], tuple[np.ndarray, list[str]]]
 """Values [n, k] -> which rows are bad [n], and in words why the first is."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Varied:
     """A coordinate of a sweep while the run is resolved: its values in SI, and the scalar that stands for them."""
 
@@ -29,7 +29,7 @@ class Varied:
     scale: float
 
 
-@dataclass(frozen=True)
+@frozen
 class Check:
     """A condition on values that hold only once the cases are known."""
 

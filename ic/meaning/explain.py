@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from os import PathLike
 
 import numpy as np
@@ -14,13 +13,14 @@ from ic.meaning.complaints import did_you_mean
 from ic.meaning.lower import Compiled, Select, check
 from ic.meaning.scope import Scope, Settled
 from met.diagnostic import Label, Place, Problem, error
+from met.frozen import frozen
 from met.plan import Experiment
 from met.trace import Formulas, Scalar
 
 DEEPEST = 16  # names behind names that are followed
 
 
-@dataclass(frozen=True)
+@frozen
 class Explanation:
     """One parameter of one run or sweep.
 

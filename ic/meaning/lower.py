@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from os import PathLike
 from pathlib import Path
 from typing import Literal
@@ -21,13 +21,14 @@ from ic.meaning.sweep import Sweep, check_coordinates, coordinates, kept, read_s
 from ic.meaning.values import Value
 from ic.read import in_order, read
 from met.diagnostic import Diagnostic, Label, Problem, error
+from met.frozen import frozen
 from met.plan import Cases, Experiment, Formula, Plan, Source
 from met.trace import Formulas, Graph, Scalar
 
 Select = Sequence[str] | Literal["all"] | None
 
 
-@dataclass(frozen=True)
+@frozen
 class Compiled:
     """A plan, None where an error stands in its way; all diagnostics, warnings too; every file's text by name."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from ic.grammar.spell import spell
@@ -16,6 +15,7 @@ from ic.meaning.values import place_of
 from met import models
 from met.channel import Channel, channels
 from met.diagnostic import Label, Place
+from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import MetricUse, Recorded, Requirement, Structure
 from met.trace import Scalar
@@ -159,7 +159,7 @@ def metric_unit(use: MetricUse, known: dict[str, Channel]) -> str:
 # Requirements
 
 
-@dataclass(frozen=True)
+@frozen
 class Comparison:
     """A `require` with its metric on the left."""
 

@@ -7,16 +7,17 @@ kind (`metric settle = ...`, `link upper { ... }`) adds; one without overrides w
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from ic.grammar.syntax import Call, Deck, Entry, Expression, Group, Let, Name, Setting, Statement, Word
 from ic.meaning.complaints import Complaints, did_you_mean, known_words
 from met.diagnostic import Diagnostic, Label, Place, Problem, error
+from met.frozen import frozen
 
 KINDS = ("arm", "servo", "run", "sweep")
 
 
-@dataclass(frozen=True)
+@frozen
 class Item:
     """One entry of a merged block.
 
@@ -42,7 +43,7 @@ class Item:
         return f"{self.kind} {self.name}" if self.kind else self.name
 
 
-@dataclass(frozen=True)
+@frozen
 class Block:
     """Merged entries by key ("kind name", or the name of a plain key), in order, and statements such as `require`."""
 
@@ -57,7 +58,7 @@ class Block:
         return self.items.get(key)
 
 
-@dataclass(frozen=True)
+@frozen
 class Definition:
     """A definition as written: `default run nominal like base { ... }`."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from ic.grammar.syntax import Call, Name, Word
 from ic.meaning.arm import Arm, resolve_arm
@@ -16,6 +16,7 @@ from ic.meaning.servos import RATE, Use, fixed_rate, resolve_servos
 from ic.meaning.values import Values, place_of
 from met import models
 from met.diagnostic import Place
+from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import EnvironmentUse, Requirement, Schedule, ServoUse, Structure
 from met.trace import Real
@@ -28,7 +29,7 @@ ON_OFF = Parameter(name="velocity_products", shape="word", words=("on", "off"), 
                    doc="Coriolis, centrifugal and gyroscopic torques")
 
 
-@dataclass(frozen=True)
+@frozen
 class Resolved:
     """A run's structure and requirements; its parameters are in the scope.
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -16,6 +15,7 @@ import numpy as np
 from ic.meaning.complaints import Complaints
 from ic.meaning.scope import Scope
 from met.diagnostic import Label, Place
+from met.frozen import frozen
 from met.plan import Schedule
 from met.trace import Real
 
@@ -23,7 +23,7 @@ MOST_TICKS = 2**53  # a tick's number is a double
 WARN_ABOVE = 0.5  # of h lambda: above it, a step sees less than the decay it should follow
 
 
-@dataclass(frozen=True)
+@frozen
 class Rate:
     """A rate as written: whose it is, in words, how often (Hz), and where."""
 

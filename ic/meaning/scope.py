@@ -22,6 +22,7 @@ from ic.meaning.unit_words import in_deck, unit_here
 from ic.meaning.values import Value, Values, place_of
 from met import units
 from met.diagnostic import Label, Place, Problem, error
+from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import JointKind, Origin, Quantity
 from met.trace import Graph, Real, Scalar
@@ -30,7 +31,7 @@ from met.units import PURE, Dimension
 XYZ = ("x", "y", "z")
 
 
-@dataclass(frozen=True)
+@frozen
 class Owner:
     """What parameters belong to: in words, where it is, and the first part of their paths.
 

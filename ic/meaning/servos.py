@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from ic.grammar.syntax import Call, Name, Word
@@ -18,6 +18,7 @@ from ic.meaning.values import place_of
 from met import models
 from met.channel import COMMAND_UNIT
 from met.diagnostic import Label, Place, Problem
+from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Command
 
@@ -26,7 +27,7 @@ RATE = Parameter(name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, doc=
 NOT_PARAMETERS = ("model", "command", "rate")
 
 
-@dataclass(frozen=True)
+@frozen
 class Use:
     """A servo on a joint. rate None: the run's `rates.servos`. parameters None: some failed, which was told."""
 

@@ -7,8 +7,8 @@ there.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
+from met.frozen import frozen
 from met.parameter import Parameter
 from met.trace import Real
 
@@ -18,7 +18,7 @@ Six = tuple[Real, Real, Real, Real, Real, Real]
 ALONG = Parameter(name="along", shape="word", words=("x", "y", "z"), doc="axis of the link along which it extends")
 
 
-@dataclass(frozen=True)
+@frozen
 class Solid:
     """A shape with its sizes: centre of mass (m, link frame), and inertia about it (kg m^2) from the mass (kg).
 
@@ -35,7 +35,7 @@ class Solid:
         return (mass * xx, mass * yy, mass * zz, 0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
+@frozen
 class Shape:
     parameters: tuple[Parameter, ...]
     solid: Callable[[Mapping[str, Real], int], Solid]

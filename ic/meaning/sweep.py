@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from ic.meaning.scope import Scope
 from ic.meaning.values import COMPARISONS, PURE, Value, Values, evaluate_number, measure_of, place_of
 from met import units
 from met.diagnostic import Label, Place, Problem, error
+from met.frozen import frozen
 from met.plan import Coordinate
 from met.trace import Formulas, Graph, Scalar
 
@@ -29,7 +29,7 @@ ROUNDING = 1e-12  # relative: some thousand roundings, and far below what anyone
 LATER = ("sample", "repeat", "seeds", "substitute", "design")
 
 
-@dataclass(frozen=True)
+@frozen
 class Sweep:
     """What a sweep's block says. Each axis is one varied parameter, or several that go together."""
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import cast
 
@@ -15,6 +15,7 @@ from ic.grammar.syntax import Binary, Call, Expression, List, Name, Number, Stri
 from ic.meaning.complaints import did_you_mean, known_words
 from met import units
 from met.diagnostic import Label, Place, Problem, error
+from met.frozen import frozen
 from met.trace import Real, Scalar, cos, maximum, minimum, sin, sqrt
 from met.units import PURE, Dimension
 
@@ -26,7 +27,7 @@ FUNCTIONS = ("sqrt", "sin", "cos", "min", "max", "linspace", "logspace")
 CONSTANTS = {"pi": math.pi}
 
 
-@dataclass(frozen=True)
+@frozen
 class Value:
     """A quantity: number in SI, dimension. bare: a number written with no unit. unit: the one it was written in."""
 
@@ -37,7 +38,7 @@ class Value:
     unit: Unit | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class Values:
     """A list of quantities."""
 

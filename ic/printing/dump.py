@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from met.diagnostic import Place, Problem, error
 from met.entry_points import offered
+from met.frozen import frozen
 
 if TYPE_CHECKING:
     from ic.grammar.syntax import Entry
@@ -23,7 +23,7 @@ GROUP = "met.stages"
 ORDER = ("tokens", "syntax", "model", "plan", "program", "kernel", "assembly")  # that of the way; others come after
 
 
-@dataclass(frozen=True)
+@frozen
 class Asked:
     """Which deck is to be shown, and of its plan which runs (None: the only one, else the default)."""
 

@@ -13,12 +13,12 @@ import posixpath
 import re
 import stat
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from ic.grammar.syntax import SourceText
 from ic.text.limits import MOST_BYTES
 from met.diagnostic import Diagnostic, Place, Problem, error
+from met.frozen import frozen
 
 LIBRARY = Path(__file__).parents[1] / "decks"
 MOST_LISTED = 2_000  # files looked at for a "did you mean"
@@ -26,7 +26,7 @@ MOST_LISTED = 2_000  # files looked at for a "did you mean"
 _NOT_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
 
-@dataclass(frozen=True)
+@frozen
 class Directory:
     """A directory to look in, and the name it goes by in messages; "<" begins the library's."""
 
@@ -45,7 +45,7 @@ class Directory:
         return "the standard library" if self.name == "<>" else f"`{self.name or '.'}`"
 
 
-@dataclass(frozen=True)
+@frozen
 class FoundFile:
     """A file: the path to open it by, and its name in messages."""
 

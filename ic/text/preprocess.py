@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +45,7 @@ from ic.text.limits import (
 from ic.text.macros import Macros
 from ic.text.strays import complain_of_stray
 from met.diagnostic import Diagnostic, Label, Place, Problem
+from met.frozen import frozen
 
 CONDITIONALS = ("if", "ifdef", "ifndef", "elif", "else", "endif")
 DIRECTIVES = (*CONDITIONALS, "define", "undef", "include", "pragma", "error", "warning")
@@ -54,7 +54,7 @@ TRUTH = "TRUTH"  # the kind of a condition's value
 COMMAND_LINE = "<command line>"
 
 
-@dataclass(frozen=True)
+@frozen
 class Tokens:
     """A deck after the preprocessor.
 

@@ -7,14 +7,14 @@ constant profile. The engine evaluates it at the servo's ticks.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
+from met.frozen import frozen
 from met.parameter import Parameter
 from met.trace import Real
 
 
-@dataclass(frozen=True, kw_only=True)
+@frozen(kw_only=True)
 class Profile:
     """The declaration of a command profile; one a file.
 

@@ -16,7 +16,6 @@ nowhere: products of velocities are w x (w x r), w x I w and 2 w x z qd.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from met.dynamics.spatial import (
@@ -45,13 +44,14 @@ from met.dynamics.spatial import (
     turn_by,
     turn_vector,
 )
+from met.frozen import frozen
 
 X, Y, Z = 0, 1, 2
 
 Moving = Literal["revolute", "prismatic"]
 
 
-@dataclass(frozen=True)
+@frozen
 class Joint:
     """A moving joint with the rigid body that it carries (fixed joints outboard merged into it).
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from met.dynamics.joints import Step
 from met.dynamics.spatial import (
@@ -20,9 +19,10 @@ from met.dynamics.spatial import (
     turn_vector_back,
 )
 from met.dynamics.tree import Tree
+from met.frozen import frozen
 
 
-@dataclass(frozen=True)
+@frozen
 class LinkMotion:
     """A link's frame in the world.
 

@@ -19,7 +19,6 @@ One formula serves both modes. With r the rotor's inertia and D = S'IA S + r:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from met.dynamics.joints import Step
 from met.dynamics.spatial import (
@@ -45,6 +44,7 @@ from met.dynamics.spatial import (
     turn_vector_back,
 )
 from met.dynamics.tree import Tree
+from met.frozen import frozen
 from met.trace import Mask, Truth, both
 from met.trace.primitives import divide
 from met.trace.scalar import Scalar
@@ -56,7 +56,7 @@ SINGULAR = 1e-13
 """Share of the outboard inertia (`Joint.reach`) below which D is rounding noise: some hundred roundings."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Solved:
     """What a pass gives. Sequences have one entry a moving joint, in the tree's order of joints.
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from typing import Any, Literal
 
 from met.dynamics.joints import Joint, X, Z
@@ -58,9 +58,10 @@ from met.dynamics.spatial import (
     transposed,
     turn_vector,
 )
+from met.frozen import frozen
 
 
-@dataclass(frozen=True)
+@frozen
 class Body:
     """A link and the joint that carries it; every number may be traced.
 
@@ -86,7 +87,7 @@ class Body:
     inertia: tuple[Real, Real, Real, Real, Real, Real] = (0.0,) * 6
 
 
-@dataclass(frozen=True)
+@frozen
 class Frame:
     """A link frame of the deck: the moving joint whose body it belongs to (-1: the base), and its pose there."""
 
@@ -94,7 +95,7 @@ class Frame:
     pose: Pose
 
 
-@dataclass(frozen=True)
+@frozen
 class Tree:
     """Moving joints, and the way back to the deck's frames.
 

@@ -6,9 +6,10 @@ Evaluated at every stage of every step (`docs/physics.md`, "Rates"), as ordinary
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Protocol
 
+from met.frozen import frozen
 from met.parameter import Parameter
 from met.trace import Real
 
@@ -37,7 +38,7 @@ class World(Protocol):
     def to_world(self, link: str, vector: Vector) -> Vector: ...
 
 
-@dataclass(frozen=True)
+@frozen
 class Force:
     """A force and a moment on a link, in the world's axes, the force at a point in the link's frame (m)."""
 
@@ -47,7 +48,7 @@ class Force:
     point: Vector = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
+@frozen
 class Loads:
     """What one environment model does: loads of several models add up.
 
@@ -61,7 +62,7 @@ class Loads:
     forces: tuple[Force, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@frozen(kw_only=True)
 class Environment:
     """The declaration of an environment model; one a file.
 

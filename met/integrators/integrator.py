@@ -8,14 +8,14 @@ through zero on the parabola through both ends (docs/physics.md, "Friction stick
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
+from met.frozen import frozen
 from met.trace import Real
 
 Reals = tuple[Real, ...]
 
 
-@dataclass(frozen=True)
+@frozen
 class Motion:
     """A state of the whole arm: joint positions q, rates qd (rad, rad/s; m, m/s), other integrated states x."""
 
@@ -24,7 +24,7 @@ class Motion:
     x: Reals = ()
 
 
-@dataclass(frozen=True)
+@frozen
 class Slope:
     """Its derivative: qd of the positions, qdd of the rates, xd of the other states."""
 
@@ -51,7 +51,7 @@ def mean(k1: Slope, k2: Slope) -> Slope:
     )
 
 
-@dataclass(frozen=True, kw_only=True)
+@frozen(kw_only=True)
 class Integrator:
     """The declaration of an integrator; one a file.
 

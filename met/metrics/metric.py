@@ -7,14 +7,14 @@ its computer holds), whatever is recorded, so its value does not depend on the r
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from met.frozen import frozen
 from met.parameter import Memory, Parameter
 from met.trace import Real
 
 
-@dataclass(frozen=True, kw_only=True)
+@frozen(kw_only=True)
 class Metric:
     """The declaration of a metric; one a file.
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from met.dynamics.recursion import Solved, solve
 from met.dynamics.tree import Tree
 from met.environments.environment import Vector
+from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
 from met.program.machine import Actuator, Machine, ReadCell
 from met.program.values import Values, parameters, returned
@@ -16,7 +16,7 @@ from met.servos.servo import Drive, JointMotion
 from met.trace import Real, Truth, not_
 
 
-@dataclass(frozen=True)
+@frozen
 class Derivative:
     """What holds at one stage.
 

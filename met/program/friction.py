@@ -7,8 +7,8 @@ Stuck is acceleration mode with qdd = 0, so a stuck joint does not creep, ever. 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope, ahead
 from met.trace import Real, Truth, absolute, both, either, minimum, not_, sign, sqrt, where
 
@@ -43,7 +43,7 @@ def crossings(s: Sequence[Real | None], y_new: Motion) -> list[Truth]:
     ]
 
 
-@dataclass(frozen=True)
+@frozen
 class Split:
     """Where a (sub)step with a crossing stops: the state, crossing joints at rest, and the share of the step done."""
 

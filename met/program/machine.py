@@ -7,7 +7,6 @@ from the case's memory where a sweep varies it (`PARAMETER` cells, computed once
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -17,6 +16,7 @@ from met.commands.profile import Profile
 from met.diagnostic import Problem, error
 from met.dynamics.tree import Body, Tree
 from met.environments.environment import Environment
+from met.frozen import frozen
 from met.integrators.integrator import Integrator
 from met.metrics.metric import Metric
 from met.plan import Experiment, Formula, Joint, ServoUse, Structure
@@ -30,7 +30,7 @@ PARAMETER, TREE = "parameter:", "tree:"
 ReadCell = Callable[[str], Real]
 
 
-@dataclass(frozen=True)
+@frozen
 class Actuator:
     """A servo at work on a moving joint: its declaration, use, and number in the order of moving joints.
 
@@ -58,7 +58,7 @@ class Actuator:
         return f"servo `{self.use.definition}` of joint `{self.use.joint}` (model {self.use.model})"
 
 
-@dataclass(frozen=True)
+@frozen
 class Machine:
     """Models and parameters of one experiment."""
 

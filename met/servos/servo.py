@@ -11,14 +11,15 @@ on a prismatic joint.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from met.frozen import frozen
 from met.parameter import Memory, Parameter, Signal, State
 from met.trace import Real, Truth
 
 
-@dataclass(frozen=True)
+@frozen
 class Asked:
     """What the joint's command asks at a tick: its kind, its value and the value's rate of change.
 
@@ -31,7 +32,7 @@ class Asked:
     slope: Real
 
 
-@dataclass(frozen=True)
+@frozen
 class Seen:
     """What the servo's computer sees at a tick.
 
@@ -46,7 +47,7 @@ class Seen:
     period: float
 
 
-@dataclass(frozen=True)
+@frozen
 class JointMotion:
     """What nature does to the servo's physics at a stage: joint position and rate, and the time (s)."""
 
@@ -55,7 +56,7 @@ class JointMotion:
     time: Real
 
 
-@dataclass(frozen=True)
+@frozen
 class Drive:
     """What the servo does to its joint at a stage.
 
@@ -78,7 +79,7 @@ class Drive:
     signals: Mapping[str, Real] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, kw_only=True)
+@frozen(kw_only=True)
 class Servo:
     """The declaration of a servo model; one a file, in met/servos or in a package of your own.
 

@@ -17,11 +17,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from met.frozen import frozen
 from met.trace.primitives import ARRAYS, PLAIN
 from met.trace.scalar import Mask, Scalar
 
@@ -321,7 +321,7 @@ def _spelled(node: Node) -> Node:
     return node
 
 
-@dataclass(frozen=True)
+@frozen
 class Formulas:
     """Formulas as plain data: what a plan stores, what replays over floats, arrays or scalars alike.
 

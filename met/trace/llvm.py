@@ -6,17 +6,17 @@ Where results could depend on the compiler nothing is left to it (met/trace/ir.p
 from __future__ import annotations
 
 import platform
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import llvmlite
 import llvmlite.binding as llvm
 
+from met.frozen import frozen
 from met.trace.entry import ENTRY
 
 
-@dataclass(frozen=True)
+@frozen
 class Machine:
     """What code is made for: LLVM's names of processor and features, doubles in a register, whether it has fma."""
 

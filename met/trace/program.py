@@ -11,9 +11,9 @@ any case still asks for more. Memory is cells by name, one number a case, 0 befo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Protocol
 
+from met.frozen import frozen
 from met.trace.fuse import fused
 from met.trace.graph import Graph, Node, Real, Truth, live
 from met.trace.scalar import Mask, Scalar
@@ -52,7 +52,7 @@ class Tape(Protocol):
         """One of the program's outputs; only in `end`."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Phase:
     """A straight piece of computation: `body` reads, computes and writes, without looking at values."""
 
@@ -60,14 +60,14 @@ class Phase:
     body: Callable[[Tape], None]
 
 
-@dataclass(frozen=True)
+@frozen
 class Run:
     """A phase, at this point. Neighbouring `Run`s become one straight piece."""
 
     phase: Phase
 
 
-@dataclass(frozen=True)
+@frozen
 class Every:
     """The body at ticks whose number `divisor` divides."""
 
@@ -75,14 +75,14 @@ class Every:
     body: tuple[Control, ...]
 
 
-@dataclass(frozen=True)
+@frozen
 class Unless0:
     """The body at all ticks but tick 0."""
 
     body: tuple[Control, ...]
 
 
-@dataclass(frozen=True)
+@frozen
 class WhileAny:
     """The body as long as any case of the block has a cell that is not zero, at most `at_most` times.
 
@@ -95,7 +95,7 @@ class WhileAny:
     body: tuple[Control, ...]
 
 
-@dataclass(frozen=True)
+@frozen
 class Record:
     """A phase that records row k // divisor, at ticks that `divisor` divides; nothing where no record is kept."""
 
@@ -106,7 +106,7 @@ class Record:
 Control = Run | Every | Unless0 | WhileAny | Record
 
 
-@dataclass(frozen=True)
+@frozen
 class Program:
     """What a kernel runs: control at the start, at each tick and at the end, inputs, columns of a row, outputs."""
 
@@ -135,7 +135,7 @@ def walk(body: tuple[Control, ...]) -> Iterator[Control]:
             yield from walk(node.body)
 
 
-@dataclass(frozen=True)
+@frozen
 class Section:
     """Consecutive phases as one recorded piece. References are into `nodes`; what is not live is to be ignored.
 
@@ -160,14 +160,14 @@ class Section:
         return live(self.nodes, self.roots)
 
 
-@dataclass(frozen=True)
+@frozen
 class Straight:
     """Control of a recorded program: the section of that number, here."""
 
     section: int
 
 
-@dataclass(frozen=True)
+@frozen
 class Recorded:
     """Control of a recorded program: a section that records, at ticks that `divisor` divides."""
 
@@ -175,7 +175,7 @@ class Recorded:
     divisor: int
 
 
-@dataclass(frozen=True)
+@frozen
 class Block:
     """Control of a recorded program: an `Every`, `Unless0` or `WhileAny` (`condition`, its body unused)."""
 
@@ -186,7 +186,7 @@ class Block:
 Step = Straight | Recorded | Block
 
 
-@dataclass(frozen=True)
+@frozen
 class Recording:
     """A recorded program: its sections, the control over them, and the cells, in the order of memory."""
 
