@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import threading
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
@@ -29,8 +30,9 @@ if TYPE_CHECKING:
 # live operations of the largest section up to which four parts of a block take turns rather than two: the shorter
 # the code, the more of it a processor has in flight at once
 _SMALL = 400
-# blocks that one call into machine code runs at most: calls cannot be interrupted, and progress is told between them
-_CHUNK = 256
+# blocks, and blocks times ticks, that one call into machine code runs at most: calls cannot be interrupted, and
+# progress is told between them; a tenth of a second or so
+_CHUNK, _CALL = 256, 1 << 16
 
 _SIGNATURE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4, *[ctypes.c_int64] * 6)
 
@@ -123,12 +125,14 @@ class Kernel:
         outputs = np.empty((cases, len(program.outputs)))
         threads = _threads(threads)
         blocks = -(-cases // self.lanes)
-        chunk = self.lanes * max(1, min(_CHUNK, -(-blocks // (8 * threads))))
+        chunk = self.lanes * max(1, min(_CHUNK, _CALL // (ticks + 1), -(-blocks // (8 * threads))))
         starts = range(0, cases, chunk)
+        ended = threading.Event()
 
         def work(start: int) -> int:
             stop = min(start + chunk, cases)
-            self._run_chunk(inputs[start:stop], ticks, None if rows is None else rows[start:stop], outputs[start:stop])
+            kept = None if rows is None else rows[start:stop]
+            self._run_chunk(inputs[start:stop], ticks, kept, outputs[start:stop], ended)
             return stop - start
 
         done = 0
@@ -147,12 +151,15 @@ class Kernel:
                     if progress is not None:
                         progress(done)
             except BaseException:
+                ended.set()
                 pool.shutdown(wait=False, cancel_futures=True)
                 raise
         return rows, outputs
 
-    def _run_chunk(self, inputs: np.ndarray, ticks: int, rows: np.ndarray | None, outputs: np.ndarray) -> None:
-        """Some cases, in this thread; all blocks use one state in turn."""
+    def _run_chunk(
+        self, inputs: np.ndarray, ticks: int, rows: np.ndarray | None, outputs: np.ndarray, ended: threading.Event
+    ) -> None:
+        """Some cases, in this thread; all blocks use one state in turn. A long run of one block goes by stretches."""
         cases, lanes = len(inputs), self.lanes
         blocks = -(-cases // lanes)
         packed = _aligned((blocks, inputs.shape[1], lanes))
@@ -160,8 +167,15 @@ class Kernel:
         state = _aligned((max(1, len(self.recording.cells)), lanes))
         results = _aligned((blocks, max(1, outputs.shape[1]), lanes))
         record = rows is not None and rows.shape[2] > 0
-        self.entry(packed.ctypes.data, state.ctypes.data, rows.ctypes.data if record and rows is not None else None,
-                   results.ctypes.data, blocks, 0, ticks, cases, rows.strides[0] // 8 if rows is not None else 0, 0)
+        stretch = _CALL if blocks == 1 else ticks + 1
+        for first in range(0, ticks + 1, stretch):
+            if ended.is_set():
+                return
+            at = None
+            if record and rows is not None:
+                at = rows.ctypes.data + self.rows(0, first - 1) * rows.strides[1] if first else rows.ctypes.data
+            self.entry(packed.ctypes.data, state.ctypes.data, at, results.ctypes.data, blocks, first,
+                       min(first + stretch - 1, ticks), cases, rows.strides[0] // 8 if rows is not None else 0, 0)
         width = outputs.shape[1]
         flat = results.reshape(-1)[:blocks * width * lanes].reshape(blocks, width, lanes)
         outputs[:] = flat.transpose(0, 2, 1).reshape(blocks * lanes, width)[:cases]

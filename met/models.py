@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any, Literal, Protocol
 
+from met import units
 from met.diagnostic import Place, Problem, error
 from met.entry_points import offered
 from met.frozen import frozen
@@ -101,6 +102,7 @@ def available(kind: Kind) -> dict[str, Any]:
             raise Problem(error("E215", message, help=f"let it name the {declaration.__name__} that the file declares"))
         model: Any = loaded
         _check_names(model, found_at)
+        _check_units(model, found_at)
         if model.name in found and found[model.name] is not model:
             message = f"{found_at} offers {kind} `{model.name}`, which exists already"
             raise Problem(error("E215", message, help="give the model another name"))
@@ -115,7 +117,19 @@ def _check_names(model: Any, found_at: str) -> None:
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             message = f"{found_at} declares `{twice[0]}` twice"
-            raise Problem(error("E215", message, help="give each memory, state, signal and parameter a name of its own"))
+            raise Problem(error("E215", message, help="each memory, state, signal and parameter has its own name"))
+
+
+def _check_units(model: Any, found_at: str) -> None:
+    """Every declared unit can be read."""
+    words = {word: units.parse_unit("1") for word in ("joint", "effort", "command", "of")}
+    for part in (p for group in ("parameters", "memory", "states", "signals") for p in getattr(model, group, ())):
+        try:
+            units.parse_unit(part.unit, words)
+        except ValueError as reason:
+            message = f"{found_at} declares `{part.name}` with {reason}"
+            help = "units are those of decks, and joint, effort, command, of"
+            raise Problem(error("E215", message, help=help)) from None
 
 
 def find(kind: Kind, name: str, place: Place | None = None) -> Any:

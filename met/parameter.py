@@ -22,8 +22,8 @@ class Parameter:
     """One number (or vector of three, list, or word) that a deck may set on a model.
 
     `default` None means that the deck must write it. The bounds are in SI: `above` and `below` exclude their
-    value, `at_least` and `at_most` include it. `words` lists what a word may be. A list or a word cannot vary in a sweep.
-    `needed_for` names the kinds of command of a servo under which a parameter with a default must be written all the same.
+    value, `at_least` and `at_most` include it. `words` lists what a word may be. A list or a word cannot vary in a
+    sweep. `needed_for` names the kinds of command of a servo under which it must be written, default or not.
     """
 
     name: str

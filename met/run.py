@@ -30,7 +30,7 @@ class Run:
     metrics      by name, SI; not-a-number where the case failed
     met          requirements by their text: True where met; False for a failed case
     coordinates  the varied parameters as the engine used them, by path, SI
-    events       friction events by name (`program.build.EVENTS`): splits, clamped, undecided (docs/physics.md, section 6)
+    events       friction events by name: splits, clamped, undecided (docs/physics.md, section 6)
     """
 
     case: np.ndarray

@@ -1,6 +1,7 @@
 """What an environment model is to the engine: loads on the arm, from where it is and how it moves.
 
-Evaluated at every stage of every step (`docs/physics.md`, "Rates"), as ordinary functions over numbers that may be traced.
+Evaluated at every stage of every step (`docs/physics.md`, "Rates"), as ordinary functions over numbers that may be
+traced.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ class World(Protocol):
 
     time                 s
     joints, links        names, in the plan's order; joints are those that move
+    slides(joint)        whether it is prismatic
     q(joint), qd(joint)  rad, rad/s (m, m/s)
     position(link, point)  world position of a point given in the link's frame (m)
     velocity(link, point)  its velocity in the world (m/s)
@@ -31,6 +33,7 @@ class World(Protocol):
     joints: tuple[str, ...]
     links: tuple[str, ...]
 
+    def slides(self, joint: str) -> bool: ...
     def q(self, joint: str) -> Real: ...
     def qd(self, joint: str) -> Real: ...
     def position(self, link: str, point: Vector = (0.0, 0.0, 0.0)) -> Vector: ...
@@ -66,7 +69,7 @@ class Loads:
 class Environment:
     """The declaration of an environment model; one a file.
 
-    loads  (p, world) -> Loads. A parameter of shape "word" whose name is `joint` or `link` must name one of the arm's.
+    loads  (p, world) -> Loads. A parameter of shape "word" whose name is `joint` or `link` names one of the arm's.
     """
 
     name: str

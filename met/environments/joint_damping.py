@@ -1,4 +1,4 @@
-"""Viscous damping at every joint, as of grease outside the servo: torque = -damping qd."""
+"""Viscous damping at every joint, as of grease outside the servo: torque = -damping qd, force = -sliding qd."""
 
 from __future__ import annotations
 
@@ -9,14 +9,22 @@ from met.parameter import Parameter
 
 
 def loads(p: Any, world: World) -> Loads:
-    return Loads(torques={joint: -p.damping * world.qd(joint) for joint in world.joints})
+    rates = {joint: p.sliding if world.slides(joint) else p.damping for joint in world.joints}
+    return Loads(torques={joint: -rate * world.qd(joint) for joint, rate in rates.items()})
 
 
 ENVIRONMENT = Environment(
     name="joint_damping",
     doc=__doc__,
     parameters=(
-        Parameter(name="damping", unit="N*m*s/rad", at_least=0.0, doc="torque per joint rate, the same at all joints"),
+        Parameter(
+            name="damping", unit="N*m*s/rad", default=0.0, at_least=0.0,
+            doc="torque per joint rate, the same at all revolute joints",
+        ),
+        Parameter(
+            name="sliding", unit="N*s/m", default=0.0, at_least=0.0,
+            doc="force per joint rate, the same at all prismatic joints",
+        ),
     ),
     loads=loads,
 )

@@ -15,7 +15,7 @@ from met.plan import Experiment
 from met.program import friction
 from met.program.evaluation import Derivative, derivative, drive_of, state_names
 from met.program.machine import PARAMETER, Actuator, Machine
-from met.program.values import Values, parameters, returned
+from met.program.values import Values, answer, parameters, returned
 from met.servos.servo import Asked, Seen
 from met.trace import Real, Truth, absolute, any_of, both, either, floor, isfinite, not_, sign, where
 from met.trace.program import Control, Every, Phase, Program, Record, Run, Tape, Unless0, WhileAny
@@ -116,7 +116,7 @@ class Builder:
             tape.output(name, tape.read(name))
         for name, metric, _ in self.machine.metrics:
             p, held = self._metric(tape, name)
-            tape.output(f"metrics.{name}", metric.result(p, held, tape.time))
+            tape.output(f"metrics.{name}", answer(f"metric `{name}`", metric.result, p, held, tape.time))
         for coordinate in self.machine.experiment.cases.coordinates:
             tape.output(coordinate.path, tape.input(coordinate.path))
 
@@ -141,7 +141,7 @@ class Builder:
                 actuator.profile.parameters,
                 lambda path: self.machine.value(path, tape.read),
             )
-            value, slope = actuator.profile.course(p, tape.time)
+            value, slope = answer(actuator.owner, actuator.profile.course, p, tape.time)
             asked = Asked(actuator.use.command.kind, value, slope)
             tape.write(f"{actuator.path}.command", value)
         if servo.tick is None:
@@ -149,7 +149,7 @@ class Builder:
         q, qd = self._carried(tape, actuator) if actuator in self.between else self._state_of(tape, joint)
         held = Values(actuator.owner, {m.name: tape.read(f"{actuator.path}.{m.name}") for m in servo.memory})
         seen = Seen(q, qd, asked, actuator.use.divisor / self.schedule.base_hz)
-        new = servo.tick(self.machine.servo_values(actuator, tape.read), held, seen)
+        new = answer(actuator.owner, servo.tick, self.machine.servo_values(actuator, tape.read), held, seen)
         returned(actuator.owner, "tick", new, (memory.name for memory in servo.memory))
         for name, value in new.items():
             tape.write(f"{actuator.path}.{name}", value)
@@ -415,8 +415,9 @@ class Builder:
             for name, metric, channel in self.machine.metrics:
                 if channel.divisor == divisor:
                     p, held = self._metric(tape, name)
-                    new = metric.update(p, held, tape.read(channel.path), tape.time, dt)
-                    returned(f"metric `{name}`", "update", new, (memory.name for memory in metric.memory))
+                    owner = f"metric `{name}` (model {metric.name})"
+                    new = answer(owner, metric.update, p, held, tape.read(channel.path), tape.time, dt)
+                    returned(owner, "update", new, (memory.name for memory in metric.memory))
                     for memory, value in new.items():
                         tape.write(f"metrics.{name}.{memory}", value)
 

@@ -10,7 +10,7 @@ from met.environments.environment import Vector
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
 from met.program.machine import Actuator, Machine, ReadCell
-from met.program.values import Values, parameters, returned
+from met.program.values import Values, answer, parameters, returned
 from met.program.world import ArmWorld
 from met.servos.servo import Drive, JointMotion
 from met.trace import Real, Truth, not_
@@ -90,7 +90,8 @@ def drive_of(machine: Machine, actuator: Actuator, read: ReadCell, y: Motion, he
     names = state_names(machine)
     states = {state.name: y.x[names.index(f"{actuator.path}.{state.name}")] for state in servo.states}
     motion = JointMotion(y.q[actuator.index], y.qd[actuator.index], time)
-    drive = servo.drive(machine.servo_values(actuator, read), held, Values(actuator.owner, states), motion)
+    p = machine.servo_values(actuator, read)
+    drive = answer(actuator.owner, servo.drive, p, held, Values(actuator.owner, states), motion)
     returned(actuator.owner, "slopes", drive.slopes, states)
     returned(actuator.owner, "signals", drive.signals, (signal.name for signal in servo.signals))
     return drive
@@ -113,7 +114,7 @@ def _slopes(machine: Machine, drives: Sequence[Drive | None]) -> tuple[Real, ...
 def _environment(
     machine: Machine, tree: Tree, read: ReadCell, y: Motion, time: Real
 ) -> tuple[Vector, list[Real], dict[str, tuple[Vector, Vector]]]:
-    """Sum of all loads: gravity (world), torque a joint, wrench a link (moment about the link's origin, force; link axes)."""
+    """Sum of all loads: gravity (world), torque a joint, wrench a link (moment about its origin, force; link axes)."""
     world = ArmWorld(machine, tree, y.q, y.qd, time)
     gravity: list[Real] = [0.0, 0.0, 0.0]
     torques: list[Real] = [0.0 for _ in machine.joints]
@@ -122,7 +123,7 @@ def _environment(
         prefix = f"environment.{name}"
         owner = f"environment model `{model.name}` (as `{name}`)"
         p = parameters(owner, prefix, model.parameters, lambda path: machine.value(path, read))
-        loads = model.loads(p, world)
+        loads = answer(owner, model.loads, p, world)
         gravity = [a + b for a, b in zip(gravity, loads.gravity, strict=True)]
         for joint, torque in loads.torques.items():
             number = world._number(joint)

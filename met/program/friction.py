@@ -81,7 +81,7 @@ def split_at_rest(
 
 
 def first_root(rate: Real, slope: Real, end: Real) -> Real:
-    """Smallest root in (0, 1] of the parabola through `rate` at 0 with slope `slope` and `end` at 1; 1 where none is."""
+    """Smallest root in (0, 1] of the parabola from `rate` at 0, with slope `slope` there, to `end` at 1; else 1."""
     curve = end - rate - slope
     reach = sqrt(slope * slope - 4.0 * curve * rate)
     half = -0.5 * (slope + where(slope >= 0.0, reach, -reach))

@@ -20,7 +20,7 @@ from met.frozen import frozen
 from met.integrators.integrator import Integrator
 from met.metrics.metric import Metric
 from met.plan import Experiment, Formula, Joint, ServoUse, Structure
-from met.program.values import Values, parameters
+from met.program.values import Values, answer, parameters
 from met.servos.servo import Drive, JointMotion, Servo
 from met.trace import Graph, Real, Scalar
 
@@ -191,7 +191,8 @@ class Machine:
         drive, level = self._probe(bare)
         if drive.given is not None and level != 0.0:
             message = f"{bare.owner} gives both an acceleration and dry friction"
-            raise Problem(error("E219", message, use.place, help="a joint that is told its acceleration has no use for friction"))
+            help = "a joint that is told its acceleration has no use for friction"
+            raise Problem(error("E219", message, use.place, help=help))
         return Actuator(index, use, servo, profile, level)
 
     def _probe(self, actuator: Actuator) -> tuple[Drive, float | None]:
@@ -201,5 +202,5 @@ class Machine:
         held = Values(actuator.owner, {memory.name: graph.input(memory.name) for memory in servo.memory})
         states = Values(actuator.owner, {state.name: graph.input(state.name) for state in servo.states})
         joint = JointMotion(graph.input("q"), graph.input("qd"), graph.input("time"))
-        drive = servo.drive(self.servo_values(actuator, graph.input), held, states, joint)
+        drive = answer(actuator.owner, servo.drive, self.servo_values(actuator, graph.input), held, states, joint)
         return drive, graph.value(drive.dry.ref) if isinstance(drive.dry, Scalar) else float(drive.dry)

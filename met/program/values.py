@@ -1,13 +1,18 @@
-"""A model's parameters, memory and states as its functions see them: numbers by name, `p.kp`, `held.voltage`."""
+"""What passes between the engine and a model's functions: numbers by name, `p.kp`, `held.voltage`; their answers."""
 
 from __future__ import annotations
 
+import linecache
+import traceback
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from dataclasses import replace
+from typing import Any, TypeVar
 
-from met.diagnostic import Problem, error
+from met.diagnostic import Place, Problem, error
 from met.parameter import Parameter
 from met.trace import Real
+
+T = TypeVar("T")
 
 Read = Callable[[str], Any]
 """From a parameter's path to its value: a number (float or traced), a list or a word."""
@@ -46,12 +51,31 @@ def parameters(owner: str, prefix: str, declared: Iterable[Parameter], read: Rea
     return Values(owner, numbers)
 
 
+def answer(owner: str, function: Callable[..., T], *arguments: Any) -> T:
+    """What a model's function gives back. Whatever it raises is said at the model's own line, Problem E213."""
+    try:
+        return function(*arguments)
+    except Problem:
+        raise
+    except Exception as reason:  # a model is its author's code: whatever it raises is for the author to read
+        frames = traceback.extract_tb(reason.__traceback__)
+        own = [frame for frame in frames if frame.filename == function.__code__.co_filename] or frames
+        frame = own[-1]
+        place = Place(frame.filename, frame.lineno or 1, (frame.colno or 0) + 1)
+        if frame.end_colno is not None and frame.colno is not None and frame.end_lineno == frame.lineno:
+            place = replace(place, length=max(frame.end_colno - frame.colno, 1))
+        message = f"{owner}: `{function.__name__}` raises {type(reason).__name__}: {reason}"
+        sources = {frame.filename: "".join(linecache.getlines(frame.filename))}
+        raise Problem(error("E213", message, place, help="mend the model, or tell its author"), sources) from reason
+
+
 def returned(owner: str, what: str, given: Mapping[str, Real], declared: Iterable[str]) -> Mapping[str, Real]:
     """What a model's function gave back, checked to hold just the names that the model declares."""
     names = list(declared)
     missing = [name for name in names if name not in given]
     unknown = [name for name in given if name not in names]
     if missing or unknown:
-        message = f"{owner}: {what} gave back {', '.join(given) or 'nothing'}; declared are {', '.join(names) or 'none'}"
+        listed = ", ".join(given) or "nothing"
+        message = f"{owner}: {what} gave back {listed}; declared are {', '.join(names) or 'none'}"
         raise Problem(error("E212", message, help="give back every declared name and no other"))
     return given

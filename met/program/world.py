@@ -17,8 +17,12 @@ class ArmWorld:
         self.time = time
         self.joints = tuple(joint.name for joint in machine.joints)
         self.links = tuple(link.name for link in machine.structure.links)
+        self._sliding = {joint.name: joint.kind == "prismatic" for joint in machine.joints}
         self._tree, self._q, self._qd = tree, q, qd
         self._motions: dict[str, LinkMotion] | None = None
+
+    def slides(self, joint: str) -> bool:
+        return self._sliding[self.joints[self._number(joint)]]
 
     def q(self, joint: str) -> Real:
         return self._q[self._number(joint)]

@@ -71,16 +71,28 @@ SERVO = Servo(
     doc=__doc__,
     commands=("rate", "position", "torque"),
     parameters=(
-        Parameter(name="ratio", unit="rad/joint", above=0.0, doc="gear ratio N: motor turns per joint turn", source=TABLE_1),
-        Parameter(name="kp", unit="V*s/rad", at_least=0.0, doc="gain on the motor's rate error", source=TABLE_1),
-        Parameter(name="ki", unit="V/rad", at_least=0.0, doc="gain on the rate error's integral", source=TABLE_1),
-        Parameter(name="v_max", unit="V", above=0.0, doc="largest voltage of the drive's amplifier", source=TABLE_1),
-        Parameter(name="resistance", unit="ohm", above=0.0, doc="armature resistance R", source=TABLE_1),
-        Parameter(name="kt", unit="N*m/A", above=0.0, doc="torque constant, and back-EMF constant in V s/rad", source=TABLE_1),
-        Parameter(name="tau_max", unit="N*m", above=0.0, doc="largest motor torque, before friction", source=TABLE_1),
-        Parameter(name="j_m", unit="kg*m^2", above=0.0, doc="inertia of the motor's shaft J_m", source=TABLE_1),
-        Parameter(name="f_c", unit="N*m", default=0.0, at_least=0.0, doc="Coulomb friction at the motor", source=TABLE_1),
-        Parameter(name="f_v", unit="N*m*s/rad", default=0.0, at_least=0.0, doc="viscous friction at the motor", source=TABLE_1),
+        Parameter(
+            name="ratio", unit="rad/joint", above=0.0, source=TABLE_1,
+            doc="gear ratio N: motor turns per joint turn",
+        ),
+        Parameter(name="kp", unit="V*s/rad", at_least=0.0, source=TABLE_1, doc="gain on the motor's rate error"),
+        Parameter(name="ki", unit="V/rad", at_least=0.0, source=TABLE_1, doc="gain on the rate error's integral"),
+        Parameter(name="v_max", unit="V", above=0.0, source=TABLE_1, doc="largest voltage of the drive's amplifier"),
+        Parameter(name="resistance", unit="ohm", above=0.0, source=TABLE_1, doc="armature resistance R"),
+        Parameter(
+            name="kt", unit="N*m/A", above=0.0, source=TABLE_1,
+            doc="torque constant, and back-EMF constant in V s/rad",
+        ),
+        Parameter(name="tau_max", unit="N*m", above=0.0, source=TABLE_1, doc="largest motor torque, before friction"),
+        Parameter(name="j_m", unit="kg*m^2", above=0.0, source=TABLE_1, doc="inertia of the motor's shaft J_m"),
+        Parameter(
+            name="f_c", unit="N*m", default=0.0, at_least=0.0, source=TABLE_1,
+            doc="Coulomb friction at the motor",
+        ),
+        Parameter(
+            name="f_v", unit="N*m*s/rad", default=0.0, at_least=0.0, source=TABLE_1,
+            doc="viscous friction at the motor",
+        ),
         Parameter(
             name="k_position", unit="1/s", default=0.0, at_least=0.0, needed_for=("position",),
             doc="gain from position error to rate asked, used under a position command alone",

@@ -36,7 +36,7 @@ from met.trace.graph import Formulas, Graph, Real, Truth
 from met.trace.scalar import Mask, Scalar
 
 __all__ = [
-    "Formulas", "Graph", "Mask", "Real", "Scalar", "Truth", "absolute", "all_of", "any_of", "atan2", "both", "clip", "cos",
-    "either", "exp", "floor", "fma", "gather", "is_nan", "isfinite", "log", "maximum", "minimum", "not_", "rint", "sign",
-    "sin", "sqrt", "tan", "tanh", "where",
+    "Formulas", "Graph", "Mask", "Real", "Scalar", "Truth", "absolute", "all_of", "any_of", "atan2", "both", "clip",
+    "cos", "either", "exp", "floor", "fma", "gather", "is_nan", "isfinite", "log", "maximum", "minimum", "not_", "rint",
+    "sign", "sin", "sqrt", "tan", "tanh", "where",
 ]  # fmt: skip

@@ -63,4 +63,5 @@ def refuse(what: str, help: str = _CHOOSE, *, truth: bool = False, function: str
         what = f"{what}, for `{piece}`"
         help = f"use met.trace.{_OURS[name]}"
     message = f"a model asks for {what}, which only a run knows"
-    raise Problem(error("E200", message, Label(place, "while it is recorded"), help=help))
+    text = "".join(linecache.getlines(place.file))
+    raise Problem(error("E200", message, Label(place, "while it is recorded"), help=help), {place.file: text})

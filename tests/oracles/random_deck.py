@@ -66,7 +66,7 @@ def random_deck(seed: int, *, friction: bool = True) -> str:
             )
             uses.append(f"j{i} = servo{i};")
     gravity = f"gravity = {vector(9.81, 'm/s^2')};" if pick.random() < 0.7 else ""
-    damping = "drag = joint_damping { damping = 0.3 N*m*s/rad; };" if pick.random() < 0.3 and count == 1 else ""
+    damping = "drag = joint_damping { damping = 0.3 N*m*s/rad; sliding = 4 N*s/m; };" if pick.random() < 0.3 else ""
     dynamics = pick.choice(["250 Hz", "500 Hz", "1 kHz"])
     initial = " ".join(
         f"j{i}.q = {number(-1, 1)} {unit}; j{i}.qd = {number(-1, 1)} {unit}/s;" if pick.random() < 0.5 else ""

@@ -92,7 +92,8 @@ def test_an_edited_servo_runs_as_edited_and_the_old_one_comes_from_the_cache(met
 
     try:
         before, kept = run("before.h5")
-        source.write_text(original.replace("p.gain * (held.qd_cmd - joint.qd)", "0.5 * p.gain * (held.qd_cmd - joint.qd)"))
+        law = "p.gain * (held.qd_cmd - joint.qd)"
+        source.write_text(original.replace(law, f"0.5 * {law}"))
         assert source.read_text() != original
         edited, more = run("edited.h5")
         assert (edited != before).any(), "the edit is to be seen in the very next run"
@@ -117,3 +118,20 @@ def test_a_servo_that_branches_on_a_recorded_value_is_told_where(met, site: Path
     assert f"velocity_servo.py:{line}:" in said
     assert "where(condition, a, b)" in said
     assert "Traceback" not in said
+
+
+def test_a_servo_that_raises_is_told_where(met, site: Path) -> None:  # type: ignore[no-untyped-def]
+    source = site / "met_example_models" / "velocity_servo.py"
+    original = source.read_text()
+    broken = original.replace("held.qd_cmd - joint.qd)", "held.qd_cmd - joint.qdot)")
+    line = broken[: broken.index("joint.qdot")].count("\n") + 1
+    try:
+        source.write_text(broken)
+        said = met("run", "blown.ic", "blown", "-o", "x.h5", "--no-picture", status=2)
+        source.write_text(original.replace('unit="effort*s/joint"', 'unit="efort*s/joint"'))
+        unit = met("check", "blown.ic", status=2)
+    finally:
+        source.write_text(original)
+    assert "error[E213]: servo `drive` of joint `shoulder` (model velocity_servo): `drive` raises AttributeError" in said
+    assert f"velocity_servo.py:{line}:" in said and "joint.qdot" in said and "Traceback" not in said
+    assert "error[E215]" in unit and "`gain`" in unit and "`efort` is not a unit" in unit
