@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from met.cli import BAD_INPUT, YES, complain, deck_options, format_option, loudness_options
-from met.diagnostic import Label, Problem
+from met.diagnostic import Label, Problem, did_you_mean
 
 if TYPE_CHECKING:
     from ic.meaning.lower import Compiled
@@ -237,7 +237,7 @@ def _compiled(
 def _plan_in_file(path: str, names: tuple[str, ...]) -> Plan:
     from dataclasses import replace
 
-    from ic.meaning.complaints import did_you_mean, known_words
+    from ic.meaning.complaints import known_words
     from met import plan_file
     from met.diagnostic import error
 

@@ -3,11 +3,10 @@ directories of MET_DECK_PATH and in the standard library."""
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
 from ic.text.files import LIBRARY, Files
-from met.diagnostic import Problem, error
+from met.diagnostic import Problem, error, nearest
 
 
 def find(name: str) -> Path:
@@ -19,8 +18,8 @@ def find(name: str) -> Path:
     standard = standard_decks()
     folder = "" if str(Path(name).parent) == "." else f"{Path(name).parent}/"
     known = [f"{folder}{each}" for each in here] + standard
-    close = difflib.get_close_matches(name, known, n=1) or difflib.get_close_matches(f"{name}.ic", known, n=1)
-    helps = [f"did you mean `{close[0]}`?"] if close else []
+    close = nearest(name, known) or nearest(f"{name}.ic", known)
+    helps = [f"did you mean `{close}`?"] if close is not None else []
     raise Problem(error("D173", f"no deck `{name}`", help=[*helps, f"standard decks: {', '.join(standard)}"]))
 
 

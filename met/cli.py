@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 
 import click
 
-from met.diagnostic import Diagnostic, Problem, error
+from met.diagnostic import Diagnostic, Problem, error, nearest
 from met.entry_points import EntryPoint, offered
 from met.version import VERSION
 
@@ -81,12 +81,10 @@ class Table(click.Group):
             formatter.write_dl(lines)
 
     def _meant(self, name: str) -> str:
-        import difflib
-
         if name.endswith(".ic"):
             return f"; did you mean `met run {name}`?"
-        close = difflib.get_close_matches(name, self.table(), n=1)
-        return f"; did you mean `met {close[0]}`?" if close else ""
+        close = nearest(name, self.table())
+        return f"; did you mean `met {close}`?" if close is not None else ""
 
 
 @click.command(

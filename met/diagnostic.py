@@ -86,3 +86,18 @@ def error(code: str, message: str, at: Label | Place | None = None, *, also: Ite
     label = Label(at) if isinstance(at, Place) else at
     helps = (help,) if isinstance(help, str) else tuple(help)
     return Diagnostic(code, message, label, tuple(also), helps)
+
+
+def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
+    """The known word that is most like this one; None where none is `cutoff` like it (1 is the same word)."""
+    import difflib  # only who made a mistake pays for it
+
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=cutoff)
+    return close[0] if close else None
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> tuple[str, ...]:
+    """The help line that offers the nearest known word, capitals or not; or none."""
+    folded = {candidate.lower(): candidate for candidate in dict.fromkeys(known)}
+    close = nearest(word.lower(), folded)
+    return (f"did you mean `{folded[close]}`?",) if close is not None else ()

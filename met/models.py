@@ -11,13 +11,12 @@ offer the same name are an error, never a race.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any, Literal, Protocol
 
 from met import units
-from met.diagnostic import Place, Problem, error
+from met.diagnostic import Place, Problem, did_you_mean, error
 from met.entry_points import offered
 from met.frozen import frozen
 from met.parameter import Parameter
@@ -140,9 +139,7 @@ def find(kind: Kind, name: str, place: Place | None = None) -> Any:
     models = available(kind)
     if name in models:
         return models[name]
-    close = difflib.get_close_matches(name, models, n=1)
-    helps = [f"did you mean `{close[0]}`?"] if close else []
-    helps.append(f"{kind} models: {', '.join(sorted(models))}")
+    helps = [*did_you_mean(name, models), f"{kind} models: {', '.join(sorted(models))}"]
     raise Problem(error("D140", f"no {kind} model `{name}`", place, help=helps))
 
 

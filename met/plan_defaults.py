@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator
 
 from met import models
 from met.channel import channels, joint_unit
+from met.diagnostic import nearest
 from met.parameter import Parameter
 from met.plan import Experiment, Origin, Quantity, Structure
 
@@ -30,8 +30,7 @@ def unknown_parameters(experiment: Experiment) -> Iterator[tuple[str, str | None
     models_of += [f"metrics.{use.name}." for use in structure.metrics]
     for path in experiment.parameters:
         if path not in known and path.startswith(tuple(models_of)):
-            near = difflib.get_close_matches(path, known, n=1, cutoff=0.8)
-            yield path, near[0] if near else None
+            yield path, nearest(path, known, cutoff=0.8)
 
 
 def required(structure: Structure) -> Iterator[tuple[str, str, float | tuple[float, ...] | str | None]]:

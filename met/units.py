@@ -10,7 +10,6 @@ prefixes beyond the table, so that a unit's name is known to be one wherever a d
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -219,8 +218,7 @@ def suggest(name: str) -> str | None:
     folded = {unit.lower(): unit for unit in UNITS}
     if name.lower() in folded:
         return folded[name.lower()]
-    near = difflib.get_close_matches(name, UNITS, n=1, cutoff=0.75)
-    return near[0] if near else None
+    return nearest(name, UNITS, cutoff=0.75)
 
 
 def parse_unit(written: str, names: Mapping[str, Measure] = MappingProxyType({})) -> Measure:

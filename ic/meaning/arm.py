@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from ic.grammar.syntax import Expression, Name, Unary
-from ic.meaning.complaints import did_you_mean, known_words
+from ic.meaning.complaints import known_words
 from ic.meaning.models import check_keys, word_of
 from ic.meaning.resolve import Block, Definition, Item
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.shapes import SHAPES, Solid
-from met.diagnostic import Label, Place
+from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Joint, Link

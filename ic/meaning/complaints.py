@@ -68,16 +68,6 @@ class Complaints:
             raise Problem(self.all)
 
 
-def did_you_mean(word: str, known: Iterable[str]) -> tuple[str, ...]:
-    """The help line that offers the nearest known word, or none."""
-    import difflib  # only a deck with a mistake pays for it
-
-    candidates = list(dict.fromkeys(known))
-    folded = {candidate.lower(): candidate for candidate in candidates}
-    close = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.6)
-    return (f"did you mean `{folded[close[0]]}`?",) if close else ()
-
-
 def known_words(what: str, known: Iterable[str], most: int = 24) -> str:
     """`keys of a link: com, inertia, mass, shape`, cut where there are many."""
     names = list(dict.fromkeys(known))

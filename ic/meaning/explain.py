@@ -9,10 +9,9 @@ import numpy as np
 
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Binary, Call, Expression, List, Name, Unary, WithUnit
-from ic.meaning.complaints import did_you_mean
 from ic.meaning.lower import Compiled, Select, check
 from ic.meaning.scope import Scope, Settled
-from met.diagnostic import Label, Place, Problem, error
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan import Experiment
 from met.trace import Formulas, Scalar

@@ -12,7 +12,7 @@ import numpy as np
 
 from ic.grammar.syntax import Deck, Word
 from ic.meaning.arm import resolve_arm
-from ic.meaning.complaints import Complaints, did_you_mean, known_words
+from ic.meaning.complaints import Complaints, known_words
 from ic.meaning.resolve import Definition, Definitions
 from ic.meaning.run import Resolved, resolve_run
 from ic.meaning.scope import Scope
@@ -20,7 +20,7 @@ from ic.meaning.servos import check_servo_definition
 from ic.meaning.sweep import Sweep, check_coordinates, coordinates, kept, read_sweep, table
 from ic.meaning.values import Value
 from ic.read import in_order, read
-from met.diagnostic import Diagnostic, Label, Problem, error
+from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan import Cases, Experiment, Formula, Plan, Source
 from met.trace import Formulas, Graph, Scalar

@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from typing import Any
 
 from ic.grammar.syntax import Call, Expression, Name
-from ic.meaning.complaints import did_you_mean, known_words
+from ic.meaning.complaints import known_words
 from ic.meaning.resolve import Block
 from ic.meaning.scope import Owner, Scope
 from met import models
-from met.diagnostic import Place, Problem
+from met.diagnostic import Place, Problem, did_you_mean
 from met.parameter import Parameter
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 from ic.grammar.syntax import Expression, Name
-from ic.meaning.complaints import did_you_mean, known_words
+from ic.meaning.complaints import known_words
 from ic.meaning.resolve import Definitions
 from ic.meaning.values import CONSTANTS, FUNCTIONS, Value, Values, evaluate
 from met import units
-from met.diagnostic import Label, Place, Problem, error
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
 
 DEEPEST = 64  # lets that need lets: far more than a deck has, far less than Python's recursion bears
 

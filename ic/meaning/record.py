@@ -7,14 +7,14 @@ from typing import Any, Literal
 
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Binary, Expression, List, Name, Statement
-from ic.meaning.complaints import did_you_mean, known_words
+from ic.meaning.complaints import known_words
 from ic.meaning.models import find_model, use_model, word_of
 from ic.meaning.resolve import Block, Item
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.values import place_of
 from met import models
 from met.channel import Channel, channels
-from met.diagnostic import Label, Place
+from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import MetricUse, Recorded, Requirement, Structure

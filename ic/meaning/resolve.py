@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field, replace
 
 from ic.grammar.syntax import Call, Deck, Entry, Expression, Group, Let, Name, Setting, Statement, Word
-from ic.meaning.complaints import Complaints, did_you_mean, known_words
-from met.diagnostic import Diagnostic, Label, Place, Problem, error
+from ic.meaning.complaints import Complaints, known_words
+from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 
 KINDS = ("arm", "servo", "run", "sweep")

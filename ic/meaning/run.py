@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from ic.grammar.syntax import Call, Name, Word
 from ic.meaning.arm import Arm, resolve_arm
-from ic.meaning.complaints import did_you_mean, known_words
+from ic.meaning.complaints import known_words
 from ic.meaning.models import find_model, use_model, word_of
 from ic.meaning.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
 from ic.meaning.resolve import Block, Definition, Item
@@ -15,7 +15,7 @@ from ic.meaning.scope import Owner, Scope
 from ic.meaning.servos import RATE, Use, fixed_rate, resolve_servos
 from ic.meaning.values import Values, place_of
 from met import models
-from met.diagnostic import Place
+from met.diagnostic import Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import EnvironmentUse, Requirement, Schedule, ServoUse, Structure

@@ -15,13 +15,13 @@ import numpy as np
 
 from ic.grammar.syntax import Call, Expression, Name
 from ic.meaning.checks import Checks, Varied
-from ic.meaning.complaints import Complaints, did_you_mean
+from ic.meaning.complaints import Complaints
 from ic.meaning.names import Names
 from ic.meaning.resolve import Definitions, Item
 from ic.meaning.unit_words import in_deck, unit_here
 from ic.meaning.values import Value, Values, place_of
 from met import units
-from met.diagnostic import Label, Place, Problem, error
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import JointKind, Origin, Quantity

@@ -8,7 +8,7 @@ from typing import Any
 
 from ic.grammar.syntax import Call, Name, Word
 from ic.meaning.arm import Arm
-from ic.meaning.complaints import did_you_mean, known_words
+from ic.meaning.complaints import known_words
 from ic.meaning.models import check_keys, find_model, use_model, word_of
 from ic.meaning.resolve import Block, Item, open_call, overlay
 from ic.meaning.schedule import Rate
@@ -17,7 +17,7 @@ from ic.meaning.unit_words import in_deck
 from ic.meaning.values import place_of
 from met import models
 from met.channel import COMMAND_UNIT
-from met.diagnostic import Label, Place, Problem
+from met.diagnostic import Label, Place, Problem, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Command

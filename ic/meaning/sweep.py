@@ -13,13 +13,13 @@ import numpy as np
 
 from ic.grammar.syntax import Binary, Expression, Group, Name, Setting, Statement, Unary
 from ic.meaning.checks import Varied
-from ic.meaning.complaints import Complaints, did_you_mean, known_words
+from ic.meaning.complaints import Complaints, known_words
 from ic.meaning.names import Names
 from ic.meaning.resolve import Definition, Definitions
 from ic.meaning.scope import Scope
 from ic.meaning.values import COMPARISONS, PURE, Value, Values, evaluate_number, measure_of, place_of
 from met import units
-from met.diagnostic import Label, Place, Problem, error
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan import Coordinate
 from met.trace import Formulas, Graph, Scalar

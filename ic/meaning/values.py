@@ -12,9 +12,9 @@ from fractions import Fraction
 from typing import cast
 
 from ic.grammar.syntax import Binary, Call, Expression, List, Name, Number, String, Unary, Unit, WithUnit
-from ic.meaning.complaints import did_you_mean, known_words
+from ic.meaning.complaints import known_words
 from met import units
-from met.diagnostic import Label, Place, Problem, error
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.trace import Real, Scalar, cos, maximum, minimum, sin, sqrt
 from met.units import PURE, Dimension

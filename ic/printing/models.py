@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import textwrap
 from collections.abc import Iterator
 from typing import Any, get_args
 
 from ic.printing.columns import columns, number, vector
 from met import models
-from met.diagnostic import Problem, error
+from met.diagnostic import Problem, did_you_mean, error
 from met.parameter import Parameter
 
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
@@ -43,9 +42,7 @@ def chosen(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
     if found and len(words) == 1:
         return found
     known = [*KINDS, *(model.name for _, model in everything)]
-    close = difflib.get_close_matches(words[0], known, n=1)
-    helps = [f"did you mean `{close[0]}`?"] if close else []
-    helps.append(f"kinds: {', '.join(KINDS)}")
+    helps = [*did_you_mean(words[0], known), f"kinds: {', '.join(KINDS)}"]
     raise Problem(error("D171", f"no kind of model and no model `{words[0]}`", help=helps))
 
 

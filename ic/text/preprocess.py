@@ -15,7 +15,7 @@ from typing import Any
 from pcpp import Action, OutputDirective
 
 from ic.grammar.syntax import SourceText
-from ic.meaning.complaints import Complaints, did_you_mean
+from ic.meaning.complaints import Complaints
 from ic.text.conditions import Refused, evaluate, well_formed
 from ic.text.files import LIBRARY, Files, FoundFile
 from ic.text.lexer import (
@@ -44,7 +44,7 @@ from ic.text.limits import (
 )
 from ic.text.macros import Macros
 from ic.text.strays import complain_of_stray
-from met.diagnostic import Diagnostic, Label, Place, Problem
+from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean
 from met.frozen import frozen
 
 CONDITIONALS = ("if", "ifdef", "ifndef", "elif", "else", "endif")
