@@ -40,7 +40,7 @@ class Archive:
 
 
 def run(
-    plan: Plan,
+    plan: Plan | str | os.PathLike[str],
     *,
     output: str | os.PathLike[str] | None = None,
     experiments: Sequence[str] | None = None,
@@ -51,7 +51,9 @@ def run(
 ) -> Archive:
     """Run a plan's cases into an archive.
 
-    output       the archive; None: the deck's name with `.h5`, in the current folder
+    plan         what `ic.compile` gives, or a plan file (`met plan DECK -o p.json`)
+    output       the archive; None: in the current folder, called as `met run` calls it: the deck's name, and those of
+                 the runs and sweeps that were asked for (`two_link.gains.h5`)
     experiments  names of runs and sweeps; None: all of the plan's
     cases        rows of the case table, `"#7"`, or the beginnings of case_ids; None: all
     histories    "default": all while the archive stays below 1 GiB, else metrics only; "all"; "none"
@@ -59,9 +61,24 @@ def run(
     """
     from batch.campaign import perform, prepare
 
-    campaign = prepare(plan, output=output, experiments=experiments, cases=cases, histories=histories)
+    campaign = prepare(_plan(plan), output=output, experiments=experiments, cases=cases, histories=histories)
     perform(campaign, threads=threads, progress=progress)
     return look(campaign.output, campaign.notes)
+
+
+def _plan(given: object) -> Plan:
+    """A plan, or the one in a plan file; TypeError for what is neither, such as a deck's name."""
+    from met.plan import Plan
+
+    if isinstance(given, Plan):
+        return given
+    if not isinstance(given, str | os.PathLike):
+        raise TypeError(f"batch.run takes a plan, as ic.compile gives it, and not {type(given).__name__}")
+    if Path(given).suffix != ".json":
+        raise TypeError(f"batch.run takes a plan, and {os.fspath(given)!r} is none: batch.run(ic.compile({given!r}))")
+    from met import plan_file
+
+    return plan_file.read(given)
 
 
 def look(path: str | os.PathLike[str], notes: Sequence[str] = ()) -> Archive:

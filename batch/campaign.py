@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import json
 import os
+import shlex
 import shutil
 import time
 from collections.abc import Iterator, Sequence
@@ -18,6 +19,8 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from batch.archive import layout as archive_layout
+from batch.archive.sink import Busy, Sink, temporary_of
+from batch.rows import row_of
 from met import keys
 from met.diagnostic import Problem, error
 from met.frozen import frozen
@@ -128,9 +131,10 @@ def default_output(
 ) -> Path:
     """`two_link.h5`; `two_link.gains.h5` where runs are named; `two_link.gains.case7.h5` for some of the cases.
 
+    They are named here, or were when the plan was made (`two_link.all.h5` where all were asked for).
     So a case that is run again does not take its sweep's place. A deck of the standard library is called `<name>`.
     """
-    names = [Path(plan.deck.strip("<>")).stem, *(experiments or ())]
+    names = [Path(plan.deck.strip("<>")).stem, *(experiments or plan.selected)]
     chosen = [int(row) for _, rows in selected for row in rows]
     if len(chosen) < sum(experiment.cases.count for experiment, _ in selected):
         names.append("case" + "-".join(map(str, chosen)) if len(chosen) <= 4 else "cases")
@@ -146,7 +150,7 @@ def perform(
     from batch.archive.write import Writer
 
     began = time.time()
-    temporary = _temporary(campaign.output)
+    temporary = temporary_of(campaign.output)
     try:
         writer = Writer(temporary, campaign.plan, [(p.experiment, p.rows, p.recorded) for p in campaign.parts])
         try:
@@ -161,9 +165,12 @@ def perform(
                 **machine(),
             }
             publish(campaign.output, temporary, sidecar)
+            writer.close()
         except BaseException:
             writer.abandon()
             raise
+    except Busy:
+        raise Problem(_busy(campaign.output)) from None
     except OSError as reason:
         raise Problem(_cannot_write(campaign.output, reason)) from reason
     return timings
@@ -203,10 +210,13 @@ def _batches(part: Part) -> Iterator[tuple[int, np.ndarray]]:
 def publish(output: Path, temporary: Path, sidecar: dict[str, Any]) -> None:
     """Give a finished archive its name, and its sidecar."""
     beside = sidecar_path(output)
-    beside_temporary = _temporary(beside)
-    beside_temporary.write_text(json.dumps(sidecar, indent=1) + "\n", encoding="utf-8")
-    temporary.replace(output)
-    beside_temporary.replace(beside)
+    beside_temporary = temporary_of(beside)
+    try:
+        beside_temporary.write_text(json.dumps(sidecar, indent=1) + "\n", encoding="utf-8")
+        temporary.replace(output)
+        beside_temporary.replace(beside)
+    finally:
+        beside_temporary.unlink(missing_ok=True)
     folder = os.open(output.parent, os.O_RDONLY)
     try:
         os.fsync(folder)
@@ -216,10 +226,6 @@ def publish(output: Path, temporary: Path, sidecar: dict[str, Any]) -> None:
 
 def sidecar_path(output: Path) -> Path:
     return output.with_name(output.name + ".run.json")
-
-
-def _temporary(target: Path) -> Path:
-    return target.with_name(f".{target.name}.{os.getpid()}.tmp")
 
 
 # What can be refused
@@ -264,7 +270,7 @@ def _selected(
 
 
 def _is_row(case: int | str) -> bool:
-    return not isinstance(case, str) or (case.startswith("#") and case[1:].isdecimal())
+    return not isinstance(case, str) or row_of(case) is not None
 
 
 def _case_text(case: int | str) -> str:
@@ -273,8 +279,8 @@ def _case_text(case: int | str) -> str:
 
 def _rows(experiment: Experiment, case: int | str) -> list[int]:
     if _is_row(case):
-        row = int(case.lstrip("#")) if isinstance(case, str) else int(case)
-        return [row] if 0 <= row < experiment.cases.count else []
+        row = row_of(case) if isinstance(case, str) else int(case)
+        return [row] if row is not None and 0 <= row < experiment.cases.count else []
     return [row for row, case_id in enumerate(keys.case_ids(experiment)) if case and case_id.startswith(str(case))]
 
 
@@ -282,6 +288,8 @@ def check_output(campaign: Campaign) -> None:
     """Refuse an output that could not be written in the end, before anything runs."""
     try:
         _check_output(campaign)
+    except Busy:
+        raise Problem(_busy(campaign.output)) from None
     except OSError as reason:
         raise Problem(_cannot_write(campaign.output, reason)) from reason
 
@@ -290,22 +298,23 @@ def _check_output(campaign: Campaign) -> None:
     from batch.archive.read import is_archive
 
     output = campaign.output
-    for target in (output, sidecar_path(output)):
+    for target in (output, sidecar_path(output)) if output.name else (output,):  # the name of . and / is empty
         if target.is_dir():
-            helps = f"name a file in it: `-o {target / default_output(campaign.plan)}`" if target == output else ()
+            inside = quoted(target / default_output(campaign.plan))
+            helps = f"name a file in it: `-o {inside}`" if target == output else ()
             raise Problem(error("E305", f"cannot write {target}: it is a folder", help=helps))
     if not output.parent.is_dir():
         what = "is a file, not a folder" if output.parent.exists() else "does not exist"
-        helps = () if output.parent.exists() else f"make it first: `mkdir -p {output.parent}`"
+        helps = () if output.parent.exists() else f"make it first: `mkdir -p {quoted(output.parent)}`"
         raise Problem(error("E305", f"cannot write {output}: {output.parent} {what}", help=helps))
     if output.exists() and not output.is_file():
         raise Problem(error("E305", f"cannot write {output}: it is not a regular file"))
     if output.exists() and output.stat().st_size > 0 and not is_archive(output):
         helps = "give another name with `-o`, or remove the file"
         raise Problem(error("E305", f"{output} exists and is no archive of MET: it is not written over", help=helps))
-    probe = _temporary(output)
-    probe.open("xb").close()
-    probe.unlink()
+    probe = Sink(temporary_of(output))
+    probe.remove()
+    probe.close()
     free = shutil.disk_usage(output.parent).free
     if campaign.bytes > free:
         needs, has = size_text(campaign.bytes), size_text(free)
@@ -319,6 +328,17 @@ def _check_output(campaign: Campaign) -> None:
 def _cannot_write(output: Path, reason: OSError) -> Any:
     why = (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
     return error("E305", f"cannot write {output}: {why}", help="nothing was kept; `-o FILE` names another place")
+
+
+def _busy(output: Path) -> Any:
+    helps = "wait until it is done, or give another name with `-o`"
+    return error("E307", f"cannot write {output}: another run is writing it now", help=helps)
+
+
+def quoted(path: Any) -> str:
+    """A path as a word of a command line: for a shell, and not to be taken for an option."""
+    text = str(path)
+    return shlex.quote(f"./{text}" if text.startswith("-") else text)
 
 
 def size_text(size: float) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from met.cli import NO, YES, deck_options, format_option, loudness_options
+from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
 
 
 @click.command(short_help="Run the cases of a deck or a plan into an archive.")
@@ -29,21 +29,33 @@ def run(source: str, names: tuple[str, ...], form: str, **options: Any) -> int:
     met the requirements; 1 not all; 2 the input is wrong, and nothing was written.
     """
     from batch.running import run_and_tell
+    from batch.termination import TERMINATED, Terminated, terminable
 
-    return YES if run_and_tell(source, names, json=form == "json", **options) else NO
+    check_options(source, names, options["everything"], options["defines"], options["include_dirs"])
+    try:
+        with terminable():
+            return YES if run_and_tell(source, names, json=form == "json", **options) else NO
+    except Terminated:
+        click.echo("\nmet: terminated", err=True)
+        return TERMINATED
 
 
 @click.command(short_help="Show an archive in the terminal: outcome, metrics, signals.")
 @click.argument("archive", metavar="ARCHIVE")
 @click.argument("signals", nargs=-1, metavar="[SIGNAL]...")
 @click.option("--run", "experiments", multiple=True, metavar="NAME", help="Only this run or sweep of the archive.")
-@click.option("--case", metavar="ID", help="The case to draw: the beginning of its id, or '#0' [the first].")
+@click.option("--case", metavar="ID", help="All about this case alone: the beginning of its id, or '#0'.")
+@click.option("--all-cases", is_flag=True, help="All rows of the table of cases, not the worst 20 alone.")
 @click.option("--no-plots", is_flag=True, help="Numbers only.")
 @format_option
 def show(
-    archive: str, signals: tuple[str, ...], experiments: tuple[str, ...], case: str | None, no_plots: bool, form: str
-) -> int:
-    """Show what an archive holds: what was run, how it went, metrics, requirements, and SIGNALs (`qd`, `elbow.q`)."""
+    archive: str, signals: tuple[str, ...], experiments: tuple[str, ...], case: str | None, all_cases: bool,
+    no_plots: bool, form: str,
+) -> int:  # fmt: skip
+    """Show what an archive holds: what was run, how it went, metrics, requirements, and SIGNALs (`qd`, `elbow.q`).
+
+    Of a sweep, also which cases failed or missed a requirement, worst first.
+    """
     import shutil
     import sys
 
@@ -53,11 +65,14 @@ def show(
 
     with ArchiveFile(archive) as file:
         if form == "json":
-            click.echo(as_json(file, experiments))
+            click.echo(as_json(file, experiments, case=case, all_cases=all_cases))
             return YES
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
         colour = wants_colour(sys.stdout)
-        text = show(file, signals, experiments=experiments, case=case, width=width, colour=colour, plots=not no_plots)
+        text = show(
+            file, signals, experiments=experiments, case=case, all_cases=all_cases, width=width, colour=colour,
+            plots=not no_plots,
+        )  # fmt: skip
         click.echo(text, nl=False, color=colour)
     return YES
 

@@ -1,7 +1,8 @@
 """`met plot`: an archive as a picture. One panel a signal; joints as lines, cases overlaid, many cases as a fan.
 
 One case: a line a joint. Up to `OVERLAID` cases: a column a joint, a line a case. More: a line for the median of all
-cases, a dark band for nine in ten and a light one for all. Without histories: metrics over the varied parameter.
+cases, a dark band for nine in ten and a light one for all. A recorded command is dashed over what should follow it.
+Without histories: metrics over the varied parameter.
 """
 
 from __future__ import annotations
@@ -15,18 +16,18 @@ from typing import Any
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group, Stored
-from batch.signals import Panel, case_text, history, number_text, panels, pretty_unit
+from batch.arrange import Cell, Command, arranged, joints_of, overlaid, spread
+from batch.signals import Panel, case_text, deck_unit, history, number_text, panels
 from met.diagnostic import Problem, error
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Okabe and Ito, "Color Universal Design" (2008): told apart by colour-blind eyes as well."""
 
 OVERLAID = 8
-FAN_CASES = 2000
-"""A fan is drawn from this many cases at most, spread over all."""
-
 INK, FAINT = "#22282e", "#8a939c"
 PANEL_INCHES, MARKER = 1.85, 14
+MOST_COLUMNS = 3
+COMMAND = "command"
 SOFTWARE = "MET"
 
 STYLE: dict[str, Any] = {
@@ -134,25 +135,26 @@ def _save(figure: Any, output: Path) -> None:
 
 
 def _histories(archive: ArchiveFile, group: Group, signals: Sequence[str], cases: Sequence[str]) -> Any:
-    wanted = panels(group, signals)
     positions = [_recorded_position(group, case) for case in cases] if cases else list(range(group.recorded))
-    single = len(positions) == 1
-    columns = 1 if single else max(len(panel.lines) for panel in wanted)
-    fan = len(positions) > OVERLAID
-    by_joint = single or columns > 3
-    columns = 1 if by_joint else columns
-    figure, axes = _grid(len(wanted), columns)
+    single, fan = len(positions) == 1, len(positions) > OVERLAID
+    found = panels(group, signals)
+    commands = overlaid(group, found, positions, apart=not single and not fan)
+    if not signals:  # a command that is drawn where it belongs needs no panel of its own
+        drawn = {(command.variable, command.column) for command in commands.values()}
+        found = [panel for panel in found if not drawn.issuperset((panel.variable, c) for c in panel.columns)]
+    rows = arranged(group, found)
+    by_joint = single or len(rows[0]) > MOST_COLUMNS
+    if by_joint:
+        rows = [[Cell(panel, tuple(range(len(panel.lines))), panel.axis, panel.about)] for panel in found]
+    figure, axes = _grid(rows)
     time = group.values("time")
-    joints = list(group.values("joint")) if "joint" in group.variables else []
-    for row, panel in enumerate(wanted):
-        for column in range(columns):
-            ax = axes[row][column]
-            lines = range(len(panel.lines)) if by_joint else [column] if column < len(panel.lines) else []
-            if not lines:
-                ax.set_visible(False)
+    joints = joints_of(group)
+    for cells, row in zip(rows, axes, strict=True):
+        for cell, ax in zip(cells, row, strict=True):
+            if cell is None:
                 continue
-            for line in lines:
-                colour = _joint_colour(joints, panel, line)
+            for line in cell.lines:
+                panel, colour = cell.panel, _joint_colour(joints, cell.panel, line)
                 if single:
                     y = history(group, panel, positions[0])[:, line]
                     style = {"linewidth": _width(line, len(panel.lines)), "linestyle": _dashes(line)}
@@ -161,12 +163,11 @@ def _histories(archive: ArchiveFile, group: Group, signals: Sequence[str], cases
                     _fan(ax, time, group, panel, positions, line, colour)
                 else:
                     _overlay(ax, time, group, panel, positions, line, colour if by_joint else None)
-            _dress(ax, panel, panel.lines[column] if not by_joint else "", column)
+            for line in cell.lines:
+                _draw_command(ax, time, group, commands.get((cell.panel.name, cell.panel.unit, line)), positions)
             ax.margins(x=0.0)
-        for ax in axes[row]:
-            ax.tick_params(labelbottom=row == len(wanted) - 1)
-    _time_labels(axes, wanted, columns)
-    _legend(figure, axes, group, wanted, positions, single=single, fan=fan, by_joint=by_joint)
+    _dress(axes, rows)
+    _legend(figure, axes, group, rows, single=single, fan=fan, by_joint=by_joint)
     if single:
         below = case_text(group, positions[0]) if group.attributes["cases_in_table"] > 1 else ""
     else:
@@ -207,12 +208,7 @@ def _line(ax: Any, time: np.ndarray, y: np.ndarray, **style: Any) -> None:
 
 def _fan(ax: Any, time: np.ndarray, group: Group, panel: Panel, positions: list[int], line: int, colour: str) -> None:
     """Median, nine in ten, all."""
-    some = (
-        positions
-        if len(positions) <= FAN_CASES
-        else [positions[i] for i in np.linspace(0, len(positions) - 1, FAN_CASES).astype(int)]
-    )
-    values = np.stack([history(group, panel, position)[:, line] for position in some])
+    values = np.stack([history(group, panel, position)[:, line] for position in spread(positions)])
     good = np.isfinite(values).any(axis=0)
     time, values = time[good], values[:, good]
     if not len(time):
@@ -237,6 +233,22 @@ def _overlay(
             _line(ax, time, y, color=_sequence(index, len(positions)), label=_case_label(group, position))
 
 
+def _draw_command(ax: Any, time: np.ndarray, group: Group, command: Command | None, positions: Sequence[int]) -> None:
+    """Dashed, over what followed it; in the cases' colours where each has its own."""
+    if command is None:
+        return
+    style: dict[str, Any] = {"linestyle": (0, (4, 3)), "linewidth": 1.0}
+    if command.shared:
+        known = COMMAND in ax.get_legend_handles_labels()[1]
+        label = None if known else COMMAND
+        ax.plot(time, command.values(group, command.longest), color=INK, label=label, **style)
+        return
+    for index, position in enumerate(positions):
+        colour = _sequence(index, len(positions))
+        ax.plot(time, command.values(group, position), color=colour, **style)
+    ax.plot([], [], color=INK, label=COMMAND, **style)
+
+
 def _sequence(index: int, count: int) -> Any:
     """Colours that order cases: from dark blue to yellow, the pale end left out."""
     import matplotlib
@@ -244,15 +256,25 @@ def _sequence(index: int, count: int) -> Any:
     return matplotlib.colormaps["viridis"](0.0 if count == 1 else 0.88 * index / (count - 1))
 
 
+def _differing(group: Group) -> list[Stored]:
+    """The varied parameters that tell the cases here apart."""
+    return [v for v in group.role("coordinate") if len(np.unique(group.values(v.name))) > 1]
+
+
 def _case_label(group: Group, position: int) -> str:
-    varied = group.coordinates_of(position)
-    differing = {v.name for v in group.role("coordinate") if len(np.unique(group.values(v.name))) > 1}
-    words = [
-        f"{path} = {number_text(value)} {pretty_unit(unit)}".removesuffix(" 1")
-        for path, (value, unit) in varied.items()
-        if path in differing
-    ]
-    return "\n".join(words) or f"case #{group.values('case')[position]}"
+    """The values of what differs; the legend's title says of what."""
+    values = [number_text(group.values(v.name)[position] / deck_unit(v)[0]) for v in _differing(group)]
+    return " · ".join(values) or f"case #{group.values('case')[position]}"
+
+
+def _case_title(group: Group) -> str:
+    """What the values in the legend are of, a line each."""
+    return " ·\n".join(_with_unit(v) for v in _differing(group))
+
+
+def _with_unit(variable: Stored) -> str:
+    unit = deck_unit(variable)[1]
+    return f"{variable.name}  ({unit})" if unit else variable.name
 
 
 # Metrics
@@ -267,19 +289,20 @@ def _metrics(archive: ArchiveFile, group: Group) -> Any:
             error("E327", f"nothing to draw in `{group.name}`: it has neither histories nor metrics", help=helps)
         )
     varied = sorted(group.role("coordinate"), key=lambda v: -len(np.unique(group.values(v.name))))
-    figure, axes = _grid(len(metrics), 1)
+    shown = [_shown(group, metric) for metric in metrics]
+    rows: list[list[Cell | None]] = []
+    for metric, (y, label) in zip(metrics, shown, strict=True):
+        lost = int((~np.isfinite(y)).sum())
+        about = metric.long_name + (f"; not finite in {lost:,} cases, which are left out" if lost else "")
+        panel = Panel(metric.name, about, metric.unit, metric.name, ("",), (0,))
+        rows.append([Cell(panel, (0,), label, about)])
+    figure, axes = _grid(rows)
     x, x_label = group.values("case"), "case"
     if varied:
         x, x_label = _shown(group, varied[0])
-    for row, metric in enumerate(metrics):
-        ax = axes[row][0]
-        y = group.values(metric.name)
-        _scatter(ax, group, x, np.where(np.isfinite(y), y, np.nan), varied[1] if len(varied) > 1 else None)
-        lost = int((~np.isfinite(y)).sum())
-        about = metric.long_name + (f"; not finite in {lost:,} cases, which are left out" if lost else "")
-        _dress(ax, Panel(metric.name, about, metric.unit, metric.name, ("",), (0,)), "", 0)
-        ax.tick_params(labelbottom=row == len(metrics) - 1)
-    axes[-1][0].set_xlabel(x_label)
+    for (y, _), row in zip(shown, axes, strict=True):
+        _scatter(row[0], group, x, np.where(np.isfinite(y), y, np.nan), varied[1] if len(varied) > 1 else None)
+    _dress(axes, rows, below=x_label)
     if len(varied) > 1:
         handles, labels = axes[0][0].get_legend_handles_labels()
         if handles:
@@ -291,10 +314,8 @@ def _metrics(archive: ArchiveFile, group: Group) -> Any:
 
 
 def _shown(group: Group, variable: Stored) -> tuple[np.ndarray, str]:
-    """A varied parameter in the deck's unit, and its axis label."""
-    scale = float(variable.attributes.get("deck_scale", 1.0))
-    unit = pretty_unit(str(variable.attributes.get("deck_unit", variable.unit)))
-    return group.values(variable.name) / scale, variable.name if unit == "1" else f"{variable.name}  ({unit})"
+    """A varied parameter or a metric in the deck's unit, and its axis label."""
+    return group.values(variable.name) / deck_unit(variable)[0], _with_unit(variable)
 
 
 def _marker_scale(count: int) -> float:
@@ -325,24 +346,43 @@ def _scatter(ax: Any, group: Group, x: np.ndarray, y: np.ndarray, by: Stored | N
 # Dress
 
 
-def _grid(rows: int, columns: int) -> tuple[Any, list[list[Any]]]:
-    """Panels under and beside one another, time shared."""
+def _grid(rows: Sequence[Sequence[Cell | None]]) -> tuple[Any, list[list[Any]]]:
+    """Panels under and beside one another; time shared, and in a row the scale of what has the same unit."""
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+    columns = len(rows[0])
     width = 8.6 if columns == 1 else 3.6 * columns + 2.2
     engine = ConstrainedLayoutEngine(h_pad=0.05, w_pad=0.06, hspace=0.02)
-    figure = Figure(figsize=(width, PANEL_INCHES * max(rows, 1.5) + 1.0), layout=engine)
-    axes = figure.subplots(rows, columns, sharex=True, sharey="row", squeeze=False)
-    return figure, [list(row) for row in axes]
+    figure = Figure(figsize=(width, PANEL_INCHES * max(len(rows), 1.5) + 1.0), layout=engine)
+    axes = [list(row) for row in figure.subplots(len(rows), columns, sharex=True, squeeze=False)]
+    for cells, row in zip(rows, axes, strict=True):
+        first: dict[str, Any] = {}
+        for cell, ax in zip(cells, row, strict=True):
+            if cell is None:
+                ax.set_visible(False)
+            elif cell.axis in first:
+                ax.sharey(first[cell.axis])
+            else:
+                first[cell.axis] = ax
+    return figure, axes
 
 
-def _dress(ax: Any, panel: Panel, joint: str, column: int) -> None:
-    """Label of the axis, and above the panel what it shows."""
-    if column == 0:
-        ax.set_ylabel(_broken(panel.axis))
-    above = joint if column else " · ".join(part for part in (joint, panel.about) if part)
-    ax.set_title(above, loc="left", fontsize=8.5, color=INK if joint else FAINT, pad=4)
+def _dress(axes: list[list[Any]], rows: Sequence[Sequence[Cell | None]], below: str = "time  (s)") -> None:
+    """Labels of the axes, once where neighbours share them, and above each panel what it shows."""
+    for number, (cells, row) in enumerate(zip(rows, axes, strict=True)):
+        before = None
+        for column, (cell, ax) in enumerate(zip(cells, row, strict=True)):
+            if cell is not None:
+                alike = before is not None and before.axis == cell.axis
+                ax.set_ylabel("" if alike else _broken(cell.axis))
+                ax.tick_params(labelleft=not alike)
+                colour = INK if len(cells) > 1 else FAINT
+                ax.set_title(cell.title, loc="left", fontsize=8.5, color=colour, pad=4)
+                last = all(later[column] is None for later in rows[number + 1 :])
+                ax.set_xlabel(below if last else "")
+                ax.tick_params(labelbottom=last)
+            before = cell
 
 
 def _broken(label: str) -> str:
@@ -350,30 +390,35 @@ def _broken(label: str) -> str:
     return label.replace("  (", "\n(") if len(label) > 16 else label
 
 
-def _time_labels(axes: list[list[Any]], wanted: list[Panel], columns: int) -> None:
-    for column in range(columns):
-        shown = [row for row in range(len(wanted)) if axes[row][column].get_visible()]
-        last = axes[shown[-1]][column]
-        last.set_xlabel("time  (s)")
-        last.tick_params(labelbottom=True)
-
-
 def _legend(
-    figure: Any, axes: list[list[Any]], group: Group, wanted: list[Panel], positions: list[int], *,
+    figure: Any, axes: list[list[Any]], group: Group, rows: Sequence[Sequence[Cell | None]], *,
     single: bool, fan: bool, by_joint: bool,
 ) -> None:  # fmt: skip
     """Beside the panels, once for all that share it."""
-    if not single and not fan and not by_joint:
-        handles, labels = axes[0][0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside right upper", fontsize=8, labelspacing=0.9)
+    if by_joint:
+        last: list[str] = []
+        for row in axes:
+            labels = row[0].get_legend_handles_labels()[1]
+            if labels and labels != last:
+                row[0].legend(loc="upper left", bbox_to_anchor=(1.005, 1.06), fontsize=8.5, handlelength=1.4)
+                last = labels
         return
-    if not by_joint:
-        return
-    last: tuple[str, ...] = ()
-    for row, panel in enumerate(wanted):
-        if panel.lines != last and any(panel.lines):
-            axes[row][0].legend(loc="upper left", bbox_to_anchor=(1.005, 1.06), fontsize=8.5, handlelength=1.4)
-        last = panel.lines if any(panel.lines) else last
+    known: dict[str, Any] = {}
+    for cells, row in zip(rows, axes, strict=True):
+        for cell, ax in zip(cells, row, strict=True):
+            if cell is not None:
+                handles, labels = ax.get_legend_handles_labels()
+                known |= {text: handle for text, handle in zip(labels, handles, strict=True) if text not in known}
+    if fan:  # its panels have their joints' names above them
+        known = {text: handle for text, handle in known.items() if text == COMMAND}
+    if known:
+        command = known.pop(COMMAND, None)
+        known |= {COMMAND: command} if command is not None else {}
+        title = None if fan else _case_title(group)
+        figure.legend(
+            known.values(), known.keys(), loc="outside right upper", fontsize=8, title=title, title_fontsize=8,
+            alignment="left",
+        )  # fmt: skip
 
 
 def _title(figure: Any, archive: ArchiveFile, group: Group, below: str) -> None:

@@ -8,12 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from batch.archive.read import ArchiveFile
-from batch.campaign import Campaign, Part, default_output, history_bytes, perform, prepare, size_text
+from batch.campaign import Campaign, Part, history_bytes, perform, prepare, quoted, size_text
 from batch.progress import Bar, duration
 from batch.show import verdict
 from batch.summary import Summary, as_json, summarise
 from met.diagnostic import Problem
+from met.frozen import frozen
 from met.plan import Plan
+
+WORST = 3
+"""Cases of a sweep that the verdict names."""
 
 
 def run_and_tell(
@@ -37,19 +41,18 @@ def run_and_tell(
     plan = read_plan(
         source, names, everything=everything, defines=defines, include_dirs=include_dirs, quiet=quiet or json
     )
-    if everything and output is None:
-        output = str(default_output(plan, ("all",)))
     campaign = prepare(plan, output=output, experiments=names or None, cases=cases or None, histories=histories)
     say("\n".join(announcement(campaign, verbose, notes=verbose or is_plan(source))))
     timings = perform(campaign, threads=threads, progress=None if quiet or json else Bar())
     with ArchiveFile(campaign.output) as file:
         summaries = summarise(file)
+        worst = worst_cases(file)
         picture, excuse = (None, "") if no_picture else first_picture(file)
     ok = all(summary.ok for summary in summaries)
     if json:
-        print(verdict_json(campaign, summaries, picture, timings, ok))
+        print(verdict_json(campaign, summaries, worst, picture, timings, ok))
     else:
-        say("\n".join(told(source, campaign, summaries, picture, excuse, timings, ok)))
+        say("\n".join(told(source, campaign, summaries, worst, picture, excuse, timings, ok)))
     return ok
 
 
@@ -135,25 +138,55 @@ def _part_lines(part: Part, verbose: bool) -> list[str]:
 # What is said after
 
 
+@frozen
+class Worst:
+    """The worst cases of a sweep: as lines, for programs, and the row of the first."""
+
+    lines: tuple[str, ...] = ()
+    rows: tuple[dict[str, Any], ...] = ()
+
+    @property
+    def first(self) -> str:
+        return f"#{self.rows[0]['row']}"
+
+
+def worst_cases(archive: ArchiveFile) -> tuple[Worst, ...]:
+    """Of every experiment; none where there is one case, or nothing by which one would be worse than another."""
+    from batch import cases
+
+    out = []
+    for group in archive.groups:
+        rows = tuple(cases.rows_json(group, WORST))
+        judged = any(row["met"] or row["status"] == "failed" for row in rows)
+        lines = (cases.title(group, WORST), *cases.table(group, WORST, hint=False)) if judged else ()
+        out.append(Worst(lines, rows if judged else ()) if group.count > 1 else Worst())
+    return tuple(out)
+
+
 def told(
-    source: str, campaign: Campaign, summaries: tuple[Summary, ...], picture: Path | None, excuse: str,
-    timings: list[dict[str, Any]], ok: bool,
+    source: str, campaign: Campaign, summaries: tuple[Summary, ...], worst: tuple[Worst, ...], picture: Path | None,
+    excuse: str, timings: list[dict[str, Any]], ok: bool,
 ) -> list[str]:  # fmt: skip
     """The verdict, and where everything is."""
     out: list[str] = []
-    for summary, timing in zip(summaries, timings, strict=True):
+    for summary, cases, timing in zip(summaries, worst, timings, strict=True):
         lines = verdict(summary, 100)
         name = f"{summary.name}: " if len(summaries) > 1 else ""
         out += ["", f"{name}{lines[0]}, in {duration(timing['seconds'])}", *lines[1:]]
+        out += ["", *cases.lines] if cases.lines else []
     path = campaign.output
     out += ["", f"archive  {path}  ({size_text(path.stat().st_size)})"]
     if picture is not None:
         out.append(f"picture  {picture}")
     elif excuse:
         out.append(f"picture  none: {excuse}")
-    out.append(f"next     met show {_quoted(path)}")
+    out.append(f"next     met show {quoted(path)}")
+    for summary, cases in zip(summaries, worst, strict=True):
+        if cases.rows:
+            only = f" --run {quoted(summary.name)}" if len(summaries) > 1 else ""
+            out.append(f"         met show {quoted(path)}{only} --case '{cases.first}'")
     if not any(summary.recorded for summary in summaries) and campaign.parts[0].experiment.structure.record:
-        out.append(f"         met run {_quoted(source)} {summaries[0].name} --case '#0'")
+        out.append(f"         met run {quoted(source)} {summaries[0].name} --case '#0'")
     if not ok:
         out.append(f"exit 1: {_why_not(summaries)}")
     return out
@@ -168,15 +201,10 @@ def _why_not(summaries: tuple[Summary, ...]) -> str:
     return "; ".join(parts)
 
 
-def _quoted(path: Any) -> str:
-    import shlex
-
-    return shlex.quote(str(path))
-
-
 def verdict_json(
-    campaign: Campaign, summaries: tuple[Summary, ...], picture: Path | None, timings: list[dict[str, Any]], ok: bool
-) -> str:
+    campaign: Campaign, summaries: tuple[Summary, ...], worst: tuple[Worst, ...], picture: Path | None,
+    timings: list[dict[str, Any]], ok: bool,
+) -> str:  # fmt: skip
     """The verdict for programs."""
     data = {
         "ok": ok,
@@ -184,8 +212,8 @@ def verdict_json(
         "picture": None if picture is None else str(picture),
         "notes": list(campaign.notes),
         "experiments": [
-            {**as_json(summary), "seconds": timing["seconds"]}
-            for summary, timing in zip(summaries, timings, strict=True)
+            {**as_json(summary), "worst": list(cases.rows), "seconds": timing["seconds"]}
+            for summary, cases, timing in zip(summaries, worst, timings, strict=True)
         ],
     }
     return json_module.dumps(data, indent=1)

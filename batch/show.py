@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from batch import braille
+from batch import braille, cases
 from batch.archive.read import ArchiveFile, Group
 from batch.campaign import size_text
 from batch.signals import case_text, history, number_text, panels, pretty_unit
@@ -25,36 +26,60 @@ def show(
     *,
     experiments: Sequence[str] = (),
     case: str | None = None,
+    all_cases: bool = False,
     width: int = 100,
     colour: bool = False,
     plots: bool = True,
 ) -> str:
-    """The whole text; a plot is of one case, the first recorded unless `case` names another."""
+    """The whole text: of all cases with their table, or all about one `case`.
+
+    A plot is of one case, the first recorded unless `case` names another; under the table of all cases there is none
+    unless `signals` are asked for.
+    """
     out = [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
-    for group in chosen(archive, experiments):
-        summary = summary_of(group)
-        out += ["", *heading(group, width), "", *verdict(summary, width), ""]
-        if plots:
-            out += _plots(group, signals, case, width, colour)
+    for group, position in picked(archive, experiments, case):
+        out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, width), ""]
+        if plots and (signals or position is not None or not all_cases):
+            out += _plots(group, signals, position, width, colour)
     return "\n".join(out).rstrip() + "\n"
 
 
-def as_json(archive: ArchiveFile, experiments: Sequence[str] = ()) -> str:
-    """The same for programs: outcome, variables and attributes, without the signals' values."""
+def _about(archive: ArchiveFile, group: Group, position: int | None, all_cases: bool, width: int) -> list[str]:
+    """How the cases went, and which of them how; or one case: how it went, and what was varied in it."""
+    if position is not None:
+        varied = cases.varied_lines(archive, group, position)
+        name = [case_text(group, position, varied=False)] if group.count > 1 else []
+        return [*name, *verdict(summary_of(group, position), width), *([""] if varied else []), *varied]
+    out = verdict(summary_of(group), width)
+    if group.count > 1:
+        out += ["", cases.title(group), *cases.table(group, None if all_cases else cases.SHOWN_CASES)]
+    return out
+
+
+def as_json(
+    archive: ArchiveFile, experiments: Sequence[str] = (), *, case: str | None = None, all_cases: bool = False
+) -> str:
+    """The same for programs: outcome, cases, variables and attributes, without the signals' values.
+
+    `case_table` holds the cases as `show` lists them, the worst of many unless `all_cases`; where one `case` is asked
+    for, the outcome is its own, and `case` holds it with all its parameters.
+    """
     import json
 
     from batch import summary as outcomes
 
-    groups = [
-        {
-            **outcomes.as_json(summary_of(group)),
-            "attributes": group.attributes,
-            "variables": [
-                {"name": v.name, "role": v.role, "dims": v.dims, "unit": v.unit} for v in group.variables.values()
-            ],
-        }
-        for group in chosen(archive, experiments)
-    ]
+    groups = []
+    for group, position in picked(archive, experiments, case):
+        if position is None:
+            said: dict[str, Any] = {"case_table": cases.rows_json(group, None if all_cases else cases.SHOWN_CASES)}
+        else:
+            [about] = cases.rows_json(group, positions=[position])
+            said = {"case": {**about, "parameters": outcomes.finite(cases.parameters(archive, group, position))}}
+        variables = [{"name": v.name, "role": v.role, "dims": v.dims, "unit": v.unit} for v in group.variables.values()]
+        groups.append({
+            **outcomes.as_json(summary_of(group, position)), **said, "attributes": group.attributes,
+            "variables": variables,
+        })  # fmt: skip
     data = {"archive": str(archive.path), "deck": archive.deck, "provenance": archive.provenance, "experiments": groups}
     return json.dumps(data, indent=1)
 
@@ -69,14 +94,31 @@ def chosen(archive: ArchiveFile, names: Sequence[str]) -> tuple[Group, ...]:
     return tuple(groups[name] for name in names) if names else archive.groups
 
 
+def picked(archive: ArchiveFile, names: Sequence[str], case: str | None) -> list[tuple[Group, int | None]]:
+    """The experiments of these names; where a case is asked for, those that have it, and its position in each."""
+    groups = chosen(archive, names)
+    if case is None:
+        return [(group, None) for group in groups]
+    found: list[tuple[Group, int | None]] = []
+    problems = []
+    for group in groups:
+        try:
+            found.append((group, group.find_case(case)))
+        except Problem as problem:
+            problems.append(problem)
+    if not found:
+        raise Problem([d for problem in problems for d in problem.diagnostics])
+    return found
+
+
 def heading(group: Group, width: int) -> list[str]:
     """What was run."""
     a = group.attributes
-    cases = f"{group.count:,} case{'s' if group.count != 1 else ''}"
+    count = f"{group.count:,} case{'s' if group.count != 1 else ''}"
     if group.count < a["cases_in_table"]:
-        cases += f" of {a['cases_in_table']:,}"
+        count += f" of {a['cases_in_table']:,}"
     text = (
-        f"{cases}, {a['duration_s']:g} s, {a['integrator']} at {a['dynamics_hz']:g} Hz, recorded at "
+        f"{count}, {a['duration_s']:g} s, {a['integrator']} at {a['dynamics_hz']:g} Hz, recorded at "
         f"{a['record_hz']:g} Hz, arm {a['arm']}, velocity products {a['velocity_products']}"
     )
     lines = textwrap.wrap(text, width - len(group.name) - 2)
@@ -104,10 +146,12 @@ def verdict(summary: Summary, width: int) -> list[str]:
     wide = max((len(r.text) for r in summary.requirements), default=0)
     for r in summary.requirements:
         if summary.cases == 1:
-            said = "met" if r.met else "missed" if r.missed else "not known: the case failed"
+            why = "its metric has no value here" if r.no_value else "the case failed"
+            said = "met" if r.met else "missed" if r.missed else f"not known: {why}"
         else:
             said = f"met by {r.met:,} of {summary.cases:,} ({100 * r.met / summary.cases:.3g} %)"
             said += f", not known of {r.unknown:,}" if r.unknown else ""
+            said += f" (its metric has no value in {r.no_value:,})" if r.no_value else ""
         out.append(f"  require {r.text:<{wide}}  {said}")
     return out
 
@@ -126,9 +170,8 @@ def _metric_table(summary: Summary) -> list[str]:
     head = ("", "", "") if single else ("min", "median", "max")
     rows = [("", *(head[:1] if single else head), "", "")]
     for metric in summary.metrics:
-        rows.append(
-            (metric.name, *_metric_numbers(metric, single), pretty_unit(metric.unit), _metric_words(metric, single))
-        )
+        unit = "" if metric.deck_unit == "1" else pretty_unit(metric.deck_unit)
+        rows.append((metric.name, *_metric_numbers(metric, single), unit, _metric_words(metric, single)))
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     out = []
     for row in rows[1:] if single else rows:
@@ -138,10 +181,11 @@ def _metric_table(summary: Summary) -> list[str]:
 
 
 def _metric_numbers(metric: MetricSummary, single: bool) -> tuple[str, ...]:
+    scale = metric.deck_scale
     if single:
-        return ("inf" if metric.infinite else "-" if metric.unknown else number_text(metric.median),)
+        return ("inf" if metric.infinite else "-" if metric.unknown else number_text(metric.median / scale),)
     values = (metric.minimum, metric.median, metric.maximum)
-    return tuple("-" if math.isnan(value) else number_text(value) for value in values)
+    return tuple("-" if math.isnan(value) else number_text(value / scale) for value in values)
 
 
 def _metric_words(metric: MetricSummary, single: bool) -> str:
@@ -151,17 +195,15 @@ def _metric_words(metric: MetricSummary, single: bool) -> str:
     return words
 
 
-def _plots(group: Group, signals: Sequence[str], case: str | None, width: int, colour: bool) -> list[str]:
+def _plots(group: Group, signals: Sequence[str], case: int | None, width: int, colour: bool) -> list[str]:
     if not group.recorded:
-        if signals or case:
+        if signals:
             panels(group, signals)  # says that there are none
         return ["no histories kept"]
-    position = 0
-    if case is not None:
-        position = group.find_case(case)
+    position = case or 0
     wanted = panels(group, signals)
     drawn = wanted if signals else wanted[:PLOTS]
-    out = [case_text(group, position)] if group.count > 1 else []
+    out = [case_text(group, position)] if group.count > 1 and case is None else []
     time = group.values("time")
     for panel in drawn:
         values = history(group, panel, position)

@@ -90,7 +90,7 @@ def pretty_unit(unit: str) -> str:
     while "^" in rest:
         before, _, rest = rest.partition("^")
         digits = 1 if rest[:1] == "-" else 0
-        while rest[digits : digits + 1].isdigit():
+        while rest[digits : digits + 1].isdecimal():
             digits += 1
         out += before + rest[:digits].translate(SUPERSCRIPTS)
         rest = rest[digits:]
@@ -108,11 +108,26 @@ def number_text(value: float) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def case_text(group: Group, position: int) -> str:
+def deck_unit(variable: Stored) -> tuple[float, str]:
+    """What to divide a variable's SI values by, and the unit they are then in, typeset; "" for a pure number."""
+    unit = str(variable.attributes.get("deck_unit", variable.unit))
+    return float(variable.attributes.get("deck_scale", 1.0)), "" if unit == "1" else pretty_unit(unit)
+
+
+def value_text(value: float | str | tuple[float, ...], variable: Stored) -> str:
+    """An SI value of a variable as the deck would write it: `20.1 g`, `4.2 %`."""
+    scale, unit = deck_unit(variable)
+    if isinstance(value, str):
+        return value
+    text = f"[{', '.join(number_text(v / scale) for v in value)}]" if isinstance(value, tuple) else ""
+    return f"{text or number_text(value / scale)} {unit}".rstrip()  # type: ignore[operator]
+
+
+def case_text(group: Group, position: int, *, varied: bool = True) -> str:
     """A case in a few words: `case #4 8f3ab2c1 · gearbox.kp = 0.02 V·s/rad`."""
     row, case_id = group.values("case")[position], group.values("case_id")[position]
-    varied = [
+    words = [
         f"{path} = {number_text(value)} {pretty_unit(unit)}".removesuffix(" 1")
-        for path, (value, unit) in group.coordinates_of(position).items()
+        for path, (value, unit) in (group.coordinates_of(position).items() if varied else ())
     ]
-    return " · ".join([f"case #{row} {case_id[:8]}", *varied])
+    return " · ".join([f"case #{row} {case_id[:8]}", *words])

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Group
+from batch.archive.read import ArchiveFile, Group, Stored
 from met.frozen import frozen
 
 
@@ -24,7 +24,8 @@ class Failure:
 class MetricSummary:
     """A metric over the cases that have one: how many, and the spread of the finite ones (SI).
 
-    infinite  cases where it is infinite (a settling time that never comes);  unknown  where it is not a number
+    infinite    cases where it is infinite (a settling time that never comes);  unknown  where it is not a number
+    deck_unit   the unit its requirement is written in, else that of its values; shown = value / deck_scale
     """
 
     name: str
@@ -35,16 +36,22 @@ class MetricSummary:
     maximum: float
     infinite: int
     unknown: int
+    deck_unit: str = ""
+    deck_scale: float = 1.0
 
 
 @frozen
 class RequirementSummary:
-    """How many cases meet a requirement, miss it, and leave it open because they failed."""
+    """How many cases meet a requirement, miss it, and leave it open.
+
+    unknown  because they failed, or because the metric has no value;  no_value  of these, the latter
+    """
 
     text: str
     met: int
     missed: int
     unknown: int
+    no_value: int
 
 
 @frozen
@@ -73,27 +80,34 @@ def summarise(archive: ArchiveFile) -> tuple[Summary, ...]:
     return tuple(summary_of(group) for group in archive.groups)
 
 
-def summary_of(group: Group) -> Summary:
-    """The outcome of one experiment."""
-    failed = np.flatnonzero(group.values("status") != 0)
+def summary_of(group: Group, position: int | None = None) -> Summary:
+    """The outcome of one experiment, or of its case at this position."""
+    here = slice(None) if position is None else slice(position, position + 1)
+    failed = np.flatnonzero(group.values("status")[here] != 0)
     failures: tuple[Failure, ...] = ()
     if len(failed):
-        rows, ids, causes = group.values("case"), group.values("case_id"), group.values("cause")
+        rows, ids, causes = (group.values(name)[here] for name in ("case", "case_id", "cause"))
         failures = tuple(Failure(int(rows[i]), str(ids[i]), str(causes[i])) for i in _one_of_each(causes, failed))
     requirements: tuple[RequirementSummary, ...] = ()
     if "met" in group.variables:
-        met = group.values("met")
+        met, done = group.values("met")[here], group.values("status")[here] == 0
         requirements = tuple(
-            RequirementSummary(str(text), *(int((met[:, i] == value).sum()) for value in (1, 0, -1)))
+            RequirementSummary(
+                str(text),
+                met=int((met[:, i] == 1).sum()),
+                missed=int((met[:, i] == 0).sum()),
+                unknown=int((met[:, i] == -1).sum()),
+                no_value=int(((met[:, i] == -1) & done).sum()),
+            )
             for i, text in enumerate(group.values("requirement"))
         )
     return Summary(
         name=group.name,
-        cases=group.count,
+        cases=group.count if position is None else 1,
         failed=len(failed),
-        recorded=group.recorded,
+        recorded=group.recorded if position is None else min(1, group.recorded),
         failures=failures,
-        metrics=tuple(_metric(v.name, v.unit, v.long_name, group.values(v.name)) for v in group.role("metric")),
+        metrics=tuple(_metric(v, group.values(v.name)[here]) for v in group.role("metric")),
         requirements=requirements,
     )
 
@@ -102,7 +116,7 @@ def _one_of_each(causes: np.ndarray, failed: np.ndarray) -> list[int]:
     """The first few failed cases, unlike ones first: a cause without its numbers is what counts as alike."""
     first: dict[str, int] = {}
     for position in failed.tolist():
-        kind = "".join(c for c in str(causes[position]).partition(": ")[2] if not c.isdigit())
+        kind = "".join(c for c in str(causes[position]).partition(": ")[2] if not c.isdecimal())
         first.setdefault(kind, position)
         if len(first) >= SHOWN_FAILURES:
             break
@@ -110,11 +124,15 @@ def _one_of_each(causes: np.ndarray, failed: np.ndarray) -> list[int]:
     return sorted([*first.values(), *more][:SHOWN_FAILURES])
 
 
-def _metric(name: str, unit: str, about: str, values: np.ndarray) -> MetricSummary:
+def _metric(variable: Stored, values: np.ndarray) -> MetricSummary:
     finite = np.sort(values[np.isfinite(values)])
     low, middle, high = (finite[0], _median(finite), finite[-1]) if len(finite) else (np.nan,) * 3
     infinite, unknown = int(np.isinf(values).sum()), int(np.isnan(values).sum())
-    return MetricSummary(name, unit, about, float(low), float(middle), float(high), infinite, unknown)
+    told = variable.attributes
+    return MetricSummary(
+        variable.name, variable.unit, variable.long_name, float(low), float(middle), float(high), infinite, unknown,
+        str(told.get("deck_unit", variable.unit)), float(told.get("deck_scale", 1.0)),
+    )  # fmt: skip
 
 
 def _median(rising: np.ndarray) -> float:
@@ -127,13 +145,14 @@ def as_json(summary: Summary) -> dict[str, Any]:
     """Plain data for `--format json`; a number that is not finite is null."""
     from dataclasses import asdict
 
-    data: dict[str, Any] = _finite(asdict(summary))
+    data: dict[str, Any] = finite(asdict(summary))
     return {**data, "ok": summary.ok}
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
+    """The same with null for every number that JSON has no word for."""
     if isinstance(value, Mapping):
-        return {key: _finite(part) for key, part in value.items()}
+        return {key: finite(part) for key, part in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(part) for part in value]
+        return [finite(part) for part in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value

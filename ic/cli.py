@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from met.cli import BAD_INPUT, YES, complain, deck_options, format_option, loudness_options
+from met.cli import BAD_INPUT, YES, check_options, complain, deck_options, format_option, loudness_options
 from met.diagnostic import Label, Problem, did_you_mean
 
 if TYPE_CHECKING:
@@ -27,8 +27,12 @@ def check(
 ) -> int:
     """Find all that is wrong with a deck.
 
-    Every run and sweep of it is compiled to its plan; nothing is run.
+    Every run and sweep of it is compiled to its plan; nothing is run. A plan file is read, and what it holds is said.
     """
+    check_options(deck, defines=defines, include_dirs=include_dirs)
+    check_options(deck, defines=defines, include_dirs=include_dirs)
+    if deck.endswith(".json"):
+        return _check_plan(deck, form, quiet)
     import ic
     from ic.find import find
 
@@ -42,9 +46,24 @@ def check(
     if compiled.plan is None:
         return BAD_INPUT
     if not quiet:
-        from ic.printing.check import verdict
+        from ic.printing.check import notes, verdict
 
+        if verbose:
+            _print(notes(compiled.plan))
         click.echo(verdict(compiled.plan, compiled.diagnostics))
+    return YES
+
+
+def _check_plan(path: str, form: str, quiet: bool) -> int:
+    """The same for a plan file. Raises Problem where it cannot be read."""
+    from ic.printing.check import verdict
+    from met import plan_file
+
+    made = plan_file.read(path)
+    if form == "json":
+        complain((), {}, json=True)
+    elif not quiet:
+        click.echo(f"{path}: plan of {verdict(made, ())}")
     return YES
 
 
@@ -74,6 +93,7 @@ def plan(
     """
     from met import plan_file
 
+    check_options(deck, names, everything, defines, include_dirs)
     made = _plan(deck, include_dirs, defines, names, everything, quiet)
     if output is not None:
         plan_file.write(made, output)
@@ -84,7 +104,7 @@ def plan(
     elif not quiet:
         from ic.printing.plan import print_plan
 
-        _print(print_plan(made))
+        _print(print_plan(made, verbose=verbose))
 
 
 @click.command()
@@ -110,6 +130,7 @@ def cases(
     """
     from ic.printing.cases import cases_json, print_cases
 
+    check_options(deck, defines=defines, include_dirs=include_dirs)
     made = _plan(deck, include_dirs, defines, names, not names, True)
     shown = [e for e in made.experiments if names or e.cases.coordinates] or list(made.experiments)
     if form == "json":
@@ -140,11 +161,13 @@ def explain(
 ) -> None:
     """Say where a value comes from: who wrote it, and over what.
 
-    PATH is a parameter (elbow.servo.kt), the beginning of several (elbow.servo), or one of a definition (gearbox.kp).
+    PATH is a parameter (elbow.servo.kt), the beginning of several (elbow.servo), one of a definition (gearbox.kp), or a
+    setting of the run (rates.dynamics).
     """
-    from ic.meaning.explain import explained
-    from ic.printing.explain import explain_json, print_explain
+    from ic.meaning.explain import explained, in_full
+    from ic.printing.explain import explain_json, print_explain, with_settings
 
+    check_options(deck, defines=defines, include_dirs=include_dirs)
     names = (name,) if name else ()
     compiled = None if deck.endswith(".json") else _compiled(deck, include_dirs, defines, names or None)
     made = _plan_in_file(deck, names) if compiled is None else compiled.plan
@@ -153,11 +176,12 @@ def explain(
     def names_of(path: str) -> tuple[Label, ...]:
         return () if compiled is None else next((found.names for found in explained(compiled, path)), ())
 
-    experiment = made.experiments[0]
+    experiment = with_settings(made.experiments[0] if compiled is None else in_full(compiled))
+    also = {} if compiled is None else compiled.scopes[0].known
     if form == "json":
-        _print_json(explain_json(experiment, path))
+        _print_json(explain_json(experiment, path, also))
         return
-    _print(print_explain(experiment, path, {source.name: source.text for source in made.sources}, names_of))
+    _print(print_explain(experiment, path, {source.name: source.text for source in made.sources}, names_of, also))
 
 
 @click.command()

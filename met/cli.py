@@ -111,6 +111,18 @@ def deck_options(face: Face) -> Face:
     )(face)
 
 
+def check_options(
+    source: str, names: Sequence[str] = (), everything: bool = False, defines: Sequence[str] = (),
+    include_dirs: Sequence[str] = (),
+) -> None:  # fmt: skip
+    """Refuse options that clash, or that would do nothing, as click refuses what it cannot read."""
+    if names and everything:
+        raise click.UsageError(f"--all and `{names[0]}` exclude each other: name runs and sweeps, or take all")
+    for option, given in (("-D", defines), ("-I", include_dirs)):
+        if given and source.endswith(".json"):
+            raise click.UsageError(f"{option} is for decks: `{source}` is a plan, whose macros are expanded already")
+
+
 def format_option(face: Face) -> Face:
     """--format: text for people or JSON for programs, diagnostics included; given on as `form`."""
     return click.option(

@@ -79,6 +79,17 @@ class Problem(Exception):
         )
         super().__init__("; ".join(f"{d.code}: {d.message}" for d in self.diagnostics))
 
+    def __str__(self) -> str:
+        """The messages in one line; where the sources are known, as the command line prints them.
+
+        So the traceback in a notebook ends in the deck's line with its caret.
+        """
+        if not self.sources:
+            return super().__str__()
+        from met.render import render
+
+        return "\n" + render(self.diagnostics, self.sources).rstrip("\n")
+
 
 def error(code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
           help: Iterable[str] | str = ()) -> Diagnostic:

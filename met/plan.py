@@ -256,9 +256,14 @@ class Source:
 
 @frozen
 class Plan:
-    """What a deck means. `deck` names the root file; `sources` holds every file that was read."""
+    """What a deck means. `deck` names the root file; `sources` holds every file that was read.
+
+    selected: how the runs and sweeps were asked for, by name or `all`; none where the deck's own choice was taken.
+    An archive is called after it.
+    """
 
     deck: str
     experiments: tuple[Experiment, ...]
     sources: tuple[Source, ...] = ()
     defines: tuple[str, ...] = field(default=())
+    selected: tuple[str, ...] = field(default=())

@@ -155,16 +155,39 @@ def _quantity(data: Any, where: str) -> Any:
 
 def _check_formulas(values: dict[str, Any], where: str) -> None:
     """Formulas are replayed, so a reference that points nowhere must not get that far."""
-    from met.trace.graph import OPERANDS
+    from met.trace.graph import OPERANDS, TRUTHS
 
     nodes = values.get("nodes", ())
+    truths: list[bool] = []
     for position, node in enumerate(nodes):
         count = OPERANDS.get(node[0]) if isinstance(node, tuple) and node and isinstance(node[0], str) else None
-        whole = count is not None and len(node) > count and node[0] not in ("cell", "tick", "time")
-        if not whole or any(type(ref) is not int or not 0 <= ref >> 1 < position for ref in node[1 : 1 + (count or 0)]):
+        if count is None or len(node) <= count or node[0] in ("cell", "tick", "time"):
             raise Damaged(f"{where}.nodes[{position}]", "it is not a formula's node")
+        references, rest = node[1 : 1 + count], node[1 + count :]
+        pointing = all(type(ref) is int and 0 <= ref >> 1 < position for ref in references)
+        wanted = {"and": (True, True), "where": (True, False, False)}.get(node[0], (False,) * count)
+        if not pointing or tuple(truths[ref >> 1] for ref in references) != wanted or not _is_rest(node[0], rest):
+            raise Damaged(f"{where}.nodes[{position}]", "it is not a formula's node")
+        truths.append(node[0] in TRUTHS)
     if any(not 0 <= ref >> 1 < len(nodes) for ref in values.get("outputs", ())):
         raise Damaged(f"{where}.outputs", "a reference points nowhere")
+
+
+def _is_rest(op: str, rest: tuple[Any, ...]) -> bool:
+    """Whether this stands behind a node's operands: a constant's number, an input's name, a bit's place, a table."""
+    if op == "const":
+        return len(rest) == 1 and _is_number(rest[0])
+    if op == "input":
+        return len(rest) == 1 and isinstance(rest[0], str)
+    if op in ("bit", "flip"):
+        return len(rest) == 1 and type(rest[0]) is int and 0 <= rest[0] < 64
+    if op == "gather":
+        return len(rest) == 1 and isinstance(rest[0], tuple) and len(rest[0]) > 0 and all(map(_is_number, rest[0]))
+    return not rest
+
+
+def _is_number(value: Any) -> bool:
+    return type(value) in (int, float) or (isinstance(value, str) and value in NOT_FINITE)
 
 
 def _number(data: Any, where: str) -> float:

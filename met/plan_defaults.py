@@ -15,7 +15,7 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity | None]]:
     """Paths that the experiment lacks, each with its model's default, None where there is none."""
-    for path, unit, default in required(experiment.structure):
+    for path, unit, default, _ in declared(experiment.structure):
         if path not in experiment.parameters:
             note = "not in the plan file" if default is not None else ""
             yield path, None if default is None else Quantity(default, unit, Origin("default", note=note))
@@ -24,7 +24,7 @@ def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity |
 def unknown_parameters(experiment: Experiment) -> Iterator[tuple[str, str | None]]:
     """Paths under a model of the experiment that its declaration does not have, with the nearest that it has."""
     structure = experiment.structure
-    known = {path for path, _, _ in required(structure)}
+    known = {path for path, *_ in declared(structure)}
     models_of = [f"{use.joint}.servo." for use in structure.servos]
     models_of += [f"environment.{use.name}." for use in structure.environment]
     models_of += [f"metrics.{use.name}." for use in structure.metrics]
@@ -33,23 +33,27 @@ def unknown_parameters(experiment: Experiment) -> Iterator[tuple[str, str | None
             yield path, nearest(path, known, cutoff=0.8)
 
 
-def required(structure: Structure) -> Iterator[tuple[str, str, float | tuple[float, ...] | str | None]]:
-    """Path, SI unit and default of every parameter of a structure (head of `met.plan`)."""
+Declared = tuple[str, str, float | tuple[float, ...] | str | None, Parameter | None]
+"""Path, SI unit and default of a parameter, and its model's declaration; None for the arm's own."""
+
+
+def declared(structure: Structure) -> Iterator[Declared]:
+    """Every parameter of a structure (head of `met.plan`)."""
     for link in structure.links:
-        yield f"links.{link.name}.mass", "kg", None
+        yield f"links.{link.name}.mass", "kg", None, None
         for axis in "xyz":
-            yield f"links.{link.name}.com.{axis}", "m", None
+            yield f"links.{link.name}.com.{axis}", "m", None, None
         for entry in INERTIA:
-            yield f"links.{link.name}.inertia.{entry}", "kg*m^2", None
+            yield f"links.{link.name}.inertia.{entry}", "kg*m^2", None, None
     kinds = {joint.name: joint for joint in structure.joints}
     for joint in structure.joints:
         vectors = [("at", "m"), ("rpy", "rad"), *([] if joint.kind == "fixed" else [("axis", "1")])]
         for name, unit in vectors:
             for axis in "xyz":
-                yield f"{joint.name}.{name}.{axis}", unit, None
+                yield f"{joint.name}.{name}.{axis}", unit, None, None
     for joint in structure.moving:
-        yield f"initial.{joint.name}.q", joint_unit("joint", joint), None
-        yield f"initial.{joint.name}.qd", joint_unit("joint/s", joint), None
+        yield f"initial.{joint.name}.q", joint_unit("joint", joint), None, None
+        yield f"initial.{joint.name}.qd", joint_unit("joint/s", joint), None, None
     for use in structure.servos:
         joint = kinds[use.joint]
         for parameter in models.find("servo", use.model, use.place).parameters:
@@ -68,14 +72,12 @@ def required(structure: Structure) -> Iterator[tuple[str, str, float | tuple[flo
             yield from _numbers(f"metrics.{metric.name}", parameter, of if parameter.unit == "of" else parameter.unit)
 
 
-def _numbers(
-    prefix: str, parameter: Parameter, unit: str
-) -> Iterator[tuple[str, str, float | tuple[float, ...] | str | None]]:
+def _numbers(prefix: str, parameter: Parameter, unit: str) -> Iterator[Declared]:
     """A vector is three numbers, `.x .y .z`; everything else is one."""
     path = f"{prefix}.{parameter.name}"
     if parameter.shape != "vector":
-        yield path, unit, parameter.default
+        yield path, unit, parameter.default, parameter
         return
     for index, axis in enumerate("xyz"):
         default = parameter.default[index] if isinstance(parameter.default, tuple) else None
-        yield f"{path}.{axis}", unit, default
+        yield f"{path}.{axis}", unit, default, parameter

@@ -39,8 +39,13 @@ Fetch = Callable[[dict[str, Any]], np.ndarray]
 
 
 def write(plan: Plan, path: str | os.PathLike[str]) -> tuple[Path, ...]:
-    """Write a plan, and its large case tables beside it; the files written. Raises Problem E300 where it cannot."""
+    """Write a plan, and its large case tables beside it; the files written.
+
+    Raises Problem E300, and writes nothing, where it cannot, or where something else than a plan is there already.
+    """
     path = Path(path)
+    if not path.name:
+        raise Problem(error("E300", f"cannot write {path}: it is a folder", help="name a file: `-o plan.json`"))
     files: dict[Path, bytes] = {}
 
     def refer(experiment: Experiment, index: int) -> dict[str, Any]:
@@ -50,6 +55,7 @@ def write(plan: Plan, path: str | os.PathLike[str]) -> tuple[Path, ...]:
         return {"file": beside.name, "row": index, "sha256": hashlib.sha256(files[beside]).hexdigest()}
 
     files[path] = dumps(plan, refer).encode()  # last, so that a plan never names a table that is not there yet
+    _check_targets(path, files)
     for target, data in files.items():
         _replace_file(target, data)
     return tuple(files)
@@ -97,6 +103,8 @@ def dumps(plan: Plan, refer: Refer | None = None) -> str:
 
 def loads(text: str, name: str = "plan", fetch: Fetch | None = None) -> Plan:
     """A plan from its JSON. name: for messages. fetch: gives the values of a coordinate that are kept elsewhere."""
+    from met.plan_check import check, check_text
+
     try:
         document = json.loads(text, parse_constant=_no_constant)
     except (ValueError, RecursionError) as reason:
@@ -112,8 +120,12 @@ def loads(text: str, name: str = "plan", fetch: Fetch | None = None) -> Plan:
         message = f"{name} was written by a newer MET: plan schema {version}, and this one reads up to {VERSION}"
         raise Problem(error("E303", message, help="update MET, or make the plan again from its deck"))
     try:
+        if "\\u" in text:  # what cannot stand in a file as it is; see `dumps`
+            check_text(document)
         plan: Plan = decode(Plan, document, "", fetch)
-        plan = replace(plan, experiments=tuple(_checked(experiment) for experiment in plan.experiments))
+        check(plan.experiments)
+    except RecursionError as reason:
+        raise Problem(_damaged(name, "it is nested too deeply")) from reason
     except Damaged as reason:
         raise Problem(_damaged(name, str(reason))) from reason
     return completed(plan, name, version)
@@ -167,40 +179,8 @@ def _without_values(experiment: Experiment) -> Experiment:
     return replace(experiment, cases=replace(experiment.cases, coordinates=coordinates))
 
 
-def _checked(experiment: Experiment) -> Experiment:
-    """What the types cannot say: a plan whose parts do not fit together is damaged."""
-    where = f"run {experiment.name}"
-    names = [joint.name for joint in experiment.structure.joints]
-    known = {link.name for link in experiment.structure.links} | {"base"}
-    for joint in experiment.structure.joints:
-        for link in (joint.parent, joint.child):
-            if link not in known:
-                raise Damaged(where, f"joint {joint.name} connects link {link}, which is not there")
-    for use in experiment.structure.servos:
-        if use.joint not in names:
-            raise Damaged(where, f"a servo is on joint {use.joint}, which is not there")
-    count = experiment.cases.count
-    for coordinate in experiment.cases.coordinates:
-        if coordinate.values.shape != (count,):
-            raise Damaged(where, f"coordinate {coordinate.path} has {coordinate.values.size} values for {count} cases")
-    schedule = experiment.structure.schedule
-    whole = (schedule.dynamics, schedule.record, *(use.divisor for use in experiment.structure.servos))
-    if not schedule.base_hz > 0.0 or schedule.ticks < 0 or min(whole) < 1 or count < 1:
-        raise Damaged(where, "its schedule or its number of cases makes no sense")
-    names_of_metrics = {use.name for use in experiment.structure.metrics}
-    for requirement in experiment.requirements:
-        if requirement.metric not in names_of_metrics:
-            raise Damaged(where, f"a requirement is on metric {requirement.metric}, which is not there")
-    outputs = len(experiment.formulas.outputs)
-    for path, quantity in experiment.parameters.items():
-        output = getattr(quantity.value, "output", 0)
-        if output and not 0 <= output < outputs:
-            raise Damaged(where, f"parameter {path} follows formula {output} of {outputs}")
-    return experiment
-
-
 def _read_table(plan: Path, name: str) -> tuple[np.ndarray, str]:
-    if Path(name).name != name:
+    if Path(name).name != name or not name:
         raise Damaged("", f"it names a case table outside its folder: {name}")
     try:
         data = plan.with_name(name).read_bytes()
@@ -210,11 +190,43 @@ def _read_table(plan: Path, name: str) -> tuple[np.ndarray, str]:
         ) from reason
     try:
         array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
-    except (ValueError, EOFError, OSError) as reason:
+    except (ValueError, EOFError, OSError, TypeError, OverflowError, MemoryError) as reason:
         raise Damaged("", f"the case table {name} beside it is damaged") from reason
     if array.ndim != 2 or array.dtype != np.dtype("<f8"):
         raise Damaged("", f"the case table {name} beside it is not a table of doubles")
     return array, hashlib.sha256(data).hexdigest()
+
+
+def _check_targets(path: Path, files: dict[Path, bytes]) -> None:
+    """Nothing is written over but a plan of MET's, and the tables that it names."""
+    before = _plan_there(path)
+    for target, data in files.items():
+        if target == path or not target.exists() or f'"{target.name}"' in before or target.read_bytes() == data:
+            continue
+        message = f"cannot write {target}: it exists, and is no case table of {path}; it is not written over"
+        raise Problem(error("E300", message, help="give another name with `-o`, or remove the file"))
+
+
+def _plan_there(path: Path) -> str:
+    """The text of the plan that is there now; empty where nothing is. Raises Problem E300 for anything else."""
+    text = ""
+    try:
+        if not path.is_file() and path.exists() and not path.is_dir():
+            raise Problem(error("E300", f"cannot write {path}: it is not a regular file"))
+        with path.open("rb") as file:
+            begins = file.read(1)
+            text = (begins + file.read()).decode("utf-8") if begins == b"{" else ""
+        document = json.loads(text) if begins else {"schema": SCHEMA}
+    except FileNotFoundError:
+        return ""
+    except OSError as reason:
+        raise Problem(error("E300", f"cannot write {path}: {_why(reason)}")) from reason
+    except (ValueError, RecursionError):
+        document = None
+    if not isinstance(document, dict) or document.get("schema") != SCHEMA:
+        message = f"{path} exists and is no plan of MET: it is not written over"
+        raise Problem(error("E300", message, help="give another name with `-o`, or remove the file"))
+    return text
 
 
 def _replace_file(target: Path, data: bytes) -> None:
@@ -222,6 +234,7 @@ def _replace_file(target: Path, data: bytes) -> None:
     temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
         try:
+            temporary.unlink(missing_ok=True)  # of a process that had this number before, and was killed
             with temporary.open("xb") as file:
                 file.write(data)
                 file.flush()

@@ -14,9 +14,7 @@ A token from an argument is shown where the argument was written.
 
 from __future__ import annotations
 
-import json
 import os
-import unicodedata
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, TextIO
@@ -95,6 +93,8 @@ def to_json(diagnostics: Iterable[Diagnostic]) -> str:
             for d in found
         ],
     }
+    import json
+
     return json.dumps(result, indent=1)
 
 
@@ -225,6 +225,8 @@ def _width(character: str) -> int:
     """Columns that a terminal gives a character."""
     if character < "\x7f":
         return TAB if character == "\t" else 1
+    import unicodedata
+
     if unicodedata.combining(character):
         return 0
     return 2 if unicodedata.east_asian_width(character) in ("W", "F") else 1
@@ -234,4 +236,6 @@ def _safe(text: str) -> str:
     """Text without what could steer a terminal."""
     if text.isprintable():
         return text
+    import unicodedata
+
     return "".join(c if c.isprintable() or unicodedata.combining(c) else "\ufffd" for c in text)

@@ -11,7 +11,7 @@ import numpy as np
 
 from met.frozen import frozen
 from met.plan import Experiment
-from met.program.build import EVENTS, NOT_FINITE, OUTPUTS, SINGULAR, build
+from met.program.build import COORDINATE, EVENTS, METRIC, NOT_FINITE, OUTPUTS, SINGULAR, build
 from met.trace.program import Program
 
 DONE, FAILED = 0, 1
@@ -115,9 +115,7 @@ def _results(
             if not recorded.joints:
                 signals[recorded.name] = signals[recorded.name][:, :, 0]
             column += width
-    metrics = {
-        use.name: np.where(failed, math.nan, out[f"metrics.{use.name}"]) for use in experiment.structure.metrics
-    }
+    metrics = {use.name: np.where(failed, math.nan, out[METRIC + use.name]) for use in experiment.structure.metrics}
     return Run(
         case=rows,
         status=np.where(failed, FAILED, DONE).astype(np.int8),
@@ -127,7 +125,7 @@ def _results(
         signals=signals,
         metrics=metrics,
         met={r.text: _met(metrics[r.metric], r.comparison, r.limit) for r in experiment.requirements},
-        coordinates={coordinate.path: out[coordinate.path] for coordinate in experiment.cases.coordinates},
+        coordinates={c.path: out[COORDINATE + c.path] for c in experiment.cases.coordinates},
         events={name.split(".")[1]: out[name].astype(np.int64) for name in EVENTS},
     )
 
@@ -154,6 +152,7 @@ def _cause(experiment: Experiment, failure: float, number: float, tick: float) -
         )
     assert failure == NOT_FINITE
     return (
-        f"{head}the acceleration is no longer a finite number{where}. A step too long for the servo or the arm is "
-        f"the usual reason: try a faster rate for the dynamics, and see the stability figures of `met plan`."
+        f"{head}the acceleration is no longer a finite number{where}. Usual reasons: a step too long for the servo or "
+        f"the arm (see the stability figures of `met plan`; try a faster rate for the dynamics), or a model that "
+        f"divides by zero."
     )

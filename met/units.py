@@ -17,6 +17,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
+from met.diagnostic import nearest
 from met.frozen import frozen
 
 BIGGEST_EXPONENT = 9

@@ -324,7 +324,7 @@ def test_scripts_test_adds_what_it_needs_and_ends_with_the_summary_of_pytest(che
     )
     done = start(checkout, script="test")
     last = done.stdout.splitlines()[-1]
-    assert "1 passed, 1 deselected" in last, done.stdout + done.stderr
+    assert "1 passed in" in last, done.stdout + done.stderr  # and not the slow one
     stages = [line.split()[1] for line in done.stdout.splitlines() if line.startswith("scripts/test: ")]
     assert stages[:3] == ["ruff", "mypy", "import-linter"]
     assert done.returncode == ("FAILED" in done.stdout)

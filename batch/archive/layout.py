@@ -14,25 +14,29 @@ Dimensions, each with its coordinate variable:
     joint           names of the moving joints; a signal of some joints only has a dimension of its own, `joint_of_...`
     requirement     texts of the requirements
 
-A variable says what it is by its attribute `role`: dimension, case, coordinate, metric, requirement or signal.
+A variable says what it is by its attribute `role`: dimension, case, coordinate, metric, requirement, recorded or
+signal. In a sweep, `recorded.case_id` and `recorded.<path>` repeat names and varied parameters along recorded_case, for
+a variable has one set of dimensions only: so a signal that is taken out by itself still says what its cases are
+(`q.where(q["recorded.gearbox.kp"] > 0.02, drop=True)`).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import field
 from typing import Any, Literal
 
 import numpy as np
 
+from batch.archive import limits
 from met.frozen import frozen
 from met.plan import Coordinate, Experiment, MetricUse, Plan, Recorded
 
 SCHEMA = "met.archive"
 VERSION = 1
 
-Role = Literal["dimension", "case", "coordinate", "metric", "requirement", "signal"]
+Role = Literal["dimension", "case", "coordinate", "metric", "requirement", "recorded", "signal"]
 Kind = Literal["float64", "int64", "int8", "str"]
 
 CHUNK_BYTES = 4 << 20
@@ -56,8 +60,10 @@ EVENTS = {
 
 RESERVED = frozenset({
     "case", "recorded_case", "time", "joint", "requirement", "case_id", "case_key", "repeat", "seed", "status",
-    "cause", "n_valid", "met", *(f"friction_{name}" for name in EVENTS),
+    "cause", "n_valid", "met", "provenance", *(f"friction_{name}" for name in EVENTS),
 })  # fmt: skip
+"""What a group holds under names of our own. A deck's name that is taken here, or by a signal, gets a word before it:
+`coordinates.seed`, `metrics.time`, and for an experiment's group `experiments.provenance`."""
 
 
 @frozen
@@ -124,7 +130,8 @@ def layout(experiment: Experiment, cases: int, recorded: bool) -> Layout:
             Variable("recorded_case", "int64", ("recorded_case",), "dimension", "cases whose histories are kept"),
             Variable("time", "float64", ("time",), "dimension", "time", "s"),
         ]
-        variables += _signals(experiment, sizes)
+        repeated = _recorded(variables) if experiment.cases.coordinates else []
+        variables += [*repeated, *_signals(experiment, sizes, {"coordinates": " ".join(v.name for v in repeated)})]
     return Layout(sizes, tuple(variables), _attributes(experiment, variables))
 
 
@@ -173,7 +180,11 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         variable("repeat", "int64", "number of the repeat"),
         variable("seed", "int64", "seed of the run's noise"),
     ]
-    out += [_coordinate(experiment, coordinate) for coordinate in experiment.cases.coordinates]
+    taken = RESERVED | {recorded.name for recorded in experiment.structure.record}
+    taken |= set(joint_dimensions(experiment).values())
+    paths = [coordinate.path for coordinate in experiment.cases.coordinates]
+    names = {path: _apart(path, "coordinates", taken, paths) for path in paths}
+    out += [_coordinate(experiment, c, names[c.path]) for c in experiment.cases.coordinates]
     out += [
         variable(
             "status", "int8", "how the case ended", flag_values=np.array([0, 1], np.int8), flag_meanings="done failed"
@@ -182,18 +193,27 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         variable("n_valid", "int64", "recorded rows before the case failed; after them, not-a-number"),
         *(variable(f"friction_{name}", "int64", words) for name, words in EVENTS.items()),
     ]
-    taken = RESERVED | {c.path for c in experiment.cases.coordinates} | {r.name for r in experiment.structure.record}
+    taken |= set(names.values())
+    metrics = [use.name for use in experiment.structure.metrics]
+    named: dict[str, str] = {}
     for use in experiment.structure.metrics:
-        name = use.name if use.name not in taken else f"metrics.{use.name}"
+        name = _apart(use.name, "metrics", taken, metrics)
         unit = metric_unit(experiment, use)
         words = f"{use.model} of {use.of}"
-        out.append(
-            Variable(name, "float64", ("case",), "metric", words, unit, {"model": use.model, "of": use.of}, use.name)
-        )
+        shown, scale = limits.deck_unit(use.name, unit, experiment.requirements)
+        told = {"model": use.model, "of": use.of, "deck_unit": shown, "deck_scale": scale}
+        out.append(Variable(name, "float64", ("case",), "metric", words, unit, told, use.name))
+        named[use.name] = name
     if experiment.requirements:
+        words = "the requirement, as the deck wrote it"
+        wanted = {
+            "metric": [named.get(r.metric, r.metric) for r in experiment.requirements],
+            "comparison": [r.comparison for r in experiment.requirements],
+            "limit": np.array([r.limit for r in experiment.requirements]),
+        }
         flags = {"flag_values": np.array([1, 0, -1], np.int8), "flag_meanings": "met missed unknown"}
         out += [
-            Variable("requirement", "str", ("requirement",), "dimension", "the requirement, as the deck wrote it"),
+            Variable("requirement", "str", ("requirement",), "dimension", words, attributes=wanted),
             Variable(
                 "met",
                 "int8",
@@ -206,13 +226,42 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
     return out
 
 
-def _coordinate(experiment: Experiment, coordinate: Coordinate) -> Variable:
-    written = {"deck_unit": coordinate.unit, "deck_scale": coordinate.scale, "sets": " ".join(coordinate.sets)}
+def _apart(name: str, word: str, taken: Collection[str], fellows: Collection[str]) -> str:
+    """A name, with a word before it (or several) where it is taken; then it is none of its fellows' names either."""
+    if name not in taken:
+        return name
+    while name in taken or name in fellows:
+        name = f"{word}.{name}"
+    return name
+
+
+def _coordinate(experiment: Experiment, coordinate: Coordinate, name: str) -> Variable:
+    written: dict[str, Any] = {
+        "deck_unit": coordinate.unit, "deck_scale": coordinate.scale, "sets": " ".join(coordinate.sets)
+    }  # fmt: skip
     unit = coordinate_unit(experiment, coordinate)
-    return Variable(coordinate.path, "float64", ("case",), "coordinate", f"varied: {coordinate.path}", unit, written)
+    words = f"varied: {coordinate.path}"
+    if name != coordinate.path:
+        written["path"] = coordinate.path
+    return Variable(name, "float64", ("case",), "coordinate", words, unit, written, coordinate.path)
 
 
-def _signals(experiment: Experiment, sizes: dict[str, int]) -> list[Variable]:
+def _recorded(variables: list[Variable]) -> list[Variable]:
+    """What says which case is which, along recorded_case; `source` is the variable along case."""
+    taken = [variable.name for variable in variables]
+    out = []
+    for v in variables:
+        if v.role == "coordinate" or v.name == "case_id":
+            name = _apart(f"recorded.{v.name}", "recorded", taken, ())
+            taken.append(name)
+            out.append(
+                Variable(name, v.kind, ("recorded_case",), "recorded", v.long_name, v.unit, v.attributes, v.name)
+            )
+    return out
+
+
+def _signals(experiment: Experiment, sizes: dict[str, int], told: Mapping[str, str]) -> list[Variable]:
+    """told: attributes of every signal; empty ones are left out."""
     dimensions = joint_dimensions(experiment)
     out = []
     for joints, dim in dimensions.items():
@@ -221,7 +270,9 @@ def _signals(experiment: Experiment, sizes: dict[str, int]) -> list[Variable]:
             out.append(Variable(dim, "str", (dim,), "dimension", "joint"))
     for recorded in experiment.structure.record:
         dims = ("recorded_case", "time", *([dimensions[recorded.joints]] if recorded.joints else []))
-        out.append(Variable(recorded.name, "float64", dims, "signal", recorded.doc, *_signal_unit(recorded)))
+        unit, attributes = _signal_unit(recorded)
+        attributes |= {name: value for name, value in told.items() if value}
+        out.append(Variable(recorded.name, "float64", dims, "signal", recorded.doc, unit, attributes))
     return out
 
 
@@ -238,7 +289,7 @@ def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, 
     from met import keys
 
     structure, schedule = experiment.structure, experiment.structure.schedule
-    coordinates = ["case_id", "case_key", *(v.name for v in variables if v.role == "coordinate")]
+    coordinates = ["case_id", "case_key", *(v.name for v in variables if v.role in ("coordinate", "recorded"))]
     return {
         "experiment": experiment.name,
         "arm": structure.arm,
@@ -257,4 +308,7 @@ def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, 
 
 def group_names(plan: Plan) -> tuple[str, ...]:
     """Paths of the experiments' groups."""
-    return ("/",) if len(plan.experiments) == 1 else tuple(f"/{experiment.name}" for experiment in plan.experiments)
+    if len(plan.experiments) == 1:
+        return ("/",)
+    names = [experiment.name for experiment in plan.experiments]
+    return tuple("/" + _apart(name, "experiments", ("provenance",), names) for name in names)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,7 @@ import numpy as np
 
 from batch.archive.hdf5 import SIGNATURE, h5py
 from batch.archive.layout import SCHEMA, VERSION
+from batch.rows import row_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Plan
@@ -28,37 +31,109 @@ class Stored:
     long_name: str
     attributes: dict[str, Any]
 
+    @property
+    def path(self) -> str:
+        """Of a coordinate: its path in the deck, which is its name unless that was taken."""
+        return str(self.attributes.get("path", self.name))
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """What HDF5 and h5py raise over a file whose bytes are not what was written is Problem E302."""
+    try:
+        yield
+    except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError, ArithmeticError) as reason:
+        raise Problem(_damaged(path, str(reason) if isinstance(reason, Unlike) else "")) from reason
+
+
+class Unlike(ValueError):
+    """An archive lacks something that all archives have: what."""
+
+
+NUMBERS, WORDS = "iuf", "O"
+"""Kinds of numpy's types: of numbers, and of strings as h5py has them."""
+
+ATTRIBUTES: dict[str, tuple[type, ...]] = {
+    "experiment": (str,), "arm": (str,), "integrator": (str,), "velocity_products": (str,), "duration_s": (float,),
+    "dynamics_hz": (float,), "record_hz": (float,), "cases_in_table": (int,),
+}  # fmt: skip
+VARIABLES = {"case": "iu", "case_id": WORDS, "cause": WORDS, "status": "iu", "n_valid": "iu"}
+"""What every experiment's group has, and of which type."""
+
+
+FEW = 100
+"""So many values at most are read one by one."""
+
 
 class Group:
-    """One experiment of an archive."""
+    """One experiment of an archive. Raises Problem E302 where the file does not hold what it should."""
 
-    def __init__(self, node: Any) -> None:
-        self._node = node
-        self.attributes: dict[str, Any] = {name: _plain(value) for name, value in node.attrs.items()}
-        self.name: str = str(self.attributes["experiment"])
+    def __init__(self, node: Any, path: Path) -> None:
+        self._node, self._path = node, path
+        with reading(path):
+            self.attributes: dict[str, Any] = {name: _plain(value) for name, value in node.attrs.items()}
+            self._check()
+        self.name: str = self.attributes["experiment"]
+
+    def _check(self) -> None:
+        """That the variables are those of an experiment, and that their sizes are those of their dimensions."""
+        for name, types in ATTRIBUTES.items():
+            if not isinstance(self.attributes.get(name), types):
+                raise Unlike(f"attribute `{name}` is missing or of another type")
+        variables = self.variables
+        shapes = {name: self._node[name].shape for name in variables}
+        for name, kinds in VARIABLES.items():
+            if name not in variables or self._node[name].dtype.kind not in kinds or variables[name].dims != ("case",):
+                raise Unlike(f"variable `{name}` is missing or of another type")
+        for name, variable in variables.items():
+            if any(dim not in shapes for dim in variable.dims):
+                raise Unlike(f"variable `{name}` lacks a dimension")
+            if shapes[name] != tuple(shapes[dim][0] for dim in variable.dims):
+                raise Unlike(f"variable `{name}` is not of the size of its dimensions")
+            numbers = variable.role in ("coordinate", "metric", "signal") or name in ("time", "met", "recorded_case")
+            words = name == "requirement"
+            if self._node[name].dtype.kind not in (NUMBERS if numbers else WORDS if words else NUMBERS + WORDS):
+                raise Unlike(f"variable `{name}` is of another type")
+            if variable.role == "signal" and variable.dims[:2] != ("recorded_case", "time"):
+                raise Unlike(f"variable `{name}` is not over cases and time")
+            if not float(variable.attributes.get("deck_scale", 1.0)):
+                raise Unlike(f"variable `{name}` has no scale")
 
     @cached_property
     def variables(self) -> dict[str, Stored]:
         """All variables, in the file's order."""
-        return {name: _stored(name, node) for name, node in self._node.items() if isinstance(node, h5py().Dataset)}
+        with reading(self._path):
+            return {name: _stored(name, node) for name, node in self._node.items() if isinstance(node, h5py().Dataset)}
 
     def role(self, role: str) -> tuple[Stored, ...]:
         return tuple(variable for variable in self.variables.values() if variable.role == role)
 
     def values(self, name: str) -> np.ndarray:
         """All of a variable; strings as an array of str."""
-        dataset = self._node[name]
-        if h5py().check_string_dtype(dataset.dtype) is not None:
-            return np.asarray(dataset.asstr()[...], dtype=object)
-        return np.asarray(dataset[...])
+        with reading(self._path):
+            dataset = self._node[name]
+            if h5py().check_string_dtype(dataset.dtype) is not None:
+                return np.asarray(dataset.asstr()[...], dtype=object)
+            return np.asarray(dataset[...])
+
+    def at(self, name: str, positions: Sequence[int] | np.ndarray) -> np.ndarray:
+        """A variable in the cases at these positions, in their order; few of many are read by themselves."""
+        if len(positions) > FEW:
+            return self.values(name)[positions]
+        with reading(self._path):
+            dataset = self._node[name]
+            words = h5py().check_string_dtype(dataset.dtype) is not None
+            read = dataset.asstr() if words else dataset
+            return np.array([read[int(position)] for position in positions], dtype=object if words else dataset.dtype)
 
     def signal(self, name: str, position: int) -> np.ndarray:
         """History of one signal in the recorded case at this position: (time,) or (time, joint)."""
-        return np.asarray(self._node[name][position])
+        with reading(self._path):
+            return np.asarray(self._node[name][position])
 
     def joints(self, variable: Stored) -> tuple[str, ...]:
         """Names along a signal's joint dimension; none where it has no such dimension."""
-        return tuple(self.values(variable.dims[2])) if len(variable.dims) > 2 else ()
+        return tuple(map(str, self.values(variable.dims[2]))) if len(variable.dims) > 2 else ()
 
     @property
     def count(self) -> int:
@@ -75,25 +150,36 @@ class Group:
         for variable in self.role("coordinate"):
             scale = float(variable.attributes.get("deck_scale", 1.0))
             unit = str(variable.attributes.get("deck_unit", variable.unit))
-            out[variable.name] = (float(self._node[variable.name][position]) / scale, unit)
+            out[variable.path] = (float(self.values(variable.name)[position]) / scale, unit)
         return out
 
     def find_case(self, wanted: str) -> int:
         """Position in this group of a case: `#7`, its row in the case table, or the beginning of its case_id."""
-        if wanted.startswith("#") and wanted[1:].isdigit():
-            found = np.flatnonzero(self.values("case") == int(wanted[1:]))
+        row = row_of(wanted)
+        if row is not None:
+            found = np.flatnonzero(self.values("case") == row)
         else:
             found = np.flatnonzero([case_id.startswith(wanted) for case_id in self.values("case_id")])
         if len(found) == 1:
             return int(found[0])
         if len(found) == 0:
-            rows = self.values("case")
-            helps = f"cases here: #{rows[0]} to #{rows[-1]}, {len(rows)} of them; or the beginning of a case_id"
-            raise Problem(error("E321", f"no case `{wanted}` in `{self.name}`", help=helps))
+            raise Problem(error("E321", f"no case `{wanted}` in `{self.name}`", help=_cases_here(self.values("case"))))
         some = ", ".join(self.values("case_id")[found[:4]])
         raise Problem(
             error("E322", f"case `{wanted}` may be any of {len(found)}: {some} ...", help="give more of its id")
         )
+
+
+def _cases_here(rows: np.ndarray) -> str:
+    """Which cases an archive has: all of a table, or some of it."""
+    if not len(rows):
+        return "there is no case here"
+    if len(rows) == 1:
+        return f"the only case here is #{rows[0]}"
+    if rows[-1] - rows[0] == len(rows) - 1:
+        return f"cases here: #{rows[0]} to #{rows[-1]}; or the beginning of a case_id"
+    some = ", ".join(f"#{row}" for row in rows[:8]) + (f" ... #{rows[-1]}" if len(rows) > 8 else "")
+    return f"cases here: {some}; or the beginning of a case_id"
 
 
 class ArchiveFile:
@@ -102,22 +188,31 @@ class ArchiveFile:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         check_signature(self.path)
-        try:
+        with reading(self.path):
             self._file = h5py().File(self.path, "r")
-            attributes = {name: _plain(value) for name, value in self._file.attrs.items()}
-        except OSError as reason:
-            helps = "an archive that MET writes has its name only when it is whole: was this one copied in part?"
-            raise Problem(error("E302", f"the archive {path} is damaged", help=helps)) from reason
+        try:
+            with reading(self.path):
+                attributes = {name: _plain(value) for name, value in self._file.attrs.items()}
+                self._check(attributes)
+                self.deck: str = attributes["deck"]
+                self.groups: tuple[Group, ...] = self._groups()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _check(self, attributes: dict[str, Any]) -> None:
         if attributes.get("schema") != SCHEMA:
-            self._file.close()
-            raise Problem(error("E302", f"{path} is an HDF5 file, but no archive of MET"))
-        if attributes["schema_version"] > VERSION:
-            self._file.close()
-            message = (
-                f"{path} was written by a newer MET: schema {attributes['schema_version']}, known here is {VERSION}"
-            )
+            raise Problem(error("E302", f"{self.path} is an HDF5 file, but no archive of MET"))
+        version = attributes.get("schema_version")
+        if type(version) is not int or version < 1:
+            raise Unlike("it has no schema version")
+        if version > VERSION:
+            message = f"{self.path} was written by a newer MET: schema {version}, known here is {VERSION}"
             raise Problem(error("E303", message, help="update MET; xarray can open the file meanwhile"))
-        self.deck = str(attributes["deck"])
+        if not isinstance(attributes.get("deck"), str):
+            raise Unlike("it does not name its deck")
+        if not isinstance(self._file.get("provenance"), h5py().Group):
+            raise Unlike("it does not say where it comes from")
 
     def __enter__(self) -> ArchiveFile:
         return self
@@ -125,32 +220,34 @@ class ArchiveFile:
     def __exit__(self, *_: object) -> None:
         self._file.close()
 
-    @cached_property
-    def groups(self) -> tuple[Group, ...]:
+    def _groups(self) -> tuple[Group, ...]:
         """The experiments, in the plan's order."""
         if "experiment" in self._file.attrs:
-            return (Group(self._file),)
-        return tuple(Group(node) for node in self._file.values() if "experiment" in node.attrs)
+            return (Group(self._file, self.path),)
+        nodes = [node for node in self._file.values() if node.name != "/provenance"]
+        if not nodes:
+            raise Unlike("it holds no run and no sweep")
+        return tuple(Group(node, self.path) for node in nodes)
 
     @property
     def provenance(self) -> dict[str, Any]:
         """Versions, git commit and whether MET's source was changed, defines."""
-        return {name: _plain(value) for name, value in self._file["provenance"].attrs.items()}
+        with reading(self.path):
+            return {name: _plain(value) for name, value in self._file["provenance"].attrs.items()}
 
     def sources(self) -> dict[str, str]:
         """The deck's files as they were read, by name."""
-        node = self._file["provenance"]
-        if "source" not in node:
-            return {}
-        names, texts = node["source"].asstr()[...], node["source_text"].asstr()[...]
-        return dict(zip(names.tolist(), texts.tolist(), strict=True))
+        with reading(self.path):
+            node = self._file["provenance"]
+            if "source" not in node:
+                return {}
+            names, texts = node["source"].asstr()[...], node["source_text"].asstr()[...]
+            return dict(zip(names.tolist(), texts.tolist(), strict=True))
 
     def plan(self) -> Plan:
         """The plan that was run, whole."""
         from met import plan_file
         from met.plan_codec import Damaged
-
-        node = self._file["provenance"]
 
         def fetch(reference: dict[str, Any]) -> np.ndarray:
             table = np.asarray(node[reference["file"]][...], dtype="<f8")
@@ -158,7 +255,9 @@ class ArchiveFile:
                 raise Damaged("", "its case table is not the one it was written with (SHA-256 differs)")
             return np.asarray(table[reference["row"]])
 
-        return plan_file.loads(node["plan"].asstr()[()], str(self.path), fetch)
+        with reading(self.path):
+            node = self._file["provenance"]
+            return plan_file.loads(node["plan"].asstr()[()], str(self.path), fetch)
 
 
 def check_signature(path: Path) -> None:
@@ -174,13 +273,23 @@ def check_signature(path: Path) -> None:
         raise Problem(error("E302", f"{path} is no archive of MET: it is not an HDF5 file"))
 
 
+HEAD_BYTES = 4096
+"""The schema's name is the first text that is written: it lies this near the head of the file."""
+
+
 def is_archive(path: Path) -> bool:
-    """Whether a file is an archive of MET: one that may be written over."""
-    try:
-        with ArchiveFile(path):
-            return True
-    except Problem:
-        return False
+    """Whether a file is an archive of MET, sound or damaged: one that may be written over.
+
+    HDF5 does not open it: over a damaged file it may never come back.
+    """
+    with path.open("rb") as file:
+        head = file.read(HEAD_BYTES)
+    return head.startswith(SIGNATURE) and SCHEMA.encode() in head
+
+
+def _damaged(path: Path, why: str = "") -> Any:
+    helps = "an archive that MET writes has its name only when it is whole: was this one copied in part?"
+    return error("E302", f"the archive {path} is damaged" + (f": {why}" if why else ""), help=helps)
 
 
 def _stored(name: str, node: Any) -> Stored:

@@ -3,19 +3,35 @@
 HDF5 does not survive a write that fails: its caches stay dirty, every close fails again, and the process may die at
 exit. So it writes through this object, which remembers the first failure, takes everything after it without a word,
 and lets the writer raise what happened.
+
+The file has a temporary name that follows from the archive's, and is locked while it is written: two runs into one
+archive cannot both have it, and what a run left that was killed is taken over by the next.
 """
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import os
 from pathlib import Path
 
 
+class Busy(Exception):
+    """Another run has the file, in this process or in another."""
+
+
+def temporary_of(target: Path) -> Path:
+    """Where a file is written until it is whole."""
+    return target.with_name(f".{target.name}.tmp")
+
+
 class Sink:
-    """A new file, as HDF5 wants it: seek, then read or write."""
+    """A new file, as HDF5 wants it: seek, then read or write. Raises Busy where it is being written already."""
 
     def __init__(self, path: Path) -> None:
-        self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+        self._path = path
+        self._file = _locked(path)
+        os.ftruncate(self._file, 0)
         self._at = 0
         self._size = 0
         self.failure: OSError | None = None
@@ -83,7 +99,38 @@ class Sink:
         self.check()
         os.fsync(self._file)
 
+    def remove(self) -> None:
+        """Leave nothing under the temporary name, unless what is there is another's by now."""
+        if self._file >= 0 and _is_at(self._file, self._path):
+            self._path.unlink()
+
     def close(self) -> None:
+        """Give the file up, and with it the lock: only after it has got its name, or is removed."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
+
+
+def _locked(path: Path) -> int:
+    """A file of this name, locked, as a descriptor; made where there is none."""
+    while True:
+        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(file)
+            raise Busy from None
+        except OSError as reason:
+            if reason.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a disk without locks: do without
+                os.close(file)
+                raise
+        if _is_at(file, path):
+            return file
+        os.close(file)  # between its opening and its locking, it was given its name or removed
+
+
+def _is_at(file: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(file), os.stat(path, follow_symlinks=False))
+    except FileNotFoundError:
+        return False

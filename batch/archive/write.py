@@ -44,7 +44,6 @@ class Writer:
     """An archive being written. Call `put` for every batch, then `finish`; or `abandon`, which leaves nothing."""
 
     def __init__(self, temporary: Path, plan: Plan, parts: Sequence[tuple[Experiment, np.ndarray, bool]]) -> None:
-        self.temporary = temporary
         self.plan = plan
         self._sink = Sink(temporary)
         self._revision = Revision()
@@ -52,10 +51,10 @@ class Writer:
         try:
             self._file = h5py().File(self._sink, "w", libver=LIBVER, track_order=True)
             self.sections = [self._section(group, part) for group, part in zip(self._groups(), parts, strict=True)]
+            self._sink.check()
         except BaseException:
             self.abandon()
             raise
-        self._sink.check()
 
     def put(self, section: int, first: int, run: Run) -> None:
         """Take a batch: `run` holds the cases of `section` from its `first` one on."""
@@ -79,12 +78,15 @@ class Writer:
         self._sink.check()
 
     def finish(self) -> None:
-        """Write what is left, and see the file safely on the disk under its temporary name."""
+        """Write what is left, and see the file safely on the disk under its temporary name, still locked."""
         for section in self.sections:
             self._write_cases(section)
         self._write_provenance()
         self._file.close()
         self._sink.settle()
+
+    def close(self) -> None:
+        """Let go of the file, which has its name by now."""
         self._sink.close()
 
     def abandon(self) -> None:
@@ -92,8 +94,8 @@ class Writer:
         self._revision.close()
         if self._file:
             self._file.close()
+        self._sink.remove()
         self._sink.close()
-        self.temporary.unlink(missing_ok=True)
 
     def _groups(self) -> list[Any]:
         root = self._file
@@ -133,6 +135,8 @@ class Writer:
         values["seed"][:] = experiment.cases.seed
         values["case"] = section.rows
         values["requirement"] = np.array([r.text for r in experiment.requirements], dtype=object)
+        for variable in section.layout.role("recorded"):
+            values[variable.name] = values[variable.source]
         if section.recorded:
             values["recorded_case"] = section.rows
             values["time"] = np.arange(schedule.rows) * schedule.record / schedule.base_hz
@@ -185,7 +189,8 @@ def _make(group: Any, layout: Layout, variable: Variable) -> Any:
     if chunks is not None:
         early = module.h5p.create(module.h5p.DATASET_CREATE)
         early.set_alloc_time(module.h5d.ALLOC_TIME_EARLY)
-        options = {"chunks": chunks, "dcpl": early, "fill_time": "never"}
+        # checksums cost a second a gigabyte; without them, a flipped bit on a disk would be a result
+        options = {"chunks": chunks, "dcpl": early, "fill_time": "never", "fletcher32": True}
     dtype = module.string_dtype("utf-8") if variable.kind == "str" else np.dtype(variable.kind).newbyteorder("<")
     dataset = group.create_dataset(variable.name, layout.shape(variable), dtype=dtype, track_order=True, **options)
     attributes = {"long_name": variable.long_name, "role": variable.role, **variable.attributes}

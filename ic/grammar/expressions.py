@@ -142,7 +142,7 @@ class Expressions(Cursor):
             self.fail("D027", f"`{first.text}{token.text}` is not a number", span(first, token))
 
     def unit(self) -> Unit | None:
-        """The unit that follows, if one does. `15 1/s`: a bare 1 may stand over the line, since no number follows one."""
+        """The unit that follows, if one does. In `15 1/s` the 1 belongs to it, since no number follows a number."""
         token = self.token
         over = None
         if token.kind == WHOLE and token.text == "1" and self.following.text == "/":
@@ -171,7 +171,7 @@ class Expressions(Cursor):
     def unit_product(
         self, at: int, sign: int, depth: int, first: tuple[list[tuple[Word, int]], int] | None = None
     ) -> tuple[list[tuple[Word, int]], int] | None:
-        """Factors from token `at` on, and the token behind them; None where no unit begins there. first: already read."""
+        """Factors from token `at` on, and the token behind them; None where no unit begins there. first: was read."""
         first = self.unit_factor(at, sign, depth) if first is None else first
         if first is None:
             return None
@@ -303,6 +303,12 @@ class Expressions(Cursor):
                     f"`{name.text}` is the unit {units.UNITS[name.text].word}, and stands here without a number",
                     parts[0],
                 )
+            if name.text == "pi":
+                unit = self.unit()
+                text = token.text if unit is None else unit.text
+                turn = f"; a whole turn is `1 cycle{text.removeprefix('rad')}`" if token.text == "rad" else ""
+                self.fail("D030", "a unit follows a number or brackets, and `pi` is neither", token,
+                          help=f"put brackets around the number, as in `(2*pi) {text}`{turn}")  # fmt: skip
             self.fail("D030", f"`{name.text[:LONGEST_NUMBER]}` is a name, and only a number takes a unit", token,
                       help="what it names has its unit already")  # fmt: skip
         return name

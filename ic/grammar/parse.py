@@ -14,15 +14,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 
-from ic.grammar.cursor import Ended, Unreadable, span
+from ic.grammar.cursor import OPENING, Ended, Unreadable, found, span
 from ic.grammar.expressions import Expressions
 from ic.grammar.syntax import Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
-from ic.text.lexer import BAD, END, NAME, NUMBERS, STRING, Token
+from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, Token
 from ic.text.limits import Findings, GiveUp, without_collection
 from met import units
 from met.diagnostic import Diagnostic, Label
 
 COMPARE = ("require", "exclude")
+_SEMICOLON = "an entry ends with `;`"
+_NOT_OPEN = "leave it out, or open it where it begins"
 
 
 def parse(
@@ -85,12 +87,13 @@ class _Parser(Expressions):
             also = [
                 Label(inner.place, f"perhaps this one: the `}}` on line {closing.line} that closes it is indented less")
             ]
-        self.tell("D022", f"this `{opening.text}` is not closed", opening, also=also)
+        self.tell("D022", f"this `{opening.text}` is not closed", opening, also=also,
+                  help=f"write the `{OPENING[opening.text]}` where it ends")  # fmt: skip
         raise Ended
 
     def closes_nothing(self) -> None:
         token = self.advance()
-        self.tell("D022", f"this `{token.text}` closes nothing", token)
+        self.tell("D022", f"this `{token.text}` closes nothing", token, help=_NOT_OPEN)
 
     # entries
 
@@ -100,6 +103,8 @@ class _Parser(Expressions):
         if first.kind != NAME:
             self.not_an_entry()
         names = [self.advance()]
+        if first.text == "let" and self.token.kind != NAME and self.token.expansions:
+            self.replaced_name()
         while self.token.kind == NAME and not (len(names) > 0 and self.line_break_in(names)):
             names.append(self.advance())
         tail: list[Token] = []
@@ -121,6 +126,8 @@ class _Parser(Expressions):
             self.unexpected("`=`", help="a deck writes `name = value;`")
         if text == "==" and len(names) == 1 and not tail:
             self.fail("D023", "`==` compares", self.token, help="to set a value, write `=`")
+        if _base_at(names) is not None and not self.begins_value_on_this_line():
+            self.no_brace([*names, *tail])
         return self.statement(start, names, tail)
 
     def line_break_in(self, names: list[Token]) -> bool:
@@ -130,10 +137,38 @@ class _Parser(Expressions):
     def not_an_entry(self) -> None:
         token = self.token
         if token.text in (")", "]"):
-            self.fail("D022", f"this `{token.text}` closes nothing", token)
+            self.fail("D022", f"this `{token.text}` closes nothing", token, help=_NOT_OPEN)
         if token.text == "{":
             self.unexpected("a name before the block", help="a block is written `kind name { ... }`")
         self.unexpected("an entry, such as `name = value;`")
+
+    def begins_value_on_this_line(self) -> bool:
+        return self.begins_value() and not self.on_new_line(self.at)
+
+    def no_brace(self, names: list[Token]) -> None:
+        """`servo light like strong` without the `{` of its block; its entries are skipped where they follow."""
+        self.tell("D020", f"expected `{{` after `{names[-1].text[:40]}`", self.behind(names[-1]),
+                  help="a definition has a block, `... like BASE { ... }`; `;` stands for an empty one")  # fmt: skip
+        inside = self.token.kind == NAME and self.following.text in ("=", "+=")
+        inside = inside or (self.token.text == "}" and not self.open)
+        depth = 0
+        while inside and self.token.kind != END:
+            depth += {"{": 1, "}": -1}.get(self.token.text, 0)
+            inside = depth >= 0
+            self.advance()
+        raise Unreadable
+
+    def replaced_name(self) -> None:
+        """A macro has put its body where the name of a `let` stands: `-D height=2` and `let height = ...`."""
+        step = self.token.expansions[-1]
+        told = f"the macro `{step.macro}` has put {found(self.token)} in the place of this name"
+        helps: tuple[str, ...] = ("give one of the two another name",)
+        if self.token.source.name == COMMAND_LINE:
+            told = f"`-D {step.macro}` has put {found(self.token)} in the place of this name"
+            helps = ("-D defines a macro, as #define does; it does not set a `let`",
+                     f"give the macro a name of its own, as in `-D SET_{step.macro}={self.token.text[:40]}` and "
+                     f"`let {step.macro} = SET_{step.macro} * 1 m;`")
+        self.fail("D035", told, step.use, help=helps)
 
     def let(self, names: list[Token], tail: list[Token]) -> Let:
         name = names[1]
@@ -218,16 +253,16 @@ class _Parser(Expressions):
         if token.kind == BAD:
             raise Unreadable
         if token.text == "}" or token.kind == END or self.on_new_line(self.at):
-            self.tell("D021", "expected `;`", self.behind(self.previous))
+            self.tell("D021", "expected `;`", self.behind(self.previous), help=_SEMICOLON)
             return
         if token.text == "," and (self.on_new_line(self.at + 1) or self.following.text == "}"):
             self.tell("D024", "`,` at the end of an entry", token, help="write `;`")
             self.advance()
             return
         if token.text in (")", "]"):
-            self.fail("D022", f"this `{token.text}` closes nothing", token)
+            self.fail("D022", f"this `{token.text}` closes nothing", token, help=_NOT_OPEN)
         if token.kind == NAME and self.following.text in ("=", "+=", "{", "."):
-            self.tell("D021", "expected `;`", self.behind(self.previous))
+            self.tell("D021", "expected `;`", self.behind(self.previous), help=_SEMICOLON)
             return
         helps = {
             "=": "to compare, write `==`; to set two things, write two entries",

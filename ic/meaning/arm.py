@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from ic.grammar.syntax import Expression, Name, Unary
 from ic.meaning.complaints import known_words
 from ic.meaning.models import check_keys, word_of
-from ic.meaning.resolve import Block, Definition, Item
+from ic.meaning.resolve import RESERVED, Block, Definition, Item
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.shapes import SHAPES, Solid
 from met.diagnostic import Label, Place, did_you_mean
@@ -35,9 +36,12 @@ JOINT_KEYS = ("parent", "child", "at", "rpy", "axis")
 
 @frozen
 class Arm:
+    """lost: names of joints and links that failed, which was told."""
+
     name: str
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
+    lost: frozenset[str] = frozenset()
 
     def kind(self, joint: str) -> str | None:
         return next((j.kind for j in self.joints if j.name == joint), None)
@@ -66,7 +70,9 @@ def resolve_arm(scope: Scope, definition: Definition) -> Arm | None:
         scope.complaints.error("D081", f"arm `{definition.name}` has no links", definition.place,
                                help="write `link NAME { ... }` and a joint to hold it")
     check_tree(scope, definition.name, links, joints, complete=len(joints) == len(made))
-    return Arm(definition.name, tuple(links), tuple(joints))
+    written = {item.name for kind in ("link", "joint") for item in block.of_kind(kind)}
+    lost = frozenset(written - {link.name for link in links} - {joint.name for joint in joints})
+    return Arm(definition.name, tuple(links), tuple(joints), lost)
 
 
 def _stray(scope: Scope, item: Item, block: Block) -> None:
@@ -180,6 +186,7 @@ def _inertia(scope: Scope, owner: Owner, item: Item | None, solid: Solid | None,
                       "or `inertia = [xx, yy, zz] kg*m^2;`, about the centre of mass"])
         return None
     if mass is None:
+        scope.checks.fail(owner.join("inertia"))
         return None
     scope.whole[owner.join("inertia")] = "is made of 6 numbers; vary one of them, such as `" + owner.join("inertia.xx`")
     return tuple(scope.derived(owner, f"inertia.{name}", value, "kg*m^2", f"uniform {solid.kind} of the link's mass")
@@ -223,6 +230,10 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], arm: Block) -> Join
         scope.complaints.error("D090", message, place,
                                help=[*(did_you_mean(kind, JOINT_KINDS) if kind else ()),
                                      f"write `joint {item.name} revolute {{ ... }}`, or prismatic, or fixed"])
+        return None
+    if item.name in RESERVED:
+        scope.complaints.error("D166", f"`{item.name}` begins paths of its own, so no joint may be called so",
+                               item.place, help="give the joint another name")
         return None
     if item.body is None:
         scope.complaints.error("D091", f"joint `{item.name}` needs a block", item.place,
@@ -272,19 +283,29 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
                                help="write `axis = z;`, or x, y, -x, ... or [0, 0.6, 0.8]")
         return
     named = _named_axis(item.value)
-    if named is not None:
-        scope.vector(owner, AXIS, replace(item, value=None), given=named)
+    value = item.value.operand if isinstance(item.value, Unary) else item.value
+    if named is None and isinstance(value, Name) and len(value.path) == 1 and not scope.names.knows(value.text):
+        scope.complaints.error("D065", f"no axis and no value `{value.text}`", value.place,
+                               help="an axis is x, y, z, -x, -y or -z, or three numbers such as [0, 0.6, 0.8]")
+        scope.checks.fail(owner.join("axis"))
         return
-    written = scope.vector(owner, AXIS, item, record=False)
+    written = scope.vector(owner, AXIS, item if named is None else replace(item, value=None), given=named)
     if written is None:
         return
+    scope.checks.hold(written, _no_direction, code="D097", message=f"the axis of {owner.label} has no direction",
+                      place=item.place, needs=(owner.join("axis"),), help="one of its numbers must not be zero")
     x, y, z = written
     length = sqrt(x * x + y * y + z * z)
-    if not isinstance(length, Scalar) and not length > 0.0:
-        scope.complaints.error("D097", f"the axis of {owner.label} has no direction", item.place,
-                               help="one of its numbers must not be zero")
-        return
-    scope.vector(owner, AXIS, item, given=(x / length, y / length, z / length))
+    if isinstance(length, Scalar) or 0.0 < length < math.inf:
+        parts = zip("xyz", written, strict=True)
+        scope.remake({owner.join(f"axis.{name}"): part / length for name, part in parts}, item)
+
+
+def _no_direction(parts: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """Which rows [n, 3] point nowhere, or have a length that no double holds."""
+    with np.errstate(over="ignore", under="ignore"):
+        length = np.sqrt((parts * parts).sum(axis=1))
+    return ~((length > 0.0) & (length < np.inf)), []
 
 
 def _named_axis(value: Expression | None) -> tuple[float, float, float] | None:

@@ -57,6 +57,10 @@ class Checks:
     def failed(self, path: str) -> bool:
         return bool(path) and any(each == path or each.startswith(path + ".") for each in self._failed)
 
+    def touches(self, path: str) -> bool:
+        """Whether what failed is this, or inside it, or around it."""
+        return self.failed(path) or any(path.startswith(each + ".") for each in self._failed if each)
+
     def hold(self, values: tuple[Real, ...], test: Test, *,
                     code: str, message: str, place: Place, help: str | tuple[str, ...] = (), path: str = "",
                     needs: tuple[str, ...] = ()) -> None:

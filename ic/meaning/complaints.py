@@ -68,6 +68,11 @@ class Complaints:
             raise Problem(self.all)
 
 
+def an(word: str) -> str:
+    """`an arm`, `a servo`."""
+    return f"an {word}" if word[:1] in tuple("aeiou") else f"a {word}"
+
+
 def known_words(what: str, known: Iterable[str], most: int = 24) -> str:
     """`keys of a link: com, inertia, mass, shape`, cut where there are many."""
     names = list(dict.fromkeys(known))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from os import PathLike
 
 import numpy as np
@@ -11,9 +12,11 @@ from ic.grammar.spell import spell
 from ic.grammar.syntax import Binary, Call, Expression, List, Name, Unary, WithUnit
 from ic.meaning.lower import Compiled, Select, check
 from ic.meaning.scope import Scope, Settled
+from ic.meaning.values import Value, place_of
+from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
-from met.plan import Experiment
+from met.plan import Experiment, Formula, Origin, Quantity
 from met.trace import Formulas, Scalar
 
 DEEPEST = 16  # names behind names that are followed
@@ -58,12 +61,31 @@ def explain(path: str | PathLike[str], target: str, *, include_dirs: Sequence[st
         raise Problem(compiled.diagnostics, compiled.sources)
     found = tuple(explained(compiled, target))
     if not found:
-        known = list(dict.fromkeys(path for scope in compiled.scopes for path in (*scope.parameters, *scope.known)))
+        known = list(dict.fromkeys(
+            path for scope in compiled.scopes for path in (*scope.parameters, *scope.beside, *scope.known)
+        ))
         inside = [path for path in known if path.startswith(target + ".")]
         runs = ", ".join(f"`{experiment.name}`" for experiment in compiled.plan.experiments)
         helps = [f"there are: {', '.join(inside[:24])}"] if inside else list(did_you_mean(target, known))
         raise Problem(error("D163", f"nothing is called `{target}` in {runs}", help=helps), compiled.sources)
     return found
+
+
+def in_full(compiled: Compiled) -> Experiment:
+    """The first experiment of a deck, with settings and what parameters are made of as if these were parameters."""
+    assert compiled.plan is not None
+    experiment, scope = compiled.plan.experiments[0], compiled.scopes[0]
+    parameters, outputs = scope.quantities(beside=True)
+    for name in scope.definitions.lets:
+        let = _let(scope, name)
+        if let is None or name in parameters or any(path.startswith(f"{name}.") for path in parameters):
+            continue
+        value = let.value
+        if isinstance(value, Scalar):
+            outputs.append(value)
+        parameters[name] = Quantity(Formula(len(outputs) - 1) if isinstance(value, Scalar) else value, let.unit,
+                                    let.origin)
+    return replace(experiment, parameters=parameters, formulas=Formulas.of(scope.graph, outputs))
 
 
 def explained(compiled: Compiled, target: str) -> Iterator[Explanation]:
@@ -73,14 +95,32 @@ def explained(compiled: Compiled, target: str) -> Iterator[Explanation]:
         paths = dict.fromkeys((target, *scope.known.get(target, ())))
         vector = [
             path
-            for path in scope.parameters
+            for path in (*scope.parameters, *scope.beside)
             if path.startswith(target + ".")
             and path.count(".") == target.count(".") + 1
             and path.rpartition(".")[2] in ("x", "y", "z", "xx", "yy", "zz", "xy", "xz", "yz")
         ]
         for path in (*paths, *vector):
-            if path in scope.parameters:
-                yield _explanation(experiment, scope, path, scope.parameters[path])
+            settled = scope.settled(path) or _let(scope, path)
+            if settled is not None:
+                yield _explanation(experiment, scope, path, settled)
+
+
+def _let(scope: Scope, name: str) -> Settled | None:
+    """A `let` as if it were a parameter; None where it is none, or no number or list of numbers."""
+    let = scope.definitions.lets.get(name)
+    if let is None:
+        return None
+    varied = scope.varied.get(name)
+    origin = Origin("deck", place_of(let.value)) if varied is None else Origin("case", varied.place, (let.name.place,))
+    found = scope.names.find(Name((let.name,), let.name.place))
+    if isinstance(found, Value):
+        return Settled(found.number, units.text(found.dimension), origin, "", let.value)
+    numbers = [value for value in found.items if isinstance(value, Value) and not isinstance(value.number, Scalar)]
+    if not numbers or len(numbers) < len(found.items):
+        return None
+    unit = units.text(numbers[0].dimension)
+    return Settled(tuple(float(value.number) for value in numbers), unit, origin, "", let.value)
 
 
 def _explanation(experiment: Experiment, scope: Scope, path: str, settled: Settled) -> Explanation:

@@ -84,7 +84,8 @@ def compile_deck(deck: Deck, *, select: Select = None, defines: Iterable[str] = 
     else:
         return Compiled(None, in_order(complaints.all, deck.sources), texts)
     sources = tuple(Source(source.name, source.text, source.sha256) for source in deck.sources)
-    return Compiled(Plan(deck.file, tuple(experiments), sources, tuple(defines)),
+    selected = (select,) if isinstance(select, str) else tuple(dict.fromkeys(select or ()))
+    return Compiled(Plan(deck.file, tuple(experiments), sources, tuple(defines), selected),
                     in_order(complaints.all, deck.sources), texts, tuple(scopes))
 
 
@@ -135,7 +136,7 @@ def lower(definitions: Definitions, complaints: Complaints, definition: Definiti
         return None
     scope = Scope(definitions, complaints, {varied.path: varied for varied in sweep.varied}, graph)
     resolved = resolve_run(scope, base)
-    check_coordinates(scope)
+    check_coordinates(scope, complete=resolved is not None)
     return None if resolved is None else _experiment(scope, definition, resolved, sweep)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from ic.grammar.syntax import Call, Expression, Name
-from ic.meaning.complaints import known_words
+from ic.meaning.complaints import an, known_words
 from ic.meaning.resolve import Block
 from ic.meaning.scope import Owner, Scope
 from met import models
@@ -41,7 +41,7 @@ def check_keys(scope: Scope, body: Block, known: Iterable[str], owner: Owner) ->
 def find_model(scope: Scope, kind: models.Kind, name: str | None, place: Place) -> Any:
     """The declaration; None where there is none, which was told."""
     if name is None:
-        scope.complaints.error("D143", f"the name of a {kind} model is needed here", place,
+        scope.complaints.error("D143", f"the name of {an(kind)} model is needed here", place,
                                help=known_words(f"{kind} models", sorted(models.available(kind))))
         return None
     try:

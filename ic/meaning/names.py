@@ -32,6 +32,10 @@ class Names:
     def evaluate(self, expression: Expression) -> Value | Values:
         return evaluate(expression, self.find)
 
+    def knows(self, text: str) -> bool:
+        """Whether a single word has a value."""
+        return text in self.varied or text in self.definitions.lets or text in CONSTANTS
+
     def find(self, name: Name) -> Value | Values:
         """The value of a name. Raises Problem D065 where there is none, D073 where it needs itself."""
         text = name.text

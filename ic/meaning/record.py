@@ -41,6 +41,8 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
             made = _recorded(structure, known, groups, name.text)
             if made is None and scope.lost and "servo" in [word.text for word in name.path]:
                 continue
+            if made is None and scope.gone and (name.path[0].text in scope.gone or not structure.moving):
+                continue
             if made is None:
                 scope.complaints.error(
                     "D125", f"no channel `{name.text}`", name.place, help=_nearest(name, known, groups)
@@ -132,7 +134,7 @@ def _metric(scope: Scope, item: Item, known: dict[str, Channel]) -> MetricUse | 
                                help="write `of = CHANNEL;`, such as `of = shoulder.qd;`")
     elif not isinstance(of.value, Name) or of.value.text not in known:
         name = of.value if isinstance(of.value, Name) else None
-        if name is not None and name.path[0].text in scope.lost:
+        if name is not None and name.path[0].text in scope.lost | scope.gone:
             return None
         helps = _nearest(name, known, {}) if name is not None else []
         of_all = name is not None and any(path.endswith("." + name.text) for path in known)
@@ -172,9 +174,8 @@ class Comparison:
 def read_requirements(scope: Scope, block: Block) -> list[Comparison]:
     """Every `require` that compares a metric of the run with a limit; tells of the others."""
     written = {item.name for item in block.of_kind("metric")}
-    removed = {key.removeprefix("metric ") for key, _ in block.removed if key.startswith("metric ")} - written
     found = []
-    for statement in block.statements:
+    for position, statement in enumerate(block.statements):
         if [word.text for word in statement.words] != ["require"]:
             continue
         comparison = statement.value
@@ -182,6 +183,8 @@ def read_requirements(scope: Scope, block: Block) -> list[Comparison]:
             scope.complaints.error("D131", "a requirement compares a metric with a limit", place_of(comparison),
                                    help="write `require METRIC < LIMIT;`, or <=, >, >=")
             continue
+        removed = {key.removeprefix("metric ") for key, before in block.removed
+                   if key.startswith("metric ") and position < before}
         operator, metric, limit = comparison.operator, comparison.left, comparison.right
         if not _is_metric(metric, written | removed) and _is_metric(limit, written | removed):
             operator, metric, limit = FLIPPED[operator], limit, metric

@@ -10,11 +10,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field, replace
 
 from ic.grammar.syntax import Call, Deck, Entry, Expression, Group, Let, Name, Setting, Statement, Word
-from ic.meaning.complaints import Complaints, known_words
+from ic.meaning.complaints import Complaints, an, known_words
+from ic.text.files import library_defines
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 
 KINDS = ("arm", "servo", "run", "sweep")
+RESERVED = ("links", "initial", "environment", "metrics", "rates")  # what paths of a run begin with, besides joints
 
 
 @frozen
@@ -45,11 +47,14 @@ class Item:
 
 @frozen
 class Block:
-    """Merged entries by key ("kind name", or the name of a plain key), in order, and statements such as `require`."""
+    """Merged entries by key ("kind name", or the name of a plain key), in order, and statements such as `require`.
+
+    removed  keys of what was removed, each with the number of statements that stood before its `remove`
+    """
 
     items: Mapping[str, Item] = field(default_factory=dict)
     statements: tuple[Statement, ...] = ()
-    removed: tuple[tuple[str, Place], ...] = ()
+    removed: tuple[tuple[str, int], ...] = ()
 
     def of_kind(self, kind: str) -> Iterator[Item]:
         return (item for item in self.items.values() if item.kind == kind)
@@ -97,11 +102,13 @@ class Definitions:
         for other, definitions in self._by_kind.items():
             if name.text in definitions:
                 raise Problem(error(
-                    "D042", f"`{name.text}` is {_an(other)}, and {_an(kind)} is needed here", name.place,
+                    "D042", f"`{name.text}` is {an(other)}, and {an(kind)} is needed here", name.place,
                     also=[Label(definitions[name.text].place, "defined here")],
                     help=known_words(f"{kind}s of this deck", known)))
+        file = library_defines(kind, name.text)
+        include = [f"a standard deck defines it: add `#include <{file}>`"] if file else did_you_mean(name.text, known)
         raise Problem(error("D041", f"no {kind} `{name.text}`", name.place,
-                            help=[*did_you_mean(name.text, known), known_words(f"{kind}s of this deck", known)]))
+                            help=[*include, known_words(f"{kind}s of this deck", known)]))
 
     def block(self, definition: Definition) -> Block | None:
         """The definition merged with its bases; None where that failed (and was told)."""
@@ -174,6 +181,11 @@ class Definitions:
         if default:
             words.pop(0)
         kind = words[0]
+        lower = [word.text.lower() for word in group.words[:2]]
+        if kind.text not in KINDS and (lower[0] in KINDS or (lower[0] == "default" and lower[-1] in KINDS)):
+            meant = f"{lower[0]} {lower[-1]}" if lower[0] == "default" else lower[0]
+            raise Problem(error("D045", f"no kind of definition `{kind.text}`", kind.place,
+                                help=f"write `{meant}`: the language's words are in lower case"))
         if kind.text not in KINDS:
             raise Problem(error("D045", f"no kind of definition `{kind.text}`", kind.place,
                                 help=[*did_you_mean(kind.text, KINDS), "kinds: arm, servo, run, sweep"]))
@@ -181,16 +193,19 @@ class Definitions:
             raise Problem(error("D046", f"this {kind.text} has no name", kind.place,
                                 help=f"write `{kind.text} NAME {{ ... }}`"))
         if len(words) > 2:
-            raise Problem(error("D047", f"`{words[2].text}` after the name of {_an(kind.text)}", words[2].place,
+            raise Problem(error("D047", f"`{words[2].text}` after the name of {an(kind.text)}", words[2].place,
                                 help=f"write `{kind.text} {words[1].text} {{ ... }}`, `like BASE` before the brace"))
         if default and kind.text not in ("run", "sweep"):
-            raise Problem(error("D048", f"{_an(kind.text)} cannot be the default", group.words[0].place,
+            raise Problem(error("D048", f"{an(kind.text)} cannot be the default", group.words[0].place,
                                 help="`default` marks the run or sweep that `met run` takes unless told another"))
         if (group.of is not None) != (kind.text == "sweep") or (kind.text == "sweep" and group.like is not None):
             usage = f"sweep {words[1].text} of RUN {{ ... }}" if kind.text == "sweep" else f"{kind.text} NAME like BASE"
             raise Problem(error("D049", "a sweep is `of` a run, other definitions are `like` another", kind.place,
                                 help=f"write `{usage}`"))
         name = words[1]
+        if name.text in RESERVED and kind.text in ("arm", "servo"):  # whose names begin paths of parameters
+            raise Problem(error("D166", f"`{name.text}` begins paths of its own, so no {kind.text} may be called so",
+                                name.place, help=f"give the {kind.text} another name"))
         spaces = ("run", "sweep") if kind.text in ("run", "sweep") else (kind.text,)
         for space in spaces:
             if name.text in self._by_kind[space]:
@@ -329,7 +344,7 @@ class _Merger:
         del self.items[earlier.key]
         self.names[name].remove(earlier.key)
         self.written.pop(earlier.key, None)
-        self.removed.append((earlier.key, entry.place))
+        self.removed.append((earlier.key, len(self.statements)))
 
 
 def overlay(base: Block, over: Block) -> Block:
@@ -344,7 +359,8 @@ def overlay(base: Block, over: Block) -> Block:
             items[key] = replace(earlier, body=body)
         else:
             items[key] = replace(item, homes=(), overrides=(*item.overrides, earlier.place, *earlier.overrides))
-    return Block(items, (*base.statements, *over.statements), (*base.removed, *over.removed))
+    removed = ((key, len(base.statements) + before) for key, before in over.removed)
+    return Block(items, (*base.statements, *over.statements), (*base.removed, *removed))
 
 
 def open_call(value: Expression, home: str | None, complaints: Complaints) -> tuple[Expression, Block | None]:
@@ -379,7 +395,3 @@ def _twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnostic:
     if (place.file, place.line, place.column) == (earlier.file, earlier.line, earlier.column):
         helps = ["its file is included twice: begin that file with `#pragma once`"]
     return error("D040", f"{what} is written twice", Label(place, "again"), also=[Label(earlier, "first")], help=helps)
-
-
-def _an(word: str) -> str:
-    return f"an {word}" if word[0] in "aeiou" else f"a {word}"

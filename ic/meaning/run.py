@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from ic.grammar.syntax import Call, Name, Word
 from ic.meaning.arm import Arm, resolve_arm
@@ -13,13 +15,14 @@ from ic.meaning.resolve import Block, Definition, Item
 from ic.meaning.schedule import Rate, base_rate, check_stability, divisor, make_schedule
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.servos import RATE, Use, fixed_rate, resolve_servos
-from ic.meaning.values import Values, place_of
-from met import models
-from met.diagnostic import Place, did_you_mean
+from ic.meaning.values import Value, Values, place_of
+from met import models, units
+from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import EnvironmentUse, Requirement, Schedule, ServoUse, Structure
-from met.trace import Real
+from met.trace import Real, Scalar
+from met.units import PURE
 
 KEYS = ("arm", "servos", "initial", "environment", "rates", "integrator", "duration", "record", "seed")
 RATES = ("dynamics", "servos", "record", "base")
@@ -62,12 +65,14 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         )
     if arm is None:
         return None
+    scope.gone = arm.lost
     uses, scope.lost = resolve_servos(scope, _body(scope, block.get("servos")), arm)
     environment, products = _environment(scope, _body(scope, block.get("environment")), arm)
     _initial(scope, _body(scope, block.get("initial")), arm)
     schedule, divisors = _schedule(scope, run, block, rates, uses, duration)
     if schedule is None or integrator is None:
         return None
+    _keep_settings(scope, block, arm, integrator, rates, schedule)
     stability = []
     for use in uses:
         if use.parameters is not None:
@@ -84,8 +89,24 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     metrics = resolve_metrics(scope, block, structure)
     record = resolve_record(scope, run, block.get("record"), structure)
     structure = replace(structure, metrics=metrics, record=record)
+    scope.setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure)
     return Resolved(structure, requirements, seed, tuple(stability), definition.place)
+
+
+def _keep_settings(scope: Scope, block: Block, arm: Arm, integrator: Any, rates: Mapping[str, Rate],
+                   schedule: Schedule) -> None:
+    """What the run says besides parameters, for who asks; `Scope.constant` and `Scope.word` have kept some."""
+    scope.setting("arm", arm.name, item=block.get("arm"))
+    scope.setting("integrator", integrator.name, item=block.get("integrator"))
+    if "rates.base" not in scope.beside:
+        scope.setting("rates.base", schedule.base_hz, "Hz", note="the fastest of the rates")
+    if "rates.record" not in scope.beside:
+        scope.setting("rates.record", rates["dynamics"].hz, "Hz", note="that of the dynamics")
+    if "environment.velocity_products" not in scope.beside:
+        scope.setting("environment.velocity_products", "on")
+    if "seed" not in scope.beside:
+        scope.setting("seed", 0.0, "1")
 
 
 def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
@@ -190,10 +211,19 @@ def _environment(scope: Scope, body: Block, arm: Arm) -> tuple[tuple[Environment
 def _environment_use(scope: Scope, item: Item, arm: Arm) -> EnvironmentUse | None:
     owner = Owner(f"environment `{item.name}`", item.place, f"environment.{item.name}", homes=item.homes)
     name = word_of(item.value)
+    if item.name == "gravity" and name in (None, "gravity", *scope.definitions.lets):
+        owner = replace(owner, short="g")
     is_value = item.name == "gravity" and (name is None or name in scope.definitions.lets)
     if item.value is not None and is_value:
         gravity = models.find_own("environment")["gravity"]
-        scope.vector(replace(owner, label="gravity"), gravity.parameters[0], item)
+        with scope.complaints.gather():
+            found = scope.written(item)
+            if isinstance(found, Value):
+                size = "9.81" if isinstance(found.number, Scalar) else f"{abs(found.number):g}"
+                scope.complaints.error("D071", "`gravity` is a list of 3 numbers", found.place,
+                                       help=f"write `gravity = [0, 0, -{size}] m/s^2;`")
+                return None
+        scope.vector(replace(owner, label="gravity", called="`gravity`"), gravity.parameters[0], item)
         return EnvironmentUse(item.name, gravity.name, None, item.place)
     if item.value is None:
         scope.complaints.error("D158", f"no environment model `{item.name}` to change", item.place,
@@ -208,7 +238,7 @@ def _environment_use(scope: Scope, item: Item, arm: Arm) -> EnvironmentUse | Non
         names = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
         for wanted in environment.parameters:
             known = names.get(wanted.name)
-            if wanted.shape == "word" and known is not None and values[wanted.name] not in known:
+            if wanted.shape == "word" and known is not None and values[wanted.name] not in (*known, *arm.lost):
                 given = (item.body or Block()).get(wanted.name)
                 place = given.place if given is not None else item.place
                 scope.complaints.error("D159", f"no {wanted.name} `{values[wanted.name]}` in arm `{arm.name}`", place,
@@ -221,6 +251,8 @@ def _initial(scope: Scope, body: Block, arm: Arm) -> None:
     known = dict.fromkeys(("q", "qd"), "")
     known |= {f"{joint.name}.{name}": "" for joint in arm.moving for name in ("q", "qd")}
     for item in body.items.values():
+        if not item.kind and item.name.partition(".")[0] in arm.lost:
+            continue
         if item.kind or item.name not in known:
             scope.complaints.error("D114", f"no initial `{item.name}`", item.place,
                                    help=[*did_you_mean(item.name, known), known_words("there is", known)])
@@ -232,6 +264,8 @@ def _initial(scope: Scope, body: Block, arm: Arm) -> None:
             with scope.complaints.gather():
                 found = scope.written(general)
                 listed = found if isinstance(found, Values) else None
+            if listed is not None and arm.lost:
+                continue
             if listed is not None and len(listed.items) != len(arm.moving):
                 scope.complaints.error(
                     "D071",
@@ -249,7 +283,26 @@ def _initial(scope: Scope, body: Block, arm: Arm) -> None:
             if isinstance(value, Values):
                 scope.complaints.error("D071", "a list inside a list", value.place)
                 continue
+            if general is not None and own is None and listed is None and _mixed(scope, owner, wanted, general, arm):
+                break
             scope.number(owner, wanted, own or general, value=value)
+
+
+def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: Arm) -> bool:
+    """Whether one value for all joints has not this joint's unit, since others move otherwise; tells that."""
+    if len({joint.kind for joint in arm.moving}) < 2:
+        return False
+    with scope.complaints.gather():
+        found = scope.written(general)
+        unit, dimension = scope.unit(owner, wanted)
+        if isinstance(found, Value) and found.dimension != PURE and not units.same(found.dimension, dimension):
+            scope.complaints.error(
+                "D061", f"`{wanted.name}` of {owner.label}, which is {owner.joint}, is in {unit}, and this is in "
+                f"{units.text(found.dimension)}", found.place,
+                help=[f"write it joint by joint: `{owner.path.removeprefix('initial.')}.{wanted.name} = 0 {unit};`",
+                      "or leave it out: without it all joints begin at 0"])
+            return True
+    return False
 
 
 # Rates
@@ -302,6 +355,11 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
     for use in uses:
         rate = use.rate or shared or dynamics
         divisors[use.joint] = divisor(scope.complaints, rate, base, everyone, written=written)
+    if record.hz > dynamics.hz:
+        scope.complaints.remark(
+            "D167", f"`record` is faster than the dynamics: rows repeat, {record.hz / dynamics.hz:g} for each step",
+            record.place, also=[Label(dynamics.place, "a step of the dynamics")],
+            help="record at the rate of the dynamics, or slower")
     if shared is not None and shared.hz and not uses:
         divisor(scope.complaints, shared, base, everyone, written=written)
     return schedule, divisors

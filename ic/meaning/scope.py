@@ -7,8 +7,8 @@ definition that hands it down without its being overridden (`gearbox.kp`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,8 +17,9 @@ from ic.grammar.syntax import Call, Expression, Name
 from ic.meaning.checks import Checks, Varied
 from ic.meaning.complaints import Complaints
 from ic.meaning.names import Names
+from ic.meaning.remedies import components, mended
 from ic.meaning.resolve import Definitions, Item
-from ic.meaning.unit_words import in_deck, unit_here
+from ic.meaning.unit_words import either, in_deck, in_degrees, unit_here
 from ic.meaning.values import Value, Values, place_of
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
@@ -49,12 +50,19 @@ class Owner:
     command: str | None = None
     of: str | None = None
     called: str | None = None  # what to call its one parameter, which has no name in the deck
+    short: str = ""  # the parameter that a path may leave out: `environment.gravity.x` for `environment.gravity.g.x`
 
     def what(self, wanted: Parameter) -> str:
         return self.called or f"`{wanted.name}` of {self.label}"
 
     def join(self, name: str) -> str:
-        return f"{self.path}.{name}"
+        return f"{self.path}.{name}" if self.path else name
+
+    def paths(self, name: str, homes: Iterable[str]) -> tuple[str, ...]:
+        """Every path of a parameter: its own first, then those under definitions."""
+        names = [name, name.removeprefix(f"{self.short}.")] if self.short else [name]
+        made = [path for each in names for path in (self.join(each), *(self.join_local(home, each) for home in homes))]
+        return tuple(dict.fromkeys(made))
 
     def join_local(self, home: str, name: str) -> str:
         local = self.path if self.local is None else self.local
@@ -84,15 +92,29 @@ class Scope:
     varied: dict[str, Varied] = field(default_factory=dict)
     graph: Graph = field(default_factory=Graph)
     parameters: dict[str, Settled] = field(default_factory=dict)
+    beside: dict[str, Settled] = field(default_factory=dict)  # what parameters are made of, and settings of the run
     known: dict[str, list[str]] = field(default_factory=dict)  # every path that would set something -> parameters
     sets: dict[str, list[str]] = field(default_factory=dict)  # coordinate -> parameters that took it directly
     whole: dict[str, str] = field(default_factory=dict)  # paths that cannot vary -> why
     notes: list[str] = field(default_factory=list)
     lost: frozenset[str] = frozenset()  # joints whose servo failed: nothing can be said of its channels
+    gone: frozenset[str] = frozenset()  # joints and links that failed: nothing can be said of what begins with them
 
     def __post_init__(self) -> None:
         self.checks = Checks(self.complaints, self.graph, self.varied)
         self.names = Names(self.definitions, {path: varied.value for path, varied in self.varied.items()})
+
+    def settled(self, path: str) -> Settled | None:
+        """What is settled under a path, whether the plan has it as a parameter or not."""
+        return self.parameters.get(path) or self.beside.get(path)
+
+    def hangs(self, path: str) -> bool:
+        """Whether nothing can be said of this path, because what it leads to has failed, which was told."""
+        first, _, rest = path.partition(".")
+        thing = rest.partition(".")[0] if first == "links" else first
+        if self.checks.touches(path) or thing in self.gone:
+            return True
+        return bool(self.lost) and (first in self.lost or first in self.definitions.of_kind("servo"))
 
     # Numbers
 
@@ -119,12 +141,14 @@ class Scope:
 
         given  numbers made of what the item says, in its stead
         """
-        self.whole.setdefault(owner.join(wanted.name), f"is made of {len(names)} numbers; vary one of them: "
-                              + ", ".join(f"`{owner.join(wanted.name)}.{name}`" for name in names))
+        heads = [owner.path] * (wanted.name == owner.short) + [owner.join(wanted.name)]
+        for head in heads:
+            self.whole.setdefault(head, f"is made of {len(names)} numbers; vary one of them: "
+                                  + ", ".join(f"`{heads[0]}.{name}`" for name in names))
         values: list[Value | None] = [None] * len(names)
         if item is not None and given is None:
             with self.complaints.gather():
-                values = list(self._components(owner, wanted, item, len(names), short))
+                values = list(self._components(owner, wanted, item, names, short))
             if all(value is None for value in values):
                 self.checks.fail(owner.join(wanted.name))
                 return None
@@ -135,34 +159,34 @@ class Scope:
             self._missing(owner, wanted)
             return None
         defaults = wanted.default if isinstance(wanted.default, tuple) else (None,) * len(names)
-        numbers = [self._settle(owner, wanted, f"{wanted.name}.{name}", item, value, default, record)
-                   for name, value, default in zip(names, values, defaults, strict=True)]
+        parts = components(item, len(names)) if given is None else (None,) * len(names)
+        numbers = [self._settle(owner, wanted, f"{wanted.name}.{name}", item, value, default, record, part)
+                   for name, value, default, part in zip(names, values, defaults, parts, strict=True)]
         return None if any(number is None for number in numbers) else tuple(numbers)  # type: ignore[arg-type]
 
-    def _components(self, owner: Owner, wanted: Parameter, item: Item, count: int, short: int) -> Iterable[Value]:
+    def _components(self, owner: Owner, wanted: Parameter, item: Item, names: Sequence[str],
+                    short: int) -> Iterable[Value]:
+        count = len(names)
         found = self.written(item)
+        text, dimension = self.unit(owner, wanted)
         expected = f"{short} or {count}" if short else f"{count}"
         if isinstance(found, Value):
-            raise Problem(
-                error(
-                    "D071",
-                    f"`{wanted.name}` of {owner.label} is a list of {expected} numbers",
-                    found.place,
-                    help=f"write `{wanted.name} = [...] {self.unit(owner, wanted)[0]};`",
-                )
-            )
+            unit = "" if text == "1" else f" {in_deck(text)}"
+            raise Problem(error("D071", f"{owner.what(wanted)} is a list of {expected} numbers", found.place,
+                                help=f"write `{item.name} = [...]{unit};`"))
         if len(found.items) not in (short, count):
-            raise Problem(error("D071", f"`{wanted.name}` of {owner.label} has {expected} numbers, not "
-                                f"{len(found.items)}", found.place))
+            shown = ", ".join(names)
+            raise Problem(error("D071", f"{owner.what(wanted)} has {expected} numbers, not {len(found.items)}",
+                                found.place, help=f"they are [{shown}]"))
         numbers = []
         for value in found.items:
             if isinstance(value, Values):
                 raise Problem(error("D071", "a list inside a list", value.place))
             numbers.append(value)
-        text, dimension = self.unit(owner, wanted)
         if dimension != PURE and len(numbers) > 1 and all(value.bare for value in numbers):
             raise Problem(error("D060", f"{owner.what(wanted)} is in {text}, and these are bare numbers", found.place,
-                                help=f"write `[...] {text}`: a unit after the bracket is for all of them"))
+                                help=f"write {either(f'[...] {each}' for each in in_degrees(text))}: "
+                                     "a unit after the bracket is for all of them"))
         numbers += [Value(0.0, dimension, found.place)] * (count - len(numbers))
         return numbers
 
@@ -170,7 +194,7 @@ class Scope:
         """A number that decides the program, so that no sweep can vary it."""
         path = owner.join(wanted.name)
         reason = "decides the program, which is one for the whole sweep in this version"
-        for known in (path, *(owner.join_local(home, wanted.name) for home in item.homes)):
+        for known in owner.paths(wanted.name, item.homes):
             self.whole[known] = reason
         number = None
         with self.complaints.gather():
@@ -185,6 +209,9 @@ class Scope:
             before = len(self.complaints.all)
             self._check_range(owner, wanted, found.number, found.place)
             number = float(found.number) if len(self.complaints.all) == before else None
+            if number is not None:
+                self.beside[path] = Settled(number, self.unit(owner, wanted)[0], _origin(item, found.place),
+                                            wanted.doc, item.value)
         if number is None:
             self.checks.fail(path)
         return number
@@ -227,7 +254,7 @@ class Scope:
             if not isinstance(wanted.default, str):
                 self._missing(owner, wanted)
                 return None
-            word, origin = wanted.default, Origin("default", None, (), wanted.source)
+            word, origin = wanted.default, Origin("default")
         else:
             named = item.value.text if isinstance(item.value, Name) else None
             if named is None or (wanted.words and named not in wanted.words):
@@ -242,9 +269,30 @@ class Scope:
                 return None
             word = named
             origin = _origin(item, place_of(item.value) if item.value else item.place)
-        if record:
-            self.parameters[path] = Settled(word, "", origin, wanted.doc, item.value if item else None)
+        kept = self.parameters if record else self.beside
+        origin = replace(origin, note="")  # a word is no name that stands for something
+        kept[path] = Settled(word, "", origin, wanted.doc, item.value if item else None)
         return word
+
+    def setting(self, path: str, value: Real | str, unit: str = "", item: Item | None = None, note: str = "") -> None:
+        """Keeps, for who asks where it comes from, what decides the program; item: who wrote it, None for a default."""
+        origin = Origin("default", note=note)
+        if item is not None:
+            place = item.place if item.value is None else place_of(item.value)
+            origin = Origin("deck", place, item.overrides)
+        self.beside[path] = Settled(value, unit, origin, "", item.value if item is not None else None)
+
+    def remake(self, values: Mapping[str, Real], item: Item) -> None:
+        """Puts values in the stead of settled ones, each made of all that the item writes: what varies one, varies all.
+        """
+        for path, value in values.items():
+            settled = self.parameters[path]
+            settled.value, settled.expression = self._plain(value), item.value
+            if settled.origin.kind == "deck" and item.value is not None:
+                settled.origin = replace(settled.origin, place=place_of(item.value))
+        for taken in self.sets.values():
+            if any(path in values for path in taken):
+                taken += [path for path in values if path not in taken]
 
     def derived(self, owner: Owner, name: str, value: Real, unit: str, note: str) -> Real:
         """A parameter that follows from others, unless a sweep varies it itself."""
@@ -279,11 +327,12 @@ class Scope:
                               help=f"write `{wanted.name} = {shown};` ({wanted.doc})")
 
     def _settle(self, owner: Owner, wanted: Parameter, name: str, item: Item | None, written: Value | None,
-                default: float | None, record: bool) -> Real | None:
+                default: float | None, record: bool, part: Expression | None = None) -> Real | None:
+        """part: of the item's expression, what this number was written as; None where that is the whole of it."""
         homes = owner.homes if item is None else item.homes
         place = owner.place if item is None else item.place
         value: Real | None = None
-        origin = Origin("default", None, (), wanted.source)
+        origin = Origin("default")
         if item is None:
             value = default
         elif written is not None:
@@ -296,14 +345,16 @@ class Scope:
         if value is None and (item is not None or coordinate is None):
             if item is None:
                 self._missing(owner, wanted)
-            self.checks.fail(owner.join(name))
+            for path in (owner.join(name), *(owner.join_local(home, name) for home in homes)):
+                self.checks.fail(path)
             return None
-        return self._finish(owner, wanted, name, homes, value, origin, place, record, item.value if item else None)
+        expression = part if part is not None else item.value if item is not None else None
+        return self._finish(owner, wanted, name, homes, value, origin, place, record, expression)
 
     def _finish(self, owner: Owner, wanted: Parameter, name: str, homes: tuple[str, ...], value: Real | None,
                 origin: Origin, place: Place, record: bool, expression: Expression | None = None) -> Real:
         path = owner.join(name)
-        for known in (path, *(owner.join_local(home, name) for home in homes)):
+        for known in owner.paths(name, homes):
             self.known.setdefault(known, []).append(path)
         coordinate = self._coordinate(owner, name, homes)
         if coordinate is not None:
@@ -319,19 +370,27 @@ class Scope:
                 self.checks.fail(coordinate.path)
         assert value is not None
         self._check_range(owner, wanted, value, place, path)
-        if record:
-            self.parameters[path] = Settled(value, self.unit(owner, wanted)[0], origin, wanted.doc, expression)
+        kept = self.parameters if record else self.beside
+        if record or owner.called is None:
+            kept[path] = Settled(value, self.unit(owner, wanted)[0], origin, wanted.doc, expression)
         return value
 
     def _coordinate(self, owner: Owner, name: str, homes: tuple[str, ...]) -> Varied | None:
-        paths = {owner.join(name), *(owner.join_local(home, name) for home in homes)}
+        paths = owner.paths(name, homes)
         found = [varied for path, varied in self.varied.items() if path in paths]
         for other in found[1:]:
             self.sets.setdefault(other.path, [])
             self.complaints.error(
                 "D123", f"`{found[0].path}` and `{other.path}` both set `{owner.join(name)}`", other.place,
-                also=[Label(found[0].place, "the first")], help="vary one of them, or different joints")
+                also=[Label(found[0].place, "the first")],
+                help=["vary one of them, or different joints", *self._own(owner, name, homes, (found[0], other))])
         return found[0] if found else None
+
+    def _own(self, owner: Owner, name: str, homes: tuple[str, ...], both: tuple[Varied, ...]) -> list[str]:
+        """What parts two coordinates of a servo's definition and of its base, where they are that."""
+        by_path = {owner.join_local(home, name): home for home in homes}
+        named = [home for path, home in by_path.items() if path in (both[0].path, both[1].path)]
+        return [f"or give `{named[1]}` its own `{name}`, which `{named[0]}` does not reach"] if len(named) > 1 else []
 
     def _plain(self, number: Real) -> Real:
         """A recorded number that turned out to be a constant is one."""
@@ -354,20 +413,15 @@ class Scope:
         what = owner.what(wanted)
         also = self.names.label(value)
         if value.dimension == PURE:
-            shown = (
-                f"`{value.number:g} {in_deck(text)}`" if not isinstance(value.number, Scalar) else f"a number in {text}"
-            )
+            shown = f"a number in {text}"
+            if not isinstance(value.number, Scalar):
+                shown = either(f"{value.number:g} {in_deck(each)}" for each in in_degrees(text))
             raise Problem(error(
                 "D060", f"{what} is in {text}, and this is a {'bare' if value.bare else 'pure'} number", value.place,
                 also=also, help=f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}"))
         found = units.text(value.dimension)
         message = f"{what} is " + ("a pure number" if dimension == PURE else f"in {text}") + f", and this is in {found}"
-        helps = []
-        if value.dimension == Dimension(s=-1) and dimension == Dimension(s=-1, rad=1):
-            helps = ["Hz counts cycles without an angle: write rad/s, deg/s, rpm or cycle/s"]
-        elif dimension == PURE:
-            helps = ["leave the unit out; `%` is the only unit of a pure number"]
-        raise Problem(error("D061", message, value.place, also=also, help=helps))
+        raise Problem(error("D061", message, value.place, also=also, help=mended(value, text, dimension)))
 
     def _check_range(self, owner: Owner, wanted: Parameter, value: Real, place: Place, path: str = "") -> None:
         bounds = [(bound, word, sign) for bound, word, sign in (
@@ -383,16 +437,17 @@ class Scope:
             return bad, [f"this is {x:g}{unit}" for x in values[bad, 0][:1]]
 
         limits = " and ".join(f"{word} {bound:g}" for bound, word, _ in bounds) or "finite"
+        remedy = f"write a number {limits}{unit}" if bounds else "write a finite number"
         self.checks.hold((value,), test, code="D077", message=f"{owner.what(wanted)} must be {limits}{unit}",
-                         place=place, path=path)
+                         place=place, path=path, help=remedy + (f" ({wanted.doc})" if wanted.doc else ""))
 
-    def quantities(self) -> tuple[dict[str, Any], list[Scalar]]:
-        """The parameters as a plan holds them, and the scalars of its formulas, in order."""
+    def quantities(self, *, beside: bool = False) -> tuple[dict[str, Any], list[Scalar]]:
+        """The parameters as a plan holds them, and the scalars of its formulas, in order. beside: the others too."""
         from met.plan import Formula
 
         outputs: list[Scalar] = []
         made = {}
-        for path, settled in self.parameters.items():
+        for path, settled in {**self.parameters, **(self.beside if beside else {})}.items():
             value: Any = settled.value
             if isinstance(value, Scalar):
                 outputs.append(value)

@@ -8,13 +8,14 @@ from typing import Any
 
 from ic.grammar.syntax import Call, Name, Word
 from ic.meaning.arm import Arm
-from ic.meaning.complaints import known_words
+from ic.meaning.complaints import an, known_words
 from ic.meaning.models import check_keys, find_model, use_model, word_of
 from ic.meaning.resolve import Block, Item, open_call, overlay
 from ic.meaning.schedule import Rate
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.unit_words import in_deck
 from ic.meaning.values import place_of
+from ic.text.files import library_defines
 from met import models
 from met.channel import COMMAND_UNIT
 from met.diagnostic import Label, Place, Problem, did_you_mean
@@ -55,6 +56,8 @@ def resolve_servos(scope: Scope, body: Block, arm: Arm) -> tuple[list[Use], froz
 def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
     kind = arm.kind(item.name)
     moving = [joint.name for joint in arm.moving]
+    if item.name in arm.lost and not item.kind:
+        return None
     if item.kind or kind is None:
         scope.complaints.error("D144", f"no joint `{item.name}` in arm `{arm.name}`", item.place,
                                help=[*did_you_mean(item.name, moving), known_words("joints", moving)])
@@ -73,8 +76,10 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
     assert item.value is not None
     place = item.value.name.place if isinstance(item.value, Call) else item.value.place
     if name not in scope.definitions.of_kind("servo") and name in models.find_own("servo"):
+        file = library_defines("servo", name)
+        include = [f"a standard deck defines a servo of this name: add `#include <{file}>`"] if file else []
         scope.complaints.error("D147", f"`{name}` is a servo model; a servo definition is needed here", place,
-                               help=f"`servo NAME {{ model = {name}; ... }}`, and `{item.name} = NAME;`")
+                               help=[*include, f"`servo NAME {{ model = {name}; ... }}`, and `{item.name} = NAME;`"])
         return None
     definition = scope.definitions.find("servo", Word(name, place))
     block = scope.definitions.block(definition)
@@ -158,7 +163,7 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     call = item.value
     place = place_of(call) if call is not None else item.place
     if not servo.commands:
-        scope.complaints.error("D150", f"a {servo.name} takes no command", place, help="leave `command` out")
+        scope.complaints.error("D150", f"{an(servo.name)} takes no command", place, help="leave `command` out")
         return None
     if not isinstance(call, Call) or item.body is not None or len(call.positional) != 1:
         scope.complaints.error("D151", "a command is its kind and one value or course in time", place,
@@ -167,7 +172,7 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
         return None
     kind = call.name.text
     if kind not in servo.commands:
-        scope.complaints.error("D152", f"a {servo.name} takes no command `{kind}`", call.name.place,
+        scope.complaints.error("D152", f"{an(servo.name)} takes no command `{kind}`", call.name.place,
                                help=[*did_you_mean(kind, servo.commands), f"it takes {known}"])
         return None
     inner = call.positional[0]

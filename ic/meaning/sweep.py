@@ -25,6 +25,7 @@ from met.plan import Coordinate
 from met.trace import Formulas, Graph, Scalar
 
 MOST_CASES = 10_000_000
+MOST_NAMED = 4
 ROUNDING = 1e-12  # relative: some thousand roundings, and far below what anyone means to tell apart
 LATER = ("sample", "repeat", "seeds", "substitute", "design")
 
@@ -261,9 +262,15 @@ def scope_lookup(scope: Scope):  # type: ignore[no-untyped-def]  # a Lookup
             raise Problem(())  # which was told
         if name.text in scope.varied:
             return scope.varied[name.text].value
-        for path in scope.known.get(name.text, ()):
-            settled = scope.parameters.get(path)
-            if settled is not None and isinstance(settled.value, (float, int, Scalar)):
+        paths = scope.known.get(name.text, ())
+        found = {path: settled for path in paths if (settled := scope.settled(path)) is not None}
+        numbers = [(x.ref if isinstance(x := each.value, Scalar) else x, each.unit) for each in found.values()]
+        if len(set(numbers)) > 1:
+            choice = " or ".join(f"`{path}`" for path in list(found)[:MOST_NAMED])
+            raise Problem(error("D165", f"`{name.text}` is not the same wherever it is used in this sweep", name.place,
+                                help=f"say which is meant: write {choice}"))
+        for settled in found.values():
+            if isinstance(settled.value, (float, int, Scalar)):
                 return Value(settled.value, units.parse_unit(settled.unit).dimension, name.place)
         try:
             return scope.names.find(name)
@@ -278,10 +285,16 @@ def scope_lookup(scope: Scope):  # type: ignore[no-untyped-def]  # a Lookup
 # What a coordinate sets
 
 
-def check_coordinates(scope: Scope) -> None:
-    """Every coordinate sets something."""
+def check_coordinates(scope: Scope, *, complete: bool) -> None:
+    """Every coordinate sets something.
+
+    complete  all of the run was resolved; else nothing is said of what hangs on the rest, since that was told
+    """
     for path, varied in scope.varied.items():
-        if path in scope.sets or path in scope.names.followed:
+        if path in scope.sets or path in scope.names.followed or scope.hangs(path):
+            continue
+        unknown = path in scope.definitions.lets or path.startswith("metrics.") or not scope.known
+        if unknown and (not complete or scope.gone or scope.lost):
             continue
         place = varied.place
         if path in scope.whole:
@@ -306,7 +319,7 @@ def check_coordinates(scope: Scope) -> None:
         else:
             scope.complaints.error("D128", f"no parameter `{path}` in this run", place,
                                    help=did_you_mean(path, (*scope.known, *scope.whole, *scope.definitions.lets))
-                                   or _continued(scope, path))
+                                   or _continued(scope, path) or _beginnings(scope))
 
 
 def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
@@ -318,6 +331,11 @@ def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
     block = scope.definitions.block(definition) if definition is not None else None
     item = block.get(rest) if block is not None else None
     return [Label(item.place, "written here")] if item is not None else None
+
+
+def _beginnings(scope: Scope) -> list[str]:
+    """What the paths of this run begin with."""
+    return [known_words("paths begin with", dict.fromkeys(known.partition(".")[0] for known in scope.known))]
 
 
 def _continued(scope: Scope, path: str) -> list[str]:

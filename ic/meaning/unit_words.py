@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from functools import lru_cache
 
 from met import units
@@ -15,6 +16,21 @@ def in_deck(unit: str) -> str:
     """A unit as a deck can write it after a number: `1/s` is `s^-1` there."""
     match = re.fullmatch(r"1/(\w+)(?:\^(\d+))?", unit)
     return f"{match[1]}^-{match[2] or 1}" if match else unit
+
+
+def in_degrees(unit: str) -> tuple[str, ...]:
+    """The ways to write a unit that most would choose from: `deg/s`, `rad/s`; of a unit without an angle that alone."""
+    return (unit.replace("rad", "deg", 1), unit) if re.fullmatch(r"rad(/s(\^\d)?)?", unit) else (unit,)
+
+
+def either(texts: Iterable[str]) -> str:
+    """`30 deg` or `30 rad`, each in the quotes of what a deck writes."""
+    return " or ".join(f"`{text}`" for text in texts)
+
+
+def units_of(dimension: Dimension) -> list[str]:
+    """The units of the table that have this dimension."""
+    return [name for name, unit in units.UNITS.items() if unit.measure.dimension == dimension]
 
 
 @lru_cache(maxsize=4096)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from fractions import Fraction
 from typing import cast
 
 from ic.grammar.syntax import Binary, Call, Expression, List, Name, Number, String, Unary, Unit, WithUnit
@@ -299,13 +298,21 @@ def _spaced(call: Call, arguments: list[Value]) -> Values:
 
 def _even(a: float, b: float, n: int) -> Iterable[float]:
     """Each point is the double nearest to what the ends' shortest decimals give: 0.01 to 0.04 in 7 has 0.015 in it."""
-    first, last = Fraction(repr(a)), Fraction(repr(b))
-    below = first.denominator * last.denominator
-    p, q = first.numerator * last.denominator, last.numerator * first.denominator
+    (first, under_first), (last, under_last) = _shortest(a), _shortest(b)
+    below = under_first * under_last
+    p, q = first * under_last, last * under_first
     try:
         return [(p * (n - 1 - i) + q * i) / (below * (n - 1)) for i in range(n)]
     except OverflowError:
         return [a + (b - a) * (i / (n - 1)) for i in range(n)]
+
+
+def _shortest(x: float) -> tuple[int, int]:
+    """The shortest decimal that reads back as x, as a fraction. (Not a `Fraction`: importing them takes 2 ms.)"""
+    digits, _, power = repr(x).partition("e")
+    whole, _, rest = digits.partition(".")
+    exponent = int(power or 0) - len(rest)
+    return int(whole + rest) * 10 ** max(exponent, 0), 10 ** max(-exponent, 0)
 
 
 def _by_ratio(a: float, b: float, n: int) -> Iterable[float]:

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from ic.printing.columns import count
+from ic.printing.plan import STABILITY, passive
 from met.diagnostic import Diagnostic
 from met.plan import Plan
+
+
+def notes(plan: Plan) -> Iterator[str]:
+    """What is no mistake but worth knowing, run by run: `free: no servo on rail, which moves freely`."""
+    for experiment in plan.experiments:
+        free = passive(experiment.structure)
+        if free:
+            freely = "which moves freely" if len(free) == 1 else "which move freely"
+            yield f"{experiment.name}: no servo on {', '.join(free)}, {freely}"
+        yield from (f"{experiment.name}: {note}" for note in experiment.notes if not note.startswith(STABILITY))
 
 
 def verdict(plan: Plan, diagnostics: Sequence[Diagnostic]) -> str:

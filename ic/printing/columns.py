@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Iterable, Sequence
 
 
@@ -43,13 +42,18 @@ def count(n: int, thing: str, things: str = "") -> str:
 
 
 def size(n: int) -> str:
-    """Bytes, in decimal units: `593 kB`."""
-    value, units = float(n), ["B", "kB", "MB", "GB", "TB", "PB"]
-    while value >= 999.5 and len(units) > 1:
-        value /= 1000.0
+    """Bytes, in the units that `met run` counts them in: `593 KiB`."""
+    value, units = float(n), ["B", "KiB", "MiB", "GiB", "TiB", "PiB"]
+    while value >= 1024.0 and len(units) > 1:
+        value /= 1024.0
         units.pop(0)
-    return f"{value:.3g} {units[0]}"
+    return f"{value:.0f} {units[0]}" if value >= 100.0 or units[0] == "B" else f"{value:.1f} {units[0]}"
 
 
 def _width(text: str) -> int:
+    """Columns that a terminal gives a text."""
+    if text.isascii():
+        return len(text)
+    import unicodedata
+
     return sum(0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)

@@ -6,11 +6,10 @@ that may import all it needs: tokens, syntax, model and plan from here, program,
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from met.diagnostic import Place, Problem, error
+from met.diagnostic import Place, Problem, did_you_mean, error
 from met.entry_points import offered
 from met.frozen import frozen
 
@@ -57,9 +56,8 @@ def find_stage(name: str) -> Stage:
     point = next((point for point in offered(GROUP) if point.name == name), None)
     if point is None:
         names = stage_names()
-        close = difflib.get_close_matches(name, names, n=1)
-        helps = [f"did you mean `{close[0]}`?"] if close else []
-        raise Problem(error("D172", f"no stage `{name}`", help=[*helps, f"stages: {', '.join(names)}"]))
+        helps = [*did_you_mean(name, names), f"stages: {', '.join(names)}"]
+        raise Problem(error("D172", f"no stage `{name}`", help=helps))
     stage: Stage = point.load()
     return stage
 
@@ -116,10 +114,14 @@ def model(asked: Asked) -> Iterator[str]:
 
 
 def plan(asked: Asked) -> Iterator[str]:
-    """The run plan, as `met plan -o` writes it, its case tables inside."""
+    """The run plan, as `met plan -o` writes it, its case tables inside; with a line for each value on a terminal."""
+    import json
+    import sys
+
     from met import plan_file
 
-    yield plan_file.dumps(asked.plan()).rstrip("\n")
+    text = plan_file.dumps(asked.plan()).rstrip("\n")
+    yield json.dumps(json.loads(text), indent=1) if sys.stdout.isatty() else text
 
 
 def _entry(entry: Entry, indent: str) -> Iterator[str]:

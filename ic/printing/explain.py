@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from ic.printing.columns import columns, number, quantity, vector
+from ic.printing.settings import settings
 from met import models, render
-from met.diagnostic import Diagnostic, Label, Place, Problem, error
+from met.diagnostic import Diagnostic, Label, Place, Problem, error, nearest
 from met.models import parameter as declared
 from met.parameter import Parameter
 from met.plan import Coordinate, Experiment, Formula, Quantity
@@ -21,28 +23,54 @@ SAID = {
     "default": "the default",
     "derived": "computed",
 }
+HEADS = ("links", "metrics", "environment", "initial")
+IN_PLAN = "as the plan has it"
+NO_MORE: Mapping[str, Sequence[str]] = MappingProxyType({})
 MOST_NEAR = 12
 MOST_IN_FULL = 3  # parameters; of more a line each
 
 
-def find_paths(experiment: Experiment, path: str) -> list[str]:
+def with_settings(experiment: Experiment) -> Experiment:
+    """The experiment with the settings of its run as if they were parameters, so that they can be asked for."""
+    return replace(experiment, parameters={**experiment.parameters, **{
+        path: quantity for path, quantity in settings(experiment).items() if path not in experiment.parameters
+    }})
+
+
+def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[str]] = NO_MORE) -> list[str]:
     """The parameters that a deck's path means. Raises Problem D170 with what was probably meant.
 
+    also: further paths with the parameters that they mean.
+
     A path is one parameter (`elbow.servo.kt`), a vector of three (`elbow.at`), a servo's definition with one of its
-    parameters (`gearbox.kp`, then each joint that uses it), or the head of several (`elbow.servo`).
+    parameters (`gearbox.kp`, then each joint that uses it), or the head of several (`elbow.servo`). A definition alone
+    (`gearbox`) means all that follows it, and a link or a metric may be named without `links.` or `metrics.`.
     """
     known = experiment.parameters
     if path in known:
         return [path]
+    gravity = path.replace("environment.gravity.", "environment.gravity.g.")
+    meant = [name for name in also.get(path, [gravity]) if name in known]
+    if meant:
+        return meant
     inside = [name for name in known if name.startswith(f"{path}.")]
     if inside:
         return inside
+    for head in HEADS:
+        inside = [name for name in known if name == f"{head}.{path}" or name.startswith(f"{head}.{path}.")]
+        if inside:
+            return inside
+    follow = [name for each, names in also.items() if each.startswith(f"{path}.") for name in names if name in known]
+    if follow:
+        return list(dict.fromkeys(follow))
     definition, _, rest = path.partition(".")
     joints = [use.joint for use in experiment.structure.servos if use.definition == definition]
     found = [name for joint in joints for name in (f"{joint}.servo.{rest}",) if name in known]
+    if not rest:
+        found = [name for name in known for joint in joints if name.startswith(f"{joint}.servo.")]
     if found:
         return found
-    near = difflib.get_close_matches(path, known, n=3, cutoff=0.6)
+    near = _three_nearest(path, known)
     helps = [f"did you mean `{'`, `'.join(near)}`?"] if near else []
     last = path.rpartition(".")[2]
     same = [name for name in known if name.rpartition(".")[2] == last and name not in near]
@@ -55,21 +83,36 @@ def find_paths(experiment: Experiment, path: str) -> list[str]:
     raise Problem(error("D170", f"no parameter `{path}` in `{experiment.name}`", help=helps))
 
 
+def _three_nearest(path: str, known: Iterable[str]) -> list[str]:
+    near: list[str] = []
+    while len(near) < 3 and (found := nearest(path, [name for name in known if name not in near])) is not None:
+        near.append(found)
+    return near
+
+
 Names = Callable[[str], tuple[Label, ...]]
 
 
-def print_explain(experiment: Experiment, path: str, sources: Mapping[str, str], names_of: Names) -> Iterator[str]:
+def print_explain(
+    experiment: Experiment,
+    path: str,
+    sources: Mapping[str, str],
+    names_of: Names,
+    also: Mapping[str, Sequence[str]] = NO_MORE,
+) -> Iterator[str]:
     """Line by line, parameter by parameter.
 
     sources    text of each file by name
     names_of   of a parameter, the names that its value is written with, each with what it stands for
+    also       further paths with the parameters that they mean
     """
-    names = find_paths(experiment, path)
+    names = find_paths(experiment, path, also)
     if len(names) > MOST_IN_FULL:
         yield from columns([_in_short(experiment, name) for name in names], indent="")
         return
     if _is_vector(experiment, names):
-        yield from _one(experiment, names, sources, names_of(names[0]))
+        used = dict.fromkeys(label for name in names for label in names_of(name))
+        yield from _one(experiment, names, sources, tuple(used))
         return
     for position, name in enumerate(names):
         if position:
@@ -77,10 +120,12 @@ def print_explain(experiment: Experiment, path: str, sources: Mapping[str, str],
         yield from _one(experiment, [name], sources, names_of(name))
 
 
-def explain_json(experiment: Experiment, path: str) -> list[dict[str, Any]]:
+def explain_json(
+    experiment: Experiment, path: str, also: Mapping[str, Sequence[str]] = NO_MORE
+) -> list[dict[str, Any]]:
     """The same for programs, values in SI."""
     told = []
-    for name in find_paths(experiment, path):
+    for name in find_paths(experiment, path, also):
         found = experiment.parameters[name]
         varied = isinstance(found.value, Formula)
         told.append(
@@ -102,6 +147,8 @@ def _in_short(experiment: Experiment, name: str) -> tuple[str, ...]:
     found = experiment.parameters[name]
     place = found.origin.place
     said = found.origin.note or SAID[found.origin.kind].removesuffix(" here").rstrip(",")
+    if place is None and found.origin.kind == "deck":
+        said = IN_PLAN
     return name, f"= {_shown(experiment, found)}", said, "" if place is None else str(render.shown_place(place))
 
 
@@ -126,18 +173,28 @@ def _one(
         yield f"{name} = {_shown(experiment, found)}"
     parameter, owner = _declaration(experiment, name)
     if parameter is not None:
-        source = f"; {parameter.source}" if parameter.source else ""
-        yield f"  {parameter.doc} ({owner}{source})"
+        yield f"  {parameter.doc} ({owner})"
     for coordinate in _varied_by(experiment, name):
         unit = "" if coordinate.unit == "1" else f" {coordinate.unit}"
         yield f"  varied by {coordinate.path}: {_series(coordinate.values / coordinate.scale)}{unit}"
-    note = "" if parameter is not None and origin.note == parameter.source else origin.note
-    said = SAID[origin.kind] + (f": {note}" if note else "")
+    said = SAID[origin.kind] + (f": {origin.note}" if origin.note else "")
+    if origin.place is None and origin.kind == "deck":
+        said = IN_PLAN
     if origin.place is None:
         yield f"  {said}"
         return
-    also = (*used, *(Label(place, "overrides this") for place in origin.overrides))
+    also = (*used, *(Label(place, f"overrides {_written_at(place, sources)}") for place in origin.overrides))
     yield from _with_source(origin.place, said, also, sources)
+
+
+def _written_at(place: Place, sources: Mapping[str, str]) -> str:
+    """The entry, or the value, that begins at a place: up to its semicolon, or the end of its line."""
+    lines = sources.get(place.file, "").split("\n")
+    rest = lines[place.line - 1][place.column - 1 :] if place.line <= len(lines) else ""
+    ends = (rest[place.length :].find(end) for end in (";", "}", "//"))
+    text = rest[: place.length + min((end for end in ends if end >= 0), default=len(rest))]
+    text = " ".join(text.split())
+    return f"`{text}`" if text else "this"
 
 
 def _with_source(place: Place, said: str, also: tuple[Label, ...], sources: Mapping[str, str]) -> Iterator[str]:

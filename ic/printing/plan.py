@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -42,26 +43,32 @@ class _Values:
 
     def vector(self, path: str) -> tuple[float, ...] | None:
         """Three numbers `.x .y .z`; None where one of them varies."""
-        parts = [self.array(f"{path}.{axis}") for axis in "xyz"]
+        return self.numbers(path, ("x", "y", "z"))
+
+    def numbers(self, path: str, names: tuple[str, ...]) -> tuple[float, ...] | None:
+        """The numbers of these names below the path; None where one of them varies."""
+        parts = [self.array(f"{path}.{name}") for name in names]
         if any(part is None or part.size != 1 for part in parts):
             return None
         return tuple(float(part) for part in parts if part is not None)
 
 
-def print_plan(plan: Plan) -> Iterator[str]:
-    """Every experiment of the plan, line by line."""
+def print_plan(plan: Plan, *, verbose: bool = False) -> Iterator[str]:
+    """Every experiment of the plan, line by line; verbose: with centres of mass and inertias."""
     for position, experiment in enumerate(plan.experiments):
         if position:
             yield ""
-        yield from print_experiment(plan.deck, experiment)
+        yield from print_experiment(plan.deck, experiment, verbose=verbose)
 
 
-def print_experiment(deck: str, experiment: Experiment) -> Iterator[str]:
+def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False) -> Iterator[str]:
     """One run or sweep, line by line."""
     structure = experiment.structure
     yield f"{deck}: {experiment.name}"
     yield ""
     yield from _arm(experiment)
+    if verbose:
+        yield from _bodies(experiment)
     yield ""
     yield from _schedule(experiment)
     yield ""
@@ -84,7 +91,7 @@ def _arm(experiment: Experiment) -> Iterator[str]:
     structure = experiment.structure
     values = _Values(experiment)
     servos = {use.joint: use for use in structure.servos}
-    rows: list[tuple[str, ...]] = [("joint", "moves", "at", "link", "mass", "servo"), ("base",)]
+    rows: list[tuple[str, ...]] = [("joint", "moves", "at", "rpy", "link", "mass", "servo"), ("base",)]
 
     children: dict[str, list[Joint]] = {}
     for joint in structure.joints:
@@ -102,12 +109,33 @@ def _arm(experiment: Experiment) -> Iterator[str]:
         place = "varies" if at is None else vector(at, "m") if any(at) else ""
         mass = values.shown(f"links.{joint.child}.mass")
         branch = f"{stem}{'└─' if last else '├─'} {joint.name}"
-        rows.append((branch, _moves(joint, values), place, joint.child, mass, servo))
+        turned = values.vector(f"{joint.name}.rpy")
+        turn = "varies" if turned is None else vector((math.degrees(x) for x in turned), "deg") if any(turned) else ""
+        rows.append((branch, _moves(joint, values), place, turn, joint.child, mass, servo))
         waiting += [(child, stem + ("   " if last else "│  ")) for child in reversed(children.get(joint.child, []))]
     moving = f"{count(len(structure.moving), 'joint')} that move{'s' if len(structure.moving) == 1 else ''}"
     yield f"Arm {structure.arm}: {count(len(structure.links), 'link')}, {moving}"
     used = [i for i in range(len(rows[0])) if any(i < len(row) and row[i] for row in rows[1:])]
     yield from columns([[row[i] for i in used if i < len(row)] for row in rows])
+
+
+def _bodies(experiment: Experiment) -> Iterator[str]:
+    """Centre of mass and inertia of each link, in its own frame."""
+    values = _Values(experiment)
+    rows = [("link", "mass", "com", "inertia about it: xx, yy, zz, xy, xz, yz")]
+    for link in experiment.structure.links:
+        com = values.numbers(f"links.{link.name}.com", ("x", "y", "z"))
+        moments = values.numbers(f"links.{link.name}.inertia", ("xx", "yy", "zz", "xy", "xz", "yz"))
+        rows.append((link.name, values.shown(f"links.{link.name}.mass"),
+                     "varies" if com is None else vector(com, "m"),
+                     "varies" if moments is None else vector(moments, "kg*m^2")))  # fmt: skip
+    yield from columns(rows)
+
+
+def passive(structure: Structure) -> list[str]:
+    """The joints that move and have no servo."""
+    driven = {use.joint for use in structure.servos}
+    return [joint.name for joint in structure.moving if joint.name not in driven]
 
 
 def _moves(joint: Joint, values: _Values) -> str:
@@ -148,7 +176,7 @@ def _schedule(experiment: Experiment) -> Iterator[str]:
     if stability:
         limit = number(models.find("integrator", structure.integrator).real_limit)
         yield f"Stability: step times the servo's fastest rate constant; {structure.integrator} is stable below {limit}"
-        yield from columns([note.partition(": ")[::2] for note in stability])
+        yield from columns([note.removeprefix("joint ").partition(": ")[::2] for note in stability])
 
 
 def _environment(experiment: Experiment) -> Iterator[str]:

@@ -22,6 +22,7 @@ from met.frozen import frozen
 
 LIBRARY = Path(__file__).parents[1] / "decks"
 MOST_LISTED = 2_000  # files looked at for a "did you mean"
+MOST_NAMED = 8  # files named in a message
 
 _NOT_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
@@ -114,13 +115,24 @@ class Files:
         return self.read_so_far[file.name].text
 
 
+def library_defines(kind: str, name: str, library: Path = LIBRARY) -> str | None:
+    """The file of the standard library, to be included, that defines a servo (arm, ...) of that name."""
+    definition = re.compile(rf"^[ \t]*{re.escape(kind)}[ \t]+{re.escape(name)}\b", re.MULTILINE)
+    for path in sorted(library.glob("*/**/*.ic")):
+        if definition.search(path.read_text(encoding="utf-8", errors="replace")):
+            return path.relative_to(library).as_posix()
+    return None
+
+
 def _read_bytes(file: FoundFile) -> bytes:
     try:
         about = os.stat(file.path)
         if stat.S_ISDIR(about.st_mode):
-            raise Problem(error("D001", f"`{file.name}` is a directory, not a deck"))
+            inside = sorted(f for f in os.listdir(file.path) if f.endswith(".ic"))[:MOST_NAMED]
+            help = f"decks in it: {', '.join(inside)}" if inside else "there is no deck in it"
+            raise Problem(error("D001", f"`{file.name}` is a directory, not a deck", help=help))
         if not stat.S_ISREG(about.st_mode):
-            raise Problem(error("D001", f"`{file.name}` is not a regular file"))
+            raise Problem(error("D001", f"`{file.name}` is not a regular file", help="copy what it gives to a file"))
         if about.st_size > MOST_BYTES:
             size = f"{about.st_size / 2**20:.1f} MiB; a deck's file has at most {MOST_BYTES >> 20}"
             help = "numbers in bulk belong in a table file, not in a deck"
@@ -129,7 +141,8 @@ def _read_bytes(file: FoundFile) -> bytes:
             return stream.read(MOST_BYTES)
     except (OSError, ValueError) as reason:
         why = getattr(reason, "strerror", None) or str(reason)
-        raise Problem(error("D001", f"cannot read `{file.name}`: {why}")) from None
+        help = "look at the name, and at who may read the file"
+        raise Problem(error("D001", f"cannot read `{file.name}`: {why}", help=help)) from None
 
 
 def _decode(data: bytes, name: str) -> tuple[str, Diagnostic | None]:

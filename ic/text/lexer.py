@@ -29,6 +29,7 @@ JOINED = "CPP_LINECONT"
 BAD = "BAD"  # no token; with an empty text where that has been said
 END = "END"
 PASTE = "CPP_DPOUND"
+COMMAND_LINE = "<command line>"  # the name of the text that holds the macros given with -D
 
 NUMBERS = (WHOLE, DECIMAL)
 MOST_JOINED = 200_000

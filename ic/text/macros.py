@@ -93,10 +93,11 @@ class Macros(Pcpp):
         """The body of a sound definition; None, and a message, for another."""
         name, tell = tokens[0], self.findings.error
         if name.kind != NAME:
-            tell("D007", f"a macro's name cannot be `{name.text[:LONGEST_NAME]}`", name.place)
+            tell("D007", f"a macro's name cannot be `{name.text[:LONGEST_NAME]}`", name.place,
+                 help="a name is letters, digits and `_`, and begins with no digit")  # fmt: skip
             return None
         if name.text in PREDEFINED:
-            tell("D007", f"`{name.text}` cannot be a macro of yours", name.place)
+            tell("D007", f"`{name.text}` cannot be a macro of yours", name.place, help="choose another name")
             return None
         if units.is_unit(name.text):
             word = units.UNITS[name.text].word
@@ -107,15 +108,17 @@ class Macros(Pcpp):
         if body and body[0].text == "(":
             close = next((i for i, token in enumerate(body) if token.text == ")"), None)
             if close is None:
-                tell("D007", f"the parameters of macro `{name.text}` have no `)`", body[0].place)
+                tell("D007", f"the parameters of macro `{name.text}` have no `)`", body[0].place,
+                     help=f"write `#define {name.text[:LONGEST_NAME]}(A, B) ...` on one line")  # fmt: skip
                 return None
             if not self._checked_parameters(name, [t for t in body[1:close] if t.kind not in (SPACE, JOINED)]):
                 return None
             body = body[close + 1 :]
         elif body and body[0].kind not in (SPACE, JOINED):
             tell(
-                "D007", f"a space is needed between the macro's name and `{body[0].text[:LONGEST_NAME]}`", body[0].place
-            )
+                "D007", f"a space is needed between the macro's name and `{body[0].text[:LONGEST_NAME]}`",
+                body[0].place, help=f"write `#define {name.text[:LONGEST_NAME]} {body[0].text[:LONGEST_NAME]}`",
+            )  # fmt: skip
             return None
         if len(body) > MOST_MACRO_BODY:
             tell("D018", f"the body of macro `{name.text}` has more than {MOST_MACRO_BODY} tokens", name.place)

@@ -21,6 +21,7 @@ from ic.text.files import LIBRARY, Files, FoundFile
 from ic.text.lexer import (
     BAD,
     CHARACTER,
+    COMMAND_LINE,
     END,
     NAME,
     SPACE,
@@ -51,7 +52,6 @@ CONDITIONALS = ("if", "ifdef", "ifndef", "elif", "else", "endif")
 DIRECTIVES = (*CONDITIONALS, "define", "undef", "include", "pragma", "error", "warning")
 _LONG_LINE = re.compile(rf"[^\n]{{{LONGEST_LINE + 1}}}")
 TRUTH = "TRUTH"  # the kind of a condition's value
-COMMAND_LINE = "<command line>"
 
 
 @frozen
@@ -276,7 +276,8 @@ class _Preprocessor(Macros):
             raise _REMOVE
         if name in ("define", "undef", "include"):
             if not args and name != "include":
-                self.findings.error("D007", f"`#{name}` needs a name", directive.place)
+                usage = "#define NAME VALUE" if name == "define" else "#undef NAME"
+                self.findings.error("D007", f"`#{name}` needs a name", directive.place, help=f"write `{usage}`")
                 raise _REMOVE
             return True
         if name in ("error", "warning"):
@@ -284,15 +285,17 @@ class _Preprocessor(Macros):
         elif name == "pragma" and args and args[0].text == "once":
             self._once.add(self._including[-1][0].identity)
         elif name == "pragma":
-            self.findings.error("D007", "the only `#pragma` is `once`", directive.place)
+            self.findings.error("D007", "the only `#pragma` is `once`", directive.place, help="leave it out")
         elif name == "line":
             self.findings.error(
-                "D007", "a deck cannot have `#line`: messages say where a thing really stands", directive.place
-            )
+                "D007", "a deck cannot have `#line`: messages say where a thing really stands", directive.place,
+                help="leave it out",
+            )  # fmt: skip
         else:
             self.findings.error(
-                "D007", f"`#{name}` is not a directive", directive.place, help=did_you_mean(name, DIRECTIVES)
-            )
+                "D007", f"`#{name}` is not a directive", directive.place,
+                help=(*did_you_mean(name, DIRECTIVES), "a comment begins with `//`"),
+            )  # fmt: skip
         raise _REMOVE
 
     def _announce(self, name: str, directive: Token, args: list[Token]) -> None:
@@ -315,7 +318,8 @@ class _Preprocessor(Macros):
                 self._give_up("D018", f"`#if` goes deeper than {CONDITION_DEPTH}", directive.place)
             return
         if not ifs:
-            self.findings.error("D007", f"`#{name}` without an `#if`", directive.place)
+            self.findings.error("D007", f"`#{name}` without an `#if`", directive.place,
+                                help="leave it out, or write the `#if` that it belongs to")  # fmt: skip
             raise _REMOVE
         opened = ifs[-1]
         if name == "endif":
@@ -323,7 +327,8 @@ class _Preprocessor(Macros):
             self._nothing_after(args, "#endif")
         elif opened.otherwise is not None:
             label = Label(opened.otherwise.place, "the `#else` is here")
-            self.findings.error("D007", f"`#{name}` after `#else`", directive.place, also=(label,))
+            self.findings.error("D007", f"`#{name}` after `#else`", directive.place, also=(label,),
+                                help="`#elif` comes before the one `#else`")  # fmt: skip
             raise _REMOVE
         elif name == "else":
             opened.otherwise = directive
@@ -337,7 +342,8 @@ class _Preprocessor(Macros):
 
     def _known(self, name: str, directive: Token, args: list[Token]) -> bool:
         if not args or args[0].kind != NAME:
-            self.findings.error("D007", f"`#{name}` needs a name", args[0].place if args else directive.place)
+            self.findings.error("D007", f"`#{name}` needs a name", args[0].place if args else directive.place,
+                                help=f"write `#{name} NAME`")  # fmt: skip
             args[:] = [Token(NAME, "__nothing__", directive.source, directive.offset, directive.length)]
             return False
         self._nothing_after(args[1:], f"#{name} {args[0].text}")

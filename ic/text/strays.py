@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -37,6 +36,8 @@ def complain_of_stray(token: Token, findings: Findings) -> None:
     elif text == "\\":
         tell("D004", "a stray `\\`", token.place, help="it joins lines only as the last character of one")
     else:
+        import unicodedata
+
         first = text[0]
         plain = _PLAIN.get(first)
         known = unicodedata.name(first, "no name").lower()

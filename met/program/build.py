@@ -30,6 +30,9 @@ EVENTS = ("friction.splits", "friction.clamped", "friction.undecided")
 
 OUTPUTS = ("failure", "failure.joint", "failure.tick", *EVENTS)
 
+COORDINATE, METRIC = "coordinate:", "metric:"
+"""Prefixes of the outputs, and cells, that are named by a deck: no name of a deck's is one of the engine's."""
+
 
 def build(experiment: Experiment) -> Program:
     """The program of an experiment: inputs are its coordinates, columns its recorded channels."""
@@ -87,7 +90,11 @@ class Builder:
             end=(Run(Phase("end", self.end)),),
             inputs=coordinates,
             columns=len(columns),
-            outputs=(*OUTPUTS, *(f"metrics.{name}" for name, _, _ in self.machine.metrics), *coordinates),
+            outputs=(
+                *OUTPUTS,
+                *(METRIC + name for name, _, _ in self.machine.metrics),
+                *(COORDINATE + path for path in coordinates),
+            ),
         )
 
     # The run's two ends.
@@ -109,16 +116,16 @@ class Builder:
                 tape.write(f"{actuator.path}.{part.name}", part.start)
         for name, metric, _ in self.machine.metrics:
             for memory in metric.memory:
-                tape.write(f"metrics.{name}.{memory.name}", memory.start)
+                tape.write(f"{METRIC}{name}.{memory.name}", memory.start)
 
     def end(self, tape: Tape) -> None:
         for name in OUTPUTS:
             tape.output(name, tape.read(name))
         for name, metric, _ in self.machine.metrics:
             p, held = self._metric(tape, name)
-            tape.output(f"metrics.{name}", answer(f"metric `{name}`", metric.result, p, held, tape.time))
+            tape.output(METRIC + name, answer(f"metric `{name}`", metric.result, p, held, tape.time))
         for coordinate in self.machine.experiment.cases.coordinates:
-            tape.output(coordinate.path, tape.input(coordinate.path))
+            tape.output(COORDINATE + coordinate.path, tape.input(coordinate.path))
 
     # Servos.
 
@@ -404,7 +411,7 @@ class Builder:
         p = parameters(
             owner, f"metrics.{name}", metric.parameters, lambda path: self.machine.value(path, tape.read)
         )
-        held = {memory.name: tape.read(f"metrics.{name}.{memory.name}") for memory in metric.memory}
+        held = {memory.name: tape.read(f"{METRIC}{name}.{memory.name}") for memory in metric.memory}
         return p, Values(owner, held)
 
     def _metrics(self, divisor: int) -> Body:
@@ -419,7 +426,7 @@ class Builder:
                     new = answer(owner, metric.update, p, held, tape.read(channel.path), tape.time, dt)
                     returned(owner, "update", new, (memory.name for memory in metric.memory))
                     for memory, value in new.items():
-                        tape.write(f"metrics.{name}.{memory}", value)
+                        tape.write(f"{METRIC}{name}.{memory}", value)
 
         return body
 

@@ -29,6 +29,7 @@ from met.plan import (
 )
 from met.trace.graph import Formulas, Graph
 
+COMPARE = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal}
 DECK = Origin("deck", Place("two_link.ic", 12, 5, 6, included=(("main.ic", 3),)))
 TABLE_1 = {
     "ratio": (1570.0, "rad/rad"), "kp": (0.02, "V*s/rad"), "ki": (0.125, "V/rad"), "v_max": (20.0, "V"),
@@ -183,7 +184,7 @@ def answer(
         time=time,
         signals=signals if record else {},
         metrics=metrics,
-        met={r.text: metrics[r.metric] < r.limit for r in experiment.requirements},
+        met={r.text: COMPARE[r.comparison](metrics[r.metric], r.limit) for r in experiment.requirements},
         coordinates=values,
         events={name: np.zeros(len(rows), dtype=np.int64) for name in ("splits", "clamped", "undecided")},
     )

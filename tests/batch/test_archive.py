@@ -1,6 +1,7 @@
 """The archive: what xarray sees in it, and that its bytes follow from the plan alone."""
 
 import json
+import math
 import time
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 
 import batch
 from batch import campaign
+from batch.archive import limits
 from batch.archive.read import ArchiveFile
 from met import keys, plan_file
 from met.diagnostic import Problem
@@ -54,10 +56,57 @@ def test_every_variable_has_a_long_name_and_every_number_its_unit(here: Path, en
         assert units == {
             "gearbox.kp": "V*s/rad", "links.lower.mass": "kg", "settle": "s", "volts": "V", "time": "s",
             "q": "rad", "qd": "rad/s", "tau": "N*m", "shoulder.servo.voltage": "V",
+            "recorded.gearbox.kp": "V*s/rad", "recorded.links.lower.mass": "kg",
         }  # fmt: skip
         assert all(data[name].attrs.get("long_name") for name in data.variables)
         assert data.q.attrs["frame"] == "about or along the joint's axis"
         assert data["links.lower.mass"].attrs["deck_unit"] == "g"
+
+
+@pytest.mark.parametrize("engine_name", ENGINES)
+def test_a_signal_by_itself_says_what_was_varied_in_its_cases(here: Path, engine_name: str) -> None:
+    batch.run(plans.plan(plans.gains(7)), output="a.h5")
+    masses = plans.gains(7).cases.coordinates[1].values
+    with opened(here / "a.h5", engine_name) as data:
+        q = data.q
+        assert {"recorded.case_id", "recorded.gearbox.kp", "recorded.links.lower.mass"} <= set(q.coords)
+        heavy = q.where(q["recorded.links.lower.mass"] > 20.15, drop=True)
+        assert list(heavy.recorded_case.values) == list(np.flatnonzero(masses > 20.15))
+        one = q.set_xindex("recorded.gearbox.kp").sel({"recorded.gearbox.kp": 0.02}, method="nearest")
+        assert one["recorded.case_id"].values == data.case_id.values[2]
+
+
+def test_a_varied_parameter_whose_repeated_name_is_taken_gets_another(here: Path) -> None:
+    """A sweep may vary both `servo.kp` and `recorded.servo.kp`: a definition `servo`, a joint `recorded`."""
+    from dataclasses import replace
+
+    from batch.archive.layout import layout
+
+    experiment = plans.gains(3)
+    first, second = experiment.cases.coordinates
+    named = (replace(first, path="servo.kp"), replace(second, path="recorded.servo.kp"))
+    experiment = replace(experiment, cases=replace(experiment.cases, coordinates=named))
+    names = [variable.name for variable in layout(experiment, 3, True).variables]
+    assert len(set(names)) == len(names)
+    assert "recorded.recorded.servo.kp" in names
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "written"),
+    [
+        ("sag > -136 deg", "rad", ("deg", math.pi / 180)),
+        ("over < 5 %", "1", ("%", 0.01)),
+        ("rate <= 2*15 rpm", "rad/s", ("rpm", 2 * math.pi / 60)),
+        ("effort < (1 + 2) kN*m", "N*m", ("kN*m", 1000.0)),
+        ("slide < 20 1/s", "1/s", ("1/s", 1.0)),
+        ("over < 0.05", "1", None),
+        ("sag > low", "rad", None),
+        ("sag > 2 * low", "rad", None),
+        ("sag > 1 deg * 1 m / 1 mm", "rad", None),
+    ],
+)
+def test_the_unit_a_requirement_is_written_in(text: str, unit: str, written: tuple[str, float] | None) -> None:
+    assert limits.written_unit(text, unit) == written
 
 
 @pytest.mark.parametrize("engine_name", ENGINES)
@@ -274,3 +323,176 @@ def test_an_archive_of_a_newer_met_is_refused(here: Path) -> None:
     with pytest.raises(Problem) as caught:
         ArchiveFile("a.h5")
     assert caught.value.diagnostics[0].message == "a.h5 was written by a newer MET: schema 2, known here is 1"
+
+
+OWN_NAMES = (
+    "q", "time", "case", "status", "seed", "met", "joint", "recorded_case", "case_id", "requirement", "cause",
+    "n_valid", "repeat", "friction_splits", "provenance", "failure", "volts",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OWN_NAMES)
+def test_a_swept_coordinate_may_be_called_as_anything_of_our_own(here: Path, name: str) -> None:
+    experiment = renamed(plans.gains(3), "gearbox.kp", name)
+    with batch.run(plans.plan(experiment), output="a.h5").open() as data:
+        variable = name if name in ("failure", "volts") else f"coordinates.{name}"
+        np.testing.assert_array_equal(data[variable], experiment.cases.coordinates[0].values)
+        assert data.volts.dims == ("case",) if name != "volts" else data["metrics.volts"].dims == ("case",)
+    with ArchiveFile("a.h5") as file:
+        assert list(file.groups[0].coordinates_of(2)) == [name, "links.lower.mass"]
+
+
+def renamed(experiment: Any, path: str, name: str) -> Any:
+    """A sweep whose coordinate has another path."""
+    from dataclasses import replace
+
+    coordinates = tuple(replace(c, path=name) if c.path == path else c for c in experiment.cases.coordinates)
+    nodes = tuple(("input", name) if node == ("input", path) else node for node in experiment.formulas.nodes)
+    inputs = tuple(name if i == path else i for i in experiment.formulas.inputs)
+    return replace(
+        experiment,
+        cases=replace(experiment.cases, coordinates=coordinates),
+        formulas=replace(experiment.formulas, nodes=nodes, inputs=inputs),
+    )
+
+
+def test_runs_and_metrics_may_be_called_provenance(here: Path) -> None:
+    from dataclasses import replace
+
+    batch.run(plans.plan(plans.nominal("provenance"), plans.gains(2)), output="two.h5")
+    with ArchiveFile("two.h5") as file:
+        assert [group.name for group in file.groups] == ["provenance", "gains"]
+        assert file.sources()
+        assert [experiment.name for experiment in file.plan().experiments] == ["provenance", "gains"]
+    experiment = plans.nominal()
+    uses = (replace(experiment.structure.metrics[0], name="provenance"),)
+    experiment = replace(experiment, structure=replace(experiment.structure, metrics=uses), requirements=())
+    with ArchiveFile(run_with(experiment, {}, {"provenance": "settle"})) as file:
+        assert [variable.name for variable in file.groups[0].role("metric")] == ["metrics.provenance"]
+
+
+# Damage
+
+
+def damaged(change: Any, *experiments: Any) -> str:
+    """What is said of an archive after this change."""
+    import h5py
+
+    from batch.show import as_json, show
+
+    batch.run(plans.plan(*experiments), output="a.h5")
+    with h5py.File("a.h5", "r+") as file:
+        change(file)
+    with pytest.raises(Problem) as caught, ArchiveFile("a.h5") as file:
+        show(file)
+        as_json(file)
+        file.plan()
+    return "; ".join(f"{d.code}: {d.message}" for d in caught.value.diagnostics)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda f: f.attrs.__delitem__("schema_version"),
+         "E302: the archive a.h5 is damaged: it has no schema version"),
+        (lambda f: f.attrs.__setitem__("schema_version", "new"),
+         "E302: the archive a.h5 is damaged: it has no schema version"),
+        (lambda f: f.attrs.__delitem__("deck"), "E302: the archive a.h5 is damaged: it does not name its deck"),
+        (lambda f: f.attrs.__delitem__("experiment"),
+         "E302: the archive a.h5 is damaged: attribute `experiment` is missing or of another type"),
+        (lambda f: f.attrs.__setitem__("duration_s", "long"),
+         "E302: the archive a.h5 is damaged: attribute `duration_s` is missing or of another type"),
+        (lambda f: f.__delitem__("case"), "E302: the archive a.h5 is damaged"),
+        (lambda f: f.__delitem__("status"), "E302: the archive a.h5 is damaged: variable `status` is missing or of "
+         "another type"),
+        (lambda f: f.__delitem__("time"), "E302: the archive a.h5 is damaged"),
+        (lambda f: f.__delitem__("joint"), "E302: the archive a.h5 is damaged"),
+        (lambda f: f.__delitem__("provenance"), "E302: the archive a.h5 is damaged: it does not say where it comes "
+         "from"),
+        (lambda f: f["provenance"].__delitem__("plan"), "E302: the archive a.h5 is damaged"),
+    ],
+)  # fmt: skip
+def test_what_an_archive_lacks_is_said(here: Path, change: Any, said: str) -> None:
+    assert damaged(change, plans.nominal()).startswith(said)
+
+
+def test_an_archive_without_experiments_is_damaged(here: Path) -> None:
+    def empty(file: Any) -> None:
+        del file["nominal"], file["gains"]
+
+    said = damaged(empty, plans.nominal(), plans.gains(2))
+    assert said == "E302: the archive a.h5 is damaged: it holds no run and no sweep"
+
+
+def test_a_flipped_bit_in_a_history_is_noticed(here: Path) -> None:
+    batch.run(plans.plan(plans.nominal()), output="a.h5")
+    with ArchiveFile("a.h5") as file:
+        at = file._file["qd"].id.get_chunk_info(0).byte_offset
+    data = bytearray(Path("a.h5").read_bytes())
+    data[at + 100] ^= 4
+    Path("a.h5").write_bytes(data)
+    with ArchiveFile("a.h5") as file, pytest.raises(Problem) as caught:
+        file.groups[0].signal("qd", 0)
+    assert caught.value.diagnostics[0].code == "E302"
+
+
+def test_flipped_bits_anywhere_are_a_problem_or_an_archive(here: Path) -> None:
+    """In a process of its own, which has two minutes: HDF5 may not come back from some damage, nor may it be ours."""
+    import os
+    import subprocess
+    import sys
+
+    batch.run(plans.plan(plans.gains(3)), output="a.h5")
+    program = """
+import random, signal, sys
+from pathlib import Path
+from batch.archive.read import ArchiveFile, is_archive
+from batch.show import as_json, show
+from met.diagnostic import Problem
+
+class Stuck(BaseException):
+    pass
+
+def stuck(*_):
+    raise Stuck
+
+signal.signal(signal.SIGALRM, stuck)
+whole, target, chance = Path("a.h5").read_bytes(), Path("b.h5"), random.Random(1)
+for trial in range(150):
+    data = bytearray(whole)
+    for _ in range(chance.choice((1, 1, 8))):
+        data[chance.randrange(len(data))] ^= 1 << chance.randrange(8)
+    target.write_bytes(data)
+    is_archive(target)
+    signal.setitimer(signal.ITIMER_REAL, 5.0)
+    try:
+        with ArchiveFile(target) as file:
+            show(file)
+            as_json(file)
+            file.plan()
+    except (Problem, Stuck):
+        pass
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+print("done")
+"""
+    surroundings = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
+    said = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, env=surroundings, timeout=120
+    )
+    assert said.returncode < 0 or said.stdout == "done\n", said.stderr  # a signal is HDF5's own end
+
+
+def test_what_may_be_written_over_is_seen_without_hdf5(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import h5py
+
+    from batch.archive import read
+
+    batch.run(plans.plan(plans.nominal(), *(plans.gains(2, f"g{n}") for n in range(20))), output="a.h5")
+    with h5py.File("other.h5", "w") as file:
+        file["x"] = [1.0]
+    monkeypatch.setattr(read, "h5py", lambda: pytest.fail("HDF5 was asked"))
+    assert read.is_archive(Path("a.h5"))
+    assert not read.is_archive(Path("other.h5"))
+    Path("a.h5").write_bytes(Path("a.h5").read_bytes()[:5000])
+    assert read.is_archive(Path("a.h5"))  # a damaged one may be replaced

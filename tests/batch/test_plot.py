@@ -61,7 +61,100 @@ def test_few_cases_are_overlaid_and_named_by_what_varies(here: Path, figures: li
     left, right = shown(figures[0])
     assert len(left.lines) == len(right.lines) == 3
     words = [text.get_text() for text in figures[0].legends[0].get_texts()]
-    assert words[1] == "gearbox.kp = 0.025 V·s/rad\nlinks.lower.mass = 20100 g"
+    assert figures[0].legends[0].get_title().get_text() == "gearbox.kp  (V·s/rad) ·\nlinks.lower.mass  (g)"
+    assert words == ["0.01 · 20000", "0.025 · 20100", "0.04 · 20200"]
+
+
+def test_joints_of_unlike_unit_stand_beside_one_another(here: Path, figures: list[Any]) -> None:
+    with mixed(3) as file:
+        plot(file, "a.png")
+    axes = shown(figures[0])
+    assert [ax.get_title("left") for ax in axes] == [
+        "shoulder · joint position", "elbow · joint position", "shoulder · voltage on the drive motor",
+    ]  # fmt: skip
+    assert [ax.get_ylabel() for ax in axes] == ["q  (rad)", "q  (m)", "servo.voltage\n(V)"]
+    assert [ax.get_xlabel() for ax in axes] == ["", "time  (s)", "time  (s)"]
+    left, right = axes[:2]
+    assert left.get_ylim() != right.get_ylim()
+
+
+def mixed(cases: int) -> ArchiveFile:
+    """A shoulder that turns and an elbow that slides, and the shoulder's voltage."""
+    from dataclasses import replace
+
+    experiment = plans.gains(cases)
+    q, _, _, voltage = experiment.structure.record
+    record = (replace(q, unit=("rad", "m")), voltage)
+    batch.run(plans.plan(replace(experiment, structure=replace(experiment.structure, record=record))), output="a.h5")
+    return ArchiveFile("a.h5")
+
+
+def commanded(cases: int, monkeypatch: pytest.MonkeyPatch, slope: float = 0.0, fails: int = -1) -> ArchiveFile:
+    """The shoulder's commanded rate is recorded: 0.03 rad/s, and `slope` more in each case; one case may break off."""
+    from dataclasses import replace
+
+    from met import run
+    from met.plan import Recorded
+
+    def answer(*arguments: Any, **options: Any) -> Any:
+        found = plans.answer(*arguments, **options, fails=frozenset({fails}))
+        asked = 0.03 + slope * found.case[:, None] + 0.0 * found.time[None, :]
+        found.signals["shoulder.servo.command"] = np.where(np.isnan(found.signals["qd"][:, :, 0]), np.nan, asked)
+        return found
+
+    monkeypatch.setattr(run, "run", answer)
+    experiment = plans.gains(cases)
+    command = Recorded("shoulder.servo.command", ("shoulder.servo.command",), (), ("rad/s",), "rate asked of the servo")
+    structure = replace(experiment.structure, record=(*experiment.structure.record[:3], command))
+    batch.run(plans.plan(replace(experiment, structure=structure)), output="a.h5")
+    return ArchiveFile("a.h5")
+
+
+def dashed(ax: Any) -> list[Any]:
+    return [line for line in ax.lines if line.is_dashed() and len(line.get_xdata())]
+
+
+def test_a_command_is_drawn_over_what_follows_it_and_nowhere_else(
+    here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for cases, chosen in ((3, ()), (40, ()), (40, ("#3",))):
+        with commanded(cases, monkeypatch) as file:
+            plot(file, "a.png", cases=chosen)
+        axes = shown(figures[-1])
+        over = [ax for ax in axes if dashed(ax)]
+        assert len(over) == 1
+        assert "joint rate" in over[0].get_title("left")
+        np.testing.assert_array_equal(dashed(over[0])[0].get_ydata(), np.full(51, 0.03))
+        assert not any("rate asked" in ax.get_title("left") for ax in axes)
+
+
+def test_commands_that_differ_have_their_cases_colours(
+    here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with commanded(3, monkeypatch, slope=0.01) as file:
+        plot(file, "a.png", ["shoulder.qd"])
+    [ax] = shown(figures[0])
+    assert [line.get_ydata()[0] for line in dashed(ax)] == pytest.approx([0.03, 0.04, 0.05])
+    assert [line.get_color() for line in dashed(ax)] == [line.get_color() for line in ax.lines[:3]]
+
+
+def test_a_command_is_shared_by_a_case_that_broke_off(
+    here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with commanded(12, monkeypatch, fails=0) as file:
+        plot(file, "a.png", ["qd"])
+    [line] = dashed(shown(figures[0])[0])
+    assert np.isfinite(line.get_ydata()).all()
+
+
+def test_a_fan_of_unlike_commands_leaves_them_a_panel(
+    here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with commanded(12, monkeypatch, slope=0.01) as file:
+        plot(file, "a.png")
+    axes = shown(figures[0])
+    assert not any(dashed(ax) for ax in axes)
+    assert any("rate asked" in ax.get_title("left") for ax in axes)
 
 
 def test_many_cases_are_a_fan(here: Path, figures: list[Any]) -> None:

@@ -92,7 +92,7 @@ class TestWhatIsKept:
         made = campaign.prepare(plans.plan(plans.gains(400_000)))
         assert not made.parts[0].recorded
         assert made.notes == (
-            "histories would take 1.2 GiB, over 1.0 GiB: metrics only are kept (`--histories all` keeps them; any case "
+            "histories would take 1.3 GiB, over 1.0 GiB: metrics only are kept (`--histories all` keeps them; any case "
             "can be run again alone: `--case '#0'`)",
         )
 
@@ -137,6 +137,23 @@ class TestRefusedBeforeAnythingRuns:
             "\n1 error\n"
         )
 
+    @pytest.mark.parametrize("output", ["", ".", "..", "/"])
+    def test_a_folder_without_a_name(self, here: Path, output: str) -> None:
+        said = f"error[E305]: cannot write {Path(output)}: it is a folder\n = help: name a file in it: "
+        assert self.run(output).startswith(said)
+
+    def test_what_another_run_is_writing(self, here: Path) -> None:
+        from batch.archive.sink import Sink, temporary_of
+
+        other = Sink(temporary_of(Path("a.h5")))
+        assert self.run("a.h5") == (
+            "error[E307]: cannot write a.h5: another run is writing it now\n"
+            " = help: wait until it is done, or give another name with `-o`\n"
+            "\n1 error\n"
+        )  # fmt: skip
+        other.remove()
+        other.close()
+
     def test_no_such_folder(self, here: Path) -> None:
         assert self.run("no/such/a.h5") == (
             "error[E305]: cannot write no/such/a.h5: no/such does not exist\n"
@@ -177,7 +194,7 @@ class TestRefusedBeforeAnythingRuns:
         usage = namedtuple("usage", "total used free")
         monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(10**9, 10**9 - 5000, 5000))
         assert self.run("a.h5") == (
-            "error[E306]: cannot write a.h5: it needs about 65.7 KiB, and the disk has 4.9 KiB left\n"
+            "error[E306]: cannot write a.h5: it needs about 70.3 KiB, and the disk has 4.9 KiB left\n"
             " = help: `--histories none` keeps metrics only; fewer signals in `record`, or a slower `rates.record`, "
             "take less\n"
             "\n1 error\n"
@@ -217,10 +234,61 @@ class TestHowItEnds:
         with batch.open("a.h5") as data:
             assert data.sizes["case"] == 4
 
+    def test_what_a_killed_run_left_is_swept_up_by_the_next(self, here: Path) -> None:
+        (here / ".a.h5.tmp").write_bytes(b"half an archive" * 100_000)
+        (here / ".a.h5.run.json.tmp").write_bytes(b"{")
+        batch.run(plans.plan(plans.gains(3)), output="a.h5")
+        fresh = (here / "a.h5").read_bytes()
+        assert sorted(path.name for path in here.iterdir()) == ["a.h5", "a.h5.run.json"]
+        batch.run(plans.plan(plans.gains(3)), output="a.h5")
+        assert (here / "a.h5").read_bytes() == fresh
+
+    def test_a_run_that_starts_while_another_writes_is_told_and_the_other_ends_well(
+        self, here: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from met import run
+
+        said = []
+
+        def meanwhile(*arguments: Any, **options: Any) -> Any:
+            with pytest.raises(Problem) as caught:
+                campaign.perform(second)
+            said.append(caught.value.diagnostics[0].message)
+            return plans.answer(*arguments, **options)
+
+        second = campaign.prepare(plans.plan(plans.gains(4)), output="a.h5")
+        monkeypatch.setattr(run, "run", meanwhile)
+        batch.run(plans.plan(plans.gains(3)), output="a.h5")
+        assert said == ["cannot write a.h5: another run is writing it now"]
+        with batch.open("a.h5") as data:
+            assert data.sizes["case"] == 3
+
     def test_the_default_name_is_the_decks(self, here: Path) -> None:
         assert campaign.prepare(plans.plan()).output == Path("two_link.h5")
         named = campaign.prepare(plans.plan(plans.nominal(), plans.gains()), experiments=["gains"])
         assert named.output == Path("two_link.gains.h5")
+
+    def test_the_default_name_is_the_same_from_python(self, here: Path) -> None:
+        import ic
+
+        def output(select: Any, **options: Any) -> str:
+            return campaign.prepare(ic.compile("two_link.ic", select=select), **options).output.name
+
+        assert output(None) == "two_link.h5"
+        assert output(["gains"]) == output("gains") == "two_link.gains.h5"
+        assert output("all") == "two_link.all.h5"
+        assert output("all", experiments=["gains"]) == "two_link.gains.h5"
+        plan_file.write(ic.compile("two_link.ic", select=["gains"]), here / "p.json")
+        assert batch.run("p.json", cases=["#3"]).path == Path("two_link.gains.case3.h5")
+
+    def test_what_is_no_plan_is_named(self, here: Path) -> None:
+        with pytest.raises(TypeError) as caught:
+            batch.run("gantry.ic")
+        said = "batch.run takes a plan, and 'gantry.ic' is none: batch.run(ic.compile('gantry.ic'))"
+        assert str(caught.value) == said
+        with pytest.raises(TypeError) as caught:
+            batch.run(7)  # type: ignore[arg-type]
+        assert str(caught.value) == "batch.run takes a plan, as ic.compile gives it, and not int"
 
     def test_a_case_that_is_run_again_does_not_take_its_sweeps_place(self, here: Path) -> None:
         def output(*cases: str | int) -> str:
@@ -232,7 +300,8 @@ class TestHowItEnds:
         assert output(*range(9)) == "two_link.gains.h5"
 
 
-def test_a_disk_that_fills_up_leaves_nothing(tmp_path: Path) -> None:
+@pytest.mark.parametrize("room", [2_000, 60_000, 200_000, 700_000])  # full at the head, the layout, the histories
+def test_a_disk_that_fills_up_leaves_nothing(tmp_path: Path, room: int) -> None:
     """A limit on the file's size stands for a full disk; in a process of its own, where HDF5 may fail as it likes."""
     program = """
 import resource, signal, sys
@@ -242,7 +311,7 @@ from met import run
 from met.diagnostic import Problem
 from tests.batch import plans
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
 with mock.patch.object(run, "run", plans.answer), mock.patch.object(run, "prepare", lambda e: e):
     try:
         batch.run(plans.plan(plans.gains(500)), output=sys.argv[1])
@@ -250,14 +319,15 @@ with mock.patch.object(run, "run", plans.answer), mock.patch.object(run, "prepar
         print(problem.diagnostics[0].message)
 """
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-c", program, str(tmp_path / "a.h5")]
+    command = [sys.executable, "-c", program, str(tmp_path / "a.h5"), str(room)]
     said = subprocess.run(command, capture_output=True, text=True, env=environment)
     assert said.stdout.strip() == f"cannot write {tmp_path}/a.h5: file too large"
     assert said.returncode == 0, said.stderr
     assert list(tmp_path.iterdir()) == []
 
 
-def test_control_c_ends_a_real_run_and_leaves_nothing(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("signal_name", "status", "last"), [("INT", 130, "interrupted"), ("TERM", 143, "terminated")])
+def test_a_signal_ends_a_real_run_and_leaves_nothing(tmp_path: Path, signal_name: str, status: int, last: str) -> None:
     """Through the command line: kernels run outside Python, and must let it go."""
     import signal
     import time
@@ -274,10 +344,10 @@ def test_control_c_ends_a_real_run_and_leaves_nothing(tmp_path: Path) -> None:
                 break
             time.sleep(0.1)
         time.sleep(1.0)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(signal.Signals[f"SIG{signal_name}"])
         _, said = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert said.endswith("met: interrupted\n")
+    assert process.returncode == status
+    assert said.endswith(f"met: {last}\n")
     assert list((tmp_path / "out").iterdir()) == []
 
 
@@ -327,6 +397,7 @@ class TestWhatIsSaid:
             "met": 19,
             "missed": 1,
             "unknown": 0,
+            "no_value": 0,
         }
 
     def test_the_picture_lies_beside_the_archive(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -342,6 +413,55 @@ class TestWhatIsSaid:
             in capsys.readouterr().out
         )
         assert (here / "two_link.png").read_bytes() == b"\x89PNG mine"
+
+
+    def test_a_metric_without_a_value_is_not_called_a_failure(
+        self, here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from met import run
+
+        def unknown(*arguments: Any, **options: Any) -> Any:
+            answer = plans.answer(*arguments, **options)
+            answer.metrics["settle"][0] = np.nan
+            return answer
+
+        monkeypatch.setattr(run, "run", unknown)
+        run_and_tell(self.plan(here, plans.nominal()), no_picture=True)
+        assert "  require settle < 10 s  not known: its metric has no value here\n" in capsys.readouterr().out
+        run_and_tell(self.plan(here, plans.gains(4)), no_picture=True)
+        said = capsys.readouterr().out
+        assert "  require settle < 10 s  met by 3 of 4 (75 %), not known of 1 (its metric has no value in 1)\n" in said
+
+    def test_names_that_look_like_options_are_quoted(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        run_and_tell(self.plan(here, plans.nominal()), output="-x y.h5", no_picture=True)
+        assert "next     met show './-x y.h5'\n" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["p.json", "-D", "X=1"], "-D is for decks: `p.json` is a plan, whose macros are expanded already"),
+        (["p.json", "-I", "."], "-I is for decks: `p.json` is a plan, whose macros are expanded already"),
+        (["two_link.ic", "nominal", "--all"], "--all and `nominal` exclude each other"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "plan"])
+def test_options_that_clash_or_do_nothing_are_refused(
+    here: Path, capsys: pytest.CaptureFixture[str], command: str, words: list[str], said: str
+) -> None:
+    from met import cli
+
+    plan_file.write(plans.plan(), here / "p.json")
+    assert cli.main([command, *words]) == cli.BAD_INPUT
+    assert said in capsys.readouterr().err
+    assert [path.name for path in here.iterdir()] == ["p.json"]
+
+
+@pytest.mark.parametrize("case", ["#²", "#" + "9" * 5000, "#99999999999999999999", "#-1", "#"])
+def test_odd_positions_are_no_cases(here: Path, case: str) -> None:
+    with pytest.raises(Problem) as caught:
+        campaign.prepare(plans.plan(plans.gains(3)), cases=[case])
+    assert caught.value.diagnostics[0].code == "E311"
 
 
 def without_times(text: str) -> str:
@@ -424,6 +544,23 @@ class TestTheRealEngine:
             monkeypatch.setattr(campaign, "BATCH_BYTES", cases * campaign.history_bytes(plans.gains(1)))
             found.append(batch.run(plan, output="a.h5").path.read_bytes())
         assert found[0] == found[1]
+
+    @pytest.mark.parametrize("name", ["failure", "friction.splits", "metrics.kp", "q"])
+    def test_a_coordinate_and_a_metric_of_the_engines_own_names(self, here: Path, name: str) -> None:
+        from dataclasses import replace
+
+        from met import run
+        from tests.batch.test_archive import renamed
+
+        experiment = renamed(plans.gains(3), "gearbox.kp", name)
+        uses = (replace(experiment.structure.metrics[0], name="kp"),)
+        structure = replace(experiment.structure, metrics=uses)
+        parameters = {p.replace("metrics.settle.", "metrics.kp."): q for p, q in experiment.parameters.items()}
+        experiment = replace(experiment, structure=structure, parameters=parameters, requirements=())
+        found, plain = run.run(experiment), run.run(plans.gains(3))
+        np.testing.assert_array_equal(found.coordinates[name], plain.coordinates["gearbox.kp"])
+        np.testing.assert_array_equal(found.metrics["kp"], plain.metrics["settle"])
+        assert not found.status.any()
 
     def test_a_case_run_alone_is_the_case_of_the_sweep(self, here: Path) -> None:
         plan = plans.plan(plans.gains(9))

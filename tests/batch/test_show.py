@@ -44,7 +44,7 @@ def sweep(here: Path) -> Iterator[ArchiveFile]:
 def test_the_numbers_of_a_sweep(sweep: ArchiveFile) -> None:
     lines = show(sweep, width=100, plots=False).splitlines()
     assert lines[0].startswith("a.h5  (") and lines[0].endswith("), from two_link.ic")
-    assert lines[1:] == [
+    assert lines[1 : lines.index("cases, worst first:") - 1] == [
         "",
         "gains  20 cases, 2 s, modified_euler at 25 Hz, recorded at 25 Hz, arm two_link, velocity products",
         "       off",
@@ -62,10 +62,7 @@ def test_the_numbers_of_a_sweep(sweep: ArchiveFile) -> None:
 
 def test_a_plot_in_the_terminal(sweep: ArchiveFile) -> None:
     text = show(sweep, ["qd"], case="#19", width=72)
-    assert text[text.index("case #19") :] == (
-        "case #19 9e3d0889 · gearbox.kp = 0.04 V·s/rad · links.lower.mass = 20100 g\n"
-        "qd  (rad/s)  joint rate\n" + QD_PLOT
-    )
+    assert text[text.index("qd  (rad/s)") :] == "qd  (rad/s)  joint rate\n" + QD_PLOT
 
 
 def test_a_plot_fits_the_width(sweep: ArchiveFile) -> None:
@@ -115,7 +112,14 @@ def test_a_case_that_is_not_there(sweep: ArchiveFile) -> None:
     with pytest.raises(Problem) as caught:
         show(sweep, case="#20")
     assert caught.value.diagnostics[0].message == "no case `#20` in `gains`"
-    assert caught.value.diagnostics[0].help == ("cases here: #0 to #19, 20 of them; or the beginning of a case_id",)
+    assert caught.value.diagnostics[0].help == ("cases here: #0 to #19; or the beginning of a case_id",)
+
+
+@pytest.mark.parametrize("case", ["#²", "#" + "9" * 5000, "#99999999999999999999"])
+def test_a_position_that_no_table_has(sweep: ArchiveFile, case: str) -> None:
+    with pytest.raises(Problem) as caught:
+        show(sweep, case=case)
+    assert caught.value.diagnostics[0].code == "E321"
 
 
 def test_an_archive_without_histories_says_how_to_get_them(here: Path) -> None:

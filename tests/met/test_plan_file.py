@@ -10,7 +10,8 @@ import pytest
 
 from met import plan_file
 from met.diagnostic import Expansion, Place, Problem
-from met.plan import Origin, Plan, Quantity
+from met.plan import Experiment, Origin, Plan, Quantity
+from met.plan_codec import decode, encode
 from tests.batch import plans
 
 
@@ -55,12 +56,8 @@ def test_every_double_comes_back_to_the_bit(value: float) -> None:
 
 def test_words_and_lists_are_not_taken_for_numbers() -> None:
     experiment = plans.nominal()
-    odd = {
-        "word": Quantity("nan", "1", plans.DECK),
-        "list": Quantity((1.0, math.inf), "s", plans.DECK),
-    }
-    plan = plans.plan(replace(experiment, parameters={**experiment.parameters, **odd}))
-    back = plan_file.loads(plan_file.dumps(plan)).experiments[0].parameters
+    odd = {"word": Quantity("nan", "1", plans.DECK), "list": Quantity((1.0, math.inf), "s", plans.DECK)}
+    back = decode(Experiment, encode(Experiment, replace(experiment, parameters=odd))).parameters
     assert back["word"].value == "nan"
     assert back["list"].value == (1.0, math.inf)
 
@@ -143,11 +140,11 @@ def test_a_newer_plan_is_refused() -> None:
         (lambda d: d["experiments"][0]["structure"].pop("arm"), "experiments[0].structure: `arm` is missing"),
         (lambda d: d["experiments"][0].update(colour="red"), "experiments[0]: `colour` is not known"),
         (lambda d: d["experiments"][0]["structure"]["joints"][1].update(parent="nowhere"),
-         "run nominal: joint elbow connects link nowhere, which is not there"),
+         "experiments[0].structure.joints[1].parent: there is no link `nowhere`"),
         (lambda d: d["experiments"][0]["structure"]["schedule"].update(record=0),
-         "run nominal: its schedule or its number of cases makes no sense"),
+         "experiments[0].structure.schedule.record: it should be a whole number from 1 to 1000000000000"),
         (lambda d: d["experiments"][0]["requirements"][0].update(metric="speed"),
-         "run nominal: a requirement is on metric speed, which is not there"),
+         "experiments[0].requirements[0].metric: there is no metric `speed`"),
         (lambda d: d["experiments"][0]["formulas"].update(nodes=[["add", 4, 6]], outputs=[0]),
          "experiments[0].formulas.nodes[0]: it is not a formula's node"),
     ],
@@ -217,6 +214,38 @@ def test_a_plan_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(Problem) as caught:
         plan_file.read(tmp_path / "none.json")
     assert messages(caught) == [f"E301: cannot read the plan {tmp_path}/none.json: no such file or directory"]
+
+
+def test_a_plan_is_written_over_by_the_next_and_so_are_its_tables(tmp_path: Path) -> None:
+    for cases in (10_001, 10_002, 3):
+        plan_file.write(plans.plan(plans.gains(cases)), tmp_path / "p.json")
+        assert plan_file.read(tmp_path / "p.json").experiments[0].cases.count == cases
+
+
+@pytest.mark.parametrize(
+    "content", [b"run nominal { }", b"\x89HDF\r\n\x1a\n" + bytes(99), b'{"name": "left-pad"}', b"{", b"\xff\xfe"]
+)
+def test_what_is_no_plan_is_not_written_over(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "deck.ic").write_bytes(content)
+    with pytest.raises(Problem) as caught:
+        plan_file.write(plans.plan(plans.gains(10_001)), tmp_path / "deck.ic")
+    assert messages(caught) == [f"E300: {tmp_path}/deck.ic exists and is no plan of MET: it is not written over"]
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("deck.ic", content)]
+
+
+def test_a_table_of_somebody_elses_is_not_written_over(tmp_path: Path) -> None:
+    (tmp_path / "p.gains.cases.npy").write_bytes(b"mine")
+    with pytest.raises(Problem) as caught:
+        plan_file.write(plans.plan(plans.gains(10_001)), tmp_path / "p.json")
+    assert "it exists, and is no case table of" in messages(caught)[0]
+    assert [path.name for path in tmp_path.iterdir()] == ["p.gains.cases.npy"]
+
+
+@pytest.mark.parametrize("target", ["", ".", "/"])
+def test_a_plan_needs_a_name(target: str) -> None:
+    with pytest.raises(Problem) as caught:
+        plan_file.write(plans.plan(), target)
+    assert caught.value.diagnostics[0].code == "E300"
 
 
 def test_a_plan_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:

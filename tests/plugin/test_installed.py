@@ -132,6 +132,7 @@ def test_a_servo_that_raises_is_told_where(met, site: Path) -> None:  # type: ig
         unit = met("check", "blown.ic", status=2)
     finally:
         source.write_text(original)
-    assert "error[E213]: servo `drive` of joint `shoulder` (model velocity_servo): `drive` raises AttributeError" in said
+    who = "servo `drive` of joint `shoulder` (model velocity_servo)"
+    assert f"error[E213]: {who}: `drive` raises AttributeError" in said
     assert f"velocity_servo.py:{line}:" in said and "joint.qdot" in said and "Traceback" not in said
     assert "error[E215]" in unit and "`gain`" in unit and "`efort` is not a unit" in unit

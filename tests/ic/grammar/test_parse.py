@@ -27,6 +27,7 @@ from ic.grammar.syntax import (
     WithUnit,
     Word,
 )
+from ic.read import read
 from met.diagnostic import Place, Problem
 from met.render import render, to_json
 from tests.ic.decktext import Desk
@@ -263,12 +264,14 @@ error[D021]: expected `;`
   |
 2 |     mass = 3 kg   // heavy
   |                ^
+  = help: an entry ends with `;`
 
 error[D021]: expected `;`
  --> a.ic:3:15
   |
 3 |     size = 4 m
   |               ^
+  = help: an entry ends with `;`
 
 2 errors
 """
@@ -285,6 +288,7 @@ error[D022]: this `{` is not closed
 1 | run a {
   |       ^
  ::: a.ic:2:11  perhaps this one: the `}` on line 4 that closes it is indented less
+  = help: write the `}` where it ends
 
 1 error
 """
@@ -397,9 +401,17 @@ error[D026]: `m` is the unit metre, so it cannot name a value
         ("let a.b = 3;", "error[D020]: `let` gives a value to one name", ""),
         ("let a += 3;", "error[D023]: `let` gives a value once", "write `=`"),
         ("a. = 3;", "error[D020]: expected a name after `.`, found `=`", ""),
-        ("}", "error[D022]: this `}` closes nothing", ""),
-        (")", "error[D022]: this `)` closes nothing", ""),
-        ("x = 3);", "error[D022]: this `)` closes nothing", ""),
+        ("}", "error[D022]: this `}` closes nothing", "leave it out"),
+        (")", "error[D022]: this `)` closes nothing", "leave it out"),
+        ("x = 3);", "error[D022]: this `)` closes nothing", "leave it out"),
+        ("x = 2*pi rad / 10 mm;", "error[D030]: a unit follows a number or brackets, and `pi` is neither",
+         "as in `(2*pi) rad`; a whole turn is `1 cycle`"),
+        ("x = pi rad/s;", "error[D030]: a unit follows a number or brackets", "`1 cycle/s`"),
+        ("x = pi m;", "error[D030]: a unit follows a number or brackets", "as in `(2*pi) m`"),
+        ("servo strong like weak\n    kp = 3;\n    b { c = 4; }\n}\nlet x = 3;",
+         "error[D020]: expected `{` after `weak`\n --> a.ic:1:23", "`... like BASE { ... }`"),
+        ("servo strong like weak\n}", "error[D020]: expected `{` after `weak`", ""),
+        ("# mast\nx = 3;", "error[D007]: `#mast` is not a directive", "a comment begins with `//`"),
         ("x = f(3\ny = 4;", "error[D022]: expected `,` or `)`, found `y`", ""),
         ("x = [3;\ny = 4;", "error[D022]: expected `,` or `]`, found `;`", ""),
         ('x = "a\\qb";', "error[D020]: `\\q` means nothing in a string", ""),
@@ -534,3 +546,19 @@ def test_a_deck_of_sixty_lines_takes_milliseconds(desk: Desk):
         desk.read(TWO_LINK)
     # about 4 ms each on an idle machine; the command line has 250 for everything
     assert time.process_time() - start < 10 * 0.05
+
+
+def test_a_macro_of_the_command_line_that_takes_the_name_of_a_let_is_told_as_that(desk: Desk):
+    path = desk.write("let height = 1 m;\nrun a { x = height; }\n")
+    with pytest.raises(Problem) as raised:
+        read(path, [], ["height=2"])
+    (diagnostic,) = raised.value.diagnostics
+    assert (diagnostic.code, diagnostic.message) == ("D035", "`-D height` has put `2` in the place of this name")
+    assert diagnostic.at is not None and str(diagnostic.at.place) == "a.ic:1:5"
+    assert diagnostic.help[0] == "-D defines a macro, as #define does; it does not set a `let`"
+
+
+def test_a_macro_of_the_deck_that_takes_the_name_of_a_let_is_told_as_that(desk: Desk):
+    told = desk.told("#define height 2\nlet height = 1 m;\n")
+    assert told.startswith("error[D035]: the macro `height` has put `2` in the place of this name\n --> a.ic:2:5\n")
+    assert "help: give one of the two another name\n" in told

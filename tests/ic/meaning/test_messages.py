@@ -104,6 +104,7 @@ error[D077]: `mass` of link `bar` must be above 0 kg
   |
 3 |     BAR(-2 kg)
   |         ^^^^^ this is -2 kg
+  = help: write a number above 0 kg (mass of the link)
   = note: in expansion of macro BAR, used at deck.ic:3:5
 """
 
@@ -165,7 +166,7 @@ error[D104]: servo `drive` is unstable with modified_euler at this rate of the d
    |
 14 |     rates { dynamics = 1 kHz; servos = 1 kHz; record = 100 Hz; }
    |                        ^^^^^ h * lambda = 2.5; the slowest rate that fits is 2000 Hz
-   = help: h * lambda must stay below 2; lambda is the fastest decay under this servo, on any arm
+   = help: h * lambda must stay below 2; lambda is the servo's fastest rate constant, on any arm
 """
 
 
@@ -188,6 +189,7 @@ error[D147]: `rigid_gearbox` is a servo model; a servo definition is needed here
    |
 13 |     servos { hinge = rigid_gearbox; }
    |                      ^^^^^^^^^^^^^
+   = help: a standard deck defines a servo of this name: add `#include <servos/rigid_gearbox.ic>`
    = help: `servo NAME { model = rigid_gearbox; ... }`, and `hinge = NAME;`
 """
 
@@ -322,6 +324,7 @@ error[D077]: `mass` of link `bar` must be above 0 kg; case #1 breaks it, and 1 m
 18 | default sweep it of hold { vary links.bar.mass = [1000, 0, -1] g; }
    |                                 ^^^^^^^^^^^^^^ this is 0 kg
    = help: case #1: links.bar.mass = 0 g
+   = help: write a number above 0 kg (mass of the link)
 """
 
 

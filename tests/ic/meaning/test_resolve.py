@@ -66,7 +66,22 @@ def test_remove_takes_a_metric_away_and_its_requirements_with_it(tmp_path: Path)
 def test_what_was_removed_may_be_added_again(tmp_path: Path) -> None:
     run = experiment(tmp_path, *derived("remove top; metric top = min { of = hinge.qd; }"), select=["it"])
     assert [metric.model for metric in run.structure.metrics] == ["final", "min"]
-    assert [requirement.metric for requirement in run.requirements] == ["top"]
+
+
+def test_a_requirement_of_the_base_goes_with_its_metric_though_another_takes_the_name(tmp_path: Path) -> None:
+    again = "remove top; metric top = min { of = hinge.qd; }"
+    run = experiment(tmp_path, *derived(again), select=["it"])
+    assert run.requirements == ()
+    assert "`require top < 9 rad/s` went with the metric `top`, which is removed" in run.notes
+    run = experiment(tmp_path, *derived(f"{again} require top > 1 rad/s;"), select=["it"])
+    assert [requirement.text for requirement in run.requirements] == ["top > 1 rad/s"]
+    third = "run third like it { duration = 2 s; }"
+    run = experiment(tmp_path, *derived(f"{again} require top > 1 rad/s;"), third, select=["third"])
+    assert [requirement.text for requirement in run.requirements] == ["top > 1 rad/s"]
+
+
+def test_a_requirement_after_its_metric_was_removed_is_an_error(tmp_path: Path) -> None:
+    assert codes(tmp_path, *derived("remove top; require top > 1 rad/s;"), select=["it"]) == ["D132"]
 
 
 def test_nothing_to_remove_is_told(tmp_path: Path) -> None:

@@ -69,14 +69,14 @@ Schedule: 2 s, 2000 ticks of the base rate, 1000 Hz
   dynamics              1000 Hz  every tick      2000 steps of 1 ms, modified_euler
   record                 100 Hz  every 10 ticks  201 rows
 Stability: step times the servo's fastest rate constant; modified_euler is stable below 2
-  joint pivot  h * lambda = 0.025
-  joint knee   h * lambda = 0.025
+  pivot  h * lambda = 0.025
+  knee   h * lambda = 0.025
 
 Environment: with velocity products (Coriolis, centrifugal, gyroscopic)
   gravity  gravity        g = [0, 0, -9.81] m/s^2
-  grease   joint_damping  damping = 0.1 N*m*s/rad
+  grease   joint_damping  damping = 0.1 N*m*s/rad, sliding = 0 N*s/m
 
-Recorded: 7 channels in 201 rows, 11.3 kB a case
+Recorded: 7 channels in 201 rows, 11.0 KiB a case
   q                    rad, m      joint position              of pivot, knee, rail
   qd                   rad/s, m/s  joint rate                  of pivot, knee, rail
   pivot.servo.voltage  V           voltage on the drive motor
@@ -84,28 +84,28 @@ Recorded: 7 channels in 201 rows, 11.3 kB a case
 Metrics and what is required of them
   top  max of pivot.qd  require top < 0.6 rad/s
 
-Cases: 1, 11.3 kB of histories
+Cases: 1, 11.0 KiB of histories
 """
 
 EXPLAIN_OVERRIDDEN = """\
 knee.servo.kp = 0.02 V*s/rad
-  gain on the motor's rate error (rigid_gearbox; Hill, Hopping, Price 1989, table 1)
+  gain on the motor's rate error (rigid_gearbox)
   --> swing.ic:19:45
    |
 19 | servo slow like motor { rate = 100 Hz; kp = 0.02 V*s/rad; }
    |                                             ^^^^^^^^^^^^ written here
-  ::: swing.ic:16:19  overrides this
+  ::: swing.ic:16:19  overrides `kp = 0.05 V*s/rad`
 """
 
 EXPLAIN_VARIED = """\
 pivot.servo.kp = 0.05 to 0.06 V*s/rad, varies with the case
-  gain on the motor's rate error (rigid_gearbox; Hill, Hopping, Price 1989, table 1)
+  gain on the motor's rate error (rigid_gearbox)
   varied by motor.kp: 50, 60 mV*s/rad
   --> swing.ic:34:10
    |
 34 |     vary motor.kp = [50, 60] mV*s/rad;
    |          ^^^^^^^^ a sweep varies it, here
-  ::: swing.ic:16:24  overrides this
+  ::: swing.ic:16:24  overrides `0.05 V*s/rad`
 """
 
 EXPLAIN_MACRO = """\
@@ -127,7 +127,7 @@ rail.axis = [0, 0.6, 0.8]
 
 EXPLAIN_DEFAULT = """\
 knee.servo.f_c = 0 N*m
-  Coulomb friction at the motor (rigid_gearbox; Hill, Hopping, Price 1989, table 1)
+  Coulomb friction at the motor (rigid_gearbox)
   the default
 """
 
@@ -211,7 +211,7 @@ def test_plan_of_a_sweep_shows_what_varies_and_how_much_is_written(capsys: pytes
     assert "slider  1 to 5 kg" in out
     # 60 cases, 201 rows, 7 channels, 8 bytes: 675,360
     assert out.endswith(
-        "Cases: 60, 675 kB of histories\n"
+        "Cases: 60, 660 KiB of histories\n"
         "  links.slider.mass  30 values from 1 to 5 kg\n"
         "  motor.kp           50, 60 mV*s/rad\n"
     )
@@ -381,8 +381,11 @@ def test_a_number_is_shown_without_its_last_binary_digits(value: float, text: st
     assert number(value) == text
 
 
-@pytest.mark.parametrize(("count", "text"), [(0, "0 B"), (999, "999 B"), (999_600, "1 MB"), (1_234_567_890, "1.23 GB")])
-def test_a_size_has_three_digits(count: int, text: str) -> None:
+@pytest.mark.parametrize(
+    ("count", "text"),
+    [(0, "0 B"), (999, "999 B"), (11_256, "11.0 KiB"), (999_600, "976 KiB"), (1_234_567_890, "1.1 GiB")],
+)
+def test_a_size_is_in_the_units_that_a_run_counts_in(count: int, text: str) -> None:
     assert size(count) == text
 
 
@@ -401,3 +404,89 @@ def test_explain_follows_the_names_that_a_value_is_written_with(deck: Path, caps
     lines = printed(capsys, "explain", "swing.ic", "pivot.servo.command.value").splitlines()
     assert lines[0] == "pivot.servo.command.value = 0.5 rad/s"
     assert lines[-1] == "  ::: swing.ic:36:5  quick = 0.5 rad/s"
+
+
+def test_plan_shows_how_a_joints_frame_is_turned(deck: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    deck.write_text(DECK.replace("child = second; axis = -y;", "child = second; axis = -y; rpy = [0, -90, 30] deg;"))
+    lines = printed(capsys, "plan", "swing.ic").splitlines()
+    assert lines[3].split() == ["joint", "moves", "at", "rpy", "link", "mass", "servo"]
+    assert "[1, 0, 0] m      [0, -90, 30] deg  second" in lines[6]
+    assert lines[7].count("deg") == 0
+
+
+def test_plan_that_is_asked_for_more_shows_centres_of_mass_and_inertias(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = printed(capsys, "plan", "swing.ic", "-v").splitlines()
+    at = next(n for n, line in enumerate(lines) if line.startswith("  link "))
+    assert lines[at].endswith("inertia about it: xx, yy, zz, xy, xz, yz")
+    # a rod of 2 kg and 1 m: m l^2 / 12
+    assert lines[at + 1].split(maxsplit=1) == [
+        "first", "2 kg    [0.5, 0, 0] m   [0, 0.166667, 0.166667, 0, 0, 0] kg*m^2"
+    ]  # fmt: skip
+
+
+def test_check_that_is_asked_for_more_names_the_joints_without_a_servo(capsys: pytest.CaptureFixture[str]) -> None:
+    assert printed(capsys, "check", "swing.ic", "-v").splitlines() == [
+        "free: no servo on rail, which moves freely",
+        "load: no servo on rail, which moves freely",
+        "swing.ic: 1 run, 1 sweep, 61 cases: no errors",
+    ]
+
+
+def test_dump_of_a_plan_has_a_line_for_each_value_on_a_terminal(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain = printed(capsys, "dump", "plan", "swing.ic")
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    pretty = printed(capsys, "dump", "plan", "swing.ic")
+    assert json.loads(pretty) == json.loads(plain)
+    assert len(pretty.splitlines()) > 10 * len(plain.splitlines())
+
+
+def test_explain_of_a_component_names_only_what_it_is_written_with(
+    deck: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    deck.write_text(DECK.replace("at = [0.5, 0, 0.1] m", "at = [boom/2, 0 m, 0.1 m]") + "let boom = 1 m;\n")
+    x, y, z = printed(capsys, "explain", "swing.ic", "mount.at").split("\n\n")
+    assert x.startswith("mount.at.x = 0.5 m\n")
+    assert x.endswith("  ::: swing.ic:36:5  boom = 1 m")
+    assert "boom = 1 m" not in y + z
+
+
+@pytest.mark.parametrize(
+    ("asked", "same"),
+    [("camera", "links.camera"), ("camera.mass", "links.camera.mass"), ("top", "metrics.top"), ("slow", "knee.servo")],
+)
+def test_explain_knows_links_metrics_and_definitions_by_their_names(
+    asked: str, same: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = {line.split(" ")[0] for line in printed(capsys, "explain", "swing.ic", asked).splitlines()}
+    meant = {line.split(" ")[0] for line in printed(capsys, "explain", "swing.ic", same).splitlines()}
+    assert told
+    assert told <= meant
+
+
+def test_explain_of_a_definitions_parameter_in_a_sweep_shows_every_joint_that_follows(
+    deck: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    deck.write_text(DECK.replace("rate = 100 Hz; kp = 0.02 V*s/rad;", "rate = 100 Hz;"))
+    out = printed(capsys, "explain", "swing.ic", "motor.kp", "--run", "load")
+    assert [line.split(" ")[0] for line in out.splitlines() if " = 0.05 to" in line] == [
+        "pivot.servo.kp",
+        "knee.servo.kp",
+    ]
+
+
+def test_explain_of_a_let_says_what_it_is_and_what_it_is_made_of(
+    deck: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    deck.write_text(DECK + "let half = 0.5 m;\nlet whole = 2*half;\n")
+    lines = printed(capsys, "explain", "swing.ic", "whole").splitlines()
+    assert lines[0] == "whole = 1 m"
+    assert lines[1] == "  --> swing.ic:37:13"
+    assert lines[-1] == "  ::: swing.ic:36:5  half = 0.5 m"
+
+
+def test_a_default_has_no_source(capsys: pytest.CaptureFixture[str]) -> None:
+    (told,) = json.loads(printed(capsys, "explain", "swing.ic", "knee.servo.f_c", "--format", "json"))
+    assert (told["origin"], told["note"]) == ("default", "")
+    assert "Hill, Hopping, Price 1989" in printed(capsys, "doc", "rigid_gearbox")

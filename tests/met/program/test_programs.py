@@ -12,6 +12,7 @@ from met import kernel
 from met import run as engine
 from met.plan import Experiment
 from met.program import build
+from met.program.build import METRIC
 from met.trace.reference import execute
 from tests.oracles.random_deck import random_deck
 
@@ -35,7 +36,7 @@ def test_kernel_and_plain_floats_agree_on_random_decks(tmp_path: Path, seed: int
     assert np.abs(kernel - rows).max() / size.max() < 1e-10, seed
     assert (np.abs(kernel - rows).max(axis=0) < 1e-9 * size).all(), seed
     for name in ("peak", "size"):
-        assert run.metrics[name][0] == pytest.approx(out[f"metrics.{name}"], rel=1e-9, abs=1e-12), seed
+        assert run.metrics[name][0] == pytest.approx(out[METRIC + name], rel=1e-9, abs=1e-12), seed
     for name, count in run.events.items():
         assert count[0] == out[f"friction.{name}"], (seed, name)
 

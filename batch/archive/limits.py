@@ -1,0 +1,38 @@
+"""The unit in which a metric's requirement is written: whoever wrote `sag > -136 deg` reads the metric in degrees."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from met import units
+from met.plan import Requirement
+
+# what a unit may stand behind: a number, or the end of a sum in parentheses
+_NUMBER = re.compile(r"\d[\d.]*(?:[eE][-+]?\d+)?|\)")
+
+
+def deck_unit(metric: str, unit: str, requirements: Iterable[Requirement]) -> tuple[str, float]:
+    """Unit and scale (shown = SI value / scale) of the first requirement of a metric that has one, else its SI unit."""
+    for requirement in requirements:
+        if requirement.metric == metric and (found := written_unit(requirement.text, unit)) is not None:
+            return found
+    return unit, 1.0
+
+
+def written_unit(text: str, unit: str) -> tuple[str, float] | None:
+    """The unit at the end of a requirement's text and its size in SI; None where no unit of this dimension is there."""
+    try:
+        wanted = units.parse_unit(unit).dimension
+    except ValueError:
+        return None
+    limit = re.split(r"[<>]=?", text, maxsplit=1)[-1]
+    for number in _NUMBER.finditer(limit):
+        written = limit[number.end() :].strip()
+        try:
+            measure = units.parse_unit(written)
+        except ValueError:
+            continue
+        if units.same(measure.dimension, wanted):
+            return written, measure.scale
+    return None

@@ -1,0 +1,42 @@
+"""What a run is besides its parameters, under the names of a deck: `rates.dynamics`, `elbow.servo.model`."""
+
+from __future__ import annotations
+
+from met.diagnostic import Place
+from met.plan import Experiment, Origin, Quantity
+
+
+def settings(experiment: Experiment) -> dict[str, Quantity]:
+    """The settings by path, from the plan alone, which keeps the places of some of them."""
+    structure = experiment.structure
+    schedule = structure.schedule
+    made: dict[str, Quantity] = {}
+
+    def word(path: str, text: str, place: Place | None = None) -> None:
+        made[path] = Quantity(text, "", Origin("deck", place))
+
+    def number(path: str, value: float, unit: str, note: str = "") -> None:
+        made[path] = Quantity(value, unit, Origin("derived" if note else "deck", note=note))
+
+    word("arm", structure.arm)
+    for joint in structure.joints:
+        word(f"{joint.name}.parent", joint.parent, joint.place)
+        word(f"{joint.name}.child", joint.child, joint.place)
+    for use in structure.servos:
+        word(f"servos.{use.joint}", use.definition, use.place)
+        word(f"{use.joint}.servo.model", use.model, use.place)
+        number(f"{use.joint}.servo.rate", schedule.base_hz / use.divisor, "Hz", f"{use.divisor} base ticks a tick")
+    for environment in structure.environment:
+        word(f"environment.{environment.name}.model", environment.model, environment.place)
+    word("environment.velocity_products", "on" if structure.velocity_products else "off")
+    number("rates.base", schedule.base_hz, "Hz")
+    number("rates.dynamics", schedule.base_hz / schedule.dynamics, "Hz", f"{schedule.dynamics} base ticks a step")
+    number("rates.record", schedule.base_hz / schedule.record, "Hz", f"{schedule.record} base ticks a row")
+    word("integrator", structure.integrator)
+    number("duration", schedule.duration, "s", f"{schedule.ticks} base ticks")
+    word("record", ", ".join(recorded.name for recorded in structure.record) or "none")
+    number("seed", float(experiment.cases.seed), "1")
+    for metric in structure.metrics:
+        word(f"metrics.{metric.name}.model", metric.model, metric.place)
+        word(f"metrics.{metric.name}.of", metric.of, metric.place)
+    return made

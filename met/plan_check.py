@@ -1,0 +1,397 @@
+"""What the types of a plan cannot say: that its parts fit together, and that its numbers are possible.
+
+Whoever writes a plan by hand, or with another program, is told where it is wrong, by the path in the JSON; what gets
+past here runs. Everything raises `Damaged`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Callable, Collection, Iterable
+from typing import Any
+
+import numpy as np
+
+from met import models, units
+from met.channel import COMMAND_UNIT, channels
+from met.parameter import Parameter
+from met.plan import Coordinate, Experiment, Formula, Quantity, Requirement, Structure
+from met.plan_codec import Damaged
+from met.plan_defaults import INERTIA, declared
+from met.trace.graph import TRUTHS, Formulas
+
+NAME = re.compile(r"[^\W\d]\w*")
+"""What a deck can name: a name is part of paths, of messages, of files' names."""
+
+MOST_TICKS = 10**12
+"""Of a run: thirty years at a kilohertz. A divisor may not be larger either."""
+
+MOST_SEED = 2**63 - 1
+
+ROUNDING = 1e-9
+"""For rounding alone: an axis' length may be off by this, and a moment of inertia below zero by this share."""
+
+CHUNK = 1 << 14
+"""Cases whose varied numbers are tested at a time."""
+
+
+def check(experiments: Iterable[Experiment]) -> None:
+    """All experiments of a plan."""
+    names: list[str] = []
+    for index, experiment in enumerate(experiments):
+        where = f"experiments[{index}]"
+        _name(experiment.name, f"{where}.name", names)
+        names.append(experiment.name)
+        _check_arm(experiment.structure, f"{where}.structure")
+        _check_schedule(experiment.structure, f"{where}.structure")
+        _check_uses(experiment.structure, f"{where}.structure")
+        _check_record(experiment.structure, f"{where}.structure.record")
+        _check_requirements(experiment, f"{where}.requirements")
+        _check_cases(experiment, f"{where}.cases")
+        _check_formulas(experiment, where)
+        _check_parameters(experiment, f"{where}.parameters")
+    if not names:
+        raise Damaged("experiments", "there is none")
+
+
+def check_text(document: Any, where: str = "") -> None:
+    """No text but that of a source holds a null character, or half of a character."""
+    if isinstance(document, str):
+        if "\0" in document:
+            raise Damaged(where, "a null character is in it")
+        if not document.isascii() and any("\ud800" <= c <= "\udfff" for c in document):
+            raise Damaged(where, "half of a character is in it")
+    elif isinstance(document, dict):
+        for key, part in document.items():
+            check_text(key, where)
+            if not (key == "text" and where.startswith("sources")):
+                check_text(part, f"{where}.{key}".lstrip("."))
+    elif isinstance(document, list):
+        for index, part in enumerate(document):
+            check_text(part, f"{where}[{index}]")
+
+
+def _name(name: str, where: str, before: Collection[str] = ()) -> None:
+    if not NAME.fullmatch(name):
+        raise Damaged(where, f"{name!r} is no name: letters, digits and _")
+    if name in before:
+        raise Damaged(where, f"`{name}` is there twice")
+
+
+def _whole(number: int | None, low: int, high: int, where: str) -> None:
+    if number is not None and not low <= number <= high:
+        raise Damaged(where, f"it should be a whole number from {low} to {high}")
+
+
+# Structure
+
+
+def _check_arm(structure: Structure, where: str) -> None:
+    """Links and joints are a tree that stands on the base."""
+    links: list[str] = []
+    for index, link in enumerate(structure.links):
+        _name(link.name, f"{where}.links[{index}].name", ["base", *links])
+        links.append(link.name)
+    if not links:
+        raise Damaged(f"{where}.links", "there is none")
+    names: list[str] = []
+    parents: dict[str, str] = {}
+    for index, joint in enumerate(structure.joints):
+        path = f"{where}.joints[{index}]"
+        _name(joint.name, f"{path}.name", names)
+        names.append(joint.name)
+        for end, name in (("parent", joint.parent), ("child", joint.child)):
+            if name not in links and not (end == "parent" and name == "base"):
+                raise Damaged(f"{path}.{end}", f"there is no link `{name}`")
+        if joint.child in parents:
+            raise Damaged(f"{path}.child", f"link `{joint.child}` is another joint's child already")
+        parents[joint.child] = joint.parent
+    for index, name in enumerate(links):
+        if name not in parents:
+            raise Damaged(f"{where}.links[{index}]", f"no joint holds link `{name}`")
+    standing = {"base"}
+    for joint_index, joint in enumerate(structure.joints):
+        passed: set[str] = set()
+        at = joint.child
+        while at not in standing:
+            if at in passed:
+                raise Damaged(f"{where}.joints[{joint_index}].parent", f"link `{at}` hangs on itself")
+            passed.add(at)
+            at = parents[at]
+        standing |= passed
+
+
+def _check_schedule(structure: Structure, where: str) -> None:
+    schedule, path = structure.schedule, f"{where}.schedule"
+    if not 0.0 < schedule.base_hz < math.inf:
+        raise Damaged(f"{path}.base_hz", "it should be above 0, and finite")
+    _whole(schedule.ticks, 0, MOST_TICKS, f"{path}.ticks")
+    _whole(schedule.dynamics, 1, MOST_TICKS, f"{path}.dynamics")
+    _whole(schedule.record, 1, MOST_TICKS, f"{path}.record")
+    for index, use in enumerate(structure.servos):
+        _whole(use.divisor, 1, MOST_TICKS, f"{where}.servos[{index}].divisor")
+    for index, environment in enumerate(structure.environment):
+        _whole(environment.divisor, 1, MOST_TICKS, f"{where}.environment[{index}].divisor")
+
+
+def _check_uses(structure: Structure, where: str) -> None:
+    """Servos on moving joints, one each; commands that they take; metrics of channels that are there."""
+    kinds = {joint.name: joint.kind for joint in structure.joints}
+    driven: set[str] = set()
+    for index, use in enumerate(structure.servos):
+        path = f"{where}.servos[{index}]"
+        if use.joint not in kinds:
+            raise Damaged(f"{path}.joint", f"there is no joint `{use.joint}`")
+        if kinds[use.joint] == "fixed":
+            raise Damaged(f"{path}.joint", f"joint `{use.joint}` is fixed")
+        if use.joint in driven:
+            raise Damaged(f"{path}.joint", f"joint `{use.joint}` has a servo already")
+        driven.add(use.joint)
+        servo = models.find("servo", use.model, use.place)
+        if use.command is None:
+            if servo.commands:
+                raise Damaged(f"{path}.command", f"a {use.model} needs one")
+        elif use.command.kind not in servo.commands or use.command.kind not in COMMAND_UNIT:
+            known = ", ".join(servo.commands) or "none"
+            raise Damaged(f"{path}.command.kind", f"a {use.model} takes no command `{use.command.kind}`, but {known}")
+    names: list[str] = []
+    for index, environment in enumerate(structure.environment):
+        _name(environment.name, f"{where}.environment[{index}].name", names)
+        names.append(environment.name)
+    names = []
+    known_channels = channels(structure) if structure.metrics else {}
+    for index, metric in enumerate(structure.metrics):
+        _name(metric.name, f"{where}.metrics[{index}].name", names)
+        names.append(metric.name)
+        if metric.of not in known_channels:
+            raise Damaged(f"{where}.metrics[{index}].of", f"there is no channel `{metric.of}`")
+    models.find("integrator", structure.integrator)
+
+
+def _check_record(structure: Structure, where: str) -> None:
+    known = channels(structure) if structure.record else {}
+    names: list[str] = []
+    for index, recorded in enumerate(structure.record):
+        path = f"{where}[{index}]"
+        if recorded.name in names:
+            raise Damaged(f"{path}.name", f"`{recorded.name}` is there twice")
+        names.append(recorded.name)
+        for channel in recorded.channels:
+            if channel not in known:
+                raise Damaged(f"{path}.channels", f"there is no channel `{channel}`")
+        if len(set(recorded.joints)) < len(recorded.joints):
+            raise Damaged(f"{path}.joints", "a joint is there twice")
+        wanted = tuple(f"{joint}.{recorded.name}" for joint in recorded.joints) or (recorded.name,)
+        if recorded.channels != wanted:
+            raise Damaged(f"{path}.channels", f"`{recorded.name}` of these joints is {', '.join(wanted)}")
+        if len(recorded.unit) not in (1, len(recorded.channels)):
+            raise Damaged(f"{path}.unit", "it should be one unit, or one a channel")
+
+
+# Cases
+
+
+def _check_requirements(experiment: Experiment, where: str) -> None:
+    metrics = {use.name for use in experiment.structure.metrics}
+    said: dict[str, Requirement] = {}
+    for index, requirement in enumerate(experiment.requirements):
+        if requirement.metric not in metrics:
+            raise Damaged(f"{where}[{index}].metric", f"there is no metric `{requirement.metric}`")
+        if math.isnan(requirement.limit):
+            raise Damaged(f"{where}[{index}].limit", "it is not a number")
+        first = said.setdefault(requirement.text, requirement)
+        if (first.metric, first.comparison, first.limit) != (
+            requirement.metric, requirement.comparison, requirement.limit
+        ):  # fmt: skip
+            raise Damaged(f"{where}[{index}].text", "another requirement has the same text")
+
+
+def _check_cases(experiment: Experiment, where: str) -> None:
+    cases = experiment.cases
+    _whole(cases.count, 1, 2**63 - 1 if cases.coordinates else 1, f"{where}.count")
+    _whole(cases.seed, 0, MOST_SEED, f"{where}.seed")
+    paths: set[str] = set()
+    for index, coordinate in enumerate(cases.coordinates):
+        path = f"{where}.coordinates[{index}]"
+        if not all(NAME.fullmatch(part) for part in coordinate.path.split(".")):
+            raise Damaged(f"{path}.path", f"{coordinate.path!r} is no path")
+        if coordinate.path in paths:
+            raise Damaged(f"{path}.path", f"`{coordinate.path}` is there twice")
+        paths.add(coordinate.path)
+        _check_coordinate(experiment, coordinate, path)
+
+
+def _check_coordinate(experiment: Experiment, coordinate: Coordinate, where: str) -> None:
+    if coordinate.values.shape != (experiment.cases.count,):
+        raise Damaged(f"{where}.values", f"there are {coordinate.values.size} for {experiment.cases.count} cases")
+    if not 0.0 < coordinate.scale < math.inf:
+        raise Damaged(f"{where}.scale", "it should be above 0, and finite")
+    if coordinate.path not in experiment.formulas.inputs:
+        raise Damaged(f"{where}.path", f"no formula follows `{coordinate.path}`")
+    for path in coordinate.sets:
+        if path not in experiment.parameters:
+            raise Damaged(f"{where}.sets", f"there is no parameter `{path}`")
+
+
+def _check_formulas(experiment: Experiment, where: str) -> None:
+    formulas = experiment.formulas
+    paths = {coordinate.path for coordinate in experiment.cases.coordinates}
+    for index, name in enumerate(formulas.inputs):
+        if name not in paths:
+            raise Damaged(f"{where}.formulas.inputs[{index}]", f"no coordinate is `{name}`")
+    for index, node in enumerate(formulas.nodes):
+        if node[0] == "input" and node[1] not in formulas.inputs:
+            raise Damaged(f"{where}.formulas.nodes[{index}]", f"`{node[1]}` is none of the inputs")
+    for index, reference in enumerate(formulas.outputs):
+        if formulas.nodes[reference >> 1][0] in TRUTHS:
+            raise Damaged(f"{where}.formulas.outputs[{index}]", "it is a truth, not a number")
+    for path, quantity in experiment.parameters.items():
+        if isinstance(quantity.value, Formula) and not 0 <= quantity.value.output < len(formulas.outputs):
+            message = f"there is no formula {quantity.value.output}, but {len(formulas.outputs)} of them"
+            raise Damaged(f"{where}.parameters.{path}.value", message)
+
+
+# Parameters
+
+
+def _check_parameters(experiment: Experiment, where: str) -> None:
+    """Every parameter is one of the arm's or a model's, of its unit, and within its bounds. (Missing ones: E304.)"""
+    structure, parameters = experiment.structure, experiment.parameters
+    known: set[str] = set()
+    models_of = tuple(
+        [f"{use.joint}.servo." for use in structure.servos]
+        + [f"environment.{use.name}." for use in structure.environment]
+        + [f"metrics.{use.name}." for use in structure.metrics]
+    )
+    for path, unit, _, parameter in declared(structure):
+        if path in known:
+            raise Damaged(where, f"two things are called `{path}`")
+        known.add(path)
+        quantity = parameters.get(path)
+        if quantity is not None:
+            _check_quantity(quantity, unit, parameter, f"{where}.{path}")
+    for path in parameters:
+        if path not in known and not path.startswith(models_of):  # those of a model: `plan_defaults`
+            raise Damaged(f"{where}.{path}", "nothing in this run has this parameter")
+    for use in structure.servos:
+        if use.command is not None and use.command.model == "table":
+            _check_table(experiment, f"{use.joint}.servo.command", where)
+    _check_bodies(experiment, where)
+
+
+def _check_quantity(quantity: Quantity, unit: str, parameter: Parameter | None, where: str) -> None:
+    if quantity.unit != unit and not _same_unit(quantity.unit, unit):
+        raise Damaged(f"{where}.unit", f"it should be {unit}")
+    value, shape = quantity.value, parameter.shape if parameter is not None else "number"
+    if shape == "word":
+        words = parameter.words if parameter is not None else ()
+        if not isinstance(value, str) or (words and value not in words):
+            raise Damaged(f"{where}.value", "it should be a word" + (f": {', '.join(words)}" if words else ""))
+    elif shape == "list":
+        if not isinstance(value, tuple):
+            raise Damaged(f"{where}.value", "it should be a list of numbers")
+    elif isinstance(value, str | tuple):
+        raise Damaged(f"{where}.value", "it should be a number")
+    elif isinstance(value, float):
+        if parameter is None and not math.isfinite(value):
+            raise Damaged(f"{where}.value", "it is not finite")
+        if parameter is not None:
+            _check_bounds(value, parameter, where)
+
+
+def _check_bounds(value: float, parameter: Parameter, where: str) -> None:
+    bounds: tuple[tuple[float | None, str, Callable[[float, float], bool]], ...] = (
+        (parameter.above, "above", lambda x, limit: x > limit),
+        (parameter.at_least, "at least", lambda x, limit: x >= limit),
+        (parameter.below, "below", lambda x, limit: x < limit),
+        (parameter.at_most, "at most", lambda x, limit: x <= limit),
+    )
+    for limit, words, holds in bounds:
+        if limit is not None and not holds(value, limit):
+            raise Damaged(f"{where}.value", f"it should be {words} {limit:g}")
+
+
+def _same_unit(one: str, other: str) -> bool:
+    try:
+        mine, theirs = units.parse_unit(one), units.parse_unit(other)
+    except ValueError:
+        return False
+    return mine.scale == theirs.scale and units.same(mine.dimension, theirs.dimension)
+
+
+def _check_table(experiment: Experiment, prefix: str, where: str) -> None:
+    """Times rise, and there are as many values."""
+    found = [experiment.parameters.get(f"{prefix}.{name}") for name in ("times", "values")]
+    times, values = (quantity.value if quantity is not None else () for quantity in found)
+    if not isinstance(times, tuple) or not isinstance(values, tuple) or None in found:
+        return  # missing: E304
+    if not times or len(times) != len(values):
+        raise Damaged(f"{where}.{prefix}.values", f"there are {len(values)} for {len(times)} times")
+    if not all(before < after for before, after in itertools.pairwise(times)):
+        raise Damaged(f"{where}.{prefix}.times", "they do not rise")
+
+
+def _check_bodies(experiment: Experiment, where: str) -> None:
+    """Masses are above zero, inertias are possible, axes have length 1: as written, or in every case."""
+    structure = experiment.structure
+    tests: list[tuple[str, list[str], Callable[[np.ndarray], np.ndarray], str]] = []
+    for link in structure.links:
+        head = f"links.{link.name}"
+        tests.append((f"{head}.mass", [f"{head}.mass"], _is_mass, "it should be above 0"))
+        inertia = [f"{head}.inertia.{entry}" for entry in INERTIA]
+        tests.append((f"{head}.inertia", inertia, _is_inertia, "a principal moment is below 0: no body has that"))
+    for joint in structure.moving:
+        axis = [f"{joint.name}.axis.{letter}" for letter in "xyz"]
+        tests.append((f"{joint.name}.axis", axis, _is_axis, "its length should be 1"))
+    varied = []
+    for path, paths, holds, message in tests:
+        if any(path not in experiment.parameters for path in paths):
+            continue  # missing: E304
+        values = [experiment.parameters[path].value for path in paths]
+        if any(isinstance(value, Formula) for value in values):
+            varied.append((path, values, holds, message))
+        elif not holds(np.array([values], dtype=float))[0]:
+            raise Damaged(f"{where}.{path}", message)
+    if varied:
+        _check_varied(experiment, varied, where)
+
+
+def _check_varied(
+    experiment: Experiment, tests: list[tuple[str, list[Any], Callable[[np.ndarray], np.ndarray], str]], where: str
+) -> None:
+    cases, formulas = experiment.cases, experiment.formulas
+    wanted = sorted({v.output for _, values, _, _ in tests for v in values if isinstance(v, Formula)})
+    some = Formulas(formulas.inputs, formulas.nodes, tuple(formulas.outputs[output] for output in wanted))
+    for first in range(0, cases.count, CHUNK):
+        rows = slice(first, first + CHUNK)
+        columns = some.replay({coordinate.path: coordinate.values[rows] for coordinate in cases.coordinates})
+        by_output = dict(zip(wanted, columns, strict=True))
+        count = min(CHUNK, cases.count - first)
+        for path, values, holds, message in tests:
+            parts = [by_output[v.output] if isinstance(v, Formula) else v for v in values]
+            good = holds(np.stack([np.broadcast_to(np.asarray(part, dtype=float), count) for part in parts], axis=-1))
+            if not good.all():
+                raise Damaged(f"{where}.{path}", f"{message}; in case #{first + int(np.argmin(good))}")
+
+
+def _is_mass(values: np.ndarray) -> np.ndarray:
+    return (values[:, 0] > 0.0) & np.isfinite(values[:, 0])
+
+
+def _is_axis(values: np.ndarray) -> np.ndarray:
+    with np.errstate(all="ignore"):
+        return np.abs(np.sqrt((values * values).sum(axis=1)) - 1.0) <= ROUNDING
+
+
+def _is_inertia(values: np.ndarray) -> np.ndarray:
+    """Positive semidefinite, by the principal minors of the matrix scaled to its largest entry."""
+    finite = np.isfinite(values).all(axis=1)
+    size = np.abs(np.where(finite[:, None], values, 0.0)).max(axis=1)
+    xx, yy, zz, xy, xz, yz = np.where(finite[:, None], values, 0.0).T / np.where(size > 0.0, size, 1.0)
+    minors = (
+        xx, yy, zz, xx * yy - xy * xy, xx * zz - xz * xz, yy * zz - yz * yz,
+        xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz),
+    )  # fmt: skip
+    return finite & np.logical_and.reduce([minor >= -ROUNDING for minor in minors])

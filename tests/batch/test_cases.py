@@ -1,0 +1,214 @@
+"""The table of cases: which failed, which missed a requirement, and what a case is by itself."""
+
+import json
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import batch
+from batch import cases
+from batch.archive.read import ArchiveFile
+from batch.running import run_and_tell
+from batch.show import as_json, show
+from met import keys, plan_file
+from met.diagnostic import Problem
+from met.plan import Experiment, Requirement
+from tests.batch import plans
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+
+def required(experiment: Experiment, *requirements: Requirement) -> Experiment:
+    return replace(experiment, requirements=requirements)
+
+
+def made(experiment: Experiment, **options: Any) -> ArchiveFile:
+    batch.run(plans.plan(experiment), output="a.h5", **options)
+    return ArchiveFile("a.h5")
+
+
+def test_failed_cases_stand_before_those_that_miss_more_and_by_more(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from met import run
+
+    monkeypatch.setattr(run, "run", partial(plans.answer, fails=frozenset({7, 12})))
+    settle, volts = plans.gains(20).requirements
+    with made(required(plans.gains(20), settle, replace(volts, text="volts < 6 V", limit=6.0))) as file:
+        order = cases.worst_first(file.groups[0]).tolist()
+        group = file.groups[0]
+        missed, value = (group.values("met") == 0).sum(axis=1), group.values("volts")
+    assert order[:2] == [7, 12]
+    assert order[2] == 0  # its settling time is infinite
+    counts = missed[order[2:]].tolist()
+    assert counts == sorted(counts, reverse=True)
+    missing = [row for row in order[3:] if missed[row]]
+    assert len(missing) > 2
+    assert value[missing].tolist() == sorted(value[missing], reverse=True)
+
+
+def test_where_all_requirements_are_met_the_closest_to_a_limit_is_first(here: Path) -> None:
+    with made(required(plans.gains(9), Requirement("volts > 1 V", "volts", ">", 1.0))) as file:
+        group = file.groups[0]
+        order = cases.worst_first(group)
+        assert order[0] == np.argmin(group.values("volts"))
+        assert cases.title(group) == "cases, closest to a limit first:"
+
+
+def test_a_limit_of_zero_has_an_order_too(here: Path) -> None:
+    with made(required(plans.gains(9), Requirement("volts < 0 V", "volts", "<", 0.0))) as file:
+        group = file.groups[0]
+        assert cases.worst_first(group)[0] == np.argmax(group.values("volts"))
+
+
+def test_without_requirements_the_order_is_the_tables(here: Path) -> None:
+    with made(required(plans.gains(9))) as file:
+        assert cases.worst_first(file.groups[0]).tolist() == list(range(9))
+        assert cases.title(file.groups[0]) == "cases:"
+
+
+def test_the_table_is_in_the_decks_units_and_marks_what_is_missed(here: Path) -> None:
+    settle = Requirement("settle < 8600 ms", "settle", "<", 8.6)
+    ids = keys.case_ids(required(plans.gains(4), settle))
+    with made(required(plans.gains(4), settle)) as file:
+        lines = show(file, plots=False).splitlines()
+    assert lines[lines.index("cases, worst first:") :] == [
+        "cases, worst first:",
+        "      id        gearbox.kp  links.lower.mass  settle    volts",
+        "                   V·s/rad                 g      ms        V",
+        f"  #0  {ids[0][:8]}        0.01             20000     inf ✗  6.849  missed",
+        f"  #1  {ids[1][:8]}        0.02             20100    5000    5.758  met",
+        f"  #2  {ids[2][:8]}        0.03             20200    3333    5.334  met",
+        f"  #3  {ids[3][:8]}        0.04             20000    2500    5.156  met",
+    ]
+    assert "  settle   2500    3333   5000 ms  settling_time of shoulder.qd; infinite in 1" in lines
+
+
+def test_a_pure_number_has_no_unit_and_may_be_in_per_cent(here: Path) -> None:
+    from batch.summary import summary_of
+
+    experiment = plans.nominal()
+    over = replace(experiment.structure.metrics[0], name="settle", model="overshoot")
+    structure = replace(experiment.structure, metrics=(over,))
+    for limit, shown in (("settle < 1000 %", "500 %"), ("settle < 10", "5")):
+        requirement = Requirement(limit, "settle", "<", 10.0)
+        with made(replace(experiment, structure=structure, requirements=(requirement,))) as file:
+            lines = show(file, plots=False).splitlines()
+            assert summary_of(file.groups[0]).metrics[0].median == 5.0
+        assert f"settle {shown} overshoot of shoulder.qd" in [" ".join(line.split()) for line in lines]
+
+
+def test_the_worst_twenty_are_shown_and_all_on_demand(here: Path) -> None:
+    with made(plans.gains(30)) as file:
+        some, whole = (show(file, plots=False, all_cases=every).splitlines() for every in (False, True))
+        assert some[-1] == "  ... 10 more; --all-cases prints them"
+        assert sum("missed" in line.split() for line in some) == 20
+        assert len(whole) == len(some) + 9
+        for every, count in ((False, 20), (True, 30)):
+            [said] = json.loads(as_json(file, all_cases=every))["experiments"]
+            assert len(said["case_table"]) == count
+            assert said["cases"] == 30
+
+
+def test_json_says_of_each_case_what_it_met(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from met import run
+
+    monkeypatch.setattr(run, "run", partial(plans.answer, fails=frozenset({2})))
+    with made(plans.gains(4)) as file:
+        [said] = json.loads(as_json(file))["experiments"]
+    failed, infinite, *_ = said["case_table"]
+    assert (failed["row"], failed["status"]) == (2, "failed")
+    assert failed["cause"].startswith("t = 0.2 s: joint elbow")
+    assert failed["met"] == {"settle < 10 s": None, "volts < 5 V": None}
+    assert infinite["metrics"]["settle"] is None
+    assert infinite["met"] == {"settle < 10 s": False, "volts < 5 V": False}
+    assert infinite["coordinates"] == {"gearbox.kp": 0.01, "links.lower.mass": 20.0}
+
+
+def test_one_case_has_its_own_metrics_and_parameters(here: Path) -> None:
+    with made(plans.gains(4)) as file:
+        text = show(file, case="#1", plots=False)
+        [said] = json.loads(as_json(file, case="#1"))["experiments"]
+        count = len(file.plan().experiments[0].parameters)
+    assert text[text.index("case #1") :].splitlines() == [
+        f"case #1 {keys.case_ids(plans.gains(4))[1][:8]}",
+        "the case reached its end",
+        "  settle      5 s  settling_time of shoulder.qd",
+        "  volts   5.758 V  max of shoulder.servo.voltage",
+        "  require settle < 10 s  met",
+        "  require volts < 5 V    missed",
+        "",
+        "varied, and what follows from it:",
+        "  gearbox.kp              0.02 V·s/rad",
+        "  links.lower.mass        20100 g",
+        "  elbow.servo.kp          0.02 V·s/rad",
+        "  links.lower.inertia.yy  6.7 kg·m²",
+        "  links.lower.inertia.zz  6.7 kg·m²",
+        "  shoulder.servo.kp       0.02 V·s/rad",
+        f"  of {count} parameters; --format json lists them all",
+    ]
+    assert said["case"]["met"] == {"settle < 10 s": True, "volts < 5 V": False}
+    assert len(said["case"]["parameters"]) == count
+    mass = said["case"]["parameters"]["links.lower.mass"]
+    assert mass == {"value": pytest.approx(20.1, rel=1e-15), "unit": "kg", "varies": True}
+
+
+def test_a_case_is_shown_of_the_experiments_that_have_it(here: Path) -> None:
+    batch.run(plans.plan(plans.nominal(), plans.gains(4)), output="a.h5")
+    with ArchiveFile("a.h5") as file:
+        text = show(file, case="#3", plots=False)
+        assert "gains  4 cases" in text and "nominal  1 case" not in text
+        with pytest.raises(Problem) as caught:
+            show(file, case="#4")
+    assert [d.help for d in caught.value.diagnostics] == [
+        ("the only case here is #0",),
+        ("cases here: #0 to #3; or the beginning of a case_id",),
+    ]
+
+
+def test_cases_that_are_some_of_a_table_are_named(here: Path) -> None:
+    with made(plans.gains(9), cases=["#2", "#7"]) as file, pytest.raises(Problem) as caught:
+        show(file, case="#3")
+    assert caught.value.diagnostics[0].help == ("cases here: #2, #7; or the beginning of a case_id",)
+
+
+def test_few_values_are_read_by_themselves_and_many_at_once(here: Path) -> None:
+    with made(plans.gains(250)) as file:
+        group = file.groups[0]
+        for positions in (np.array([7, 3]), np.arange(249, -1, -1)):
+            for name in ("case", "case_id", "volts", "met"):
+                np.testing.assert_array_equal(group.at(name, positions), group.values(name)[positions])
+
+
+def test_an_archive_that_does_not_say_its_limits_has_a_table_all_the_same(here: Path) -> None:
+    import h5py
+
+    made(plans.gains(4)).__exit__()
+    with h5py.File("a.h5", "r+") as file:
+        del file["requirement"].attrs["limit"]
+    with ArchiveFile("a.h5") as file:
+        text = show(file, plots=False)
+    assert text.count("  missed\n") == 4
+
+
+def test_a_run_of_a_sweep_ends_with_its_worst_cases(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan_file.write(plans.plan(plans.gains(20)), here / "p.json")
+    run_and_tell("p.json", no_picture=True)
+    said = capsys.readouterr().out.splitlines()
+    at = said.index("the 3 worst cases:")
+    assert [line.split()[0] for line in said[at + 3 : at + 6]] == ["#0", "#1", "#2"]
+    assert "         met show two_link.h5 --case '#0'" in said
+    run_and_tell("p.json", json=True, no_picture=True)
+    [told] = json.loads(capsys.readouterr().out)["experiments"]
+    assert [row["row"] for row in told["worst"]] == [0, 1, 2]
+
+
+def test_a_sweep_that_nothing_judges_names_no_worst_case(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan_file.write(plans.plan(required(plans.gains(20))), here / "p.json")
+    assert run_and_tell("p.json", no_picture=True)
+    said = capsys.readouterr().out
+    assert "worst" not in said and "--case" not in said

@@ -1,0 +1,205 @@
+"""docs/decks.md and README.md are true: their decks compile and run, their tables are those of the code.
+
+Before a deck a hidden comment says where it belongs: `picker.ic` (the next piece of the tutorial's deck), `alone` (a
+deck of its own), `more` (definitions after the tutorial's), `in arm`, `in servo`, `in run`, `in sweep` (the body of a
+definition built on the tutorial's). A code after a colon is the error that it must give.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import batch
+import ic
+from ic.grammar.syntax import Name
+from ic.meaning import arm, run
+from ic.meaning.complaints import Complaints
+from ic.meaning.resolve import Definitions
+from ic.meaning.scope import Scope
+from ic.meaning.shapes import SHAPES
+from ic.meaning.values import FUNCTIONS, Values
+from ic.read import read
+from met import models, render, units
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "decks.md").read_text(encoding="utf-8")
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+PIECES = re.findall(r"<!-- (?P<where>[\w. ]+?)(?:: (?P<code>D\d+))? -->\n```c\n(?P<text>.*?)```", PAGE, re.DOTALL)
+PICKER = "\n".join(text for where, _, text in PIECES if where == "picker.ic")
+FRAGMENTS = [piece for piece in PIECES if piece[0] not in ("picker.ic", "alone")]
+AROUND = {
+    "more": "{}",
+    "in arm": "arm another like picker {{ {} }} run other like pick {{ arm = another; }}",
+    "in servo": "servo another like spindle {{ {} }} run other like pick {{ servos {{ lift = another; }} }}",
+    "in run": "run another like pick {{ {} }}",
+    "in sweep": "sweep another of pick {{ {} }}",
+}
+
+
+def checked(path: Path, text: str):  # type: ignore[no-untyped-def]
+    path.write_text(text, encoding="utf-8")
+    compiled = ic.check(path)
+    return compiled, render.render(compiled.diagnostics, compiled.sources)
+
+
+def table(heading: str) -> list[list[str]]:
+    """Cells of the rows of the page's table that begins with this cell."""
+    body = re.search(rf"^\| {re.escape(heading)} \|.*\n\|[-|]+\n((?:\|.*\n)+)", PAGE, re.MULTILINE)
+    assert body is not None, heading
+    return [[cell.strip() for cell in row.strip("|").split(" | ")] for row in body[1].splitlines()]
+
+
+def ticked(text: str) -> set[str]:
+    return set(re.findall(r"`([^`]+)`", text))
+
+
+def test_every_deck_of_the_page_says_where_it_belongs() -> None:
+    assert PAGE.count("```c\n") == len(PIECES)
+    assert {where for where, _, _ in PIECES} == {"picker.ic", "alone", *AROUND}
+
+
+def test_the_tutorials_deck_has_neither_errors_nor_warnings_and_as_many_cases_as_the_page_says(tmp_path: Path) -> None:
+    compiled, said = checked(tmp_path / "picker.ic", PICKER)
+    assert said == ""
+    assert [experiment.cases.count for experiment in compiled.plan.experiments] == [1, 14]
+    assert "1 run, 1 sweep, 15 cases: no errors" in PAGE and "the sweep's 14 cases" in PAGE
+
+
+def test_the_tutorials_run_meets_its_requirements_and_its_sweep_fails_in_two_cases_as_the_page_says(
+    tmp_path: Path,
+) -> None:
+    deck = tmp_path / "picker.ic"
+    deck.write_text(PICKER, encoding="utf-8")
+    archive = batch.run(ic.compile(deck), output=tmp_path / "pick.h5")
+    assert archive.ok
+    with archive.open() as data:
+        # what the deck is about: the boom turns at the rate asked, the carriage follows its sine
+        assert data["qd"].sel(joint="swing").isel(time=-1) == pytest.approx(0.5236, rel=0.02)  # the metric's band
+        assert data["q"].sel(joint="lift").max() == pytest.approx(0.1, rel=0.1)  # its rate loop lags
+    archive = batch.run(ic.compile(deck, select=["tuning"]), output=tmp_path / "tuning.h5")
+    with archive.open() as data:
+        assert (data["status"] == 0).all()
+        assert dict(zip(data["requirement"].values.tolist(), (data["met"] == 0).sum("case").values.tolist(),
+                        strict=True)) == {"settle < 2 s": 2, "beyond < 25 %": 0, "volts < 48 V": 0}  # fmt: skip
+    assert "2 of the cases settle too late" in PAGE
+
+
+@pytest.mark.parametrize(("where", "code", "text"), FRAGMENTS, ids=[f"{w} {t.split()[0]}" for w, _, t in FRAGMENTS])
+def test_a_fragment_compiles_where_it_belongs_or_gives_the_error_it_shows(
+    where: str, code: str, text: str, tmp_path: Path
+) -> None:
+    compiled, said = checked(tmp_path / "picker.ic", PICKER + AROUND[where].format(text))
+    if code:
+        assert compiled.plan is None and {diagnostic.code for diagnostic in compiled.diagnostics} == {code}, said
+    else:
+        assert compiled.plan is not None and said == "", said
+
+
+def test_the_sweep_of_the_page_counts_with_its_last_axis_fastest(tmp_path: Path) -> None:
+    (text,) = (text for where, _, text in FRAGMENTS if text.startswith("sweep loads"))
+    compiled, _ = checked(tmp_path / "picker.ic", PICKER + text)
+    (loads,) = (e for e in compiled.plan.experiments if e.name == "loads")
+    columns = {c.path: c.values.tolist() for c in loads.cases.coordinates}
+    assert columns["environment.gravity.g.z"] == [-9.81, -1.62] * 4
+    assert columns["swing.at.x"] == [0.1] * 8
+
+
+def test_what_the_page_builds_on_the_tutorial_runs(tmp_path: Path) -> None:
+    (text,) = (text for where, _, text in FRAGMENTS if text.startswith("arm long_picker"))
+    (tmp_path / "picker.ic").write_text(PICKER + text, encoding="utf-8")
+    archive = batch.run(ic.compile(tmp_path / "picker.ic", select=["gentle"]), output=tmp_path / "gentle.h5")
+    with archive.open() as data:
+        assert data["status"] == [0]
+        assert data["requirement"].values.tolist() == ["settle < 2 s", "volts < 48 V"]
+
+
+@pytest.mark.parametrize("links", [None, 1, 2])
+def test_the_deck_with_macros_runs_with_and_without_its_switch(links: int | None, tmp_path: Path) -> None:
+    (text,) = (text for where, _, text in PIECES if where == "alone")
+    (tmp_path / "chain.ic").write_text(text, encoding="utf-8")
+    plan = ic.compile(tmp_path / "chain.ic", defines=[] if links is None else [f"LINKS={links}"])
+    assert len(plan.experiments[0].structure.joints) == (links or 2)
+    assert batch.run(plan, output=tmp_path / "chain.h5").ok
+
+
+def test_a_let_that_takes_a_macro_is_set_from_the_command_line_as_the_page_says(tmp_path: Path) -> None:
+    assert "`let span = SPAN * 1 m;`, with `-D SPAN=0.7`" in PAGE
+    (text,) = (text for where, _, text in PIECES if where == "alone")
+    (tmp_path / "chain.ic").write_text(text.replace("let span  = 0.5 m;", "let span = SPAN * 1 m;"), encoding="utf-8")
+    plan = ic.compile(tmp_path / "chain.ic", defines=["SPAN=0.7"])
+    assert plan.experiments[0].parameters["two.at.x"].value == 0.7
+
+
+@pytest.mark.parametrize("row", table("written"), ids=lambda row: row[0])
+def test_a_value_is_what_its_row_says(row: list[str], tmp_path: Path) -> None:
+    (written,), (numbers, unit) = ticked(row[0]), row[1].rsplit(" ", 1)
+    (tmp_path / "one.ic").write_text(f"let it = {written};\n", encoding="utf-8")
+    complaints = Complaints(())
+    scope = Scope(Definitions(read(tmp_path / "one.ic", [], []), complaints), complaints)
+    place = scope.definitions.lets["it"].name
+    found = scope.names.find(Name((place,), place.place))
+    values = found.items if isinstance(found, Values) else (found,)
+    assert ", ".join(f"{value.number:g}" for value in values) == numbers  # type: ignore[union-attr]
+    assert {units.text(value.dimension) for value in values} == {unit}  # type: ignore[union-attr]
+
+
+def test_the_table_of_units_is_whole() -> None:
+    listed = [name for row in table("of") for name in re.findall(r"`([^`/*, ]+)`", row[1])]
+    assert sorted(listed) == sorted(units.UNITS)
+
+
+def test_every_function_shape_key_and_model_is_on_the_page() -> None:
+    assert {name.partition("(")[0] for row in table("function") for name in ticked(row[0])} == {*FUNCTIONS, "pi"}
+    shapes = {row[0].strip("`"): {word.split()[0] for word in ticked(row[1])} for row in table("shape")}
+    assert shapes == {name: {p.name for p in shape.parameters} for name, shape in SHAPES.items()}
+    assert {word for row in table("key of a link") for word in ticked(row[0])} == set(arm.LINK_KEYS)
+    assert {word for row in table("key of a joint") for word in ticked(row[0])} == set(arm.JOINT_KEYS)
+    entries = {entry.split()[0] for row in table("entry of a run") for entry in ticked(row[0])}
+    assert entries == {*run.KEYS, "metric", "require"}
+    words = ticked(re.sub(r"```.*?```", "", PAGE, flags=re.DOTALL))
+    assert set(run.RATES) <= words
+    for kind in ("servo", "environment", "metric", "integrator"):
+        assert set(models.find_own(kind)) <= words, kind
+    assert set(models.find_own("command")) - {"constant"} <= words
+
+
+PATHS = [path for row in table("path") for path in re.findall(r"`([^`]+)`", row[0])]
+
+
+def test_every_path_of_the_page_can_vary(tmp_path: Path) -> None:
+    deck, values = tmp_path / "picker.ic", {}
+    deck.write_text(PICKER, encoding="utf-8")
+    parameters = ic.compile(deck).experiments[0].parameters
+    for path in PATHS:
+        own = {"motor.kp": "swing.servo.kp", "turner.command.to": "swing.servo.command.to",
+               "picker.links.boom.mass": "links.boom.mass", "reach": "links.boom.com.x"}.get(path, path)  # fmt: skip
+        settled = parameters.get(own)
+        number, unit = (settled.value, settled.unit) if settled else (0.8, "m")
+        assert isinstance(number, float)
+        # the moments of a boom obey the triangle inequality, so theirs is varied a little only
+        values[path] = f"[{number * 1.01 + 0.001:.9g}, {number * 1.02 + 0.002:.9g}] {'' if unit == '1' else unit}"
+    for path, listed in values.items():
+        compiled, said = checked(deck, PICKER + f"sweep one of pick {{ vary {path} = {listed}; }}")
+        assert compiled.plan is not None, said
+
+
+def test_the_readmes_deck_runs_and_its_lines_of_python_open_what_they_wrote(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (deck,) = re.findall(r"```c\n(.*?)```", README, re.DOTALL)
+    (lines,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    Path("deck.ic").write_text(deck, encoding="utf-8")
+    archive = batch.run(ic.compile("deck.ic", select=["gains"]), histories="none")
+    with archive.open() as data:
+        assert data.sizes["case"] == 2 * 21 - 2 * 3 and (data["status"] == 0).all()
+    told: dict[str, object] = {}
+    exec(compile(lines, "README.md", "exec"), told)  # what a reader would type
+    assert told["archive"].ok  # type: ignore[attr-defined]
+    for name in ("data", "same"):
+        assert told[name]["qd"].sel(joint="elbow").isel(time=-1) == pytest.approx(0.03, rel=1e-3)  # type: ignore[index]
+        told[name].close()  # type: ignore[attr-defined]

@@ -1,0 +1,104 @@
+"""`met explain` of what is no parameter of a plan, and `met check` of a plan file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from met import cli
+from tests.ic.small_decks import ARM, RUN, SERVO, changed
+
+SWEEP = "sweep sizes of hold { vary links.bar.shape.length = [1, 2] m; }\n"
+
+
+@pytest.fixture(autouse=True)
+def deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("MET_DECK_PATH", raising=False)
+    run = changed(RUN, ("run hold {", "default run hold { environment { gravity = [0, 0, -9.81] m/s^2; }"))
+    Path("a.ic").write_text(ARM + SERVO + run + SWEEP)
+
+
+def explained(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, object]:
+    """What is said of one path, as JSON: path and value, and the line where it is written."""
+    assert cli.main(["explain", *words, "--format", "json"]) == 0
+    return {each["path"]: (each["value"], each["unit"], (each["place"] or {}).get("line"))
+            for each in json.loads(capsys.readouterr().out)}
+
+
+@pytest.mark.parametrize(("path", "value", "unit", "line"), [
+    ("links.bar.shape.length", 1.0, "m", 2),
+    ("links.bar.shape.along", "x", "", 2),
+    ("arm", "swing", "", 12),
+    ("duration", 1.0, "s", 15),
+    ("rates.dynamics", 1000.0, "Hz", 14),
+    ("rates.base", 1000.0, "Hz", None),
+    ("hinge.servo.rate", 1000.0, "Hz", None),
+    ("hinge.servo.model", "rigid_gearbox", "", 13),
+    ("hinge.parent", "base", "", 3),
+    ("servos.hinge", "drive", "", 13),
+    ("environment.velocity_products", "on", "", None),
+    ("integrator", "modified_euler", "", None),
+    ("record", "q", "", 16),
+    ("seed", 0.0, "1", None),
+])
+def test_a_setting_of_a_run_can_be_asked_for(
+    path: str, value: object, unit: str, line: int | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert explained(capsys, "a.ic", path) == {path: (value, unit, line)}
+
+
+def test_explain_shows_a_setting_as_it_shows_a_parameter(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["explain", "a.ic", "duration"]) == 0
+    assert capsys.readouterr().out == (
+        "duration = 1 s\n"
+        "  --> a.ic:15:16\n"
+        "   |\n"
+        "15 |     duration = 1 s;\n"
+        "   |                ^^^ written here\n"
+    )
+    assert cli.main(["explain", "a.ic", "integrator"]) == 0
+    assert capsys.readouterr().out == "integrator = modified_euler\n  the default\n"
+
+
+def test_the_head_of_settings_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
+    assert list(explained(capsys, "a.ic", "rates")) == ["rates.dynamics", "rates.servos", "rates.record", "rates.base"]
+    assert {"environment.gravity.g.z", "environment.velocity_products"} <= set(explained(capsys, "a.ic", "environment"))
+
+
+def test_a_swept_size_of_a_shape_is_shown_over_its_cases(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["explain", "a.ic", "links.bar.shape.length", "--run", "sizes"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("links.bar.shape.length = 1 to 2 m, varies with the case\n")
+    assert "a sweep varies it, here" in out
+
+
+def test_paths_that_a_deck_may_write_otherwise_are_understood(capsys: pytest.CaptureFixture[str]) -> None:
+    gravity = {"environment.gravity.g.z": (-9.81, "m/s^2", 11)}
+    assert explained(capsys, "a.ic", "environment.gravity.z") == gravity
+    assert explained(capsys, "a.ic", "swing.links.bar.mass") == {"links.bar.mass": (2.0, "kg", 2)}
+    assert cli.main(["plan", "a.ic", "-o", "p.json", "-q"]) == 0
+    assert explained(capsys, "p.json", "environment.gravity.z") == gravity
+
+
+def test_a_plan_file_knows_the_settings_too(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["plan", "a.ic", "-o", "p.json", "-q"]) == 0
+    assert explained(capsys, "p.json", "duration") == {"duration": (1.0, "s", None)}
+    assert explained(capsys, "p.json", "servos.hinge") == {"servos.hinge": ("drive", "", 13)}
+    assert cli.main(["explain", "p.json", "integrator"]) == 0
+    assert capsys.readouterr().out == "integrator = modified_euler\n  as the plan has it\n"
+
+
+def test_check_says_what_a_plan_file_holds(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["plan", "a.ic", "--all", "-o", "p.json", "-q"]) == 0
+    assert cli.main(["check", "p.json"]) == 0
+    assert capsys.readouterr().out == "p.json: plan of a.ic: 1 run, 1 sweep, 3 cases: no errors\n"
+    assert cli.main(["check", "p.json", "--format", "json"]) == 0
+    assert json.loads(capsys.readouterr().out)["diagnostics"] == []
+    Path("p.json").write_text("{")
+    assert cli.main(["check", "p.json"]) == 2
+    assert "error[E302]" in capsys.readouterr().err
+    assert cli.main(["check", "none.json"]) == 2
+    assert "error[E301]" in capsys.readouterr().err
