@@ -282,7 +282,8 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
 
 
 def _check_quantity(quantity: Quantity, unit: str, parameter: Parameter | None, where: str) -> None:
-    if quantity.unit != unit and not _same_unit(quantity.unit, unit):
+    is_word = parameter is not None and parameter.shape == "word"  # which has no unit, however it is written
+    if not is_word and quantity.unit != unit and not _same_unit(quantity.unit, unit):
         raise Damaged(f"{where}.unit", f"it should be {unit}")
     value, shape = quantity.value, parameter.shape if parameter is not None else "number"
     if shape == "word":
