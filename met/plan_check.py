@@ -10,6 +10,7 @@ import itertools
 import math
 import re
 from collections.abc import Callable, Collection, Iterable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -303,15 +304,28 @@ def _check_quantity(quantity: Quantity, unit: str, parameter: Parameter | None, 
 
 
 def _check_bounds(value: float, parameter: Parameter, where: str) -> None:
-    bounds: tuple[tuple[float | None, str, Callable[[float, float], bool]], ...] = (
-        (parameter.above, "above", lambda x, limit: x > limit),
-        (parameter.at_least, "at least", lambda x, limit: x >= limit),
-        (parameter.below, "below", lambda x, limit: x < limit),
-        (parameter.at_most, "at most", lambda x, limit: x <= limit),
+    for holds, message in _bounds(parameter):
+        if not holds(np.array([[value]]))[0]:
+            raise Damaged(f"{where}.value", message)
+
+
+def _bounds(parameter: Parameter) -> list[tuple[Callable[[np.ndarray], np.ndarray], str]]:
+    """What each bound of a declaration asks of values [case, 1], and how to say it."""
+    written: tuple[tuple[float | None, str, np.ufunc], ...] = (
+        (parameter.above, "above", np.greater),
+        (parameter.at_least, "at least", np.greater_equal),
+        (parameter.below, "below", np.less),
+        (parameter.at_most, "at most", np.less_equal),
     )
-    for limit, words, holds in bounds:
-        if limit is not None and not holds(value, limit):
-            raise Damaged(f"{where}.value", f"it should be {words} {limit:g}")
+    return [
+        (partial(_within, holds, limit), f"it should be {words} {limit:g}")
+        for limit, words, holds in written
+        if limit is not None
+    ]
+
+
+def _within(holds: np.ufunc, limit: float, values: np.ndarray) -> np.ndarray:
+    return np.asarray(holds(values[:, 0], limit))
 
 
 def _same_unit(one: str, other: str) -> bool:
@@ -355,6 +369,11 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
             varied.append((path, values, holds, message))
         elif not holds(np.array([values], dtype=float))[0]:
             raise Damaged(f"{where}.{path}", message)
+    for path, _, _, parameter in declared(structure):
+        quantity = experiment.parameters.get(path)
+        if parameter is not None and quantity is not None and isinstance(quantity.value, Formula):
+            for holds, message in _bounds(parameter):
+                varied.append((path, [quantity.value], holds, message))
     if varied:
         _check_varied(experiment, varied, where)
 

@@ -130,7 +130,7 @@ def layout(experiment: Experiment, cases: int, recorded: bool) -> Layout:
             Variable("recorded_case", "int64", ("recorded_case",), "dimension", "cases whose histories are kept"),
             Variable("time", "float64", ("time",), "dimension", "time", "s"),
         ]
-        repeated = _recorded(variables) if experiment.cases.coordinates else []
+        repeated = _recorded(experiment, variables) if experiment.cases.coordinates else []
         variables += [*repeated, *_signals(experiment, sizes, {"coordinates": " ".join(v.name for v in repeated)})]
     return Layout(sizes, tuple(variables), _attributes(experiment, variables))
 
@@ -246,9 +246,9 @@ def _coordinate(experiment: Experiment, coordinate: Coordinate, name: str) -> Va
     return Variable(name, "float64", ("case",), "coordinate", words, unit, written, coordinate.path)
 
 
-def _recorded(variables: list[Variable]) -> list[Variable]:
+def _recorded(experiment: Experiment, variables: list[Variable]) -> list[Variable]:
     """What says which case is which, along recorded_case; `source` is the variable along case."""
-    taken = [variable.name for variable in variables]
+    taken = [variable.name for variable in variables] + [recorded.name for recorded in experiment.structure.record]
     out = []
     for v in variables:
         if v.role == "coordinate" or v.name == "case_id":

@@ -38,7 +38,7 @@ class Names:
 
     def find(self, name: Name) -> Value | Values:
         """The value of a name. Raises Problem D065 where there is none, D073 where it needs itself."""
-        text = name.text
+        text = self._reached(name)
         if text in self.varied:
             self.followed[text] = None
             return self.varied[text]
@@ -74,6 +74,16 @@ class Names:
             self._open.pop(text, None)
         self._worth[text] = found
         return found
+
+    def _reached(self, name: Name) -> str:
+        """The path to go by: that of the base that a sweep varies, where a servo definition has the value from it."""
+        first, *rest = (word.text for word in name.path)
+        servo = self.definitions.of_kind("servo").get(first) if rest else None
+        block = self.definitions.block(servo) if servo is not None and name.text not in self.varied else None
+        item = block.items.get(".".join(rest)) if block is not None else None
+        homes = item.homes if item is not None else ()
+        paths = [".".join((home, *rest)) for home in homes]
+        return next((path for path in paths if path in self.varied or path in self.watched), name.text)
 
     def label(self, value: Value) -> list[Label]:
         """Where the name that was written for this value is defined, for messages about it."""

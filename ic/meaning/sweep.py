@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -264,8 +265,13 @@ def scope_lookup(scope: Scope):  # type: ignore[no-untyped-def]  # a Lookup
             return scope.varied[name.text].value
         paths = scope.known.get(name.text, ())
         found = {path: settled for path in paths if (settled := scope.settled(path)) is not None}
-        numbers = [(x.ref if isinstance(x := each.value, Scalar) else x, each.unit) for each in found.values()]
-        if len(set(numbers)) > 1:
+        numbers = {x.ref if isinstance(x := each.value, Scalar) else x for each in found.values()}
+        if name.path[0].text in scope.definitions.of_kind("servo"):
+            with suppress(Problem):  # a default, which the definition does not write
+                own = scope.names.find(name)
+                if isinstance(own, Value):
+                    numbers.add(own.number.ref if isinstance(own.number, Scalar) else own.number)
+        if len(numbers) > 1:
             choice = " or ".join(f"`{path}`" for path in list(found)[:MOST_NAMED])
             raise Problem(error("D165", f"`{name.text}` is not the same wherever it is used in this sweep", name.place,
                                 help=f"say which is meant: write {choice}"))

@@ -198,3 +198,8 @@ def test_whatever_is_put_anywhere_is_a_problem_or_a_plan_that_makes_a_program() 
             if path[0] == "experiments" and "parameters" not in path:
                 build(plan.experiments[0])
     assert read > 100  # some parameters may well be 0 or -2.5
+
+
+def test_a_value_that_a_sweep_takes_out_of_its_bounds_is_refused() -> None:
+    negative = coordinate(values=[0.01, -0.02, 0.03])
+    assert said_of(negative) == "parameters.shoulder.servo.kp: it should be at least 0; in case #1"

@@ -139,3 +139,25 @@ def test_links_lets_and_runs_may_be_called_like_what_begins_paths(tmp_path: Path
     run = experiment(tmp_path, arm, SERVO, changed(RUN, ("hold", word)), sweep, select=["it"])
     assert [coordinate.path for coordinate in run.cases.coordinates] == [word, f"links.{word}.mass"]
     assert values(run, f"links.{word}.com.x").tolist() == [0.5, 0.5, 1.0, 1.0]
+
+
+INHERITED = """\
+servo strong like drive { }
+let thrice = strong.kp * 3;
+servo follower like drive { kp = thrice; }
+"""
+
+
+def test_an_expression_that_names_an_inheriting_servo_follows_the_sweep_of_its_base(tmp_path: Path) -> None:
+    run = changed(BOTH, ("hinge = drive; wrist = drive;", "hinge = strong; wrist = follower;"))
+    sweep = "sweep it of hold { vary drive.kp = [0.03, 0.04] V*s/rad; }\n"
+    made = experiment(tmp_path, TWO, SERVO, INHERITED, run, sweep, select=["it"])
+    assert values(made, "hinge.servo.kp").tolist() == [0.03, 0.04]
+    assert values(made, "wrist.servo.kp") == pytest.approx([0.09, 0.12], rel=4e-16)
+
+
+def test_an_exclusion_by_a_definition_whose_heirs_differ_asks_which_is_meant(tmp_path: Path) -> None:
+    run = changed(BOTH, ("hinge = drive; wrist = drive;", "hinge = strong;"))
+    sweep = "sweep it of hold { vary strong.kp = [0.03, 0.04] V*s/rad; exclude when drive.kp > 0.035 V*s/rad; }\n"
+    parts = (TWO, SERVO, "servo strong like drive { }\n", run, sweep)
+    assert codes(tmp_path, *parts, select=["it"]) == ["D165"]
