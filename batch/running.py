@@ -71,8 +71,10 @@ def read_plan(
 
         return plan_file.read(source)
     import ic
+    from ic.find import find
 
     select: Any = "all" if everything else names or None
+    find(source)  # a misspelt name is told with the one that was probably meant
     compiled = ic.check(source, include_dirs=include_dirs, defines=defines, select=select)
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)

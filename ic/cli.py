@@ -30,7 +30,6 @@ def check(
     Every run and sweep of it is compiled to its plan; nothing is run. A plan file is read, and what it holds is said.
     """
     check_options(deck, defines=defines, include_dirs=include_dirs)
-    check_options(deck, defines=defines, include_dirs=include_dirs)
     if deck.endswith(".json"):
         return _check_plan(deck, form, quiet)
     import ic

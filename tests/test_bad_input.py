@@ -213,3 +213,18 @@ def test_the_deck_without_a_mistake_runs(tmp_path: Path, monkeypatch: pytest.Mon
     Path("deck.ic").write_text(DECK)
     assert cli.main(["run", "deck.ic", "--no-picture", "-q"]) == 0
     assert Path("deck.h5").is_file()
+
+
+def test_a_misspelt_deck_is_told_with_the_one_that_was_meant(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["run", "two_lnk.ic"]) == 2
+    assert capsys.readouterr().err == """\
+error[D173]: no deck `two_lnk.ic`
+ = help: did you mean `two_link.ic`?
+ = help: standard decks: panda.ic, two_link.ic
+
+1 error
+"""
+    assert not list(tmp_path.iterdir())
