@@ -35,7 +35,7 @@ def check(
     import ic
     from ic.find import find
 
-    find(deck)
+    find(deck, include_dirs)
     compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, select="all")
     if form == "json":
         complain(compiled.diagnostics, compiled.sources, json=True)
@@ -250,7 +250,7 @@ def _compiled(
     import ic
     from ic.find import find
 
-    find(deck)
+    find(deck, include_dirs)
     compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, select=select)
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)

@@ -3,15 +3,19 @@ directories of MET_DECK_PATH and in the standard library."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from ic.text.files import LIBRARY, Files
 from met.diagnostic import Problem, error, nearest
 
 
-def find(name: str) -> Path:
-    """The file of the deck of that name. Raises Problem D173 with what was probably meant and the standard decks."""
-    found = Files().deck(name)
+def find(name: str, include_dirs: Sequence[str | Path] = ()) -> Path:
+    """The file of the deck of that name; folders of `-I` come before the library.
+
+    Raises Problem D173 with what was probably meant and the standard decks.
+    """
+    found = Files(include_dirs).deck(name)
     if Path(found.path).exists():
         return Path(found.path)
     here = sorted(path.name for path in Path(name).parent.glob("*.ic"))

@@ -228,3 +228,11 @@ error[D173]: no deck `two_lnk.ic`
 1 error
 """
     assert not list(tmp_path.iterdir())
+
+
+def test_a_deck_is_found_in_a_folder_named_with_the_include_option(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("decks").mkdir()
+    Path("decks/mine.ic").write_text(DECK)
+    assert cli.main(["check", "mine.ic", "-I", "decks"]) == 0
+    assert cli.main(["run", "mine.ic", "-I", "decks", "--no-picture", "-q"]) == 0
