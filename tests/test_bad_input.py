@@ -230,7 +230,7 @@ error[D173]: no deck `two_lnk.ic`
     assert not list(tmp_path.iterdir())
 
 
-def test_a_deck_is_found_in_a_folder_named_with_the_include_option(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_deck_is_found_in_a_folder_of_includes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("decks").mkdir()
     Path("decks/mine.ic").write_text(DECK)

@@ -113,6 +113,22 @@ class Binary:
 Expression = Number | String | Name | List | Call | WithUnit | Unary | Binary
 
 
+def children(expression: Expression) -> tuple[Expression, ...]:
+    """The expressions that one is made of, as written; a call's body is not looked into."""
+    match expression:
+        case List(items=items):
+            return items
+        case WithUnit(inner=inner):
+            return (inner,)
+        case Unary(operand=operand):
+            return (operand,)
+        case Binary(left=left, right=right):
+            return (left, right)
+        case Call(positional=positional, named=named):
+            return (*positional, *(value for _, value in named))
+    return ()
+
+
 @frozen
 class Let:
     name: Word

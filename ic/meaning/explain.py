@@ -9,7 +9,7 @@ from os import PathLike
 import numpy as np
 
 from ic.grammar.spell import spell
-from ic.grammar.syntax import Binary, Call, Expression, List, Name, Unary, WithUnit
+from ic.grammar.syntax import Expression, Name, children
 from ic.meaning.lower import Compiled, Select, check
 from ic.meaning.scope import Scope, Settled
 from ic.meaning.values import Value, place_of
@@ -157,17 +157,8 @@ def names_in(expression: Expression) -> Iterable[Name]:
     """The names that an expression uses."""
     stack, found = [expression], []
     while stack:
-        match stack.pop():
-            case Name() as name:
-                found.append(name)
-            case List(items=items):
-                stack.extend(reversed(items))
-            case WithUnit(inner=inner):
-                stack.append(inner)
-            case Unary(operand=operand):
-                stack.append(operand)
-            case Binary(left=left, right=right):
-                stack.extend((right, left))
-            case Call(positional=positional, named=named):
-                stack.extend(reversed((*positional, *(value for _, value in named))))
+        expression = stack.pop()
+        if isinstance(expression, Name):
+            found.append(expression)
+        stack.extend(reversed(children(expression)))
     return found

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import cast
 
-from ic.grammar.syntax import Binary, Call, Expression, List, Name, Number, String, Unary, Unit, WithUnit
+from ic.grammar.syntax import Binary, Call, Expression, List, Name, Number, String, Unary, Unit, WithUnit, children
 from ic.meaning.complaints import known_words
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
@@ -140,19 +140,10 @@ def _written_unit(expression: Expression) -> Place | None:
     """Where a unit is written inside, None where there is none."""
     stack: list[Expression] = [expression]
     while stack:
-        match stack.pop():
-            case Number(unit=unit) if unit is not None:
-                return unit.place
-            case WithUnit(unit=unit):
-                return unit.place
-            case List(items=items):
-                stack.extend(reversed(items))
-            case Unary(operand=operand):
-                stack.append(operand)
-            case Binary(left=left, right=right):
-                stack.extend((right, left))
-            case Call(positional=positional, named=named):
-                stack.extend(reversed((*positional, *(value for _, value in named))))
+        part = stack.pop()
+        if isinstance(part, Number | WithUnit) and part.unit is not None:
+            return part.unit.place
+        stack.extend(reversed(children(part)))
     return None
 
 
