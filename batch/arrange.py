@@ -8,6 +8,7 @@ import numpy as np
 
 from batch.archive.read import Group
 from batch.signals import Panel
+from met.channel import joint_of
 from met.frozen import frozen
 
 SPREAD = 2000
@@ -26,36 +27,38 @@ class Cell:
 
 def arranged(group: Group, found: Sequence[Panel]) -> list[list[Cell | None]]:
     """A row a quantity, a column a joint: `q` of metres and of radians stand beside one another, each with its axis,
-    and `elbow.servo.voltage` under the elbow. None where a joint has no such quantity."""
+    and `elbow.servo.voltage` under the elbow. None where a joint has no such quantity. What is no joint's fills rows of
+    its own, components side by side."""
     joints = joints_of(group)
     placed: list[tuple[str, str, Cell]] = []
     for panel in found:
-        for line in range(len(panel.lines)):
-            joint, quantity = panel.lines[line], panel.name
-            if not joint:
-                before, _, rest = panel.name.partition(".")
-                joint, quantity = (before, rest) if before in joints else ("", panel.name)
-            axis = panel.axis.replace(panel.name, quantity, 1)
+        for line, (label, joint) in enumerate(zip(panel.lines, panel.joints, strict=True)):
+            quantity = panel.name.removeprefix(joint + ".") if joint else panel.name
+            named = f"{quantity}.{label}" if panel.joints.count(joint) > 1 else quantity
+            axis = panel.axis.replace(panel.name, named, 1)
             title = " · ".join(part for part in (joint, panel.about) if part)
-            placed.append((quantity, joint, Cell(panel, (line,), axis, title)))
+            placed.append((named if joint else quantity, joint, Cell(panel, (line,), axis, title)))
     columns = [joint for joint in joints if any(joint == where for _, where, _ in placed)] or [""]
     rows: list[tuple[str, list[Cell | None]]] = []
     for quantity, joint, cell in placed:
-        column = columns.index(joint) if joint in columns else 0
-        free = next((row for name, row in rows if name == quantity and row[column] is None), None)
+        places = [columns.index(joint)] if joint in columns else range(len(columns))
+        free = next(
+            ((row, column) for name, row in rows if name == quantity for column in places if row[column] is None), None
+        )
         if free is None:
-            free = [None] * len(columns)
-            rows.append((quantity, free))
-        free[column] = cell
+            rows.append((quantity, [None] * len(columns)))
+            free = rows[-1][1], places[0]
+        free[0][free[1]] = cell
     return [row for _, row in rows]
 
 
 def joints_of(group: Group) -> list[str]:
     """All joints whose signals are here, in the arm's order where one signal has them all."""
-    dims = dict.fromkeys(v.dims[2] for v in group.role("signal") if len(v.dims) > 2)
-    names = [str(joint) for dim in sorted(dims, key=lambda dim: dim != "joint") for joint in group.values(dim)]
-    alone = [v.name.partition(".")[0] for v in group.role("signal") if len(v.dims) == 2 and "." in v.name]
-    return list(dict.fromkeys([*names, *alone]))
+    signals = group.role("signal")
+    together = sorted((v for v in signals if group.joints(v)), key=lambda v: v.dims[2] != "joint")
+    names = [joint for variable in together for joint in group.joints(variable)]
+    alone = [joint_of(v.name) for v in signals if not group.joints(v)]
+    return [joint for joint in dict.fromkeys([*names, *alone]) if joint]
 
 
 @frozen
@@ -90,8 +93,8 @@ def overlaid(
             commands |= {(j, u): (variable.name, i) for i, (j, u) in enumerate(zip(names, units, strict=True))}
     out = {}
     for panel in found:
-        for line, name in enumerate(panel.lines):
-            command = commands.get((name or panel.name.partition(".")[0], panel.unit))
+        for line, name in enumerate(panel.joints):
+            command = commands.get((name, panel.unit))
             if panel.variable.rpartition(".")[2] in ("q", "qd", "tau") and command is not None:
                 shared, longest = _shared(group, Command(*command), spread(positions))
                 if shared or apart:

@@ -107,7 +107,7 @@ def prepare(
     cases        rows of the case table, `"#7"` or the beginning of a case_id; None: all
     histories    "default": all while the archive stays below 1 GiB, else none, and a note says so
     """
-    chosen = _experiments(plan, experiments)
+    chosen = experiments_named(plan, experiments)
     selected = _selected(chosen, cases)
     target = Path(output) if output is not None else default_output(plan, experiments, selected)
     kept = {"default": True, "all": True, "none": False}[histories]
@@ -231,7 +231,8 @@ def sidecar_path(output: Path) -> Path:
 # What can be refused
 
 
-def _experiments(plan: Plan, names: Sequence[str] | None) -> tuple[Experiment, ...]:
+def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experiment, ...]:
+    """The plan's experiments of these names; all of them for None. Raises Problem E310."""
     if names is None:
         return plan.experiments
     by_name = {experiment.name: experiment for experiment in plan.experiments}

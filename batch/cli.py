@@ -1,4 +1,4 @@
-"""`met run`, `met show`, `met plot`: faces of batch.campaign, batch.show and batch.plot."""
+"""`met run`, `met show`, `met plot`, `met profile`: faces of batch.campaign, batch.show, batch.plot, met.profile."""
 
 from __future__ import annotations
 
@@ -98,4 +98,35 @@ def plot(
         target = plot(file, output or Path(archive).with_suffix(".png"), signals, experiment=experiment, cases=cases)
     if not quiet:
         click.echo(f"{target}")
+    return YES
+
+
+@click.command(short_help="Show where the time of a run goes, and what its kernel is like.")
+@click.argument("source", metavar="DECK|PLAN.json")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@deck_options
+@format_option
+def profile(
+    source: str, names: tuple[str, ...], defines: tuple[str, ...], include_dirs: tuple[str, ...], form: str
+) -> int:
+    """Measure the kernel of a deck's only run or sweep, of the one marked `default`, or of these NAMEs, on one core.
+
+    Operations, flops and time of each part of a step, the share of what the core can do, what is folded into the code
+    and what is an input, and how the kernel was made. Nothing is written but the cache.
+    """
+    import json
+
+    from batch.campaign import experiments_named
+    from batch.profile import told
+    from batch.running import read_plan
+    from met.profile import as_data
+    from met.profile import profile as measured
+
+    check_options(source, names, defines=defines, include_dirs=include_dirs)
+    plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, quiet=form == "json")
+    found = [(measured(each), each) for each in experiments_named(plan, names or None)]
+    if form == "json":
+        click.echo(json.dumps([as_data(each) for each, _ in found], indent=1))
+        return YES
+    click.echo("\n\n".join("\n".join(told(*each)) for each in found))
     return YES

@@ -27,7 +27,7 @@ def program(asked: Asked) -> Iterator[str]:
             yield f"{name}: {', '.join(words) or 'none'}"
         for name, steps in (("start", recording.start), ("tick", recording.tick), ("end", recording.end)):
             yield f"{name}:"
-            yield from _steps(steps, "    ")
+            yield from _steps(steps, [section.name for section in recording.sections], "    ")
         for number, section in enumerate(recording.sections):
             yield ""
             yield f"section {number}, {section.name}: {len(section.order)} operations"
@@ -64,15 +64,16 @@ def _emitted(asked: Asked) -> Iterator[tuple[Machine, str]]:
     machine = llvm.machine()
     for experiment in _experiments(asked):
         recording = record(build(experiment))
-        yield machine, emit(recording, engine.choose_lanes(recording, machine), width=machine.width)
+        lanes = engine.choose_lanes(recording, machine)
+        yield machine, emit(recording, lanes, vector=min(lanes, machine.width), width=machine.width)
 
 
 def _experiments(asked: Asked) -> Sequence[Experiment]:
     return asked.plan().experiments
 
 
-def _steps(steps: Sequence[Step], indent: str) -> Iterator[str]:
-    """Control, one line a step, the bodies of blocks indented."""
+def _steps(steps: Sequence[Step], names: Sequence[str], indent: str) -> Iterator[str]:
+    """Control, one line a step with the section's name, the bodies of blocks indented."""
     from met.trace.program import Block, Every, Recorded, WhileAny
 
     for step in steps:
@@ -81,14 +82,15 @@ def _steps(steps: Sequence[Step], indent: str) -> Iterator[str]:
                 case Every(divisor):
                     yield f"{indent}at ticks that {divisor} divides:"
                 case WhileAny(cell, at_most):
-                    yield f"{indent}while {cell} is not 0 in any case of the block, at most {at_most} times:"
+                    limit = "once" if at_most == 1 else f"{at_most} times"
+                    yield f"{indent}while {cell} is not 0 in any case of the block, at most {limit}:"
                 case _:
                     yield f"{indent}at all ticks but tick 0:"
-            yield from _steps(step.body, indent + "    ")
+            yield from _steps(step.body, names, indent + "    ")
         elif isinstance(step, Recorded):
-            yield f"{indent}section {step.section}, into the record, at ticks that {step.divisor} divides"
+            yield f"{indent}section {step.section}, {names[step.section]}, at ticks that {step.divisor} divides"
         else:
-            yield f"{indent}section {step.section}"
+            yield f"{indent}section {step.section}, {names[step.section]}"
 
 
 def _operand(reference: int) -> str:

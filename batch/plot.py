@@ -182,9 +182,11 @@ def _recorded_position(group: Group, case: str) -> int:
 
 
 def _joint_colour(joints: list[str], panel: Panel, line: int) -> str:
-    """A joint has one colour in all panels, also where a signal is its alone (`shoulder.servo.voltage`)."""
-    joint = panel.lines[line] or panel.name.partition(".")[0]
-    return COLOURS[(joints.index(joint) if joint in joints else line) % len(COLOURS)]
+    """A joint has one colour in all panels, also where a signal is its alone (`shoulder.servo.voltage`); components of
+    one vector have the colours in turn."""
+    joint = panel.joints[line]
+    own = joint in joints and panel.joints.count(joint) == 1
+    return COLOURS[(joints.index(joint) if own else line) % len(COLOURS)]
 
 
 def _width(line: int, count: int) -> float:

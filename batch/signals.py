@@ -1,4 +1,4 @@
-"""Choosing what to draw: a panel is one signal in one unit, a line in it one joint."""
+"""Choosing what to draw: a panel is one signal in one unit, a line in it one joint, or one component of a vector."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from batch.archive.read import Group, Stored
+from met.channel import FAMILIES, channel_paths, joint_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 
@@ -17,7 +18,12 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @frozen
 class Panel:
-    """Lines of one signal that share an axis. columns: where each line lies along the signal's joint dimension."""
+    """Lines of one signal that share an axis.
+
+    lines    what each is called: its joint, its component, or nothing where there is no other
+    columns  where each lies along the signal's joints and components, counted as one
+    joints   the joint that each is of; none for what a link or the arm has. Lines of one joint are components
+    """
 
     name: str
     about: str
@@ -25,6 +31,7 @@ class Panel:
     variable: str
     lines: tuple[str, ...]
     columns: tuple[int, ...]
+    joints: tuple[str, ...] = ("",)
 
     @property
     def axis(self) -> str:
@@ -40,48 +47,83 @@ def panels(group: Group, names: Sequence[str] = ()) -> list[Panel]:
         raise Problem(
             error("E323", message, help="run it again with `--histories all`, or one case alone: `--case '#0'`")
         )
+    known = _choices(group, signals)
     out: list[Panel] = []
     for name in names or signals:
-        if name in signals:
-            out += _whole(group, signals[name])
-        else:
-            out.append(_one_joint(group, signals, name))
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            helps = [f"did you mean `{near[0]}`?"] if near else []
+            of_joints = next((v.name for v in signals.values() if group.joints(v)), "")
+            hint = f"; `<joint>.{of_joints}` is one joint's" if of_joints else ""
+            helps.append(f"signals here: {', '.join(signals)}{hint}")
+            raise Problem(error("E324", f"no signal `{name}` in `{group.name}`", help=helps))
+        for choice in known[name]:
+            out += _panels(group, choice)
     return out
 
 
-def _whole(group: Group, variable: Stored) -> list[Panel]:
-    joints = group.joints(variable)
-    if not joints:
-        return [Panel(variable.name, variable.long_name, variable.unit, variable.name, ("",), (0,))]
-    units = variable.units_by_joint or (variable.unit,) * len(joints)
+@frozen
+class Choice:
+    """Some of a signal's columns, and the name by which they are asked for."""
+
+    name: str
+    variable: Stored
+    columns: tuple[int, ...]
+
+
+def _choices(group: Group, signals: dict[str, Stored]) -> dict[str, tuple[Choice, ...]]:
+    """By name: whole signals, one joint's, one component's, and what a family's name stands for."""
+    found: dict[str, tuple[Choice, ...]] = {}
+    for variable in signals.values():
+        joints, components = group.joints(variable), group.components(variable)
+        parts: dict[str, list[int]] = {}
+        scalars = channel_paths(variable.name, joints, components)
+        for column, path in enumerate(scalars):
+            names = [path]
+            if components and joints:
+                owner, _, component = path.rpartition(".")
+                inner = variable.name.startswith("links.")  # whose `.x` would be that of a joint `x`
+                names += [owner] if inner else [owner, f"{variable.name}.{component}"]
+            for name in names:
+                parts.setdefault(name, []).append(column)
+        parts[variable.name] = list(range(len(scalars)))
+        for name, columns in parts.items():
+            if name == variable.name or (name not in found and name not in signals):
+                found[name] = (Choice(name, variable, tuple(columns)),)
+    for name, choice in list(found.items()):
+        family, _, member = name.rpartition(".")
+        if member in FAMILIES.get(family.rpartition(".")[2], ()):
+            found[family] = (*found.get(family, ()), *choice)
+    return found
+
+
+def _panels(group: Group, choice: Choice) -> list[Panel]:
+    """The panels of a choice: of several joints' vectors one a component, of unlike units one a unit."""
+    variable = choice.variable
+    joints, components = group.joints(variable), group.components(variable)
+    units = variable.units_by_joint or (variable.unit,) * max(1, len(joints))
+    width = max(1, len(components))
+    several = len({column // width for column in choice.columns}) > 1
+    alone = choice.name != variable.name and len(choice.columns) == 1
+    gathered: dict[tuple[str, str], list[tuple[str, str, int]]] = {}
+    for column in sorted(choice.columns, key=lambda column: column % width if several else column):
+        joint = joints[column // width] if joints else joint_of(variable.name)
+        component = components[column % width] if components else ""
+        name = f"{variable.name}.{component}" if several and component else choice.name
+        label = component if component and not several else joint if joints else ""
+        line = ("" if alone else label, joint, column)
+        gathered.setdefault((name, units[column // width]), []).append(line)
     out = []
-    for unit in dict.fromkeys(units):
-        columns = tuple(i for i, u in enumerate(units) if u == unit)
-        lines = tuple(joints[i] for i in columns)
-        out.append(Panel(variable.name, variable.long_name, unit, variable.name, lines, columns))
+    for (name, unit), lines in gathered.items():
+        labels, owners, columns = zip(*lines, strict=True)
+        out.append(Panel(name, variable.long_name, unit, variable.name, labels, columns, owners))
     return out
-
-
-def _one_joint(group: Group, signals: dict[str, Stored], name: str) -> Panel:
-    joint, _, rest = name.partition(".")
-    variable = signals.get(rest)
-    joints = group.joints(variable) if variable is not None else ()
-    if variable is None or joint not in joints:
-        known = list(signals)
-        known += [f"{joint}.{v.name}" for v in signals.values() for joint in group.joints(v)]
-        near = difflib.get_close_matches(name, known, n=1)
-        helps = [f"did you mean `{near[0]}`?"] if near else []
-        helps.append(f"signals here: {', '.join(signals)}; `<joint>.{next(iter(signals))}` is one joint's")
-        raise Problem(error("E324", f"no signal `{name}` in `{group.name}`", help=helps))
-    column = joints.index(joint)
-    unit = variable.units_by_joint[column] if variable.units_by_joint else variable.unit
-    return Panel(name, variable.long_name, unit, variable.name, ("",), (column,))
 
 
 def history(group: Group, panel: Panel, position: int) -> np.ndarray:
     """The panel's lines in the recorded case at this position: (time, line)."""
     values = group.signal(panel.variable, position)
-    return values[:, None] if values.ndim == 1 else values[:, list(panel.columns)]
+    return values.reshape(len(values), -1)[:, list(panel.columns)]
 
 
 def pretty_unit(unit: str) -> str:

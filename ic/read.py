@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -24,7 +25,7 @@ def read(
 ) -> Deck:
     """The deck at `path`, or the standard library's of that name where there is no such file.
 
-    include_dirs  further directories for `#include`
+    include_dirs  further directories for `#include`, and for other files that the deck names
     defines       macros, `NAME` or `NAME=VALUE`
 
     Raises Problem with every error and warning found, in the order of the text, and the text of every file read.
@@ -39,7 +40,7 @@ def read(
     found = in_order(findings.all, seen.sources)
     if findings.errors or not seen.whole:
         raise Problem(found, {source.name: source.text for source in seen.sources})
-    return Deck(seen.sources[0].name, entries, seen.sources, found)
+    return Deck(seen.sources[0].name, entries, seen.sources, found, tuple(os.fspath(each) for each in include_dirs))
 
 
 def in_order(diagnostics: Iterable[Diagnostic], sources: Sequence[SourceText]) -> tuple[Diagnostic, ...]:

@@ -4,13 +4,26 @@
     <joint>.tau                     torque on the joint from its servo, rotor's share included (N m; N)
     <joint>.servo.<name>            a servo's memory, state or signal, by its declaration
     <joint>.servo.command           what the servo was asked at its last tick, in the command's unit
+
+Derived, that is computed from the state only where a record or a metric asks for them (docs/physics.md, section 1):
+
+    <joint>.tau_load .J_eff .b      what the arm takes, tau_load = J_eff qdd + b, all other joints in their modes
+    <joint>.mode                    1 in torque mode, 0 in acceleration mode
+    <joint>.reaction.moment|force   what the link takes from its parent: about its frame's origin, in its axes
+    links.<link>.position, .orientation, .velocity, .rate       of the link's frame, in world axes
+    links.<link>.jacobian.angular|linear.<joint>                rate and velocity for each unit of the joint's rate
+    energy.kinetic|potential, momentum.linear|angular           of all that the joints move
+
+A vector is one channel a component: `links.tip.position.x`, `links.tip.orientation.w`.
 """
 
 from __future__ import annotations
 
+import re
+
 from met import models
 from met.frozen import frozen
-from met.plan import Joint, Structure
+from met.plan import Joint, Recorded, Structure
 
 MOTION = (
     ("q", "joint", "joint position"),
@@ -19,24 +32,81 @@ MOTION = (
     ("tau", "effort", "torque of the servo on the joint"),
 )
 
-COMMAND_UNIT = {"rate": "joint/s", "position": "joint", "torque": "effort"}
+XYZ, WXYZ = ("x", "y", "z"), ("w", "x", "y", "z")
+DIMENSIONS = {XYZ: "axis", WXYZ: "quaternion"}
+"""What the components of a vector are, as a dimension."""
+
+JOINT_AXIS = "about or along the joint's axis"
+WORLD_AXES = "world axes"
+
+# Name, unit, meaning, components, frame.
+OF_JOINT = (
+    ("tau_load", "effort", "what the arm takes of the torque", (), JOINT_AXIS),
+    ("J_eff", "inertia", "inertia of the arm at the joint", (), JOINT_AXIS),
+    ("b", "effort", "tau_load less J_eff qdd", (), JOINT_AXIS),
+    ("mode", "1", "1 torque given, 0 acceleration given", (), ""),
+    ("reaction.moment", "N*m", "moment of the joint on its link", XYZ, "link axes, about the link frame's origin"),
+    ("reaction.force", "N", "force of the joint on its link", XYZ, "link axes"),
+)
+OF_LINK = (
+    ("position", "m", "origin of the link's frame", XYZ, WORLD_AXES),
+    ("orientation", "1", "unit quaternion of the link's frame", WXYZ, "from link axes to world axes, w >= 0"),
+    ("velocity", "m/s", "velocity of the link frame's origin", XYZ, WORLD_AXES),
+    ("rate", "rad/s", "angular velocity of the link", XYZ, WORLD_AXES),
+)
+JACOBIAN = (
+    ("jacobian.angular", "angular", "rate of the link by the joint's rate"),
+    ("jacobian.linear", "linear", "velocity of the link by the joint's rate"),
+)
+OF_ARM = (
+    ("energy.kinetic", "J", "kinetic energy, rotors included", (), ""),
+    ("energy.potential", "J", "potential energy in gravity", (), ""),
+    ("momentum.linear", "kg*m/s", "momentum", XYZ, WORLD_AXES),
+    ("momentum.angular", "kg*m^2/s", "angular momentum about the origin", XYZ, WORLD_AXES),
+)
+
+FAMILIES = {
+    "reaction": ("moment", "force"), "jacobian": ("angular", "linear"),
+    "energy": ("kinetic", "potential"), "momentum": ("linear", "angular"),
+}  # fmt: skip
+"""Names that stand for several variables: `reaction` is `reaction.moment` and `reaction.force`."""
+
+COMMAND_UNIT = {"rate": "joint/s", "position": "joint", "torque": "effort", "acceleration": "joint/s^2"}
+
+REPEATED = re.compile(r"/s(?:\^\d)?(?:/s(?:\^\d)?\b)+")
+POWER = re.compile(r"/s(?:\^(\d))?")
+
+TURNING = {"joint": "rad", "effort": "N*m", "inertia": "kg*m^2", "angular": "1", "linear": "m/rad"}
+SLIDING = {"joint": "m", "effort": "N", "inertia": "kg", "angular": "rad/m", "linear": "1"}
+"""Words of declared units, as they are for a revolute and for a prismatic joint."""
 
 
 @frozen
 class Channel:
-    """One number that changes in time. divisor: base ticks between its samples; between them it is held."""
+    """One number that changes in time.
+
+    divisor     base ticks between its samples; between them it is held
+    joint       the joint that it is of; none for what a link or the arm has
+    components  of the vector that it is a component of; none where it is no vector's
+    frame       the axes that it is given in, in words
+    derived     whether it is computed only where it is asked for
+    """
 
     path: str
     unit: str
     doc: str
     divisor: int
+    joint: str = ""
+    components: tuple[str, ...] = ()
+    frame: str = ""
+    derived: bool = False
 
 
 def joint_unit(unit: str, joint: Joint, command: str | None = None) -> str:
     """A declared unit with `joint`, `effort` and `command` put in words: `joint/s` -> `rad/s`, or `m/s`."""
-    replacements = {"joint": "m", "effort": "N"} if joint.kind == "prismatic" else {"joint": "rad", "effort": "N*m"}
+    replacements = SLIDING if joint.kind == "prismatic" else TURNING
     if command is not None:
-        replacements["command"] = joint_unit(COMMAND_UNIT[command], joint)
+        replacements = {**replacements, "command": joint_unit(COMMAND_UNIT[command], joint)}
     out, word = "", ""
     for character in unit + " ":
         if character.isalpha() or character == "_":
@@ -44,7 +114,12 @@ def joint_unit(unit: str, joint: Joint, command: str | None = None) -> str:
             continue
         out += _factor(replacements.get(word, word), out) + character
         word = ""
-    return out.strip()
+    return REPEATED.sub(_per_time, out.strip())
+
+
+def _per_time(repeated: re.Match[str]) -> str:
+    """`rad/s/s` is `rad/s^2`."""
+    return f"/s^{sum(int(power or 1) for power in POWER.findall(repeated[0]))}"
 
 
 def _factor(unit: str, before: str) -> str:
@@ -53,26 +128,119 @@ def _factor(unit: str, before: str) -> str:
 
 
 def channels(structure: Structure) -> dict[str, Channel]:
-    """Every channel of the structure, by path, in the order joint by joint."""
+    """Every channel of the structure, by path: joint by joint, then the links', then the arm's."""
     servos = {use.joint: use for use in structure.servos}
+    dynamics = structure.schedule.dynamics
     found: dict[str, Channel] = {}
 
-    def add(path: str, unit: str, doc: str, divisor: int) -> None:
-        found[path] = Channel(path, unit, doc, divisor)
+    def add(path: str, unit: str, doc: str, divisor: int, joint: str, frame: str = "") -> None:
+        found[path] = Channel(path, unit, doc, divisor, joint, (), frame)
+
+    def derive(path: str, unit: str, doc: str, components: tuple[str, ...], frame: str, joint: str = "") -> None:
+        for each in [f"{path}.{component}" for component in components] or [path]:
+            found[each] = Channel(each, unit, doc, dynamics, joint, components, frame, True)
 
     for joint in structure.moving:
         for name, unit, doc in MOTION:
-            add(f"{joint.name}.{name}", joint_unit(unit, joint), doc, structure.schedule.dynamics)
+            add(f"{joint.name}.{name}", joint_unit(unit, joint), doc, dynamics, joint.name, JOINT_AXIS)
+        for name, unit, doc, components, frame in OF_JOINT:
+            derive(f"{joint.name}.{name}", joint_unit(unit, joint), doc, components, frame, joint.name)
         use = servos.get(joint.name)
         if use is None:
             continue
         servo = models.find("servo", use.model)
-        if use.command is not None:
-            unit = joint_unit(COMMAND_UNIT[use.command.kind], joint)
-            add(f"{joint.name}.servo.command", unit, f"{use.command.kind} asked of the servo", use.divisor)
+        kind = use.command.kind if use.command is not None else None
+        if kind is not None:
+            unit = joint_unit(COMMAND_UNIT[kind], joint)
+            add(f"{joint.name}.servo.command", unit, f"{kind} asked of the servo", use.divisor, joint.name)
         for memory in servo.memory:
-            add(f"{joint.name}.servo.{memory.name}", joint_unit(memory.unit, joint), memory.doc, use.divisor)
+            unit = joint_unit(memory.unit, joint, kind)
+            add(f"{joint.name}.servo.{memory.name}", unit, memory.doc, use.divisor, joint.name)
         for part in (*servo.states, *servo.signals):
-            unit = joint_unit(part.unit, joint)
-            add(f"{joint.name}.servo.{part.name}", unit, part.doc, structure.schedule.dynamics)
+            unit = joint_unit(part.unit, joint, kind)
+            add(f"{joint.name}.servo.{part.name}", unit, part.doc, dynamics, joint.name)
+    carrying = _carrying(structure)
+    for link in structure.links:
+        for name, unit, doc, parts, frame in OF_LINK:
+            derive(f"links.{link.name}.{name}", unit, doc, parts, frame)
+        for name, unit, doc in JACOBIAN:
+            for joint in carrying[link.name]:
+                path = f"links.{link.name}.{name}.{joint.name}"
+                derive(path, joint_unit(unit, joint), doc, XYZ, WORLD_AXES, joint.name)
+    for name, unit, doc, components, frame in OF_ARM:
+        derive(name, unit, doc, components, frame)
     return found
+
+
+def _carrying(structure: Structure) -> dict[str, list[Joint]]:
+    """By link: the moving joints between it and the base, in the order of `moving`."""
+    holds = {joint.child: joint for joint in structure.joints}
+    found: dict[str, list[Joint]] = {}
+    for link in structure.links:
+        chain: set[str] = set()
+        at = link.name
+        while at in holds and holds[at].name not in chain:  # a tree that does not stand is told elsewhere
+            chain.add(holds[at].name)
+            at = holds[at].parent
+        found[link.name] = [joint for joint in structure.moving if joint.name in chain]
+    return found
+
+
+def channel_paths(name: str, joints: tuple[str, ...], components: tuple[str, ...]) -> tuple[str, ...]:
+    """The channels of a variable of these joints (none: of one thing): joint by joint, component by component."""
+    inner = name.startswith("links.")  # links.tip.jacobian.linear.elbow.x, but elbow.reaction.force.x
+    owners = [f"{name}.{joint}" if inner else f"{joint}.{name}" for joint in joints] or [name]
+    return tuple(f"{owner}.{part}" for owner in owners for part in components) if components else tuple(owners)
+
+
+def joint_of(name: str) -> str:
+    """The joint that a variable of one thing belongs to, by its name; none for a link's and the arm's."""
+    if name.startswith(("links.", *(own for own, *_ in OF_ARM))):
+        return ""
+    return name.partition(".")[0]
+
+
+def recordable(structure: Structure) -> dict[str, tuple[Recorded, ...]]:
+    """Every name that a record may write, with the variables that it stands for.
+
+    A name stands for one number (`elbow.q`, `elbow.reaction.force.x`), for a vector (`links.tip.position`), for that of
+    all joints that have it (`q`, `reaction.force`), or for several variables (`reaction`, `energy`).
+    """
+    known = channels(structure)
+    own: dict[str, Channel] = {}  # numbers and vectors, a vector before its components
+    joints: dict[str, list[str]] = {}
+    for path, channel in known.items():
+        vector = path.rpartition(".")[0] if channel.components else ""
+        for name in (vector, path) if vector and vector not in own else (path,):
+            own[name] = channel
+            group = _of_all(name, channel) if channel.joint else ""
+            if group:
+                joints.setdefault(group, []).append(channel.joint)
+    found: dict[str, tuple[Recorded, ...]] = {}
+    for name, channel in own.items():
+        _enter(found, known, name, (), () if name in known else channel.components)
+    for name, of in joints.items():
+        (one,) = channel_paths(name, (of[0],), ())
+        _enter(found, known, name, tuple(of), () if one in known else own[one].components)
+    return found
+
+
+def _of_all(name: str, channel: Channel) -> str:
+    """What the same of all joints is called; a single component of a jacobian has no such name."""
+    if not channel.path.startswith("links."):
+        return name.removeprefix(channel.joint + ".")
+    return name.removesuffix("." + channel.joint) if name != channel.path else ""
+
+
+def _enter(
+    found: dict[str, tuple[Recorded, ...]], known: dict[str, Channel], name: str, joints: tuple[str, ...],
+    components: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Take a variable in, and into its family, which is told before its members."""
+    scalars = channel_paths(name, joints, components)
+    units = tuple(known[path].unit for path in scalars) if joints else (known[scalars[0]].unit,)
+    made = Recorded(name, scalars, joints, units, known[scalars[0]].doc, components)
+    family, _, member = name.rpartition(".")
+    if member in FAMILIES.get(family.rpartition(".")[2], ()):
+        found[family] = (*found.get(family, ()), made)
+    found[name] = (made,)

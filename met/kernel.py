@@ -37,19 +37,26 @@ _CHUNK, _CALL = 256, 1 << 16
 _SIGNATURE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4, *[ctypes.c_int64] * 6)
 
 
-def compile(program: Program, lanes: int | None = None, cpu: str | None = None, *, level: int = 2) -> Kernel:
+def compile(program: Program, lanes: int | None = None, cpu: str | None = None, *, level: int | None = None) -> Kernel:
     """Machine code of a program.
 
     lanes   cases a block: 2, 4, 8, 16 or 32; by default what is fastest here. Decides nothing but speed.
     cpu     one of LLVM's names of processors; the one we run on by default
-    level   of optimisation, 0 to 3
+    level   of LLVM's optimisation, 0 to 3; None: its code generator alone (met.trace.llvm.assemble)
     """
     recording = record(program)
     return from_recording(recording, lanes, cpu, level=level)
 
 
-def from_recording(recording: Recording, lanes: int | None = None, cpu: str | None = None, *, level: int = 2) -> Kernel:
-    """Machine code of a program that is recorded already."""
+def from_recording(
+    recording: Recording,
+    lanes: int | None = None,
+    cpu: str | None = None,
+    *,
+    level: int | None = None,
+    inline: bool = True,
+) -> Kernel:
+    """Machine code of a program that is recorded already. inline: as `met.trace.ir.emit` has it."""
     from met.trace import llvm
 
     machine = llvm.machine(cpu)
@@ -59,7 +66,7 @@ def from_recording(recording: Recording, lanes: int | None = None, cpu: str | No
         lanes = choose_lanes(recording, machine)
     if lanes not in (2, 4, 8, 16, 32):
         raise ValueError(f"{lanes} lanes")
-    text = emit(recording, lanes, vector=min(lanes, machine.width), width=machine.width)
+    text = emit(recording, lanes, vector=min(lanes, machine.width), width=machine.width, inline=inline)
     name = cache.key(text, llvm.versions(), machine.cpu, machine.features, str(level))
     code, hit = cache.kept(name, lambda: llvm.assemble(text, machine, level=level))
     return Kernel(recording, lanes, machine, llvm.Loaded(code, machine), hit)

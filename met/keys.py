@@ -24,7 +24,7 @@ from met.plan import Experiment, Formula, Structure
 
 DIGEST_BYTES = 8
 
-SILENT_FIELDS = frozenset({"place", "definition", "shape", "doc", "unit"})
+SILENT_FIELDS = frozenset({"place", "definition", "shape", "doc", "unit", "components"})
 """Fields of a structure that change no number: where it was written, its names and units for the reader."""
 
 

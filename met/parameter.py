@@ -14,16 +14,17 @@ from typing import Literal
 
 from met.frozen import frozen
 
-Shape = Literal["number", "vector", "list", "word"]
+Shape = Literal["number", "vector", "list", "word", "text"]
 
 
 @frozen(kw_only=True)
 class Parameter:
-    """One number (or vector of three, list, or word) that a deck may set on a model.
+    """One number (or vector of three, list, word or text) that a deck may set on a model.
 
     `default` None means that the deck must write it. The bounds are in SI: `above` and `below` exclude their
-    value, `at_least` and `at_most` include it. `words` lists what a word may be. A list or a word cannot vary in a
-    sweep. `needed_for` names the kinds of command of a servo under which it must be written, default or not.
+    value, `at_least` and `at_most` include it. `words` lists what a word may be. A list, a word or a text (in quotes;
+    for the compiler alone, no plan holds one) cannot vary in a sweep. `needed_for` names the kinds of command of a
+    servo under which it must be written, default or not.
     """
 
     name: str

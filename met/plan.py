@@ -12,6 +12,7 @@ Parameters are named by paths, the ones a deck uses inside a run:
     <joint>.at.x|y|z                       m, parent link's frame
     <joint>.rpy.x|y|z                      rad, fixed x-y-z (R = Rz Ry Rx)
     <joint>.axis.x|y|z                     unit vector in the joint frame
+    <joint>.pivot.x|y|z                    m, joint frame: a point of a revolute joint's axis; not there: the origin
     <joint>.servo.<parameter>              as the servo declares
     <joint>.servo.command.<parameter>      as the command declares
     initial.<joint>.q|qd                   rad, rad/s (m, m/s)
@@ -88,7 +89,7 @@ class Joint:
 
 @frozen
 class Command:
-    """What a servo is told: kind "rate", "position" or "torque", and the model of its course in time."""
+    """What a servo is told: "rate", "position", "torque" or "acceleration", and the model of its course in time."""
 
     kind: str
     model: str
@@ -171,8 +172,10 @@ class Schedule:
 class Recorded:
     """One variable of the archive: a channel of one thing, or of all joints (`joints` then names them in order).
 
-    name      the variable's name, as the deck records it: `q`, `shoulder.qd`, `shoulder.servo.voltage`
-    channels  paths of the scalar channels, one a joint or just one
+    name        the variable's name, as the deck records it: `q`, `shoulder.qd`, `links.tip.position`
+    channels    paths of the scalar channels: joint by joint, and of each joint component by component
+    unit        one for all, or one a channel
+    components  what a vector's numbers are called, `x y z` or `w x y z`; none where there is one number
     """
 
     name: str
@@ -180,6 +183,12 @@ class Recorded:
     joints: tuple[str, ...] = ()
     unit: tuple[str, ...] = ("1",)
     doc: str = ""
+    components: tuple[str, ...] = ()
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the variable at one instant: joints, components, each where there are some."""
+        return tuple(len(names) for names in (self.joints, self.components) if names)
 
 
 @frozen

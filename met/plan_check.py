@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from met import models, units
-from met.channel import COMMAND_UNIT, channels
+from met import plan_rest as rest
+from met.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.parameter import Parameter
 from met.plan import Coordinate, Experiment, Formula, Quantity, Requirement, Structure
 from met.plan_codec import Damaged
@@ -28,6 +29,9 @@ NAME = re.compile(r"[^\W\d]\w*")
 
 MOST_TICKS = 10**12
 """Of a run: thirty years at a kilohertz. A divisor may not be larger either."""
+
+TABLES = {"table": 1, "trajectory": 2}
+"""Profiles of points, and how many points each needs."""
 
 MOST_SEED = 2**63 - 1
 
@@ -184,7 +188,10 @@ def _check_record(structure: Structure, where: str) -> None:
                 raise Damaged(f"{path}.channels", f"there is no channel `{channel}`")
         if len(set(recorded.joints)) < len(recorded.joints):
             raise Damaged(f"{path}.joints", "a joint is there twice")
-        wanted = tuple(f"{joint}.{recorded.name}" for joint in recorded.joints) or (recorded.name,)
+        if recorded.components and recorded.components not in DIMENSIONS:
+            listed = " or ".join(", ".join(names) for names in DIMENSIONS)
+            raise Damaged(f"{path}.components", f"it should be {listed}")
+        wanted = channel_paths(recorded.name, recorded.joints, recorded.components)
         if recorded.channels != wanted:
             raise Damaged(f"{path}.channels", f"`{recorded.name}` of these joints is {', '.join(wanted)}")
         if len(recorded.unit) not in (1, len(recorded.channels)):
@@ -273,13 +280,28 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
         quantity = parameters.get(path)
         if quantity is not None:
             _check_quantity(quantity, unit, parameter, f"{where}.{path}")
+    known |= _check_pivots(experiment, where)
     for path in parameters:
         if path not in known and not path.startswith(models_of):  # those of a model: `plan_defaults`
             raise Damaged(f"{where}.{path}", "nothing in this run has this parameter")
     for use in structure.servos:
-        if use.command is not None and use.command.model == "table":
-            _check_table(experiment, f"{use.joint}.servo.command", where)
+        if use.command is not None and use.command.model in TABLES:
+            _check_table(experiment, f"{use.joint}.servo.command", TABLES[use.command.model], where)
     _check_bodies(experiment, where)
+
+
+def _check_pivots(experiment: Experiment, where: str) -> set[str]:
+    """Paths of the pivots that revolute joints have, all three numbers of one or none."""
+    found: set[str] = set()
+    for joint in experiment.structure.joints:
+        paths = [f"{joint.name}.pivot.{axis}" for axis in "xyz"] if joint.kind == "revolute" else []
+        there = [path for path in paths if path in experiment.parameters]
+        if there and len(there) < len(paths):
+            raise Damaged(f"{where}.{joint.name}.pivot", "it is made of three numbers, .x .y .z")
+        for path in there:
+            _check_quantity(experiment.parameters[path], "m", None, f"{where}.{path}")
+        found.update(there)
+    return found
 
 
 def _check_quantity(quantity: Quantity, unit: str, parameter: Parameter | None, where: str) -> None:
@@ -336,14 +358,15 @@ def _same_unit(one: str, other: str) -> bool:
     return mine.scale == theirs.scale and units.same(mine.dimension, theirs.dimension)
 
 
-def _check_table(experiment: Experiment, prefix: str, where: str) -> None:
-    """Times rise, and there are as many values."""
+def _check_table(experiment: Experiment, prefix: str, fewest: int, where: str) -> None:
+    """Times rise, and there are as many values, `fewest` or more."""
     found = [experiment.parameters.get(f"{prefix}.{name}") for name in ("times", "values")]
     times, values = (quantity.value if quantity is not None else () for quantity in found)
     if not isinstance(times, tuple) or not isinstance(values, tuple) or None in found:
         return  # missing: E304
-    if not times or len(times) != len(values):
-        raise Damaged(f"{where}.{prefix}.values", f"there are {len(values)} for {len(times)} times")
+    if len(times) < fewest or len(times) != len(values):
+        needed = f", and {fewest} are needed" if len(times) == len(values) else ""
+        raise Damaged(f"{where}.{prefix}.values", f"there are {len(values)} for {len(times)} times{needed}")
     if not all(before < after for before, after in itertools.pairwise(times)):
         raise Damaged(f"{where}.{prefix}.times", "they do not rise")
 
@@ -360,6 +383,7 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
     for joint in structure.moving:
         axis = [f"{joint.name}.axis.{letter}" for letter in "xyz"]
         tests.append((f"{joint.name}.axis", axis, _is_axis, "its length should be 1"))
+    tests += rest.tests(experiment)
     varied = []
     for path, paths, holds, message in tests:
         if any(path not in experiment.parameters for path in paths):

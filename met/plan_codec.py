@@ -181,6 +181,8 @@ def _is_rest(op: str, rest: tuple[Any, ...]) -> bool:
         return len(rest) == 1 and isinstance(rest[0], str)
     if op in ("bit", "flip"):
         return len(rest) == 1 and type(rest[0]) is int and 0 <= rest[0] < 64
+    if op == "philox":
+        return len(rest) == 1 and type(rest[0]) is int and 0 <= rest[0] < 4
     if op == "gather":
         return len(rest) == 1 and isinstance(rest[0], tuple) and len(rest[0]) > 0 and all(map(_is_number, rest[0]))
     return not rest

@@ -11,7 +11,8 @@ import numpy as np
 
 from met.frozen import frozen
 from met.plan import Experiment
-from met.program.build import COORDINATE, EVENTS, METRIC, NOT_FINITE, OUTPUTS, SINGULAR, build
+from met.program.build import COORDINATE, METRIC, OUTPUTS, build
+from met.program.step import EVENTS, NOT_FINITE, SINGULAR
 from met.trace.program import Program
 
 DONE, FAILED = 0, 1
@@ -25,8 +26,8 @@ class Run:
     status       DONE or FAILED;  cause: why, with time and joint, empty where done
     n_valid      recorded rows before the failure; all of them where done
     time         (row,) s, of the recorded rows
-    signals      by name of `plan.Recorded`: (case, row) or (case, row, joint); not-a-number from n_valid on.
-                 Empty where histories were not asked for
+    signals      by name of `plan.Recorded`: (case, row), then its `shape` (joints, components); not-a-number from
+                 n_valid on. Empty where histories were not asked for
     metrics      by name, SI; not-a-number where the case failed
     met          requirements by their text: True where met; False for a failed case
     coordinates  the varied parameters as the engine used them, by path, SI
@@ -87,14 +88,20 @@ def run(
     experiment = prepared.experiment
     schedule = experiment.structure.schedule
     rows = np.arange(experiment.cases.count) if cases is None else np.asarray(cases, dtype=np.int64)
-    coordinates = experiment.cases.coordinates
-    inputs = np.empty((len(rows), len(coordinates)))
-    for column, coordinate in enumerate(coordinates):
-        inputs[:, column] = coordinate.values[rows]
     history, outputs = prepared.kernel.run(
-        inputs, schedule.ticks, record=record and prepared.program.columns > 0, threads=threads, progress=progress
+        inputs(experiment, rows), schedule.ticks,
+        record=record and prepared.program.columns > 0, threads=threads, progress=progress,
     )
     return _results(experiment, prepared.program, rows, history, outputs)
+
+
+def inputs(experiment: Experiment, rows: np.ndarray) -> np.ndarray:
+    """What the kernel takes of these rows of the case table, [case, input]."""
+    coordinates = experiment.cases.coordinates
+    values = np.empty((len(rows), len(coordinates)))
+    for column, coordinate in enumerate(coordinates):
+        values[:, column] = coordinate.values[rows]
+    return values
 
 
 def _results(
@@ -111,9 +118,8 @@ def _results(
         column = 0
         for recorded in experiment.structure.record:
             width = len(recorded.channels)
-            signals[recorded.name] = history[:, :, column : column + width]
-            if not recorded.joints:
-                signals[recorded.name] = signals[recorded.name][:, :, 0]
+            block = history[:, :, column : column + width]
+            signals[recorded.name] = block.reshape(*block.shape[:2], *recorded.shape)
             column += width
     metrics = {use.name: np.where(failed, math.nan, out[METRIC + use.name]) for use in experiment.structure.metrics}
     return Run(
@@ -152,7 +158,7 @@ def _cause(experiment: Experiment, failure: float, number: float, tick: float) -
         )
     assert failure == NOT_FINITE
     return (
-        f"{head}the acceleration is no longer a finite number{where}. Usual reasons: a step too long for the servo or "
-        f"the arm (see the stability figures of `met plan`; try a faster rate for the dynamics), or a model that "
-        f"divides by zero."
+        f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: a step too long for "
+        f"the servo or the arm (see the stability figures of `met plan`; try a faster rate for the dynamics), or a "
+        f"model that divides by zero."
     )

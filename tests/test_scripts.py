@@ -236,16 +236,6 @@ def _any_users_python() -> str:
     pytest.skip("no Python that a user without rights may start")
 
 
-def test_benchmark_lists_what_it_can_measure() -> None:
-    listed = subprocess.run(
-        [sys.executable, "-m", "benchmarks", "--list"],
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT / "scripts")},
-    )
-    assert [line.split()[0] for line in listed.stdout.splitlines()][:3] == ["version", "check", "run"]
-
-
 # Those that make environments
 
 

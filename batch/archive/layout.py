@@ -12,6 +12,8 @@ Dimensions, each with its coordinate variable:
     recorded_case   the cases whose histories were kept
     time            s, of the recorded rows
     joint           names of the moving joints; a signal of some joints only has a dimension of its own, `joint_of_...`
+    axis            x, y, z: components of a vector
+    quaternion      w, x, y, z: of an orientation
     requirement     texts of the requirements
 
 A variable says what it is by its attribute `role`: dimension, case, coordinate, metric, requirement, recorded or
@@ -30,6 +32,7 @@ from typing import Any, Literal
 import numpy as np
 
 from batch.archive import limits
+from met.channel import DIMENSIONS, channels
 from met.frozen import frozen
 from met.plan import Coordinate, Experiment, MetricUse, Plan, Recorded
 
@@ -49,7 +52,6 @@ FRAME = (
     "joint frame: the parent link's frame moved by `at`, turned by `rpy` (fixed x-y-z); a joint moves about or along "
     "its axis in it; the link's frame is the joint frame at q = 0; the world is the base"
 )
-JOINT_FRAME = "about or along the joint's axis"
 
 EVENTS = {
     "splits": "steps split where a joint came to rest",
@@ -111,9 +113,9 @@ class Layout:
         """Chunks of a signal: one case each, cut in time where that is too large."""
         if variable.role != "signal":
             return None
-        _, rows, *joints = self.shape(variable)
-        row = 8 * int(np.prod(joints, dtype=np.int64))
-        return (1, max(1, min(rows, CHUNK_BYTES // row)), *joints)
+        _, rows, *width = self.shape(variable)
+        row = 8 * int(np.prod(width, dtype=np.int64))
+        return (1, max(1, min(rows, CHUNK_BYTES // row)), *width)
 
 
 def layout(experiment: Experiment, cases: int, recorded: bool) -> Layout:
@@ -141,8 +143,15 @@ def joint_dimensions(experiment: Experiment) -> dict[tuple[str, ...], str]:
     found = {moving: "joint"}
     for recorded in experiment.structure.record:
         if recorded.joints and recorded.joints not in found:
-            found[recorded.joints] = "joint_of_" + re.sub(r"\W", "_", recorded.name)
+            owner = recorded.name.partition(".jacobian.")[0]  # both jacobians of a link have its joints
+            found[recorded.joints] = "joint_of_" + re.sub(r"\W", "_", owner)
     return found
+
+
+def component_dimensions(experiment: Experiment) -> dict[tuple[str, ...], str]:
+    """The dimensions that hold components of recorded vectors, by the components' names."""
+    recorded = [each.components for each in experiment.structure.record if each.components]
+    return {components: DIMENSIONS[components] for components in recorded}
 
 
 def coordinate_unit(experiment: Experiment, coordinate: Coordinate) -> str:
@@ -161,7 +170,6 @@ def coordinate_unit(experiment: Experiment, coordinate: Coordinate) -> str:
 def metric_unit(experiment: Experiment, use: MetricUse) -> str:
     """SI unit of a metric's result; `of` in its declaration stands for the channel's unit."""
     from met import models
-    from met.channel import channels
 
     declared = models.find("metric", use.model, use.place).unit
     if "of" not in re.findall(r"\w+", declared):
@@ -181,7 +189,7 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         variable("seed", "int64", "seed of the run's noise"),
     ]
     taken = RESERVED | {recorded.name for recorded in experiment.structure.record}
-    taken |= set(joint_dimensions(experiment).values())
+    taken |= {*joint_dimensions(experiment).values(), *component_dimensions(experiment).values()}
     paths = [coordinate.path for coordinate in experiment.cases.coordinates]
     names = {path: _apart(path, "coordinates", taken, paths) for path in paths}
     out += [_coordinate(experiment, c, names[c.path]) for c in experiment.cases.coordinates]
@@ -262,27 +270,33 @@ def _recorded(experiment: Experiment, variables: list[Variable]) -> list[Variabl
 
 def _signals(experiment: Experiment, sizes: dict[str, int], told: Mapping[str, str]) -> list[Variable]:
     """told: attributes of every signal; empty ones are left out."""
-    dimensions = joint_dimensions(experiment)
+    joint_dims, component_dims = joint_dimensions(experiment), component_dimensions(experiment)
     out = []
-    for joints, dim in dimensions.items():
+    for joints, dim in joint_dims.items():
         if any(recorded.joints == joints for recorded in experiment.structure.record):
             sizes[dim] = len(joints)
             out.append(Variable(dim, "str", (dim,), "dimension", "joint"))
+    for components, dim in component_dims.items():
+        sizes[dim] = len(components)
+        out.append(Variable(dim, "str", (dim,), "dimension", "component"))
+    known = channels(experiment.structure)
     for recorded in experiment.structure.record:
-        dims = ("recorded_case", "time", *([dimensions[recorded.joints]] if recorded.joints else []))
+        dims = ["recorded_case", "time"]
+        dims += [joint_dims[recorded.joints]] if recorded.joints else []
+        dims += [component_dims[recorded.components]] if recorded.components else []
         unit, attributes = _signal_unit(recorded)
-        attributes |= {name: value for name, value in told.items() if value}
-        out.append(Variable(recorded.name, "float64", dims, "signal", recorded.doc, unit, attributes))
+        frame = known[recorded.channels[0]].frame
+        attributes |= {name: value for name, value in {"frame": frame, **told}.items() if value}
+        out.append(Variable(recorded.name, "float64", tuple(dims), "signal", recorded.doc, unit, attributes))
     return out
 
 
 def _signal_unit(recorded: Recorded) -> tuple[str, dict[str, Any]]:
-    """The unit, where all joints share one, and further attributes."""
-    units = recorded.unit if len(recorded.unit) > 1 else recorded.unit * max(1, len(recorded.joints))
-    frame = {} if ".servo." in recorded.channels[0] else {"frame": JOINT_FRAME}
+    """The unit, where all joints share one, and else the attribute that has each joint's."""
+    units = recorded.unit if len(recorded.unit) > 1 else recorded.unit * max(1, len(recorded.channels))
     if len(set(units)) > 1:
-        return "", {"units_by_joint": list(units), **frame}
-    return units[0], frame
+        return "", {"units_by_joint": list(units[:: max(1, len(recorded.components))])}
+    return units[0], {}
 
 
 def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, Any]:

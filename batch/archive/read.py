@@ -96,6 +96,8 @@ class Group:
                 raise Unlike(f"variable `{name}` is of another type")
             if variable.role == "signal" and variable.dims[:2] != ("recorded_case", "time"):
                 raise Unlike(f"variable `{name}` is not over cases and time")
+            if variable.role == "signal" and len(variable.dims) > (4 if _of_joints(variable) else 3):
+                raise Unlike(f"variable `{name}` has more dimensions than joints and components")
             if not float(variable.attributes.get("deck_scale", 1.0)):
                 raise Unlike(f"variable `{name}` has no scale")
 
@@ -127,13 +129,20 @@ class Group:
             return np.array([read[int(position)] for position in positions], dtype=object if words else dataset.dtype)
 
     def signal(self, name: str, position: int) -> np.ndarray:
-        """History of one signal in the recorded case at this position: (time,) or (time, joint)."""
+        """History of one signal in the recorded case at this position: (time,), then joints, then components."""
         with reading(self._path):
             return np.asarray(self._node[name][position])
 
     def joints(self, variable: Stored) -> tuple[str, ...]:
         """Names along a signal's joint dimension; none where it has no such dimension."""
-        return tuple(map(str, self.values(variable.dims[2]))) if len(variable.dims) > 2 else ()
+        return self._along(variable.dims[2:3]) if _of_joints(variable) else ()
+
+    def components(self, variable: Stored) -> tuple[str, ...]:
+        """Names of a signal's components; none where it is no vector."""
+        return self._along(variable.dims[3:4] if _of_joints(variable) else variable.dims[2:3])
+
+    def _along(self, dims: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(map(str, self.values(dims[0]))) if dims else ()
 
     @property
     def count(self) -> int:
@@ -168,6 +177,11 @@ class Group:
         raise Problem(
             error("E322", f"case `{wanted}` may be any of {len(found)}: {some} ...", help="give more of its id")
         )
+
+
+def _of_joints(variable: Stored) -> bool:
+    """Whether a signal's third dimension holds joints."""
+    return any(dim == "joint" or dim.startswith("joint_of_") for dim in variable.dims[2:3])
 
 
 def _cases_here(rows: np.ndarray) -> str:

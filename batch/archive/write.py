@@ -140,8 +140,9 @@ class Writer:
         if section.recorded:
             values["recorded_case"] = section.rows
             values["time"] = np.arange(schedule.rows) * schedule.record / schedule.base_hz
-            for joints, dim in archive_layout.joint_dimensions(experiment).items():
-                values[dim] = np.array(joints, dtype=object)
+            for along in (archive_layout.joint_dimensions(experiment), archive_layout.component_dimensions(experiment)):
+                for names, dim in along.items():
+                    values[dim] = np.array(names, dtype=object)
         for variable in section.layout.variables:
             if variable.role != "signal":
                 section.group[variable.name][...] = values[variable.name]

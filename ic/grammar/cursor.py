@@ -149,11 +149,13 @@ class Cursor:
 
     def begins_entry(self, at: int) -> bool:
         """Whether a new line begins here, and looks like an entry: the one before lacks its semicolon."""
-        token, after = self.tokens[at], self.tokens[at + 1]
-        if token.kind != NAME:
+        if self.tokens[at].kind != NAME or not self.on_new_line(at):
             return False
-        entry = after.text in ("=", "+=", "{", ".") or (after.kind == NAME and after.text not in ("and", "or"))
-        return entry and self.on_new_line(at)
+        behind = at + 1
+        while self.tokens[behind].text == "." and self.tokens[behind + 1].kind == NAME:  # a path
+            behind += 2
+        after = self.tokens[behind]
+        return after.text in ("=", "+=", "{", ".") or (after.kind == NAME and after.text not in ("and", "or"))
 
     def begins_value(self) -> bool:
         token = self.token

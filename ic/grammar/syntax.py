@@ -177,9 +177,13 @@ class SourceText:
 
 @frozen
 class Deck:
-    """A whole deck after the preprocessor: its entries in order, the files they came from, and warnings so far."""
+    """A whole deck after the preprocessor: its entries in order, the files they came from, and warnings so far.
+
+    include_dirs: further directories in which files that the deck names are looked for.
+    """
 
     file: str
     entries: tuple[Entry, ...]
     sources: tuple[SourceText, ...]
     warnings: tuple[Diagnostic, ...] = ()
+    include_dirs: tuple[str, ...] = ()

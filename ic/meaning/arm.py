@@ -9,6 +9,7 @@ import numpy as np
 
 from ic.grammar.syntax import Expression, Name, Unary
 from ic.meaning.complaints import known_words
+from ic.meaning.dh import use_dh
 from ic.meaning.models import check_keys, word_of
 from ic.meaning.resolve import RESERVED, Block, Definition, Item
 from ic.meaning.scope import Owner, Scope
@@ -31,7 +32,7 @@ RPY = Parameter(name="rpy", unit="rad", shape="vector", doc="turn of the joint f
 AXIS = Parameter(name="axis", unit="1", shape="vector", doc="axis of motion, joint frame")
 
 LINK_KEYS = ("mass", "com", "inertia", "shape")
-JOINT_KEYS = ("parent", "child", "at", "rpy", "axis")
+JOINT_KEYS = ("parent", "child", "at", "rpy", "axis", "dh")
 
 
 @frozen
@@ -244,13 +245,21 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], arm: Block) -> Join
     links = [link.name for link in arm.of_kind("link")]
     parent = _end(scope, owner, "parent", body.get("parent"), ["base", *links])
     child = _end(scope, owner, "child", body.get("child"), links)
+    if body.get("dh") is not None:
+        use_dh(scope, owner, kind, body.items["dh"], body)
+    else:
+        _frame(scope, owner, kind, body)
+    if parent is None or child is None:
+        return None
+    return Joint(item.name, kind, parent, child, item.place)  # type: ignore[arg-type]
+
+
+def _frame(scope: Scope, owner: Owner, kind: str, body: Block) -> None:
+    """The joint's frame as `at`, `rpy` and `axis` say."""
     for wanted in (AT, RPY):
         default = Parameter(name=wanted.name, unit=wanted.unit, shape="vector", doc=wanted.doc, default=(0.0, 0.0, 0.0))
         scope.vector(owner, default, body.get(wanted.name))
     _axis(scope, owner, kind, body.get("axis"))
-    if parent is None or child is None:
-        return None
-    return Joint(item.name, kind, parent, child, item.place)  # type: ignore[arg-type]
 
 
 def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: list[str]) -> str | None:

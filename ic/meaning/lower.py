@@ -52,11 +52,10 @@ def compile_deck(deck: Deck, *, select: Select = None, defines: Iterable[str] = 
                  complaints: Complaints | None = None) -> Compiled:
     """The plan of the deck's runs and sweeps that `select` names, with everything that is wrong on the way."""
     complaints = complaints if complaints is not None else Complaints(deck.warnings)
-    texts = {source.name: source.text for source in deck.sources}
+    definitions = Definitions(deck, complaints)
     experiments: list[Experiment] = []
     scopes: list[Scope] = []
     try:
-        definitions = Definitions(deck, complaints)
         complaints.add(
             *(d for problem in Scope(definitions, complaints).names.check_lets() for d in problem.diagnostics)
         )
@@ -79,14 +78,16 @@ def compile_deck(deck: Deck, *, select: Select = None, defines: Iterable[str] = 
                          help="build them up in steps, with `let`")
     except Problem as problem:
         complaints.add(*problem.diagnostics)
+    sources = (*deck.sources, *definitions.csv_files.sources)
+    texts = {source.name: source.text for source in sources}
     if not complaints.errors:
         complaints.admit_remarks()
     else:
-        return Compiled(None, in_order(complaints.all, deck.sources), texts)
-    sources = tuple(Source(source.name, source.text, source.sha256) for source in deck.sources)
+        return Compiled(None, in_order(complaints.all, sources), texts)
+    files = tuple(Source(source.name, source.text, source.sha256) for source in sources)
     selected = (select,) if isinstance(select, str) else tuple(dict.fromkeys(select or ()))
-    return Compiled(Plan(deck.file, tuple(experiments), sources, tuple(defines), selected),
-                    in_order(complaints.all, deck.sources), texts, tuple(scopes))
+    return Compiled(Plan(deck.file, tuple(experiments), files, tuple(defines), selected),
+                    in_order(complaints.all, sources), texts, tuple(scopes))
 
 
 def chosen(definitions: Definitions, complaints: Complaints, select: Select) -> list[Definition]:

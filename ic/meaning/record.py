@@ -13,7 +13,7 @@ from ic.meaning.resolve import Block, Item
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.values import place_of
 from met import models
-from met.channel import Channel, channels
+from met.channel import FAMILIES, Channel, channels, recordable
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
@@ -33,25 +33,23 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
         scope.complaints.error("D124", f"{run.label} records nothing", run.place,
                                help="write `record = [q, qd, tau];`, or `record = [];` where metrics are all you want")
         return ()
-    known = channels(structure)
-    groups = _groups(structure, known)
+    known = recordable(structure)
     found: dict[str, tuple[Recorded, Place]] = {}
     for expression in (item.value, *item.appended):
         for name in _names(scope, item, expression):
-            made = _recorded(structure, known, groups, name.text)
+            made = known.get(name.text)
             if made is None and scope.lost and "servo" in [word.text for word in name.path]:
                 continue
             if made is None and scope.gone and (name.path[0].text in scope.gone or not structure.moving):
                 continue
             if made is None:
-                scope.complaints.error(
-                    "D125", f"no channel `{name.text}`", name.place, help=_nearest(name, known, groups)
-                )
-            elif made.name in found:
-                scope.complaints.error("D040", f"`{made.name}` is recorded twice", name.place,
-                                       also=[Label(found[made.name][1], "first")], help="leave one out")
-            else:
-                found[made.name] = (made, name.place)
+                scope.complaints.error("D125", f"no channel `{name.text}`", name.place, help=_nearest(name, known))
+            for each in made or ():
+                if each.name in found:
+                    scope.complaints.error("D040", f"`{each.name}` is recorded twice", name.place,
+                                           also=[Label(found[each.name][1], "first")], help="leave one out")
+                else:
+                    found[each.name] = (each, name.place)
     return tuple(recorded for recorded, _ in found.values())
 
 
@@ -74,35 +72,22 @@ def _names(scope: Scope, item: Item, expression: Expression | None) -> Iterator[
                                    help="write `record = [q, qd, tau];`")
 
 
-def _groups(structure: Structure, known: dict[str, Channel]) -> dict[str, list[str]]:
-    """Channels that several joints may have, by what follows the joint's name."""
-    groups: dict[str, list[str]] = {}
-    for joint in structure.moving:
-        for path in known:
-            if path.startswith(joint.name + "."):
-                groups.setdefault(path.removeprefix(joint.name + "."), []).append(joint.name)
-    return groups
-
-
-def _recorded(structure: Structure, known: dict[str, Channel], groups: dict[str, list[str]],
-              name: str) -> Recorded | None:
-    if name in known:
-        return Recorded(name, (name,), (), (known[name].unit,), known[name].doc)
-    if name in groups:
-        joints = tuple(groups[name])
-        paths = tuple(f"{joint}.{name}" for joint in joints)
-        return Recorded(name, paths, joints, tuple(known[path].unit for path in paths), known[paths[0]].doc)
-    return None
-
-
-def _nearest(name: Name, known: dict[str, Channel], groups: dict[str, list[str]]) -> list[str]:
-    text = name.text
-    nearest = list(did_you_mean(text, (*groups, *known)))
+def _nearest(name: Name, known: dict[str, tuple[Recorded, ...]]) -> list[str]:
+    """What was meant, and what there is: of the same joint or link, else of all; vectors and families as a whole."""
+    whole = [each for each in known if each.rpartition(".")[0] not in known]
     first = name.path[0].text
-    own = [path for path in known if path.startswith(first + ".")]
+    head = ".".join(word.text for word in name.path[:2]) if first == "links" else first
+    own = [each for each in whole if each.startswith(head + ".")]
+    if own:
+        return [*did_you_mean(name.text, known), known_words(f"channels of `{head}`", own)]
+    joints = [each for each in whole if known[each][0].joints and not each.startswith("links.")]
+    arm = [each for each in whole if each in FAMILIES and not known[each][0].joints]
+    links = [each for each in whole if each.startswith("links.")]
+    some = [each for each in links if each.split(".")[1] == links[0].split(".")[1]]
     return [
-        *nearest,
-        known_words(f"channels of `{first}`", own) if own else known_words("channels of all joints", groups),
+        *did_you_mean(name.text, known),
+        known_words("channels of all joints", joints),
+        known_words("channels of the arm, and of a link", [*arm, *some]),
     ]
 
 
@@ -111,10 +96,11 @@ def _nearest(name: Name, known: dict[str, Channel], groups: dict[str, list[str]]
 
 def resolve_metrics(scope: Scope, block: Block, structure: Structure) -> tuple[MetricUse, ...]:
     known = channels(structure)
-    return tuple(use for item in block.of_kind("metric") if (use := _metric(scope, item, known)) is not None)
+    found = (_metric(scope, item, structure, known) for item in block.of_kind("metric"))
+    return tuple(use for use in found if use is not None)
 
 
-def _metric(scope: Scope, item: Item, known: dict[str, Channel]) -> MetricUse | None:
+def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Channel]) -> MetricUse | None:
     if item.detail:
         scope.complaints.error("D129", f"`{item.detail[0].text}` after the name of a metric", item.detail[0].place,
                                help=f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`")
@@ -136,13 +122,8 @@ def _metric(scope: Scope, item: Item, known: dict[str, Channel]) -> MetricUse | 
         name = of.value if isinstance(of.value, Name) else None
         if name is not None and name.path[0].text in scope.lost | scope.gone:
             return None
-        helps = _nearest(name, known, {}) if name is not None else []
-        of_all = name is not None and any(path.endswith("." + name.text) for path in known)
-        if of_all and name is not None:
-            helps = ["a metric watches one joint's: " + ", ".join(
-                f"`{path}`" for path in known if path.endswith("." + name.text))]
-        scope.complaints.error("D125", f"no channel `{name.text}`" if name else "a channel is needed here",
-                               place_of(of.value) if of.value is not None else of.place, help=helps)
+        message, helps = _not_one(name, recordable(structure)) if name is not None else ("a channel is needed here", [])
+        scope.complaints.error("D125", message, place_of(of.value) if of.value is not None else of.place, help=helps)
     else:
         channel = known[of.value.text]
     if channel is None:
@@ -150,6 +131,14 @@ def _metric(scope: Scope, item: Item, known: dict[str, Channel]) -> MetricUse | 
     owner = Owner(f"metric `{item.name}`", item.place, f"metrics.{item.name}", of=channel.unit)
     use_model(scope, owner, metric.parameters, body, ("of",))
     return MetricUse(item.name, metric.name, channel.path, item.place)
+
+
+def _not_one(name: Name, known: dict[str, tuple[Recorded, ...]]) -> tuple[str, list[str]]:
+    """What to say of a name that is no single channel: which ones it stands for, or else what was meant."""
+    if name.text not in known:
+        return f"no channel `{name.text}`", _nearest(name, known)
+    numbers = [f"`{path}`" for variable in known[name.text] for path in variable.channels]
+    return f"`{name.text}` is {len(numbers)} channels", [known_words("a metric watches one of them", numbers)]
 
 
 def metric_unit(use: MetricUse, known: dict[str, Channel]) -> str:

@@ -11,6 +11,7 @@ from dataclasses import field, replace
 
 from ic.grammar.syntax import Call, Deck, Entry, Expression, Group, Let, Name, Setting, Statement, Word
 from ic.meaning.complaints import Complaints, an, known_words
+from ic.meaning.csv_files import CsvFiles
 from ic.text.files import library_defines
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
@@ -78,10 +79,11 @@ class Definition:
 
 
 class Definitions:
-    """All definitions and lets of a deck, by kind and name."""
+    """All definitions and lets of a deck, by kind and name; and the CSV files that it names."""
 
     def __init__(self, deck: Deck, complaints: Complaints) -> None:
         self.lets: dict[str, Let] = {}
+        self.csv_files = CsvFiles(deck)
         self._by_kind: dict[str, dict[str, Definition]] = {kind: {} for kind in KINDS}
         self._merged: dict[tuple[str, str], Block] = {}
         self._failed: set[tuple[str, str]] = set()

@@ -14,7 +14,7 @@ from ic.meaning.record import read_requirements, resolve_metrics, resolve_record
 from ic.meaning.resolve import Block, Definition, Item
 from ic.meaning.schedule import Rate, base_rate, check_stability, divisor, make_schedule
 from ic.meaning.scope import Owner, Scope
-from ic.meaning.servos import RATE, Use, fixed_rate, resolve_servos
+from ic.meaning.servos import RATE, Use, check_rest, fixed_rate, resolve_servos
 from ic.meaning.values import Value, Values, place_of
 from met import models, units
 from met.diagnostic import Label, Place, did_you_mean
@@ -69,6 +69,8 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     uses, scope.lost = resolve_servos(scope, _body(scope, block.get("servos")), arm)
     environment, products = _environment(scope, _body(scope, block.get("environment")), arm)
     _initial(scope, _body(scope, block.get("initial")), arm)
+    for use in uses:
+        check_rest(scope, use)
     schedule, divisors = _schedule(scope, run, block, rates, uses, duration)
     if schedule is None or integrator is None:
         return None
@@ -353,7 +355,7 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
     divisors = {}
     everyone = [dynamics, record, *others]
     for use in uses:
-        rate = use.rate or shared or dynamics
+        rate = use.rate or (shared if use.servo.tick is not None else None) or dynamics
         divisors[use.joint] = divisor(scope.complaints, rate, base, everyone, written=written)
     if record.hz > dynamics.hz:
         scope.complaints.remark(

@@ -7,6 +7,7 @@ definition that hands it down without its being overridden (`gearbox.kp`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -300,6 +301,11 @@ class Scope:
         origin = Origin("derived", owner.place, (), note)
         return self._finish(owner, wanted, name, owner.homes, self._plain(value), origin, owner.place, True)
 
+    def follows(self, path: str, value: Real, unit: str, item: Item, note: str) -> None:
+        """Keeps a parameter that an item makes of numbers of its own, which are varied in its stead."""
+        place = item.place if item.value is None else place_of(item.value)
+        self.parameters[path] = Settled(self._plain(value), unit, Origin("derived", place, item.overrides, note), note)
+
     def written(self, item: Item, expression: Expression | None = None) -> Value | Values:
         """What the item's expression is worth, lists with what `+=` appended. Raises Problem."""
         expression = item.value if expression is None else expression
@@ -369,7 +375,8 @@ class Scope:
                 self.complaints.add(*problem.diagnostics)
                 self.checks.fail(coordinate.path)
         assert value is not None
-        self._check_range(owner, wanted, value, place, path)
+        if origin.kind != "default" or value != math.inf:  # a model's own default may be: never
+            self._check_range(owner, wanted, value, place, path)
         kept = self.parameters if record else self.beside
         if record or owner.called is None:
             kept[path] = Settled(value, self.unit(owner, wanted)[0], origin, wanted.doc, expression)

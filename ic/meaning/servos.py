@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 from ic.grammar.syntax import Call, Name, Word
@@ -13,6 +14,7 @@ from ic.meaning.models import check_keys, find_model, use_model, word_of
 from ic.meaning.resolve import Block, Item, open_call, overlay
 from ic.meaning.schedule import Rate
 from ic.meaning.scope import Owner, Scope
+from ic.meaning.trajectories import use_file, with_file_named
 from ic.meaning.unit_words import in_deck
 from ic.meaning.values import place_of
 from ic.text.files import library_defines
@@ -22,6 +24,7 @@ from met.diagnostic import Label, Place, Problem, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Command
+from met.trace import where
 
 SLOWEST, FASTEST = 1e-3, 1e9
 RATE = Parameter(name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, doc="how often the servo's computer ticks")
@@ -109,7 +112,10 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
     if command is not None:
         _check_needed(scope, owner, servo, command, block, place)
     rate = None
-    if block.get("rate") is not None:
+    if servo.tick is None and block.get("rate") is not None:
+        scope.complaints.error("D150", f"{an(servo.name)} has no computer that ticks, so no rate",
+                               block.items["rate"].place, help="leave `rate` out")
+    elif block.get("rate") is not None:
         rate = fixed_rate(scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`")
     scope.whole[f"{item.name}.servo.model"] = "decides the program, which is one for the whole sweep in this version"
     return Use(item.name, name, servo, command, rate, parameters, item.place)
@@ -128,6 +134,27 @@ def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, bloc
                 place,
                 help=f"write `{parameter.name} = ... {in_deck(scope.unit(owner, parameter)[0])};`: {parameter.doc}",
             )
+
+
+def check_rest(scope: Scope, use: Use) -> None:
+    """A joint whose servo must begin at rest does, in every case. After the initial state is settled."""
+    path = f"initial.{use.joint}.qd"
+    begins = scope.parameters.get(path)
+    if use.servo.at_rest is None or use.parameters is None or begins is None or begins.origin.place is None:
+        return
+    with scope.complaints.gather():
+        rate = where(use.servo.at_rest(SimpleNamespace(**use.parameters)), begins.value, 0.0)
+        scope.checks.hold(
+            (rate,),
+            lambda values: (values[:, 0] != 0.0, [f"this is {x:g} {begins.unit}" for x in values[:, 0] if x][:1]),
+            code="D119",
+            message=f"joint `{use.joint}` begins with a rate, and servo `{use.definition}` ({use.servo.name}) needs it "
+                    "at rest",
+            place=begins.origin.place,
+            help=(f"leave `{use.joint}.qd` out of `initial`", "or give the joint another servo"),
+            path=f"{path}.rest",
+            needs=(path, f"{use.joint}.servo"),
+        )
 
 
 def fixed_rate(scope: Scope, owner: Owner, item: Item, label: str, name: str = "rate") -> Rate | None:
@@ -190,14 +217,18 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     profile = find_model(scope, "command", name, inner.name.place)
     if profile is None:
         return None
+    inner = with_file_named(inner) if profile.from_file else inner
     if inner.positional:
         scope.complaints.error("D153", f"`{name}` takes its values by name", place_of(inner.positional[0]),
-                               help=f"write `{name}({', '.join(f'{p.name} = ...' for p in profile.parameters)})`")
+                               help=f"write `{name}({', '.join(f'{p.name} = ...' for p in profile.written)})`")
         return None
     _, body = open_call(inner, None, scope.complaints)
     opened = Block({key: replace(part, homes=item.homes, overrides=item.overrides)
                     for key, part in (body or Block()).items.items()}, (body or Block()).statements)
     course = replace(spot, label=f"`{name}`", called=None, place=inner.name.place)
+    if profile.from_file:
+        use_file(scope, course, profile, opened, owner.path.removesuffix(".servo"))
+        return Command(kind, profile.name)
     values = use_model(scope, course, profile.parameters, opened)
     if values is not None and profile.name == "table":
         _check_table(scope, opened, values)

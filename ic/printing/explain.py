@@ -27,6 +27,7 @@ HEADS = ("links", "metrics", "environment", "initial")
 IN_PLAN = "as the plan has it"
 NO_MORE: Mapping[str, Sequence[str]] = MappingProxyType({})
 MOST_NEAR = 12
+MOST_LISTED = 12  # numbers of a list; of a longer one the ends
 MOST_IN_FULL = 3  # parameters; of more a line each
 
 
@@ -207,6 +208,8 @@ def _shown(experiment: Experiment, found: Quantity) -> str:
     match found.value:
         case str():
             return found.value
+        case tuple() if len(found.value) > MOST_LISTED:
+            return f"{_series(np.array(found.value))}{'' if found.unit == '1' else f' {found.unit}'}"
         case tuple():
             return vector(found.value, found.unit)
         case Formula():

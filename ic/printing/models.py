@@ -14,7 +14,7 @@ from met.parameter import Parameter
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
 HOW = {
     "servo": "servo NAME { model = MODEL; ... }",
-    "command": "command = rate(MODEL(...)), position(MODEL(...)) or torque(MODEL(...)), in a servo",
+    "command": "command = rate(MODEL(...)), position(...), torque(...) or acceleration(...), in a servo",
     "environment": "environment { NAME = MODEL { ... } }, in a run",
     "metric": "metric NAME = MODEL { of = CHANNEL; ... }, in a run",
     "integrator": "integrator = MODEL, in a run",
@@ -73,7 +73,7 @@ def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
             yield f"{text}: {', '.join(value) if isinstance(value, tuple) else number(value)}"
     if kind == "metric":
         yield f"Unit of the result: {WORDS.get(model.unit, unit_in_words(model.unit))}"
-    parameters = getattr(model, "parameters", ())
+    parameters = _written(model)
     if parameters:
         yield ""
         yield "Parameters"
@@ -98,13 +98,19 @@ def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
     """All that a model declares, for programs."""
     fields = ("name", "unit", "doc", "default", "above", "at_least", "below", "at_most", "shape", "words", "source")
     told: dict[str, Any] = {"kind": kind, "name": model.name, "doc": textwrap.dedent(model.doc).strip()}
-    told["parameters"] = [{field: getattr(p, field) for field in fields} for p in getattr(model, "parameters", ())]
+    told["parameters"] = [{field: getattr(p, field) for field in fields} for p in _written(model)]
     for words in ("commands", "unit", "order", "real_limit"):
         if hasattr(model, words):
             told[words] = getattr(model, words)
     for words in ("memory", "states", "signals"):
         told[words] = [{"name": p.name, "unit": p.unit, "doc": p.doc} for p in getattr(model, words, ())]
     return told
+
+
+def _written(model: Any) -> tuple[Parameter, ...]:
+    """The parameters as a deck writes them."""
+    written: tuple[Parameter, ...] = getattr(model, "written", getattr(model, "parameters", ()))
+    return written
 
 
 def summary(model: Any) -> str:
@@ -138,5 +144,5 @@ def range_(parameter: Parameter) -> str:
 
 def meaning(parameter: Parameter) -> str:
     """What it is, and where its number comes from."""
-    shape = {"vector": "three numbers; ", "list": "a list; ", "word": ""}.get(parameter.shape, "")
+    shape = {"vector": "three numbers; ", "list": "a list; ", "text": "in quotes; "}.get(parameter.shape, "")
     return f"{shape}{parameter.doc}" + (f" ({parameter.source})" if parameter.source else "")

@@ -147,7 +147,9 @@ def _moves(joint: Joint, values: _Values) -> str:
     if axis is not None:
         opposite = tuple(-part + 0.0 for part in axis)
         word = named.get(axis, "") or (f"-{named[opposite]}" if opposite in named else vector(axis, "1"))  # type: ignore
-    return f"{joint.kind} {'along' if joint.kind == 'prismatic' else 'about'} {word}"
+    pivot = values.vector(f"{joint.name}.pivot")
+    through = f" through {vector(pivot, 'm')}" if pivot is not None else ""
+    return f"{joint.kind} {'along' if joint.kind == 'prismatic' else 'about'} {word}{through}"
 
 
 def _schedule(experiment: Experiment) -> Iterator[str]:
@@ -215,8 +217,9 @@ def _channels(structure: Structure) -> Iterator[str]:
     rows = []
     for recorded in structure.record:
         units = list(dict.fromkeys(recorded.unit))
-        joints = ", ".join(recorded.joints)
-        rows.append((recorded.name, ", ".join(units), recorded.doc, f"of {joints}" if joints else ""))
+        joints, components = ", ".join(recorded.joints), " ".join(recorded.components)
+        along = "; ".join(words for words in (f"of {joints}" if joints else "", components) if words)
+        rows.append((recorded.name, ", ".join(units), recorded.doc, along))
     yield from columns(rows)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from met import models
 from met.diagnostic import Place
 from met.plan import Experiment, Origin, Quantity
 
@@ -25,7 +26,8 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
     for use in structure.servos:
         word(f"servos.{use.joint}", use.definition, use.place)
         word(f"{use.joint}.servo.model", use.model, use.place)
-        number(f"{use.joint}.servo.rate", schedule.base_hz / use.divisor, "Hz", f"{use.divisor} base ticks a tick")
+        if models.find("servo", use.model).tick is not None:
+            number(f"{use.joint}.servo.rate", schedule.base_hz / use.divisor, "Hz", f"{use.divisor} base ticks a tick")
     for environment in structure.environment:
         word(f"environment.{environment.name}.model", environment.model, environment.place)
     word("environment.velocity_products", "on" if structure.velocity_products else "off")

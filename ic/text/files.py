@@ -90,8 +90,8 @@ class Files:
             return FoundFile(header, os.path.normpath(header)) if os.path.exists(header) else None
         return next((found for d in directories if os.path.exists((found := d.join(header)).path)), None)
 
-    def listed(self, directories: Sequence[Directory]) -> list[str]:
-        """Names that an include could have, for a "did you mean"."""
+    def listed(self, directories: Sequence[Directory], ending: str = ".ic") -> list[str]:
+        """Names that a file of this ending could have, for a "did you mean"."""
         names: list[str] = []
         for directory in directories:
             for at, folders, files in os.walk(directory.path or "."):
@@ -99,16 +99,19 @@ class Files:
                 if at.count(os.sep) - directory.path.count(os.sep) >= 2:
                     folders.clear()
                 beside = os.path.relpath(at, directory.path or ".")
-                names += [os.path.normpath(os.path.join(beside, f)) for f in sorted(files) if f.endswith(".ic")]
+                names += [os.path.normpath(os.path.join(beside, f)) for f in sorted(files) if f.endswith(ending)]
                 if len(names) > MOST_LISTED:
                     return names[:MOST_LISTED]
         return names
 
-    def text(self, file: FoundFile) -> str:
-        """The file's text, with lines ended by newlines; raises Problem (D001, D002, D018) where it has none."""
+    def text(self, file: FoundFile, *, kind: str = "deck", most: int = MOST_BYTES) -> str:
+        """The file's text, with lines ended by newlines; raises Problem (D001, D002, D018) where it has none.
+
+        kind: what it should be, for messages; most: bytes that it may have.
+        """
         if file.name not in self.read_so_far:
-            data = _read_bytes(file)
-            text, complaint = _decode(data, file.name)
+            data = _read_bytes(file, kind, most)
+            text, complaint = _decode(data, file.name, kind)
             self.read_so_far[file.name] = SourceText(file.name, text, hashlib.sha256(data).hexdigest())
             if complaint is not None:
                 raise Problem(complaint)
@@ -124,39 +127,41 @@ def library_defines(kind: str, name: str, library: Path = LIBRARY) -> str | None
     return None
 
 
-def _read_bytes(file: FoundFile) -> bytes:
+def _read_bytes(file: FoundFile, kind: str, most: int) -> bytes:
     try:
         about = os.stat(file.path)
         if stat.S_ISDIR(about.st_mode):
-            inside = sorted(f for f in os.listdir(file.path) if f.endswith(".ic"))[:MOST_NAMED]
-            help = f"decks in it: {', '.join(inside)}" if inside else "there is no deck in it"
-            raise Problem(error("D001", f"`{file.name}` is a directory, not a deck", help=help))
+            ending = ".ic" if kind == "deck" else ".csv"
+            inside = sorted(f for f in os.listdir(file.path) if f.endswith(ending))[:MOST_NAMED]
+            help = f"{kind}s in it: {', '.join(inside)}" if inside else f"there is no {kind} in it"
+            raise Problem(error("D001", f"`{file.name}` is a directory, not a {kind}", help=help))
         if not stat.S_ISREG(about.st_mode):
             raise Problem(error("D001", f"`{file.name}` is not a regular file", help="copy what it gives to a file"))
-        if about.st_size > MOST_BYTES:
-            size = f"{about.st_size / 2**20:.1f} MiB; a deck's file has at most {MOST_BYTES >> 20}"
-            help = "numbers in bulk belong in a table file, not in a deck"
+        if about.st_size > most:
+            whose = "deck's file" if kind == "deck" else kind
+            size = f"{about.st_size / 2**20:.1f} MiB; a {whose} has at most {most >> 20}"
+            help = "numbers in bulk belong in a CSV file, not in a deck" if kind == "deck" else "split it"
             raise Problem(error("D018", f"`{file.name}` has {size}", help=help))
         with open(file.path, "rb") as stream:
-            return stream.read(MOST_BYTES)
+            return stream.read(most)
     except (OSError, ValueError) as reason:
         why = getattr(reason, "strerror", None) or str(reason)
         help = "look at the name, and at who may read the file"
         raise Problem(error("D001", f"cannot read `{file.name}`: {why}", help=help)) from None
 
 
-def _decode(data: bytes, name: str) -> tuple[str, Diagnostic | None]:
+def _decode(data: bytes, name: str, kind: str) -> tuple[str, Diagnostic | None]:
     """The text, and what is wrong with it; where something is, the text is good enough to show the line."""
     complaint = None
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        complaint = error("D002", f"`{name}` is UTF-16, but decks are UTF-8", help="save it as UTF-8")
+        complaint = error("D002", f"`{name}` is UTF-16, but {kind}s are UTF-8", help="save it as UTF-8")
         return data.decode("utf-16", errors="replace"), complaint
     found = _NOT_TEXT.search(data)
     if found is not None:
         place = _place_of_byte(data, found.start(), name)
         complaint = error(
             "D002", f"`{name}` is not text: it holds the byte 0x{data[found.start()]:02x}", place,
-            help="is this an archive or a program? A deck is plain text in UTF-8",
+            help=f"is this an archive or a program? A {kind} is plain text in UTF-8",
         )  # fmt: skip
     try:
         text = data.decode("utf-8-sig")

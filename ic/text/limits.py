@@ -15,6 +15,8 @@ from met.diagnostic import Diagnostic
 
 MOST_BYTES = 2 << 20  # of one file
 MOST_TOKENS = 500_000  # of all files together, white space included
+MOST_CSV_BYTES = 16 << 20  # of one CSV file
+MOST_CSV_ROWS = 100_000
 LONGEST_LINE = 200_000  # characters
 MOST_INCLUDES = 2_000  # files entered, again and again counted
 INCLUDE_DEPTH = 50

@@ -13,16 +13,29 @@ from met.frozen import frozen
 from met.parameter import Parameter
 from met.trace import Real
 
+FILE = Parameter(name="file", shape="text", doc="CSV file")
+COLUMN = Parameter(name="column", shape="text", default="the joint's", doc="name of its column")
+
 
 @frozen(kw_only=True)
 class Profile:
     """The declaration of a command profile; one a file.
 
-    course  (p, t) -> (value, slope): value in the unit `command`, slope its time derivative; t in s.
-            The slope at a jump is zero, at a kink the slope of what follows.
+    parameters  what `course` reads, and what a plan holds
+    course      (p, t) -> (value, slope): value in the unit `command`, slope its time derivative; t in s.
+                The slope at a jump is zero, at a kink the slope of what follows.
+    from_file   the lists `times` and `values` are columns of a CSV file: a deck writes `file` and `column` for them
     """
 
     name: str
     doc: str
     parameters: tuple[Parameter, ...]
     course: Callable[[Any, Real], tuple[Real, Real]]
+    from_file: bool = False
+
+    @property
+    def written(self) -> tuple[Parameter, ...]:
+        """The parameters as a deck writes them."""
+        if not self.from_file:
+            return self.parameters
+        return (FILE, COLUMN, *(p for p in self.parameters if p.name not in ("times", "values")))

@@ -43,6 +43,7 @@ from met.dynamics.spatial import (
     cross,
     dot,
     inverse,
+    is_zero,
     lower_vector,
     product,
     rigid_about_centre,
@@ -70,6 +71,7 @@ class Body:
     at, rpy      joint frame in the parent's link frame: origin (m), turns about fixed x, y, z in that order (rad).
                  The link frame is the joint frame at q = 0
     axis         unit vector in the joint frame, of motion along or about it; not read for a fixed joint
+    pivot        a point of a revolute joint's axis, in the joint frame, m: the origin unless the axis passes it by
     mass         kg
     com          centre of mass in the link frame, m
     inertia      xx, yy, zz, xy, xz, yz about the centre of mass in link axes, kg m^2
@@ -82,6 +84,7 @@ class Body:
     at: Vector = ZERO
     rpy: Vector = ZERO
     axis: Vector = (0.0, 0.0, 1.0)
+    pivot: Vector = ZERO
     mass: Real = 0.0
     com: Vector = ZERO
     inertia: tuple[Real, Real, Real, Real, Real, Real] = (0.0,) * 6
@@ -136,7 +139,8 @@ class _Builder:
         by_joint = {body.joint: number for number, body in enumerate(bodies)}
         self.links = [by_joint[name] for name in names]
         number = {link: i for i, link in enumerate(self.links)}
-        # Group of each body: the moving joint it is rigid with, and its link frame in that joint's link frame.
+        # Group of each body: the moving joint it is rigid with, and its link frame in that joint's frame, which is
+        # the frame of the link that it carries, but for a pivot.
         self.group: list[int] = [-1] * len(self.bodies)
         self.within: list[Pose] = [HERE] * len(self.bodies)
         self.parent = [-1] * len(names)
@@ -151,6 +155,9 @@ class _Builder:
             else:
                 i = number[b]
                 self.group[b], self.parent[i], self.at[i] = i, group, pose
+                if body.kind == "revolute" and not all(is_zero(x) for x in body.pivot):
+                    x, y, z = body.pivot
+                    self.at[i], self.within[b] = _moved_to(pose, body.pivot), Pose(IDENTITY, (-x, -y, -z))
         self.order = tuple(number[b] for b in self.sorted if b in number)
         self.first: dict[int, int] = {}
         for i in self.order:
@@ -361,6 +368,12 @@ def _unit(a: Vector) -> Vector:
 def _cleaned(pose: Pose) -> Pose:
     """The pose with right angles exact and lost digits of its origin dropped, where it is constant."""
     return Pose(snap_rotation(pose.R), _clean_vector(pose.p, _norm(pose.p)) if all_constant(pose.p) else pose.p)
+
+
+def _moved_to(pose: Pose, point: Vector) -> Pose:
+    """The frame with its origin at a point of it; what cancels, cancels whole."""
+    p = compose(pose, Pose(IDENTITY, point)).p
+    return Pose(pose.R, _clean_vector(p, _norm(pose.p) + _norm(point)) if all_constant(p) else p)
 
 
 def _clean_vector(a: Vector, size: float) -> Vector:

@@ -20,7 +20,8 @@ Vector = tuple[Real, Real, Real]
 class World(Protocol):
     """What an environment model may ask of the arm at a stage.
 
-    time                 s
+    time                 of the stage, s
+    begin, step          time at which the dynamics step began that the stage is part of, and its length, s
     joints, links        names, in the plan's order; joints are those that move
     slides(joint)        whether it is prismatic
     q(joint), qd(joint)  rad, rad/s (m, m/s)
@@ -30,6 +31,8 @@ class World(Protocol):
     """
 
     time: Real
+    begin: Real
+    step: float
     joints: tuple[str, ...]
     links: tuple[str, ...]
 

@@ -42,21 +42,26 @@ def ahead(y: Motion, h: Real, k: Slope) -> Motion:
     )
 
 
+def by_parts(rule: Callable[..., Real], *slopes: Slope) -> Slope:
+    """The slope whose every part is `rule` of the same part of these."""
+    return Slope(
+        tuple(rule(*parts) for parts in zip(*(k.qd for k in slopes), strict=True)),
+        tuple(rule(*parts) for parts in zip(*(k.qdd for k in slopes), strict=True)),
+        tuple(rule(*parts) for parts in zip(*(k.xd for k in slopes), strict=True)),
+    )
+
+
 def mean(k1: Slope, k2: Slope) -> Slope:
     """(k1 + k2)/2."""
-    return Slope(
-        tuple(0.5 * (a + b) for a, b in zip(k1.qd, k2.qd, strict=True)),
-        tuple(0.5 * (a + b) for a, b in zip(k1.qdd, k2.qdd, strict=True)),
-        tuple(0.5 * (a + b) for a, b in zip(k1.xd, k2.xd, strict=True)),
-    )
+    return by_parts(lambda a, b: 0.5 * (a + b), k1, k2)
 
 
 @frozen(kw_only=True)
 class Integrator:
     """The declaration of an integrator; one a file.
 
-    order       the power of the step with which its error falls
-    real_limit  the largest h lambda for which a decay at the rate lambda stays stable
+    order       the power of the step with which its error falls, where the motion is smooth in every step
+    real_limit  the h lambda below which a rate that decays as d(qd)/dt = -lambda qd stays stable
     advance     (slope, h, y, k1) -> y at the end of a step of h s. slope(c, y) is the derivative at the share c of
                 the step; k1 = slope(0, y)
     """

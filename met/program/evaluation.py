@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 
 from met.dynamics.recursion import Solved, solve
 from met.dynamics.tree import Tree
@@ -25,6 +26,7 @@ class Derivative:
     need     smooth torque on each joint less what the arm takes: what dry friction must hold where it sticks
     solved   the recursion's own results
     drives   what each servo does, by joint number; None for a passive joint
+    gravity  acceleration of free fall, of all environment models, world axes, m/s^2
     """
 
     slope: Slope
@@ -32,21 +34,34 @@ class Derivative:
     need: tuple[Real, ...]
     solved: Solved
     drives: tuple[Drive | None, ...]
+    gravity: Vector
 
 
 def derivative(
-    machine: Machine, read: ReadCell, *, y: Motion, held: Sequence[Values], friction: Sequence[Real | None], time: Real
+    machine: Machine,
+    read: ReadCell,
+    *,
+    y: Motion,
+    held: Sequence[Values],
+    friction: Sequence[Real | None],
+    time: Real,
+    begin: Real,
+    part: Callable[[str], AbstractContextManager[None]],
 ) -> Derivative:
     """The derivative at state y (`held`, `friction`: one for each moving joint).
 
+    begin     time at which the dynamics step began that this stage is part of, s
     friction  None for a joint without dry friction; else s in {0, +1, -1}: stuck, sliding forward, backward
+    part      of the tape: tells servos, environment and dynamics apart where a profile asks
     """
-    drives = tuple(
-        None if actuator is None else drive_of(machine, actuator, read, y, held[i], time)
-        for i, actuator in enumerate(machine.actuators)
-    )
+    with part("servo physics"):
+        drives = tuple(
+            None if actuator is None else drive_of(machine, actuator, read, y, held[i], time, begin)
+            for i, actuator in enumerate(machine.actuators)
+        )
     tree = machine.tree(read)
-    gravity, torques, wrenches = _environment(machine, tree, read, y, time)
+    with part("environment"):
+        gravity, torques, wrenches = _environment(machine, tree, read, y, time, begin)
 
     given: list[Real] = []
     mode: list[Truth] = []
@@ -63,33 +78,37 @@ def derivative(
         dry.append(0.0 if drive is None or s is None else s * drive.dry)
 
     smooth = [torques[i] + (0.0 if drive is None else drive.torque) for i, drive in enumerate(drives)]
-    solved = solve(
-        tree,
-        y.q,
-        y.qd,
-        tau=tuple(a - b for a, b in zip(smooth, dry, strict=True)),
-        qdd=tuple(given),
-        mode=tuple(mode),
-        rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
-        gravity=gravity,
-        wrenches=wrenches,
-        velocity_products=machine.structure.velocity_products,
-    )
+    with part("dynamics"):
+        solved = solve(
+            tree,
+            y.q,
+            y.qd,
+            tau=tuple(a - b for a, b in zip(smooth, dry, strict=True)),
+            qdd=tuple(given),
+            mode=tuple(mode),
+            rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
+            gravity=gravity,
+            wrenches=wrenches,
+            velocity_products=machine.structure.velocity_products,
+        )
     return Derivative(
         slope=Slope(y.qd, solved.qdd, _slopes(machine, drives)),
         tau=tuple(a - b for a, b in zip(solved.tau, torques, strict=True)),
         need=tuple(a - b for a, b in zip(smooth, solved.tau_load, strict=True)),
         solved=solved,
         drives=drives,
+        gravity=gravity,
     )
 
 
-def drive_of(machine: Machine, actuator: Actuator, read: ReadCell, y: Motion, held: Values, time: Real) -> Drive:
+def drive_of(
+    machine: Machine, actuator: Actuator, read: ReadCell, y: Motion, held: Values, time: Real, begin: Real
+) -> Drive:
     """What a servo does to its joint at state y with this memory, its answer checked against its declaration."""
     servo = actuator.servo
     names = state_names(machine)
     states = {state.name: y.x[names.index(f"{actuator.path}.{state.name}")] for state in servo.states}
-    motion = JointMotion(y.q[actuator.index], y.qd[actuator.index], time)
+    motion = JointMotion(y.q[actuator.index], y.qd[actuator.index], time, begin, actuator.asked)
     p = machine.servo_values(actuator, read)
     drive = answer(actuator.owner, servo.drive, p, held, Values(actuator.owner, states), motion)
     returned(actuator.owner, "slopes", drive.slopes, states)
@@ -112,10 +131,10 @@ def _slopes(machine: Machine, drives: Sequence[Drive | None]) -> tuple[Real, ...
 
 
 def _environment(
-    machine: Machine, tree: Tree, read: ReadCell, y: Motion, time: Real
+    machine: Machine, tree: Tree, read: ReadCell, y: Motion, time: Real, begin: Real
 ) -> tuple[Vector, list[Real], dict[str, tuple[Vector, Vector]]]:
     """Sum of all loads: gravity (world), torque a joint, wrench a link (moment about its origin, force; link axes)."""
-    world = ArmWorld(machine, tree, y.q, y.qd, time)
+    world = ArmWorld(machine, tree, y.q, y.qd, time, begin)
     gravity: list[Real] = [0.0, 0.0, 0.0]
     torques: list[Real] = [0.0 for _ in machine.joints]
     wrenches: dict[str, tuple[Vector, Vector]] = {}

@@ -53,6 +53,11 @@ class Actuator:
         return f"{self.use.joint}.servo"
 
     @property
+    def asked(self) -> str:
+        """Kind of the joint's command; "none" where it has none."""
+        return "none" if self.use.command is None else self.use.command.kind
+
+    @property
     def owner(self) -> str:
         """Name for messages."""
         return f"servo `{self.use.definition}` of joint `{self.use.joint}` (model {self.use.model})"
@@ -106,6 +111,11 @@ class Machine:
         return tuple(actuator for actuator in self.actuators if actuator is not None)
 
     @cached_property
+    def between(self) -> tuple[Actuator, ...]:
+        """Those that tick between instants: faster than the dynamics, or slower and no multiple of them."""
+        return tuple(actuator for actuator in self.working if actuator.use.divisor % self.structure.schedule.dynamics)
+
+    @cached_property
     def sticking(self) -> tuple[Actuator, ...]:
         """The actuators with dry friction."""
         return tuple(actuator for actuator in self.working if actuator.dry)
@@ -146,7 +156,7 @@ class Machine:
         joints = {joint.name for joint in self.structure.joints}
         for path in self.varying:
             head, *rest = path.split(".")
-            if head == "links" or (head in joints and rest[0] in ("at", "rpy", "axis")):
+            if head == "links" or (head in joints and rest[0] in ("at", "rpy", "axis", "pivot")):
                 return None
         return self._tree(lambda _: 0.0)
 
@@ -172,12 +182,16 @@ class Machine:
                     at=vector(f"{joint.name}.at"),
                     rpy=vector(f"{joint.name}.rpy"),
                     axis=(0.0, 0.0, 1.0) if joint.kind == "fixed" else vector(f"{joint.name}.axis"),
+                    pivot=vector(f"{joint.name}.pivot") if self._has_pivot(joint) else (0.0, 0.0, 0.0),
                     mass=self.value(f"links.{link.name}.mass", read),
                     com=vector(f"links.{link.name}.com"),
                     inertia=inertia,
                 )
             )
         return Tree.build(tuple(bodies), tuple(joint.name for joint in self.joints))
+
+    def _has_pivot(self, joint: Joint) -> bool:
+        return f"{joint.name}.pivot.x" in self.experiment.parameters
 
     def _link_order(self) -> list[Any]:
         """Links in the order of the joints that carry them."""
@@ -201,6 +215,7 @@ class Machine:
         servo = actuator.servo
         held = Values(actuator.owner, {memory.name: graph.input(memory.name) for memory in servo.memory})
         states = Values(actuator.owner, {state.name: graph.input(state.name) for state in servo.states})
-        joint = JointMotion(graph.input("q"), graph.input("qd"), graph.input("time"))
+        q, qd, time, begin = (graph.input(name) for name in ("q", "qd", "time", "begin"))
+        joint = JointMotion(q, qd, time, begin, actuator.asked)
         drive = answer(actuator.owner, servo.drive, self.servo_values(actuator, graph.input), held, states, joint)
         return drive, graph.value(drive.dry.ref) if isinstance(drive.dry, Scalar) else float(drive.dry)

@@ -13,8 +13,11 @@ from met.trace import Real
 class ArmWorld:
     """A `met.environments.environment.World` at one stage."""
 
-    def __init__(self, machine: Machine, tree: Tree, q: tuple[Real, ...], qd: tuple[Real, ...], time: Real) -> None:
-        self.time = time
+    def __init__(
+        self, machine: Machine, tree: Tree, q: tuple[Real, ...], qd: tuple[Real, ...], time: Real, begin: Real
+    ) -> None:
+        self.time, self.begin = time, begin
+        self.step = machine.structure.schedule.step
         self.joints = tuple(joint.name for joint in machine.joints)
         self.links = tuple(link.name for link in machine.structure.links)
         self._sliding = {joint.name: joint.kind == "prismatic" for joint in machine.joints}

@@ -43,8 +43,8 @@ def tick(p: Any, held: Any, seen: Seen) -> Mapping[str, Real]:
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
     """The motor, the gearbox and their friction, under the voltage held."""
     w_m = p.ratio * joint.qd
-    current = (held.voltage - p.kt * w_m) / p.resistance
-    tau_m = clip(p.kt * current, -p.tau_max, p.tau_max)
+    # kt / R together: one number where no case varies them, and no division at each stage.
+    tau_m = clip(p.kt / p.resistance * (held.voltage - p.kt * w_m), -p.tau_max, p.tau_max)
     return Drive(
         torque=p.ratio * (tau_m - p.f_v * w_m),
         dry=p.ratio * p.f_c,

@@ -23,7 +23,8 @@ from met.trace import Real, Truth
 class Asked:
     """What the joint's command asks at a tick: its kind, its value and the value's rate of change.
 
-    kind   "rate" (value in rad/s), "position" (rad) or "torque" (N m, at the joint); m/s, m and N on a prismatic joint
+    kind   "rate" (value in rad/s), "position" (rad), "torque" (N m, at the joint) or "acceleration" (rad/s^2); m/s, m,
+           N and m/s^2 on a prismatic joint
     value  slope = d(value)/dt
     """
 
@@ -39,21 +40,31 @@ class Seen:
     q, qd   joint position and rate
     asked   the command
     period  time from this tick to the next, s
+    time    of this tick, s
     """
 
     q: Real
     qd: Real
     asked: Asked
     period: float
+    time: Real = 0.0
 
 
 @frozen
 class JointMotion:
-    """What nature does to the servo's physics at a stage: joint position and rate, and the time (s)."""
+    """What nature does to the servo's physics at a stage.
+
+    q, qd    joint position and rate
+    time     of the stage, s
+    begin    time at which the dynamics step began that the stage is part of, s: for what changes from step to step
+    command  kind of the joint's command, known while the servo is recorded; "none" where it has none
+    """
 
     q: Real
     qd: Real
     time: Real
+    begin: Real = 0.0
+    command: str = "none"
 
 
 @frozen
@@ -83,11 +94,12 @@ class Drive:
 class Servo:
     """The declaration of a servo model; one a file, in met/servos or in a package of your own.
 
-    commands  kinds of command it understands, of "rate", "position", "torque"; empty: it takes none
+    commands  kinds of command it understands, of "rate", "position", "torque", "acceleration"; empty: it takes none
     tick      (p, held, seen) -> new memory, by name. p: parameters by name. None: no computer
     drive     (p, held, states, joint) -> Drive
     fastest   (p) -> upper bound of the fastest rate constant of the joint's motion under this servo, 1/s, whatever
               arm it carries; for the plan's stability figure. None: no such bound
+    at_rest   (p) -> whether its joint must begin at rest: another initial rate is an error. None: it need not
     """
 
     name: str
@@ -100,3 +112,4 @@ class Servo:
     tick: Callable[[Any, Any, Seen], Mapping[str, Real]] | None = None
     drive: Callable[[Any, Any, Any, JointMotion], Drive]
     fastest: Callable[[Any], Real] | None = None
+    at_rest: Callable[[Any], Truth] | None = None

@@ -1,10 +1,12 @@
-"""sin, cos, tan, exp, log, tanh and atan2 as recorded primitives: what makes every back end agree to the bit.
+"""sin, cos, exp, log, atan2 and their like as recorded primitives: what makes every back end agree to the bit.
 
 Arguments are reduced with fused multiply-adds, then polynomials. sin and cos of one argument share everything but a
-choice. Errors, in units in the last place, are tested against 60 digits (tests/met/trace/test_functions.py): exp and
-log 1.1; sin and cos 1.5, up to 2^30 rad; tan, tanh and atan2 3. Coefficients of sin, cos, log and atan are fdlibm's
-(Sun Microsystems 1993, k_sin.c, k_cos.c, e_log.c, s_atan.c); exp's are a minimax fit of (e^r - 1 - r)/r^2 on
-|r| <= ln(2)/2.
+choice. Errors over the whole range, in units in the last place, are tested against 60 digits and more
+(tests/met/trace/test_accuracy.py): exp and log 1; sin and cos 1.6, tan 2.4, up to 2^48 rad (then see there);
+atan2 and atan 2; asin and acos 2.6; tanh 2.7. atan2, atan and asin keep the sign of a zero, the others may not.
+
+Coefficients of sin, cos, log and atan are fdlibm's (Sun Microsystems 1993, k_sin.c, k_cos.c, e_log.c, s_atan.c); exp's
+are a minimax fit of (e^r - 1 - r)/r^2 on |r| <= ln(2)/2.
 """
 
 from __future__ import annotations
@@ -12,12 +14,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from met.trace.primitives import exact_sum
 from met.trace.scalar import Mask, Scalar
 
 # pi/2 in three parts, each the double nearest to what is left; the first product with a whole number is then exact
 _QUARTER = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591698e-33)
 # 1.5 * 2^52: added, a number is rounded to a whole one, whose lowest bits are the sum's
 _ROUND = 6755399441055744.0
+
+# up to here sin, cos and tan are what they claim; a turn is then less than 200 steps of the angle itself
+FARTHEST = 2.0**48
 
 _SIN = (-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
         2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10)
@@ -35,6 +41,7 @@ _EXP = (0.5, 0.1666666666666667, 0.041666666666666685, 0.008333333333326134, 0.0
 _LN2 = (0.6931471805599453, 2.3190468138462996e-17)
 # ln(2) with 20 trailing zero bits, so that its product with an exponent is exact, and the rest
 _LN2_SPLIT = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
+_ATAN_HALF = (0.4636476090008061, 2.2698777452961687e-17)
 _PI = (3.141592653589793, 1.2246467991473532e-16)
 
 
@@ -74,7 +81,8 @@ def _polynomial(coefficients: Sequence[float], z: Scalar) -> Scalar:
 def _quadrant(x: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """(t, s, c): the number of quarter turns in t's lowest bits, sine and cosine of what is left of x.
 
-    What is left is right to half a unit in its last place up to |x| = 2^30 or so.
+    What is left is right to a unit in its last place up to |x| = FARTHEST. Beyond 2^51 it is anything: a check would
+    cost three operations for every joint that turns, and no angle of an arm gets near.
     """
     t = _fma(x, 2.0 / math.pi, _ROUND)
     k = t - _ROUND
@@ -88,20 +96,35 @@ def _quadrant(x: Scalar) -> tuple[Scalar, Scalar, Scalar]:
 
 
 def sin(x: Scalar) -> Scalar:
-    """The sine of x rad; not a number where x is infinite."""
+    """The sine of x rad, |x| <= 2^48: beyond it is worth less and less, from 2^51 on nothing; of infinity no number."""
     t, s, c = _quadrant(x)
     return _flip(_where(_bit(t, 0), c, s), t, 1)
 
 
 def cos(x: Scalar) -> Scalar:
-    """The cosine of x rad; not a number where x is infinite."""
+    """The cosine of x rad, |x| <= 2^48: beyond, as for the sine."""
     t, s, c = _quadrant(x)
     return _flip(_where(_bit(t, 0), s, c), t + 1.0, 1)
 
 
 def tan(x: Scalar) -> Scalar:
-    """The tangent of x rad; not a number where x is infinite."""
-    t, s, c = _quadrant(x)
+    """The tangent of x rad; not a number where |x| > 2^48.
+
+    A quotient shows the errors of both its parts, so what is left of x is carried as a sum here, r + rest.
+    """
+    t = _fma(x, 2.0 / math.pi, _ROUND)
+    k = t - _ROUND
+    first = _fma(-k, _QUARTER[0], x)
+    product = k * _QUARTER[1]
+    error = _fma(k, _QUARTER[1], -product)
+    r, lost = exact_sum(first, -product)
+    r, rest = exact_sum(r, _fma(-k, _QUARTER[2], lost - error))
+    r = _where(abs(x) <= FARTHEST, r, math.nan)
+    z = r * r
+    s = r + _fma(r * z, _polynomial(_SIN, z), rest)
+    high = _fma(-0.5, z, 1.0)
+    low = _fma(-0.5, z, 1.0 - high)
+    c = high + _fma(z * z, _polynomial(_COS, z), _fma(-r, rest, low))
     odd = _bit(t, 0)
     return _where(odd, c, s) / _where(odd, -s, c)
 
@@ -153,18 +176,41 @@ def tanh(x: Scalar) -> Scalar:
 
 
 def atan2(y: Scalar, x: Scalar) -> Scalar:
-    """The angle of the point (x, y), rad, in [-pi, pi]; both at most 8e307 in size, or infinite."""
+    """The angle of the point (x, y), rad, in [-pi, pi]."""
     a, b = abs(y), abs(x)
     steep = a > b
     less, more = _where(steep, b, a), _where(steep, a, b)
+    # by a power of two: no sum overflows, and the bound of `upper` is no number of few bits
+    scale = _where(more > 2.0**500, 2.0**-64, 2.0**64)
+    less, more = less * scale, more * scale
+    # the polynomial holds up to 7/16; above, what is left of the angle beyond atan(1/2), whose numerator is exact
     equal = less == more
-    upper = (less > more * (math.sqrt(2.0) - 1.0)) | (less == math.inf)
-    above = _where(equal, 0.0, less - more)
-    t = _where(upper, above, less) / _where(equal, 1.0, _where(upper, less + more, more))
+    upper = (less > more * 0.4375) | (less == math.inf)
+    beyond, around = _where(equal, 1.0, 2.0 * less - more), _where(equal, 3.0, 2.0 * more + less)
+    t = _where(upper, beyond, less) / _where(upper, around, _where(equal, 1.0, more))
     z = t * t
     angle = _fma(t * z, _polynomial(_ATAN, z), t)
-    eighth = _PI[0] / 4
-    angle = _where(upper, eighth + (angle + _PI[1] / 4), angle)
+    angle = _where(upper, _ATAN_HALF[0] + (angle + _ATAN_HALF[1]), angle)
     angle = _where(steep, _PI[0] / 2 - (angle - _PI[1] / 2), angle)
     angle = _where(_bit(x, 63), _PI[0] - (angle - _PI[1]), angle)
     return _flip(angle, y, 63)
+
+
+def atan(x: Scalar) -> Scalar:
+    """The arc tangent, rad, in [-pi/2, pi/2]."""
+    return atan2(x, Scalar(x.graph, x.graph.constant(1.0)))
+
+
+def asin(x: Scalar) -> Scalar:
+    """The arc sine, rad, in [-pi/2, pi/2]; not a number where |x| > 1."""
+    return atan2(x, _other_leg(x))
+
+
+def acos(x: Scalar) -> Scalar:
+    """The arc cosine, rad, in [0, pi]; not a number where |x| > 1."""
+    return atan2(_other_leg(x), x)
+
+
+def _other_leg(x: Scalar) -> Scalar:
+    """sqrt(1 - x^2): rounded twice only, so it is as right where x is nearly 1."""
+    return _unary("sqrt", _fma(-x, x, 1.0))

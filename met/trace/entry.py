@@ -45,6 +45,8 @@ class _Entry:
         self.counters: list[str] = []
         self.labels = 0
         self.now = ("0", "0.0", "0.0")
+        # depth of what runs seldom: its sections are called, not put in place, which compiles in half the time
+        self.rare = 0
 
     def put(self, *lines: str) -> None:
         self.lines.extend(lines)
@@ -66,10 +68,11 @@ class _Entry:
             for part in self.parts:
                 rows[part] = f"{row}.{part}"
                 self.put(f"  {rows[part]} = getelementptr i8, ptr {row}, i64 {part * self.part_bytes}")
+        apart = " #2" if self.rare else ""
         for symbol in self.calls[section]:
             for part in self.parts:
                 self.put(f"  call void {symbol}(ptr %state.{part}, ptr %inputs.{part}, ptr %scratch.{part}, "
-                         f"ptr {rows[part]}, ptr %outputs.{part}, double {tick}, double {time})")
+                         f"ptr {rows[part]}, ptr %outputs.{part}, double {tick}, double {time}){apart}")
 
     def due(self, divisor: int) -> str:
         """Whether the divisor divides the tick's number."""
@@ -110,7 +113,9 @@ class _Entry:
                  f"  br i1 %{n}, label %do.{n}, label %after.{n}", f"do.{n}:",
                  f"  %{n}.next = add i64 %{n}.count, 1",
                  f"  store i64 %{n}.next, ptr %{n}.p")
+        self.rare += 1
         self.steps(body)
+        self.rare -= 1
         self.put(f"  br label %ask.{n}", f"after.{n}:")
 
     def record(self, node: Recorded) -> None:
@@ -171,7 +176,9 @@ class _Entry:
                  "  %behind = sub i64 %cases, %case",
                  "  %most = sub i64 %behind, 1",
                  "  %fresh = icmp eq i64 %first, 0")
+        self.rare += 1
         self.guarded("%fresh", "start", self._start)
+        self.rare -= 1
         self.put("  %some = icmp sle i64 %first, %last",
                  "  br label %ticks", "ticks:",
                  "  br i1 %some, label %tick.head, label %ticks.end", "tick.head:",
@@ -192,6 +199,7 @@ class _Entry:
                      "  %rest.any = icmp ne i64 %rest, 0")
             self.guarded("%rest.any", "rest", lambda: self.flush("%rest"))
         self.now = ("%last", "%tick.last", "%time.last")
+        self.rare += 1
         self.guarded("%ending", "end", lambda: self.steps(self.recording.end))
         self.put("  br label %block.end", "block.end:",
                  "  %b.next = add i64 %b, 1",
@@ -201,7 +209,7 @@ class _Entry:
         head = [
             f"define void @{ENTRY}(ptr noalias readonly %inputs, ptr noalias %state, ptr noalias %rows, "
             "ptr noalias %outputs, i64 %blocks, i64 %first, i64 %last, i64 %cases, i64 %stride, "
-            "i64 %state.stride) #0 {", "entry:",
+            "i64 %state.stride) #3 {", "entry:",
             f"  %scratch = alloca [{max(1, self.scratch) * self.lanes} x double], align 64",
             f"  %tile = alloca [{tile * self.lanes} x double], align 64",
             "  %filled = alloca i64", "  %target = alloca ptr", *self.counters,
@@ -235,33 +243,37 @@ def spread(lanes: int, width: int) -> str:
     the last case (`most`) write what that case writes, where it does.
     """
     lines = ["define private void @spread(ptr noalias readonly %tile, i64 %count, ptr %to, i64 %stride, i64 %most) "
-             "#1 {", "entry:"]
-    for lane in range(lanes):
-        lines += [f"  %lane.{lane} = call i64 @llvm.umin.i64(i64 {lane}, i64 %most)",
-                  f"  %offset.{lane} = mul i64 %lane.{lane}, %stride",
-                  f"  %to.{lane} = getelementptr double, ptr %to, i64 %offset.{lane}"]
-    lines.append(f"  %whole = and i64 %count, {-width}")
-    previous = "entry"
-    for group in range(0, lanes, width):
-        lines += _squares(f"g{group}", group, lanes, width, previous)
-        previous = f"g{group}.done"
-    return "\n".join([*lines, "  ret void", "}", "declare i64 @llvm.umin.i64(i64, i64)"])
+             "#1 {", "entry:",
+             f"  %whole = and i64 %count, {-width}",
+             "  br label %group", "group:",
+             "  %g = phi i64 [ 0, %entry ], [ %g.next, %done ]",
+             "  %g.bytes = shl i64 %g, 3",
+             "  %from = getelementptr i8, ptr %tile, i64 %g.bytes"]
+    for j in range(width):
+        lines += [f"  %lane.{j} = add i64 %g, {j}",
+                  f"  %there.{j} = call i64 @llvm.umin.i64(i64 %lane.{j}, i64 %most)",
+                  f"  %offset.{j} = mul i64 %there.{j}, %stride",
+                  f"  %to.{j} = getelementptr double, ptr %to, i64 %offset.{j}"]
+    lines += _squares(lanes, width)
+    return "\n".join([*lines, "done:", f"  %g.next = add i64 %g, {width}", f"  %g.more = icmp ult i64 %g.next, {lanes}",
+                      "  br i1 %g.more, label %group, label %out", "out:", "  ret void", "}",
+                      "declare i64 @llvm.umin.i64(i64, i64)"])
 
 
-def _squares(g: str, group: int, lanes: int, width: int, previous: str) -> list[str]:
-    """The loop over all values for the lanes from `group` on."""
+def _squares(lanes: int, width: int) -> list[str]:
+    """The loop over all values of the lanes at `from`: squares first, then what is left, one by one."""
     vector = f"<{width} x double>"
-    lines = [f"  br label %{g}.ask", f"{g}.ask:",
-             f"  %{g}.i = phi i64 [ 0, %{previous} ], [ %{g}.next, %{g}.do ]",
-             f"  %{g}.go = icmp ult i64 %{g}.i, %whole",
-             f"  br i1 %{g}.go, label %{g}.do, label %{g}.more", f"{g}.do:",
-             f"  %{g}.b = mul i64 %{g}.i, {8 * lanes}",
-             f"  %{g}.from = getelementptr i8, ptr %tile, i64 %{g}.b"]
+    lines = ["  br label %ask", "ask:",
+             "  %i = phi i64 [ 0, %group ], [ %i.next, %do ]",
+             "  %go = icmp ult i64 %i, %whole",
+             "  br i1 %go, label %do, label %more", "do:",
+             f"  %i.bytes = mul i64 %i, {8 * lanes}",
+             "  %square = getelementptr i8, ptr %from, i64 %i.bytes"]
     names = []
     for j in range(width):
-        names.append(f"%{g}.a1.{j}")
-        lines += [f"  %{g}.p{j} = getelementptr i8, ptr %{g}.from, i64 {8 * (lanes * j + group)}",
-                  f"  {names[-1]} = load {vector}, ptr %{g}.p{j}, align {8 * width}"]
+        names.append(f"%a1.{j}")
+        lines += [f"  %p{j} = getelementptr i8, ptr %square, i64 {8 * lanes * j}",
+                  f"  {names[-1]} = load {vector}, ptr %p{j}, align {8 * width}"]
     s = 1
     while s < width:
         turned = list(names)
@@ -269,23 +281,23 @@ def _squares(g: str, group: int, lanes: int, width: int, previous: str) -> list[
         high = ", ".join(f"i32 {width + j if j & s else j + s}" for j in range(width))
         for j in (j for j in range(width) if not j & s):
             for mask, to in ((low, j), (high, j + s)):
-                turned[to] = f"%{g}.a{2 * s}.{to}"
+                turned[to] = f"%a{2 * s}.{to}"
                 lines.append(f"  {turned[to]} = shufflevector {vector} {names[j]}, {vector} {names[j + s]}, "
                              f"<{width} x i32> <{mask}>")
         names = turned
         s *= 2
     for j in range(width):
-        lines += [f"  %{g}.q{j} = getelementptr double, ptr %to.{group + j}, i64 %{g}.i",
-                  f"  store {vector} {names[j]}, ptr %{g}.q{j}, align 8"]
-    lines += [f"  %{g}.next = add i64 %{g}.i, {width}", f"  br label %{g}.ask", f"{g}.more:",
-              f"  %{g}.t = phi i64 [ %whole, %{g}.ask ], [ %{g}.tn, %{g}.one ]",
-              f"  %{g}.left = icmp ult i64 %{g}.t, %count",
-              f"  br i1 %{g}.left, label %{g}.one, label %{g}.done", f"{g}.one:",
-              f"  %{g}.o = mul i64 %{g}.t, {8 * lanes}",
-              f"  %{g}.tp = getelementptr i8, ptr %tile, i64 %{g}.o"]
+        lines += [f"  %q{j} = getelementptr double, ptr %to.{j}, i64 %i",
+                  f"  store {vector} {names[j]}, ptr %q{j}, align 8"]
+    lines += [f"  %i.next = add i64 %i, {width}", "  br label %ask", "more:",
+              "  %t = phi i64 [ %whole, %ask ], [ %t.next, %one ]",
+              "  %left = icmp ult i64 %t, %count",
+              "  br i1 %left, label %one, label %done", "one:",
+              f"  %t.bytes = mul i64 %t, {8 * lanes}",
+              "  %row = getelementptr i8, ptr %from, i64 %t.bytes"]
     for j in range(width):
-        lines += [f"  %{g}.l{j} = getelementptr double, ptr %{g}.tp, i64 {group + j}",
-                  f"  %{g}.x{j} = load double, ptr %{g}.l{j}, align 8",
-                  f"  %{g}.s{j} = getelementptr double, ptr %to.{group + j}, i64 %{g}.t",
-                  f"  store double %{g}.x{j}, ptr %{g}.s{j}, align 8"]
-    return [*lines, f"  %{g}.tn = add i64 %{g}.t, 1", f"  br label %{g}.more", f"{g}.done:"]
+        lines += [f"  %l{j} = getelementptr double, ptr %row, i64 {j}",
+                  f"  %x{j} = load double, ptr %l{j}, align 8",
+                  f"  %s{j} = getelementptr double, ptr %to.{j}, i64 %t",
+                  f"  store double %x{j}, ptr %s{j}, align 8"]
+    return [*lines, "  %t.next = add i64 %t, 1", "  br label %more"]

@@ -1,9 +1,10 @@
 """The functions that models use, over plain numbers and over recorded ones.
 
 Over floats (and arrays) they give the plain result of IEEE arithmetic and never raise: sin(inf) and sqrt(-1) are not
-numbers. Over scalars they are recorded; sin, cos and their like become primitives, so that every back end has the
-same bits (met/trace/elementary.py). Plain results are np.float64, so that what a model does with them does not raise
-either (1.0 / floor(0.5) is infinite). Not-a-number survives `minimum`, `maximum` and `clip`: a limit never hides it.
+numbers, and neither is tan of an angle beyond 2^48 rad. Over scalars they are recorded; sin, cos and
+their like become primitives, so that every back end has the same bits (met/trace/elementary.py). Plain results are
+np.float64, so that what a model does with them does not raise either (1.0 / floor(0.5) is infinite). Not-a-number
+survives `minimum`, `maximum` and `clip`: a limit never hides it.
 """
 
 from __future__ import annotations
@@ -49,17 +50,17 @@ def _plain(name: str, *values: Any) -> Any:
 
 
 def _elementary(record: Callable[[Scalar], Scalar], plain: Callable[[float], float],
-                array: Callable[[Any], Any]) -> Callable[[Real], Real]:
-    """One function of one number in its three forms."""
+                array: Callable[[Any], Any], farthest: float = math.inf) -> Callable[[Real], Real]:
+    """One function of one number in its three forms; not a number beyond `farthest`."""
 
     def function(x: Any) -> Any:
         if x.__class__ is Scalar:
             return record(x)
         if isinstance(x, np.ndarray):
             with np.errstate(all="ignore"):
-                return array(x)
+                return np.where(abs(x) > farthest, np.nan, array(x))
         try:
-            return np.float64(plain(x))
+            return np.float64(plain(x) if abs(x) <= farthest else math.nan)
         except ValueError:
             return np.float64(-math.inf if plain is math.log and x == 0.0 else math.nan)
         except OverflowError:
@@ -72,10 +73,13 @@ def _elementary(record: Callable[[Scalar], Scalar], plain: Callable[[float], flo
 
 sin = _elementary(elementary.sin, math.sin, np.sin)
 cos = _elementary(elementary.cos, math.cos, np.cos)
-tan = _elementary(elementary.tan, math.tan, np.tan)
+tan = _elementary(elementary.tan, math.tan, np.tan, elementary.FARTHEST)
 exp = _elementary(elementary.exp, math.exp, np.exp)
 log = _elementary(elementary.log, math.log, np.log)
 tanh = _elementary(elementary.tanh, math.tanh, np.tanh)
+asin = _elementary(elementary.asin, math.asin, np.arcsin)
+acos = _elementary(elementary.acos, math.acos, np.arccos)
+atan = _elementary(elementary.atan, math.atan, np.arctan)
 
 
 def atan2(y: Real, x: Real) -> Real:
@@ -227,3 +231,15 @@ def gather(table: tuple[float, ...], index: Real) -> Real:
     if isinstance(index, np.ndarray):
         return ARRAYS["gather"](index, table)
     return np.float64(PLAIN["gather"](index, table))
+
+
+def philox(c0: Real, c1: Real, c2: Real, c3: Real, k0: Real, k1: Real, word: int) -> Real:
+    """Word number `word`, 0 to 3, of what Philox4x32-10 makes of a counter and a key (met/trace/philox.py).
+
+    All are whole numbers in [0, 2^32); not a number where one is not.
+    """
+    operands = (c0, c1, c2, c3, k0, k1)
+    graph = _graph_of(*operands)
+    if graph is None:
+        return _plain("philox", *operands, word)
+    return Scalar(graph, graph.philox(*(_ref(graph, x) for x in operands), word))

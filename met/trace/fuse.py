@@ -20,18 +20,19 @@ def fused(nodes: Sequence[Node], roots: Iterable[int]) -> list[Node]:
     roots = list(roots)
     result = list(nodes)
     order = live(nodes, roots)
-    outside = {ref >> 1 for ref in roots}
-    users: dict[int, list[int]] = {}
+    # How often each node is used, by whom last; a product that leaves the section counts as used by others too.
+    uses = [0] * len(nodes)
+    user = [0] * len(nodes)
+    for ref in roots:
+        uses[ref >> 1] = 2
     for i in order:
         node = nodes[i]
         for ref in node[1:1 + OPERANDS[node[0]]]:
-            users.setdefault(ref >> 1, []).append(i)
+            uses[ref >> 1] += 1
+            user[ref >> 1] = i
 
     def fusable(i: int) -> bool:
-        if nodes[i][0] != "mul" or i in outside:
-            return False
-        using = users[i]
-        return len(using) == 1 and nodes[using[0]][0] in ("add", "sub")
+        return nodes[i][0] == "mul" and uses[i] == 1 and nodes[user[i]][0] in ("add", "sub")
 
     for i in order:
         node = nodes[i]

@@ -33,7 +33,7 @@ OPERANDS = {
     "const": 0, "input": 0, "cell": 0, "tick": 0, "time": 0, "false": 0,
     "abs": 1, "sqrt": 1, "floor": 1, "rint": 1, "bit": 1, "pow2": 1, "exponent": 1, "significand": 1, "gather": 1,
     "add": 2, "sub": 2, "mul": 2, "div": 2, "lt": 2, "le": 2, "eq": 2, "and": 2, "flip": 2,
-    "fma": 3, "where": 3,
+    "fma": 3, "where": 3, "philox": 6,
 }
 """Operations and how many operands each has: they stand at positions 1, 2, 3 of the node."""
 
@@ -254,6 +254,14 @@ class Graph:
         value = self.value(index)
         return self.make("gather", index, table) if value is None else self.constant(PLAIN["gather"](value, table))
 
+    def philox(self, *operands: Any) -> int:
+        """Word number `operands[6]`, 0 to 3, of what Philox4x32-10 makes of four counter words and two key words."""
+        *refs, word = operands
+        values = [self.value(ref) for ref in refs]
+        if None in values:
+            return self.make("philox", *refs, word)
+        return self.constant(PLAIN["philox"](*values, word))
+
     # Reading
 
     def live(self, roots: Iterable[int]) -> list[int]:
@@ -378,7 +386,7 @@ def _respliced(graph: Graph, nodes: Sequence[Node], outputs: Sequence[int], valu
     makers: dict[str, Any] = {
         "add": graph.add, "sub": lambda a, b: graph.add(a, b ^ 1), "mul": graph.mul, "div": graph.div,
         "fma": graph.fma, "where": graph.where, "eq": graph.equal, "and": graph.both, "bit": graph.bit,
-        "flip": graph.flip, "gather": lambda index, table: graph.gather(table, index),
+        "flip": graph.flip, "philox": graph.philox, "gather": lambda index, table: graph.gather(table, index),
         "const": graph.constant, "false": lambda: FALSE}
     refs: list[int] = []
     for node in nodes:

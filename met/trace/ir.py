@@ -12,15 +12,19 @@ from typing import Any
 
 from met.trace.entry import entry, number, spread
 from met.trace.graph import OPERANDS, TRUTHS
+from met.trace.philox import Written
 from met.trace.pieces import CUT_ABOVE, LONGEST, SHORTEST, Piece, cut
 from met.trace.program import Recording, Section
 
 _CALLS = {"sqrt": "llvm.sqrt", "floor": "llvm.floor", "rint": "llvm.roundeven", "abs": "llvm.fabs", "fma": "llvm.fma"}
 _ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
+# of functions: small, large and seldom called ones; of the entry
+_WIDE = 'nounwind "prefer-vector-width"="512"'
+_ATTRIBUTES = (f"alwaysinline {_WIDE}", f"noinline {_WIDE}", "noinline", _WIDE)
 _COMPARE = {"lt": "olt", "le": "ole", "eq": "oeq"}
 
 
-def emit(recording: Recording, lanes: int, *, vector: int | None = None, width: int = 8,
+def emit(recording: Recording, lanes: int, *, vector: int | None = None, width: int = 8, inline: bool = True,
          above: int = CUT_ABOVE, shortest: int = SHORTEST, longest: int = LONGEST) -> str:
     """The IR of a program. All of this is a matter of speed alone.
 
@@ -28,19 +32,27 @@ def emit(recording: Recording, lanes: int, *, vector: int | None = None, width: 
     vector  cases that one value of the code holds; a block of several takes each piece of code for one after the
             other, so that they hide each other's latency without sharing registers. By default all of a block
     width   doubles in one register of the machine it is for
+    inline  whether short code may be put in its caller's place; never where its time alone is asked for
     above, shortest, longest   operations of a section that is cut, and of its pieces (met/trace/pieces.py)
     """
-    return _Emitter(recording, lanes, vector or lanes, width, (above, shortest, longest)).text()
+    return _Emitter(recording, lanes, vector or lanes, width, inline, (above, shortest, longest)).text()
+
+
+def _remark(name: str) -> str:
+    """What a line is about, for who reads it."""
+    return f"  ; {name}" if name.isprintable() and name else ""
 
 
 class _Emitter:
     """Writes one module."""
 
-    def __init__(self, recording: Recording, lanes: int, vector: int, width: int, sizes: tuple[int, int, int]) -> None:
+    def __init__(self, recording: Recording, lanes: int, vector: int, width: int, inline: bool,
+                 sizes: tuple[int, int, int]) -> None:
         self.recording = recording
         self.lanes = lanes
         self.count = vector
         self.width = min(width, lanes)
+        self.inline = inline
         self.sizes = sizes
         self.vector = f"<{vector} x double>"
         self.align = min(64, 8 * vector)
@@ -74,8 +86,7 @@ class _Emitter:
         rows = [spread(self.lanes, self.width)] if self.recording.program.columns else []
         main = entry(self.recording, self.calls, self.lanes, self.count, self.scratch)
         return "\n".join([*tables, *self.functions, *rows, main, *self.declared.values(),
-                          'attributes #0 = { nounwind "prefer-vector-width"="512" }',
-                          'attributes #1 = { nounwind noinline "prefer-vector-width"="512" }', ""])
+                          *(f"attributes #{n} = {{ {words} }}" for n, words in enumerate(_ATTRIBUTES)), ""])
 
     def _intrinsic(self, name: str, result: str, *arguments: str) -> str:
         self.declared.setdefault(name, f"declare {result} @{name}({', '.join(arguments)})")
@@ -93,14 +104,15 @@ class _Emitter:
         suffix = f"v{L}f64"
         have: dict[int, str] = {}
         turned: dict[int, str] = {}
+        drawn: dict[tuple[int, ...], Written] = {}
 
         def slot(base: str, i: int, label: str) -> str:
             put(f"  %{label} = getelementptr i8, ptr %{base}, i64 {8 * self.lanes * i}")
             return f"%{label}"
 
-        def load(base: str, i: int, label: str) -> str:
+        def load(base: str, i: int, label: str, name: str = "") -> str:
             place = slot(base, i, f"{label}.p")
-            put(f"  %{label} = load {V}, ptr {place}, align {self.align}")
+            put(f"  %{label} = load {V}, ptr {place}, align {self.align}{_remark(name)}")
             return f"%{label}"
 
         def plain(i: int) -> str:
@@ -115,9 +127,9 @@ class _Emitter:
             elif op == "false":
                 value = "zeroinitializer"
             elif op == "input":
-                value = load("inputs", self.inputs[node[1]], f"v{i}")
+                value = load("inputs", self.inputs[node[1]], f"v{i}", node[1])
             elif op == "cell":
-                value = load("state", self.state[node[1]], f"v{i}")
+                value = load("state", self.state[node[1]], f"v{i}", node[1])
             elif op in ("tick", "time"):
                 put(f"  %v{i}.s = insertelement {V} poison, double %{op}, i64 0")
                 put(f"  %v{i} = shufflevector {V} %v{i}.s, {V} poison, <{L} x i32> zeroinitializer")
@@ -196,6 +208,11 @@ class _Emitter:
                 put(f"  %v{i}.a = and {bits} {pattern(operands[0], f'v{i}.i')}, splat (i64 {(1 << 52) - 1})")
                 put(f"  %v{i}.o = or {bits} %v{i}.a, splat (i64 {1023 << 52})")
                 put(f"  {to} = bitcast {bits} %v{i}.o to {V}")
+            elif op == "philox":
+                refs, word = node[1:7], node[7]
+                if refs not in drawn:
+                    drawn[refs] = Written(put, f"r{i}", operands, L)
+                to = drawn[refs].word(word)
             else:
                 assert op == "gather", op
                 gather(i, operands[0], node[2])
@@ -228,7 +245,8 @@ class _Emitter:
                 base, i = {"cell": ("state", self.state.get(where)), "record": ("row", where),
                            "output": ("outputs", where)}[kind]
                 assert i is not None
-                put(f"  store {V} {value}, ptr {slot(base, i, f'{base}.{i}')}, align {self.align}")
+                name = _remark(where if kind == "cell" else "")
+                put(f"  store {V} {value}, ptr {slot(base, i, f'{base}.{i}')}, align {self.align}{name}")
 
         for position, i in piece.body:
             compute(i)
@@ -236,7 +254,7 @@ class _Emitter:
                 keep(i)
             leave(piece.stores.get(position, ()))
         leave(piece.tail)
-        attributes = "#0" if piece.small else "#1"
+        attributes = "#0" if piece.small and self.inline else "#1"
         return "\n".join([
             f"define private void {symbol}(ptr noalias %state, ptr noalias readonly %inputs, ptr noalias %scratch, "
             f"ptr noalias %row, ptr noalias %outputs, double %tick, double %time) {attributes} {{", *lines,

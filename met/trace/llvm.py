@@ -18,18 +18,28 @@ from met.trace.entry import ENTRY
 
 @frozen
 class Machine:
-    """What code is made for: LLVM's names of processor and features, doubles in a register, whether it has fma."""
+    """What code is made for: LLVM's names of processor and features, doubles in a register, whether it has fma.
+
+    triple   LLVM's name of architecture and system; "" for those of this process
+    """
 
     cpu: str
     features: str
     width: int
     fma: bool
+    triple: str = ""
 
 
 @cache
 def _ready() -> None:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
+
+
+@cache
+def _ready_for_all() -> None:
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
 
 
 @cache
@@ -45,15 +55,23 @@ def machine(cpu: str | None = None) -> Machine:
             '  %b = call <8 x double> @llvm.fma.v8f64(<8 x double> %a, <8 x double> %a, <8 x double> %a)\n'
             '  ret <8 x double> %b\n}\ndeclare <8 x double> @llvm.fma.v8f64(<8 x double>, <8 x double>, <8 x double>)\n'
             'attributes #0 = { "prefer-vector-width"="512" }\n')
-    assembly = _target_machine(Machine(cpu, "", 2, True), 2).emit_assembly(llvm.parse_assembly(text))
+    assembly = _target_machine(Machine(cpu, "", 2, True)).emit_assembly(llvm.parse_assembly(text))
     width = 2 if arm else 8 if "%zmm" in assembly else 4 if "%ymm" in assembly else 2
     return Machine(cpu, "", width, arm or "vfmadd" in assembly)
 
 
-def _target_machine(target: Machine, level: int) -> Any:
+def arm64(cpu: str = "generic") -> Machine:
+    """A Linux machine of the arm64 kind, whatever we run on: objects made for it are to be run elsewhere."""
+    return Machine(cpu, "", 2, True, "aarch64-unknown-linux-gnu")
+
+
+def _target_machine(target: Machine, level: int | None = None) -> Any:
     _ready()
-    triple = llvm.Target.from_triple(llvm.get_process_triple())
-    return triple.create_target_machine(cpu=target.cpu, features=target.features, opt=level, reloc="pic",
+    if target.triple:
+        _ready_for_all()
+    triple = llvm.Target.from_triple(target.triple or llvm.get_process_triple())
+    opt = 2 if level is None else level
+    return triple.create_target_machine(cpu=target.cpu, features=target.features, opt=opt, reloc="pic",
                                         codemodel="small")
 
 
@@ -62,23 +80,32 @@ def versions() -> str:
     return f"llvmlite {llvmlite.__version__} llvm {'.'.join(map(str, llvm.llvm_version_info))}"
 
 
-def assemble(text: str, target: Machine, *, level: int = 2) -> bytes:
-    """The object file of a module."""
+def assemble(text: str, target: Machine, *, level: int | None = None) -> bytes:
+    """The object file of a module.
+
+    level  None: LLVM's optimiser is left out, its code generator works at its usual level. The graph has done what
+           an optimiser would: the code is as fast, and made in half the time. 0 to 3: optimiser and code generator at
+           that level
+    """
     machine_ = _target_machine(target, level)
-    module = _optimised(text, machine_, level)
-    return bytes(machine_.emit_object(module))
+    return bytes(machine_.emit_object(_prepared(text, machine_, level)))
 
 
-def listing(text: str, target: Machine, *, level: int = 2) -> str:
+def listing(text: str, target: Machine, *, level: int | None = None) -> str:
     """The assembly of a module, to look at."""
     machine_ = _target_machine(target, level)
-    return str(machine_.emit_assembly(_optimised(text, machine_, level)))
+    return str(machine_.emit_assembly(_prepared(text, machine_, level)))
 
 
-def _optimised(text: str, machine_: Any, level: int) -> Any:
+def _prepared(text: str, machine_: Any, level: int | None) -> Any:
     module = llvm.parse_assembly(text)
-    module.triple = llvm.get_process_triple()
+    module.triple = machine_.triple
     module.data_layout = str(machine_.target_data)
+    if level is None:
+        passes = llvm.create_new_module_pass_manager()
+        passes.add_always_inliner_pass()
+        passes.run(module, llvm.create_pass_builder(machine_, llvm.create_pipeline_tuning_options()))
+        return module
     options = llvm.create_pipeline_tuning_options(speed_level=level)
     options.slp_vectorization = False
     options.loop_vectorization = False
@@ -89,12 +116,19 @@ def _optimised(text: str, machine_: Any, level: int) -> Any:
     return module
 
 
+def size(code: bytes) -> int:
+    """Bytes of instructions in an object file."""
+    _ready()
+    return sum(part.size() for part in llvm.ObjectFileRef.from_data(code).sections() if part.is_text())
+
+
 class Loaded:
-    """Machine code in memory; `address` is the entry's."""
+    """Machine code in memory; `address` is the entry's, `code` the object file that it came from."""
 
     def __init__(self, code: bytes, target: Machine) -> None:
         _ready()
-        self._compiler = llvm.create_lljit_compiler(_target_machine(target, 2), use_jit_link=True)
+        self.code = code
+        self._compiler = llvm.create_lljit_compiler(_target_machine(target), use_jit_link=True)
         library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(ENTRY)
         self._tracker = library.link(self._compiler, "met")
         self.address: int = self._tracker[ENTRY]

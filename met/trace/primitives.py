@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from met.trace import philox
+
 _MANTISSA = (1 << 52) - 1
 _ONE = 1023 << 52
 
@@ -84,8 +86,8 @@ def _fused_arrays(a: Any, b: Any, c: Any) -> Any:
     big = np.maximum(np.maximum(np.abs(a), np.abs(b)), np.abs(c))
     usual = (big < 1e290) & (size < 1e290) & ((size > 1e-260) | (a == 0.0) | (b == 0.0))
     high, low = _product(a, b, product)
-    t_high, t_low = _sum(c, low)
-    v_high, v_low = _sum(high, t_high)
+    t_high, t_low = exact_sum(c, low)
+    v_high, v_low = exact_sum(high, t_high)
     result = np.asarray(v_high + _odd_sum(t_low, v_low))
     result = np.where((product == 0.0) & (c == 0.0), product + c, result)
     rest = np.asarray(~usual)
@@ -95,7 +97,7 @@ def _fused_arrays(a: Any, b: Any, c: Any) -> Any:
     return result
 
 
-def _sum(a: Any, b: Any) -> tuple[Any, Any]:
+def exact_sum(a: Any, b: Any) -> tuple[Any, Any]:
     """a + b as a rounded sum and its error (Knuth)."""
     s = a + b
     t = s - a
@@ -114,7 +116,7 @@ def _product(a: Any, b: Any, product: Any) -> tuple[Any, Any]:
 
 def _odd_sum(a: Any, b: Any) -> Any:
     """a + b, rounded to the neighbour whose last bit is one where it is not exact."""
-    s, e = _sum(a, b)
+    s, e = exact_sum(a, b)
     s = np.ascontiguousarray(s)
     pattern = s.view(np.int64)
     even = (e != 0.0) & ((pattern & 1) == 0)
@@ -164,6 +166,7 @@ PLAIN: dict[str, Callable[..., Any]] = {
     "exponent": lambda x: float((bits_of(x) >> 52 & 0x7FF) - 1023),
     "significand": lambda x: of_bits(bits_of(x) & _MANTISSA | _ONE),
     "gather": lambda index, table: gathered(table, index),
+    "philox": philox.plain,
 }
 """Each operation over Python floats and bools; parameters that are no operands come last."""
 
@@ -185,5 +188,6 @@ ARRAYS: dict[str, Callable[..., Any]] = PLAIN | {
     "exponent": lambda x: (_pattern(x) >> np.uint64(52) & np.uint64(0x7FF)).astype(np.float64) - 1023.0,
     "significand": lambda x: _double(_pattern(x) & np.uint64(_MANTISSA) | np.uint64(_ONE)),
     "gather": lambda index, table: _gathered_arrays(table, index),
+    "philox": philox.arrays,
 }
 """Each operation over numpy arrays (and numpy scalars), to be used with floating point errors ignored."""

@@ -11,6 +11,8 @@ any case still asks for more. Memory is cells by name, one number a case, 0 befo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from functools import cached_property
 from typing import Protocol
 
 from met.frozen import frozen
@@ -51,6 +53,9 @@ class Tape(Protocol):
     def output(self, name: str, value: Real) -> None:
         """One of the program's outputs; only in `end`."""
 
+    def part(self, name: str) -> AbstractContextManager[None]:
+        """What is computed in here belongs to the part of this name, for whoever asks what costs how much."""
+
 
 @frozen
 class Phase:
@@ -63,6 +68,13 @@ class Phase:
 @frozen
 class Run:
     """A phase, at this point. Neighbouring `Run`s become one straight piece."""
+
+    phase: Phase
+
+
+@frozen
+class Call:
+    """A phase, at this point, whose code is there once however often it is called: it stays a piece of its own."""
 
     phase: Phase
 
@@ -103,7 +115,7 @@ class Record:
     divisor: int
 
 
-Control = Run | Every | Unless0 | WhileAny | Record
+Control = Run | Call | Every | Unless0 | WhileAny | Record
 
 
 @frozen
@@ -141,6 +153,7 @@ class Section:
 
     stores    (cell, reference), in order of writing; the value a cell has afterwards
     records   (column, reference);  outputs (number of the output, reference)
+    parts     (position of the node that a part begins at, its name): the phase's, then those of `Tape.part` in it
     """
 
     name: str
@@ -148,13 +161,14 @@ class Section:
     stores: tuple[tuple[str, int], ...]
     records: tuple[tuple[int, int], ...]
     outputs: tuple[tuple[int, int], ...]
+    parts: tuple[tuple[int, str], ...] = ()
 
     @property
     def roots(self) -> list[int]:
         """References of all that the section leaves behind."""
         return [ref for _, ref in (*self.stores, *self.records, *self.outputs)]
 
-    @property
+    @cached_property
     def order(self) -> list[int]:
         """Positions of the live nodes, in order of creation."""
         return live(self.nodes, self.roots)
@@ -208,6 +222,7 @@ class RecordingTape:
         self.written: dict[str, Scalar] = {}
         self.records: dict[int, Scalar] = {}
         self.outputs: dict[int, Scalar] = {}
+        self.parts: list[tuple[int, str]] = []
 
     def _scalar(self, value: Real) -> Scalar:
         if isinstance(value, Scalar):
@@ -254,6 +269,13 @@ class RecordingTape:
             raise ValueError(f"output {name!r} written before the end")
         self.outputs[self.program.outputs.index(name)] = self._scalar(value)
 
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        outer = self.parts[-1][1] if self.parts else ""
+        self.parts.append((len(self.graph.nodes), f"{outer}/{name}" if outer else name))
+        yield
+        self.parts.append((len(self.graph.nodes), outer))
+
 
 def record(program: Program, *, fuse: bool = True) -> Recording:
     """Runs every phase once over recorded numbers.
@@ -269,7 +291,8 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
         if key not in made:
             tape = RecordingTape(program, where)
             for phase in phases:
-                phase.body(tape)
+                with tape.part(phase.name):
+                    phase.body(tape)
             made[key] = len(sections)
             names = list(dict.fromkeys(phase.name for phase in phases))
             sections.append(Section(
@@ -277,7 +300,7 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
                 tuple((name, value.ref) for name, value in tape.written.items()
                       if tape.graph.nodes[value.ref >> 1] != ("cell", name) or value.ref & 1),
                 tuple((column, value.ref) for column, value in sorted(tape.records.items())),
-                tuple((number, value.ref) for number, value in sorted(tape.outputs.items()))))
+                tuple((number, value.ref) for number, value in sorted(tape.outputs.items())), tuple(tape.parts)))
         return made[key]
 
     def steps(body: tuple[Control, ...], where: str) -> tuple[Step, ...]:
@@ -294,7 +317,9 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
                 waiting.append(node.phase)
                 continue
             flush()
-            if isinstance(node, Record):
+            if isinstance(node, Call):
+                result.append(Straight(section([node.phase], where)))
+            elif isinstance(node, Record):
                 if where != "tick":
                     raise ValueError(f"{node.phase.name} records in `{where}`; rows belong to ticks")
                 result.append(Recorded(section([node.phase], "record"), node.divisor))
@@ -345,18 +370,26 @@ def _check_complete(program: Program, sections: list[Section]) -> None:
 def _without_dead_stores(sections: list[Section], asked: set[str]) -> list[Section]:
     """The sections without stores to cells that nothing live reads."""
     read = set(asked)
+    kept = [_storing(one, read) for one in sections]
     while True:
-        kept = [Section(one.name, one.nodes, tuple(store for store in one.stores if store[0] in read),
-                        one.records, one.outputs) for one in sections]
         now = {one.nodes[i][1] for one in kept for i in one.order if one.nodes[i][0] == "cell"} | asked
         if now == read:
             return kept
-        read = now | read
+        more = now - read
+        read |= now
+        kept = [_storing(one, read) if any(name in more for name, _ in one.stores) else old
+                for one, old in zip(sections, kept, strict=True)]
+
+
+def _storing(section: Section, read: set[str]) -> Section:
+    """The section with its stores to these cells alone."""
+    stores = tuple(store for store in section.stores if store[0] in read)
+    return Section(section.name, section.nodes, stores, section.records, section.outputs, section.parts)
 
 
 def _fused(section: Section) -> Section:
     nodes = fused(section.nodes, section.roots)
-    return Section(section.name, tuple(nodes), section.stores, section.records, section.outputs)
+    return Section(section.name, tuple(nodes), section.stores, section.records, section.outputs, section.parts)
 
 
 def _cells(sections: list[Section], asked: set[str]) -> tuple[str, ...]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import numpy as np
 
 from met.trace.graph import Real, Truth
-from met.trace.program import Control, Every, Program, Record, Run, Unless0, WhileAny
+from met.trace.program import Call, Control, Every, Program, Record, Run, Unless0, WhileAny
 
 
 class PlainTape:
@@ -52,6 +53,9 @@ class PlainTape:
     def output(self, name: str, value: Real) -> None:
         self.outputs[name] = float(value)
 
+    def part(self, name: str) -> AbstractContextManager[None]:
+        return nullcontext()
+
 
 def execute(program: Program, inputs: Mapping[str, float] | Sequence[float], ticks: int) -> tuple[np.ndarray,
                                                                                                   dict[str, float]]:
@@ -74,7 +78,7 @@ def execute(program: Program, inputs: Mapping[str, float] | Sequence[float], tic
 def _run(tape: PlainTape, body: tuple[Control, ...]) -> None:
     for node in body:
         match node:
-            case Run(phase):
+            case Run(phase) | Call(phase):
                 phase.body(tape)
             case Record(phase, divisor):
                 if tape.k % divisor == 0:

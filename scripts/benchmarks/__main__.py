@@ -1,52 +1,93 @@
-"""`scripts/benchmark`: takes the figures that are asked for, prints them as a table, and writes them as JSON."""
+"""`scripts/benchmark`: takes the figures that are asked for, prints them as tables, writes and compares them."""
 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
-from benchmarks import whole_process
-from benchmarks.benchmark import machine, take
+from benchmarks import arms, compiling, evaluation, report, stepping, whole_process
+from benchmarks.benchmark import Benchmark, Derived, take, with_sources
+from benchmarks.machine import machine, told
 
-SUBJECTS = (whole_process,)
-REPEATS = 9
+RATIOS = SimpleNamespace(
+    TITLE="ratios of throughput over many cases, each on one core and in the same turns", BENCHMARKS=evaluation.RATIOS
+)
+SUBJECTS = (RATIOS, evaluation, stepping, compiling, whole_process)
+"""In the order of the report: ratios first, since they change least with machine and load."""
+
+TURNS, QUICK = 15, 3
 
 
-def main() -> int:
-    known = {benchmark.name: benchmark for subject in SUBJECTS for benchmark in subject.BENCHMARKS}
-    parser = argparse.ArgumentParser(prog="scripts/benchmark", description="Measures MET on this machine.")
-    parser.add_argument("names", nargs="*", metavar="NAME", help="benchmarks to take; all by default")
-    parser.add_argument("--list", action="store_true", help="list them and stop")
-    parser.add_argument("--repeats", type=int, default=REPEATS, metavar="N", help=f"figures of each [{REPEATS}]")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the figures there, as JSON")
-    asked = parser.parse_args()
-    for name in asked.names:
-        if name not in known:
-            parser.error(f"no benchmark `{name}`; there are {', '.join(known)}")
-    if asked.repeats < 1:
-        parser.error("--repeats: at least 1")
+def main(words: Sequence[str] | None = None) -> int:
+    known: dict[str, Benchmark | Derived] = {one.name: one for subject in SUBJECTS for one in subject.BENCHMARKS}
+    asked = _arguments(known, words)
     if asked.list:
-        for benchmark in known.values():
-            print(f"{benchmark.name:12} {benchmark.doc}")
+        width = max(map(len, known))
+        for subject in SUBJECTS:
+            print(subject.TITLE)
+            print("\n".join(f"    {one.name:{width}}  {one.doc}" for one in subject.BENCHMARKS))
+        print("arms", *_legend(), sep="\n    ")
         return 0
+    then = report.read(asked.against) if asked.against is not None else None
+    names = with_sources(asked.names or list(known), known)
+    chosen = [known[name] for name in names if not (asked.quick and getattr(known[name], "slow", False))]
+    turns = asked.repeats or (QUICK if asked.quick else TURNS)
+
     here = machine()
-    print(f"{here['processor']}, {here['cores']} cores, {here['system']}, Python {here['python']}, load {here['load']}")
-    print(f"median, least and largest of {asked.repeats} after one to warm up")
-    figures = []
-    for name in asked.names or known:
-        figure = take(known[name], asked.repeats)
-        figures.append(figure)
-        verdict = "met" if figure["met"] else "MISSED"
-        target = "" if figure["target"] is None else f"target {figure['target']:g}: {verdict}"
-        spread = f"{figure['least']:.3f} to {figure['largest']:.3f}"
-        line = f"{name:12} {figure['median']:8.3f} {figure['unit']}  {spread:16} {target:20} {figure['doc']}"
-        print(line.rstrip(), flush=True)
+    print(told(here))
+    print(f"best and median of {turns} turns, each of which takes every figure once; a target is for the best")
+    print("arms", *_legend(), sep="\n    ")
+    watched = sys.stderr.isatty()
+    figures = take(chosen, turns, lambda text: print(f"\r{text:60}", end="", file=sys.stderr) if watched else None)
+    if watched:
+        print(f"\r{'':60}\r", end="", file=sys.stderr)
+    for subject in SUBJECTS:
+        own = {one.name for one in subject.BENCHMARKS}
+        shown = [figure for figure in figures if figure["name"] in own]
+        if shown:
+            print(f"\n{subject.TITLE}", *report.table(shown), sep="\n")
     if asked.output is not None:
-        asked.output.write_text(json.dumps({"machine": here, "figures": figures}, indent=1) + "\n")
-    return 1 if any(figure["met"] is False for figure in figures) else 0
+        report.write(asked.output, here, turns, figures)
+    if then is not None:
+        print("", *report.against(then, here, figures), sep="\n")
+    print("", *report.verdict(figures), sep="\n")
+    return 1 if report.missed(figures) else 0
+
+
+def _legend() -> list[str]:
+    """What the arms' names in the names of figures mean."""
+    return [f"{arm.name:13}{arm.doc}" for arm in (*arms.ARMS, arms.CHAIN)]
+
+
+def _arguments(known: dict[str, Benchmark | Derived], words: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="scripts/benchmark", description="Measures MET on this machine. Exit status 1 where a target is missed.",
+    )  # fmt: skip
+    parser.add_argument("names", nargs="*", metavar="NAME", help="what to take, or beginnings of names [all]")
+    parser.add_argument("--list", action="store_true", help="list them and stop")
+    parser.add_argument("--quick", action="store_true", help=f"a look: {QUICK} turns, without what takes seconds")
+    parser.add_argument("--repeats", type=int, metavar="N", help=f"turns [{TURNS}]")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the figures there, as JSON")
+    parser.add_argument("--against", type=Path, metavar="FILE", help="compare with figures that -o wrote")
+    asked = parser.parse_args(words)
+    names: list[str] = []
+    for word in asked.names:
+        found = [name for name in known if name == word] or [name for name in known if name.startswith(f"{word}.")]
+        if not found:
+            parser.error(f"no benchmark `{word}`; there are {', '.join(known)}")
+        names += found
+    asked.names = names
+    if asked.repeats is not None and asked.repeats < 1:
+        parser.error("--repeats: at least 1")
+    return asked
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except report.Unreadable as reason:
+        print(f"scripts/benchmark: error: {reason}", file=sys.stderr)
+        sys.exit(2)

@@ -1,63 +1,133 @@
-"""What a benchmark is, and how a figure is told."""
+"""What a benchmark is, how its figures are taken, and how one is told."""
 
 from __future__ import annotations
 
-import os
-import platform
 import statistics
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Any, Literal
+
+
+class Untaken(Exception):
+    """A figure that cannot be taken here; the text says why."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a figure's best should be: `at_most` a number or `at_least` it."""
+
+    bound: float
+    side: Literal["at_most", "at_least"] = "at_most"
+
+    def met(self, value: float) -> bool:
+        return value <= self.bound if self.side == "at_most" else value >= self.bound
 
 
 @dataclass(frozen=True)
 class Benchmark:
-    """One figure.
+    """One figure that is measured.
 
-    measure   does it once and returns the figure, in `unit`; called once to warm up, then again and again
-    target    what it should stay at or below; None where it is only watched
+    prepare   makes all that is not measured, and returns what takes the figure once, in `unit`; raises Untaken
+    target    None where the figure is only watched
+    turns     it is taken at most this often: for what takes seconds, or is the same each time
+    slow      left out of a quick look
     """
 
     name: str
     doc: str
     unit: str
-    measure: Callable[[], float]
-    target: float | None = None
+    prepare: Callable[[], Callable[[], float]]
+    target: Target | None = None
+    turns: int = 1_000_000
+    slow: bool = False
 
 
-def machine() -> dict[str, Any]:
-    """What the figures were measured on."""
+@dataclass(frozen=True)
+class Derived:
+    """One figure that follows from others, by name: from their bests its best, from their medians its median."""
+
+    name: str
+    doc: str
+    unit: str
+    of: tuple[str, ...]
+    compute: Callable[..., float]
+    target: Target | None = None
+
+
+def ratio(name: str, doc: str, *, over: str, under: str, target: Target | None = None) -> Derived:
+    """How many times one figure is another."""
+    return Derived(name, doc, "", (over, under), lambda a, b: a / b, target)
+
+
+Figure = dict[str, Any]
+"""As in the JSON of a report: name, doc, unit, best, median, largest, turns, target, met; or `untaken`, why not."""
+
+
+def with_sources(asked: Sequence[str], known: Mapping[str, Benchmark | Derived]) -> list[str]:
+    """The names that were asked for and those that they follow from, in the order of `known`."""
+    wanted = set(asked)
+    for name in asked:
+        one = known[name]
+        wanted.update(one.of if isinstance(one, Derived) else ())
+    return [name for name in known if name in wanted]
+
+
+def take(
+    benchmarks: Sequence[Benchmark | Derived], turns: int, say: Callable[[str], None] = lambda _: None
+) -> list[Figure]:
+    """All figures, in the order of `benchmarks`.
+
+    Every turn takes each of them once, so that whatever else the machine does hits all alike. One turn before the
+    first warms up and is not counted.
+    """
+    measures: dict[str, Callable[[], float]] = {}
+    untaken: dict[str, str] = {}
+    measured = [each for each in benchmarks if isinstance(each, Benchmark)]
+    for each in measured:
+        say(f"preparing {each.name}")
+        try:
+            measures[each.name] = each.prepare()
+            if each.turns > 1:
+                measures[each.name]()
+        except Untaken as reason:
+            untaken[each.name] = str(reason)
+    values: dict[str, list[float]] = {each.name: [] for each in measured}
+    for turn in range(turns):
+        say(f"turn {turn + 1} of {turns}")
+        for each in measured:
+            if each.name not in untaken and turn < each.turns:
+                values[each.name].append(measures[each.name]())
+    return [
+        _derived(each, values, untaken) if isinstance(each, Derived)
+        else _untaken(each, untaken[each.name]) if each.name in untaken
+        else _figure(each, values[each.name])
+        for each in benchmarks
+    ]  # fmt: skip
+
+
+def _figure(one: Benchmark, values: Sequence[float]) -> Figure:
+    best = max(values) if one.target is not None and one.target.side == "at_least" else min(values)
+    return _told(one, best, statistics.median(values), max(values), len(values))
+
+
+def _derived(one: Derived, values: Mapping[str, Sequence[float]], untaken: Mapping[str, str]) -> Figure:
+    for name in one.of:
+        if name in untaken:
+            return _untaken(one, untaken[name])
+    best = one.compute(*(min(values[name]) for name in one.of))
+    median = one.compute(*(statistics.median(values[name]) for name in one.of))
+    return _told(one, best, median, max(best, median), min(len(values[name]) for name in one.of))
+
+
+def _told(one: Benchmark | Derived, best: float, median: float, largest: float, turns: int) -> Figure:
+    """The best decides whether a target is met: what else a machine does only ever adds to a time."""
+    target = None if one.target is None else {one.target.side: one.target.bound}
     return {
-        "processor": _processor(),
-        "cores": len(os.sched_getaffinity(0)),
-        "system": platform.platform(),
-        "python": platform.python_version(),
-        "load": round(os.getloadavg()[0], 2),
-    }
+        "name": one.name, "doc": one.doc, "unit": one.unit, "best": best, "median": median, "largest": largest,
+        "turns": turns, "target": target, "met": None if one.target is None else one.target.met(best),
+    }  # fmt: skip
 
 
-def take(benchmark: Benchmark, repeats: int) -> dict[str, Any]:
-    """Median, least and largest of `repeats` figures after one to warm up."""
-    benchmark.measure()
-    figures = [benchmark.measure() for _ in range(repeats)]
-    median = statistics.median(figures)
-    return {
-        "name": benchmark.name,
-        "doc": benchmark.doc,
-        "unit": benchmark.unit,
-        "median": median,
-        "least": min(figures),
-        "largest": max(figures),
-        "repeats": repeats,
-        "target": benchmark.target,
-        "met": None if benchmark.target is None else median <= benchmark.target,
-    }
-
-
-def _processor() -> str:
-    for line in Path("/proc/cpuinfo").read_text().splitlines():
-        key, _, value = line.partition(":")
-        if key.strip() in ("model name", "Processor", "Model"):
-            return value.strip()
-    return platform.processor() or platform.machine()
+def _untaken(one: Benchmark | Derived, why: str) -> Figure:
+    target = None if one.target is None else {one.target.side: one.target.bound}
+    return {"name": one.name, "doc": one.doc, "unit": one.unit, "untaken": why, "target": target, "met": None}

@@ -7,10 +7,12 @@ definition built on the tutorial's). A code after a colon is the error that it m
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
 import pytest
+import xarray
 
 import batch
 import ic
@@ -30,6 +32,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 PIECES = re.findall(r"<!-- (?P<where>[\w. ]+?)(?:: (?P<code>D\d+))? -->\n```c\n(?P<text>.*?)```", PAGE, re.DOTALL)
 PICKER = "\n".join(text for where, _, text in PIECES if where == "picker.ic")
+MOVES = re.search(r"<!-- moves.csv -->\n```csv\n(.*?)```", PAGE, re.DOTALL)
 FRAGMENTS = [piece for piece in PIECES if piece[0] not in ("picker.ic", "alone")]
 AROUND = {
     "more": "{}",
@@ -92,6 +95,8 @@ def test_the_tutorials_run_meets_its_requirements_and_its_sweep_fails_in_two_cas
 def test_a_fragment_compiles_where_it_belongs_or_gives_the_error_it_shows(
     where: str, code: str, text: str, tmp_path: Path
 ) -> None:
+    assert MOVES is not None
+    (tmp_path / "moves.csv").write_text(MOVES[1], encoding="utf-8")
     compiled, said = checked(tmp_path / "picker.ic", PICKER + AROUND[where].format(text))
     if code:
         assert compiled.plan is None and {diagnostic.code for diagnostic in compiled.diagnostics} == {code}, said
@@ -115,6 +120,21 @@ def test_what_the_page_builds_on_the_tutorial_runs(tmp_path: Path) -> None:
     with archive.open() as data:
         assert data["status"] == [0]
         assert data["requirement"].values.tolist() == ["settle < 2 s", "volts < 48 V"]
+
+
+def test_what_the_page_reads_from_a_file_is_followed(tmp_path: Path) -> None:
+    (text,) = (text for where, _, text in FRAGMENTS if text.startswith("servo replay"))
+    assert MOVES is not None
+    (tmp_path / "moves.csv").write_text(MOVES[1], encoding="utf-8")
+    (tmp_path / "picker.ic").write_text(PICKER + text, encoding="utf-8")
+    archive = batch.run(ic.compile(tmp_path / "picker.ic", select=["recorded"]), output=tmp_path / "recorded.h5")
+    with archive.open() as data:
+        # half a second after the last row, at k_position of 10 1/s and 15 1/s: e^-5 of what was left
+        end = data["q"].isel(time=-1)
+        assert end.sel(joint="swing") == pytest.approx(math.radians(25.0), abs=math.radians(0.5))
+        assert end.sel(joint="lift") == pytest.approx(0.02, abs=2e-3)
+    with xarray.open_dataset(tmp_path / "recorded.h5", group="provenance") as kept:
+        assert [Path(str(name)).name for name in kept["source"].values] == ["picker.ic", "moves.csv"]
 
 
 @pytest.mark.parametrize("links", [None, 1, 2])

@@ -47,7 +47,8 @@ def test_the_exit_codes_are_those_of_the_command() -> None:
 DECK = """
 #include <two_link.ic>
 run brief like nominal {
-    duration = 0.4 s;  remove settle;  metric q = final { of = elbow.q; }  record += [servo.command];
+    duration = 0.4 s;  remove settle;  metric q = final { of = elbow.q; }
+    record += [servo.command, reaction, links.upper.position, links.upper.orientation];
 }
 sweep two of brief { vary gearbox.kp = [0.01, 0.02] V*s/rad; }
 """
@@ -72,8 +73,14 @@ def test_an_archive_holds_what_the_page_lists_and_nothing_else(archives: tuple[P
         signals = {str(name) for name in data if "recorded_case" in data[name].dims}
         others = {str(name) for name in data.variables} - signals - {"volts"}  # a metric, named by the deck
         assert others - named == set()
-        assert {"metrics.q", "gearbox.kp", "case", "recorded_case"} <= others
-        assert signals == {"q", "qd", "tau", "shoulder.servo.voltage", "servo.command"}
+        assert {"metrics.q", "gearbox.kp", "case", "recorded_case", "axis", "quaternion"} <= others
+        assert signals == {
+            "q", "qd", "tau", "shoulder.servo.voltage", "servo.command", "reaction.moment", "reaction.force",
+            "links.upper.position", "links.upper.orientation",
+        }  # fmt: skip
+        rows = re.findall(r"^\| [a-z, ]*such as `(\S+)` \| (recorded_case, time.*?) \|", tables, re.MULTILINE)
+        assert len(rows) == 5
+        assert {name: data[name].dims for name, _ in rows} == {name: tuple(dims.split(", ")) for name, dims in rows}
         assert data["metrics.q"].dims == ("case",)
         assert data.qd.sel(recorded_case=1).sizes == {"time": 11, "joint": 2}
     with xarray.open_dataset(archives[0], group="provenance") as kept:

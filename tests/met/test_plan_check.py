@@ -85,6 +85,10 @@ def coordinate(**new: Any) -> Change:
         (structure("record", joints=[]), "structure.record[0].channels: `q` of these joints is q"),
         (structure("record", name="time"),
          "structure.record[0].channels: `time` of these joints is shoulder.time, elbow.time"),
+        (structure("record", components=["x", "y"]),
+         "structure.record[0].components: it should be x, y, z or w, x, y, z"),
+        (structure("record", components=["x", "y", "z"]), "structure.record[0].channels: `q` of these joints is "
+         "shoulder.q.x, shoulder.q.y, shoulder.q.z, elbow.q.x, elbow.q.y, elbow.q.z"),
         (structure("record", unit=[]), "structure.record[0].unit: it should be one unit, or one a channel"),
         (lambda e: e["structure"]["record"].append(e["structure"]["record"][0]),
          "structure.record[4].name: `q` is there twice"),
@@ -164,6 +168,34 @@ def test_a_table_of_a_command_is_one(times: list[float], values: list[float]) ->
         e["parameters"]["elbow.servo.command.values"] = {**given, "value": values}
 
     assert said_of(change).startswith("parameters.elbow.servo.command.")
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [([0.0], "values: there are 1 for 1 times, and 2 are needed"), ([1.0, 1.0], "times: they do not rise")],
+)
+def test_a_trajectory_has_two_points_or_more(times: list[float], said: str) -> None:
+    def change(e: dict[str, Any]) -> None:
+        e["structure"]["servos"][1]["command"]["model"] = "trajectory"
+        given = e["parameters"].pop("elbow.servo.command.value")
+        e["parameters"]["elbow.servo.command.times"] = {**given, "value": times, "unit": "s"}
+        e["parameters"]["elbow.servo.command.values"] = {**given, "value": times}
+
+    assert said_of(change) == "parameters.elbow.servo.command." + said
+
+
+@pytest.mark.parametrize(
+    ("pivot", "said"),
+    [({"x": 1.0}, "pivot: it is made of three numbers, .x .y .z"),
+     ({"x": 1.0, "y": 0.0, "z": "inf"}, "pivot.z.value: it is not finite"),
+     ({"x": 1.0, "y": 0.0, "z": 0.0, "w": 0.0}, "pivot.w: nothing in this run has this parameter")],
+)  # fmt: skip
+def test_a_pivot_is_three_numbers(pivot: dict[str, Any], said: str) -> None:
+    def change(e: dict[str, Any]) -> None:
+        given = e["parameters"]["elbow.at.x"]
+        e["parameters"] |= {f"elbow.pivot.{axis}": {**given, "value": x} for axis, x in pivot.items()}
+
+    assert said_of(change) == "parameters.elbow." + said
 
 
 def leaves(part: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:

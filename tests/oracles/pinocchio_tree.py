@@ -86,11 +86,11 @@ class PinocchioTree:
         R = (self.data.oMi[self.joint_of[b]] * self.placed[b]).rotation
         return R @ twist.angular, R @ twist.linear
 
-    def reaction(self, q, qd, qdd, wrenches, joint: str) -> tuple[np.ndarray, np.ndarray]:
-        """Moment about the child link's origin and force that a moving joint transmits, in link axes."""
+    def reactions(self, q, qd, qdd, wrenches) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Moment about the child link's origin and force that each moving joint transmits, in link axes."""
         self.torques(q, qd, qdd, wrenches)
-        force = self.data.f[self.model.getJointId(joint)]
-        return np.array(force.angular), np.array(force.linear)
+        forces = [self.data.f[self.model.getJointId(name)] for name in self.names]
+        return [(np.array(force.angular), np.array(force.linear)) for force in forces]
 
     def energy(self, q, qd) -> tuple[float, float]:
         """Kinetic energy without rotors, potential energy, J."""

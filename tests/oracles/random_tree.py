@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -62,6 +63,12 @@ def random_tree(
         seed, tuple(bodies), numbers(2.0), numbers(1.5), numbers(10.0), numbers(3.0),
         tuple(bool(x) for x in rng.random(n) < 0.6), rotor, _vector(rng, 6.0), wrenches,
     )
+
+
+@cache
+def random_trees() -> tuple[RandomArm, ...]:
+    """300 arms of 1 to 30 moving joints, ten of each size, from seeds 1000 to 1299."""
+    return tuple(random_tree(1000 + k, 1 + k % 30) for k in range(300))
 
 
 def _weights(kinds: tuple[str, ...]) -> list[float]:

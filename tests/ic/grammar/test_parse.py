@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from ic.grammar.spell import spell
 from ic.grammar.syntax import (
     Binary,
     Call,
@@ -414,6 +415,7 @@ error[D026]: `m` is the unit metre, so it cannot name a value
         ("# mast\nx = 3;", "error[D007]: `#mast` is not a directive", "a comment begins with `//`"),
         ("x = f(3\ny = 4;", "error[D022]: expected `,` or `)`, found `y`", ""),
         ("x = [3;\ny = 4;", "error[D022]: expected `,` or `]`, found `;`", ""),
+        ("x = [q,\na.y = 4;", "error[D020]: expected a value\n --> a.ic:1:8", ""),
         ('x = "a\\qb";', "error[D020]: `\\q` means nothing in a string", ""),
         ("x = not_there {", "error[D022]: this `{` is not closed", ""),
         ("3 = x;", "error[D020]: expected an entry, such as `name = value;`, found `3`", ""),
@@ -562,3 +564,8 @@ def test_a_macro_of_the_deck_that_takes_the_name_of_a_let_is_told_as_that(desk: 
     told = desk.told("#define height 2\nlet height = 1 m;\n")
     assert told.startswith("error[D035]: the macro `height` has put `2` in the place of this name\n --> a.ic:2:5\n")
     assert "help: give one of the two another name\n" in told
+
+
+def test_a_list_may_be_broken_before_a_path(desk: Desk) -> None:
+    deck = desk.read("record = [q,\n    arm.servo.voltage,\n    arm.qd, b];\nlast = 3;")
+    assert len(deck.entries) == 2 and spell(deck.entries[0].value) == "[q, arm.servo.voltage, arm.qd, b]"

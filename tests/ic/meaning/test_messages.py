@@ -202,7 +202,7 @@ error[D140]: no servo model `rigid_gearbx`
 6 |     model = rigid_gearbx;
   |             ^^^^^^^^^^^^
   = help: did you mean `rigid_gearbox`?
-  = help: servo models: rigid_gearbox
+  = help: servo models: ideal, locked, passive, rigid_gearbox
 """
 
 
@@ -262,7 +262,7 @@ error[D125]: no channel `hinge.servo.volts`
 16 |     record = [q, hinge.servo.volts];
    |                  ^^^^^^^^^^^^^^^^^
    = help: did you mean `hinge.servo.voltage`?
-   = help: channels of `hinge`: hinge.q, hinge.qd, hinge.qdd, hinge.tau, hinge.servo.command, hinge.servo.voltage, hinge.servo.integral, hinge.servo.motor_rate, hinge.servo.motor_torque
+   = help: channels of `hinge`: hinge.q, hinge.qd, hinge.qdd, hinge.tau, hinge.tau_load, hinge.J_eff, hinge.b, hinge.mode, hinge.reaction, hinge.servo.command, hinge.servo.voltage, hinge.servo.integral, hinge.servo.motor_rate, hinge.servo.motor_torque
 """
 
 

@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from met.dynamics.kinematics import jacobian, link_motions
+from met.dynamics.kinematics import jacobian, link_motions, quaternion
 from met.dynamics.spatial import Pose, rotation_about, rotation_quaternion, rotation_rpy
 from met.dynamics.tree import Tree
+from met.trace import Formulas, Graph
 from tests.oracles.pinocchio_tree import PinocchioTree
 from tests.oracles.random_tree import random_tree
 
@@ -97,3 +98,33 @@ def test_quaternion_axis_and_angle_and_rpy_name_the_same_turn() -> None:
     quaternion = rotation_quaternion(math.cos(half), 0.0, 0.0, math.sin(half))
     assert np.allclose(quaternion, rotation_about((0.0, 0.0, 1.0), 2 * half), rtol=0.0, atol=1e-15)
     assert np.allclose(quaternion, rotation_rpy(0.0, 0.0, 2 * half), rtol=0.0, atol=1e-15)
+
+
+def rotations() -> np.ndarray:
+    """Random ones; half turns about random axes and about the axes; those a little off; none."""
+    rng = np.random.default_rng(11)
+    quaternions = rng.standard_normal((300, 4))
+    quaternions[50:150, 0] = 0.0
+    quaternions[100:150, 0] += 1e-9 * rng.standard_normal(50)
+    quaternions[150:154] = np.eye(4)
+    quaternions[154:204] = np.eye(4)[rng.integers(4, size=50)] + 1e-8 * rng.standard_normal((50, 4))
+    return quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
+
+
+def test_a_rotations_quaternion_turns_back_into_it() -> None:
+    graph = Graph()
+    entries = [graph.input(f"{i}{j}") for i in range(3) for j in range(3)]
+    traced = Formulas.of(graph, quaternion((tuple(entries[:3]), tuple(entries[3:6]), tuple(entries[6:]))))
+    for wxyz in rotations():
+        R = np.array(rotation_quaternion(*wxyz))
+        found = np.array(quaternion(tuple(map(tuple, R.tolist()))))
+        # the entries round at 1e-16, and a root of no less than 1 is taken
+        assert abs(found @ found - 1.0) < 1e-15 and found[0] >= 0.0, wxyz
+        assert np.abs(np.array(rotation_quaternion(*found)) - R).max() < 2e-15, wxyz
+        replayed = traced.replay({f"{i}{j}": R[i, j] for i in range(3) for j in range(3)})
+        assert np.array_equal(replayed, found), wxyz
+
+
+def test_a_rotation_that_is_not_a_number_has_no_quaternion() -> None:
+    nan = float("nan")
+    assert np.isnan(quaternion(((nan, nan, nan),) * 3)).all()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from met.kernel import from_recording
 from met.trace import sin, where
 from met.trace.graph import OPERANDS
 from met.trace.pieces import cut, operations
-from met.trace.program import Every, Phase, Program, Record, Run, Unless0, WhileAny, record
+from met.trace.program import Call, Every, Phase, Program, Record, Run, Unless0, WhileAny, record
 from met.trace.reference import execute
 
 
@@ -74,6 +76,17 @@ def test_neighbouring_runs_are_one_section_and_pass_values_without_memory():
     assert len(recording.tick) == 1
     assert recording.cells == ("y",)
     assert ops(recording.sections[0]) == ["add", "fma"]
+
+
+def test_a_called_phase_is_there_once_and_passes_values_through_memory():
+    twice = Phase("twice", lambda t: t.write("n", t.read("n") + t.read("n")))
+    one = program((Run(COUNT), Call(twice), Run(COUNT), Every(2, (Call(twice), Run(COUNT))), Call(twice)),
+                  end=(Run(SHOW),), inputs=(), outputs=("n",))
+    recording = record(one)
+    assert [section.name for section in recording.sections].count("twice") == 1
+    assert [execute(one, {}, k)[1]["n"] for k in range(2)] == [14.0, 62.0]
+    kernel = from_recording(recording, lanes=2)
+    assert [kernel.run(np.zeros((1, 0)), k)[1][0, 0] for k in range(2)] == [14.0, 62.0]
 
 
 def test_every_tick_is_no_condition():

@@ -1,0 +1,107 @@
+"""What `met profile` prints: where the time of a run's step goes, part by part, and what its kernel is like."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+from ic.printing.columns import columns, count, size
+from met.plan import Experiment
+from met.profile import Part, Profile
+
+EVENTS = "friction events"
+
+
+def told(found: Profile, experiment: Experiment) -> Iterator[str]:
+    """The profile in lines."""
+    schedule = experiment.structure.schedule
+    yield (
+        f"{found.experiment}: {count(found.joints, 'joint')}, {count(found.cases, 'case')}, "
+        f"{experiment.structure.integrator}, steps of {1e3 * schedule.step:g} ms"
+    )
+    yield ""
+    yield from columns(list(_table(found)), right=(1, 2, 3, 4, 5))
+    yield ""
+    rates = found.flops / found.ns
+    yield (
+        f"  {rates:.1f} Gflop/s, {_percent(found.share_of_peak)} of the {found.peak * 1e-9:.1f} Gflop/s that this core "
+        f"does at most; a fused multiply-add counts as two"
+    )
+    yield f"  {_events(found.parts)}"
+    yield ""
+    yield from columns(list(_kernel(found)))
+    if found.inputs:
+        yield ""
+        yield from columns(list(_inputs(found)), right=(1, 2, 3, 4))
+        yield ""
+        yield "  sets: parameters that follow; once: operations that depend on it and are done before the first step;"
+        yield "  kept: numbers that these leave in a case's memory; taken by: operations of a step that take one"
+
+
+def _table(found: Profile) -> Iterator[tuple[str, ...]]:
+    """A row a kind of work, its parts under it; friction's events in one row."""
+    yield "a step of a case", "times", "operations", "flops", "ns", "share"
+    steady = [part for part in found.parts if not part.event]
+    for work, group in groupby(steady, key=lambda part: part.work):
+        parts = list(group)
+        yield _row(work, parts, found.ns)
+        if len(parts) > 1:
+            for part in parts:
+                if part.part:
+                    yield _row(f"  {part.part}", [part], found.ns, times=False)
+    events = [part for part in found.parts if part.event]
+    if events:
+        yield _row(EVENTS, events, found.ns, times=False)
+    yield _row("all parts, each alone", found.parts, found.ns, times=False)
+    yield "the whole run", "", "", "", _number(found.ns), "100 %"
+
+
+def _row(name: str, parts: Sequence[Part], whole: float, *, times: bool = True) -> tuple[str, ...]:
+    ns = sum(part.ns for part in parts)
+    return (
+        name,
+        _number(max(part.calls for part in parts)) if times else "",
+        *(_number(sum(numbers)) for numbers in ([p.operations for p in parts], [p.flops for p in parts])),
+        _number(ns),
+        _percent(ns / whole),
+    )
+
+
+def _events(parts: Sequence[Part]) -> str:
+    """How often friction made a block decide anew, and go back."""
+    rate = {part.work: part.calls for part in parts if part.event}
+    decided, split = rate.get("friction decisions", 0.0), rate.get("friction splits", 0.0)
+    if not rate:
+        return "no joint has dry friction: no events"
+    return f"friction events of a block: {_number(decided)} decisions at rest and {_number(split)} splits a step"
+
+
+def _kernel(found: Profile) -> Iterator[tuple[str, str]]:
+    yield "timed", f"{found.steps:,} steps of {count(found.blocks, 'block')} on one core, best of several"
+    yield "block", f"{found.lanes} cases, {found.vector} of them in a register ({found.cpu})"
+    yield "code", f"{size(found.code_bytes)} in {count(found.pieces, 'piece')}"
+    verb = "found in the cache in" if found.cached else "compiled in"
+    yield "made", f"recorded in {_seconds(found.recording_s)}, {verb} {_seconds(found.compiling_s)}"
+    yield "folded", f"{count(found.constants, 'parameter')} that no case varies"
+
+
+def _inputs(found: Profile) -> Iterator[tuple[str, ...]]:
+    """What a sweep varies, how much of its work is done before the first step, and how much each step has of it."""
+    yield "varied", "sets", "once", "kept", "taken by"
+    for each in found.inputs:
+        yield each.path, *(f"{number:,}" for number in (each.sets, each.hoisted, each.kept, each.read_by))
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
+
+
+def _number(value: float) -> str:
+    """Two digits, all of those before the point."""
+    if value < 5e-4:
+        return "0"
+    return f"{value:,.0f}" if value >= 9.95 else f"{value:.2g}"
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.2g} s" if value >= 0.9995 else f"{1e3 * value:.3g} ms"

@@ -1,0 +1,99 @@
+"""Commands whose course is a column of a CSV file: its rows become lists of the plan, as if the deck had written them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from ic.grammar.syntax import Call, Name, String, Word
+from ic.meaning.csv_files import missing_column
+from ic.meaning.models import check_keys, use_model
+from ic.meaning.resolve import Block, Item
+from ic.meaning.scope import Owner, Scope, Settled
+from ic.meaning.values import place_of
+from met.commands.profile import COLUMN, FILE, Profile
+from met.diagnostic import Label, Problem, error
+from met.models import parameter
+from met.plan import Origin
+
+LISTS = ("times", "values")
+TIME = "time"
+FEWEST = 2  # rows: a curve goes from one to the next
+
+
+def with_file_named(call: Call) -> Call:
+    """`trajectory("moves.csv")` is short for `trajectory(file = "moves.csv")`."""
+    if len(call.positional) != 1 or not isinstance(call.positional[0], String):
+        return call
+    named = call.positional[0]
+    return replace(call, positional=(), named=((Word(FILE.name, named.place), named), *call.named))
+
+
+def use_file(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: str) -> dict[str, Any] | None:
+    """Every parameter of a profile that reads a file, entered in the scope; None where one is missing or wrong."""
+    others = [each for each in profile.parameters if each.name not in LISTS]
+    check_keys(scope, body, [each.name for each in profile.written], owner)
+    values = use_model(scope, owner, others, Block({key: item for key, item in body.items.items()
+                                                    if key in [each.name for each in others]}))
+    for name in (FILE.name, COLUMN.name, *LISTS):
+        scope.whole[owner.join(name)] = "is read from a file, and is one for the whole sweep"
+    columns: dict[str, tuple[float, ...]] | None = None
+    with scope.complaints.gather():
+        columns = _columns(scope, owner, profile, body, joint)
+    if columns is None:
+        for name in LISTS:
+            scope.checks.fail(owner.join(name))
+    return None if values is None or columns is None else {**values, **columns}
+
+
+def _columns(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: str) -> dict[str, tuple[float, ...]]:
+    """The two lists. Raises Problem."""
+    item = body.get(FILE.name)
+    if item is None:
+        raise Problem(error("D075", f"{owner.label} has no `file`", owner.place, help='write `file = "NAME.csv"`'))
+    if not isinstance(item.value, String):
+        raise Problem(error("D076", f"`file` of {owner.label} is the name of a file, in quotes",
+                            place_of(item.value) if item.value is not None else item.place,
+                            help='write `file = "NAME.csv"`'))
+    named = item.value
+    wanted, place = _column_name(owner, body.get(COLUMN.name), joint), named.place
+    if body.get(COLUMN.name) is not None:
+        place = place_of(body.items[COLUMN.name].value or named)
+    table = scope.definitions.csv_files.table(named)
+    here = Label(named.place, "read here")  # the same for all joints, so that the file's own faults are told once
+    columns = {}
+    for name, column_name, at in zip(LISTS, (TIME, wanted), (named.place, place), strict=True):
+        declared = parameter(profile, name)
+        column = table.column(column_name)
+        assert declared is not None  # by the declaration of `from_file`
+        if column is None:
+            why = "the times of the rows stand in a column `time [s]`" if column_name == TIME else ""
+            raise missing_column(table, column_name, at, why)
+        text, dimension = scope.unit(owner, declared)
+        label = here if column_name == TIME else Label(named.place, f"read here for joint `{joint}`")
+        columns[name] = table.numbers(column, text, dimension, label)
+        if name == LISTS[0]:
+            table.rising(column, columns[name])
+        note = f"column `{column.name}` of {table.file}"
+        scope.parameters[owner.join(name)] = Settled(columns[name], text, Origin("deck", column.place, (), note),
+                                                     declared.doc)
+    if len(table.rows) < FEWEST:
+        raise Problem(error("D196", f"`{table.file}` has {len(table.rows) or 'no'} row"
+                            f"{'s' if not table.rows else ''}", table.columns[0].place, also=[here],
+                            help=f"a trajectory has {FEWEST} at least; `table` takes a single point"))
+    scope.setting(owner.join(FILE.name), table.file, item=item)
+    scope.setting(owner.join(COLUMN.name), wanted, item=body.get(COLUMN.name), note="the joint's name")
+    return columns
+
+
+def _column_name(owner: Owner, item: Item | None, joint: str) -> str:
+    if item is None:
+        return joint
+    if isinstance(item.value, String):
+        return item.value.value
+    if isinstance(item.value, Name) and len(item.value.path) == 1:
+        return item.value.text
+    raise Problem(error("D076", f"`column` of {owner.label} is the name of a column, in quotes",
+                        place_of(item.value) if item.value is not None else item.place,
+                        help='write `column = "NAME"`'))

@@ -1,0 +1,65 @@
+"""A sine about an offset whose frequency goes from `f0` to `f1` in the time `over`.
+
+    value = offset + amplitude sin(2 pi turns(t - begin) + phase), turns the integral of the frequency f
+    linear        f = f0 + (f1 - f0) s/over         as many hertz in each second
+    exponential   f = f0 (f1/f0)^(s/over)           as many octaves in each second
+
+Before `begin` the first value is held, and after `over` the last one, whatever that is, with slope zero. The slope's
+amplitude grows with the frequency.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from met.commands.profile import Profile
+from met.parameter import Parameter
+from met.trace import Real, absolute, both, clip, cos, exp, log, sin, tanh, where
+
+
+def course(p: Any, t: Real) -> tuple[Real, Real]:
+    s = clip(t - p.begin, 0.0, p.over)
+    if p.growth == "linear":
+        gain = (p.f1 - p.f0) / p.over
+        frequency = p.f0 + gain * s
+        turns = s * (p.f0 + 0.5 * gain * s)
+    else:
+        x = log(p.f1 / p.f0) * (s / p.over)
+        frequency = p.f0 * exp(x)
+        turns = p.f0 * s * _mean_of_exp(x)
+    angle = 2.0 * math.pi * turns + p.phase
+    slope = p.amplitude * (2.0 * math.pi * frequency) * cos(angle)
+    moving = both(t >= p.begin, t < p.begin + p.over)
+    return p.offset + p.amplitude * sin(angle), where(moving, slope, 0.0)
+
+
+def _mean_of_exp(x: Real) -> Real:
+    """(e^x - 1)/x, 1 at x = 0: the mean of e^y for y from 0 to x, right to some units in its last place.
+
+    Near 0 by e^x - 1 = 2 h/(1 - h) with h = tanh(x/2), which subtracts no like numbers.
+    """
+    small = absolute(x) < 1.0
+    h = tanh(0.5 * where(small, x, 1.0))
+    divisor = where(x == 0.0, 1.0, x)
+    near = where(x == 0.0, 1.0, 2.0 * h / ((1.0 - h) * divisor))
+    return where(small, near, (exp(x) - 1.0) / divisor)
+
+
+PROFILE = Profile(
+    name="chirp",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="amplitude", unit="command", doc="half of the way from trough to crest"),
+        Parameter(name="f0", unit="Hz", above=0.0, doc="frequency at the beginning, cycles per second"),
+        Parameter(name="f1", unit="Hz", above=0.0, doc="frequency at the end"),
+        Parameter(name="over", unit="s", above=0.0, doc="how long the frequency changes"),
+        Parameter(
+            name="growth", shape="word", words=("linear", "exponential"), default="linear", doc="how it changes"
+        ),
+        Parameter(name="offset", unit="command", default=0.0, doc="value about which it swings"),
+        Parameter(name="phase", unit="rad", default=0.0, doc="angle at the beginning"),
+        Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which it begins"),
+    ),
+    course=course,
+)

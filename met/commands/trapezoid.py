@@ -1,0 +1,49 @@
+"""From one held value to another in the least time that a rate limit and an acceleration limit allow.
+
+The rate is a trapezoid in time: it rises with `max_acceleration`, stays at `max_rate` and falls again; where the way is
+short it is a triangle, whose peak is sqrt(max_acceleration * way). So the value is C1: parabola, line, parabola. Made
+for position commands; of another command it limits the first and second derivative just so.
+
+Not a limiter: it knows neither the joint's state nor what the servo can do. The acceleration jumps at the corners.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from met.commands.profile import Profile
+from met.parameter import Parameter
+from met.trace import Real, absolute, clip, maximum, minimum, sqrt, where
+
+
+def course(p: Any, t: Real) -> tuple[Real, Real]:
+    way = absolute(p.to - p.start)
+    towards = where(p.to < p.start, -1.0, 1.0)
+    peak = minimum(p.max_rate, sqrt(p.max_acceleration * way))
+    rise = peak / p.max_acceleration
+    # without a way there is no peak: `where` computes the quotient all the same
+    level = maximum((way - peak * rise) / where(peak > 0.0, peak, 1.0), 0.0)
+    whole = 2.0 * rise + level
+    done = clip(t - p.begin, 0.0, whole)
+    left = whole - done
+    # counted from the nearer end, so that both ends are met exactly
+    rising = p.start + towards * (0.5 * p.max_acceleration * done * done)
+    even = p.start + towards * (peak * (done - 0.5 * rise))
+    falling = p.to - towards * (0.5 * p.max_acceleration * left * left)
+    value = where(left < rise, falling, where(done < rise, rising, even))
+    slope = towards * minimum(peak, p.max_acceleration * minimum(done, left))
+    return where(done < whole, value, p.to), slope
+
+
+PROFILE = Profile(
+    name="trapezoid",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="start", unit="command", default=0.0, doc="value before the move"),
+        Parameter(name="to", unit="command", doc="value after the move"),
+        Parameter(name="max_rate", unit="command/s", above=0.0, doc="rate that is not exceeded"),
+        Parameter(name="max_acceleration", unit="command/s^2", above=0.0, doc="acceleration at both ends"),
+        Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which the move begins"),
+    ),
+    course=course,
+)

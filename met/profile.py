@@ -1,0 +1,398 @@
+"""Where a run's time goes: operations and time of each part of its kernel, and the share of what the core can do.
+
+How a part's time is found. The kernel is made of sections, pieces of straight code. Each is compiled alone, called
+again and again from a state that the run went through, and its best time taken; times how often the run calls it a
+step, which is counted. What is told apart within a section (servo physics, environment, dynamics) shares its time by
+operations. What two parts have in common is counted where it was first asked for.
+
+The whole run is timed as well, in turns with its sections. The parts never add up to it exactly: alone, a section has
+its code and data at hand, and in the run short ones are put in their caller's place.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from met import kernel
+from met.frozen import frozen
+from met.kernel import Block as Cases
+from met.kernel import Kernel
+from met.plan import Experiment, Formula
+from met.program.build import build
+from met.program.machine import PARAMETER, TREE
+from met.run import inputs
+from met.trace import fma, llvm
+from met.trace.counting import counting
+from met.trace.graph import LEAVES, OPERANDS
+from met.trace.pieces import cut, operations
+from met.trace.program import (
+    Block,
+    Every,
+    Phase,
+    Program,
+    Record,
+    Recorded,
+    Recording,
+    Run,
+    Section,
+    Step,
+    Straight,
+    Tape,
+    Unless0,
+    WhileAny,
+    record,
+    walk,
+)
+
+FLOPS = {"add": 1, "sub": 1, "mul": 1, "div": 1, "sqrt": 1, "fma": 2}
+"""Operations that count as arithmetic, and for how much; comparing, choosing and moving count for none."""
+
+WORK = {
+    "servos_": "servo computers", "modes": "friction modes", "decide": "friction decisions", "derive": "first stage",
+    "watch": "failure watch", "advance": "integrator", "carry": "integrator", "slope": "further stages",
+    "split": "friction splits", "metrics_": "metrics", "record": "recorder",
+}  # fmt: skip
+"""What a phase's work is called, by the beginning of its name; in the order of an instant and the step after it."""
+
+WITHIN = ("servo physics", "environment", "dynamics")
+"""Parts of a stage (met/program/evaluation.py), in order."""
+
+_BLOCKS = 4  # blocks of cases that are timed together
+_STEPS = 5_000  # steps times blocks of the run that is timed, at most: well under a second, some 100 MB of rows
+_CALLS, _STARTS = 1000, 4  # calls of a section alone from one state, and how often from that state again
+_TURNS = 9  # times that each is timed
+
+Work = Callable[[], object]
+
+
+@frozen
+class Part:
+    """One kind of work. All numbers are a step's and a case's, averages over the run.
+
+    work        `first stage`;  part: `dynamics` of it, or "" for what is none of its parts
+    event       whether it is friction's: done only where a joint of the block comes to rest or breaks away
+    calls       how often it is done
+    operations  of the graph;  flops: of these, a fused multiply-add counting as two
+    ns          its time alone
+    """
+
+    work: str
+    part: str
+    event: bool
+    calls: float
+    operations: float
+    flops: float
+    ns: float
+
+
+@frozen
+class Input:
+    """A coordinate that varies from case to case.
+
+    sets     parameters that follow from it
+    hoisted  operations that depend on it and are done once, before the first step
+    kept     numbers that this leaves in a case's memory;  read_by: operations of a step that take one of them
+    """
+
+    path: str
+    sets: int
+    hoisted: int
+    kept: int
+    read_by: int
+
+
+@frozen
+class Profile:
+    """What is told of an experiment's kernel.
+
+    lanes         cases a block; vector: cases a register;  cpu: LLVM's name of the processor
+    code_bytes    of machine code, in `pieces` functions
+    cached        whether the machine code was found; seconds: recording the program, machine code (or finding it)
+    blocks, steps that were timed;  ns: of a step and case, all in all
+    peak          flops a second that this core can do, measured just now
+    constants     parameters that no case varies: folded into the code
+    """
+
+    experiment: str
+    cases: int
+    joints: int
+    lanes: int
+    vector: int
+    cpu: str
+    code_bytes: int
+    pieces: int
+    cached: bool
+    recording_s: float
+    compiling_s: float
+    blocks: int
+    steps: int
+    ns: float
+    peak: float
+    constants: int
+    inputs: tuple[Input, ...]
+    parts: tuple[Part, ...]
+
+    @property
+    def flops(self) -> float:
+        """Of a step and case, friction's events included as often as they were."""
+        return sum(part.flops for part in self.parts)
+
+    @property
+    def share_of_peak(self) -> float:
+        """Flops a second of the run, as a share of the peak."""
+        return self.flops / (self.ns * 1e-9) / self.peak
+
+
+def profile(experiment: Experiment) -> Profile:
+    """Measures an experiment's kernel on this core. Raises Problem where the experiment cannot be built."""
+    begun = time.perf_counter()
+    recording = record(build(experiment))
+    recorded = time.perf_counter()
+    made = kernel.from_recording(recording)
+    compiled = time.perf_counter()
+
+    cases = _cases(experiment, made.lanes)
+    schedule = experiment.structure.schedule
+    blocks = len(cases) // made.lanes
+    ticks = min(schedule.ticks, max(1, _STEPS // blocks) * schedule.dynamics)
+    steps = max(1, ticks // schedule.dynamics)
+    calls = _calls(made, cases, ticks)
+    halfway = made.block(cases[: made.lanes])
+    halfway.step(0, ticks // 2)
+    numbers = sorted({number for number, _ in calls})
+    chains, fused = _chains()
+    seconds, fastest, *alone = _best([
+        lambda: made.run(cases, ticks, threads=1), chains, *(_alone(made, number, halfway) for number in numbers)
+    ])  # fmt: skip
+    ns = {number: each * 1e9 / (_CALLS * _STARTS * made.lanes) for number, each in zip(numbers, alone, strict=True)}
+    return Profile(
+        experiment=experiment.name,
+        cases=experiment.cases.count,
+        joints=len(experiment.structure.moving),
+        lanes=made.lanes,
+        vector=min(made.lanes, made.machine.width),
+        cpu=made.machine.cpu,
+        code_bytes=llvm.size(made.loaded.code),
+        pieces=sum(len(cut(section)) for section in recording.sections),
+        cached=made.cached,
+        recording_s=recorded - begun,
+        compiling_s=compiled - recorded,
+        blocks=blocks,
+        steps=steps,
+        ns=seconds * 1e9 / (len(cases) * steps),
+        peak=2.0 * fused / fastest,
+        constants=sum(not isinstance(each.value, Formula | str) for each in experiment.parameters.values()),
+        inputs=tuple(hoisted(experiment, recording)),
+        parts=_parts(recording, {key: count / steps for key, count in calls.items()}, ns),
+    )
+
+
+def _chains() -> tuple[Work, int]:
+    """Work that keeps a core at its peak, and how many fused multiply-adds it is: enough chains to hide latency."""
+    chains, length, blocks, ticks = 12, 16, 4, 2000
+
+    def start(tape: Tape) -> None:
+        for i in range(chains):
+            tape.write(f"x{i}", tape.input("x") + float(i))
+
+    def tick(tape: Tape) -> None:
+        values = [tape.read(f"x{i}") for i in range(chains)]
+        for _ in range(length):
+            values = [fma(value, 0.75, 0.5) for value in values]
+        for i, value in enumerate(values):
+            tape.write(f"x{i}", value)
+
+    def end(tape: Tape) -> None:
+        for i in range(chains):
+            tape.output(f"x{i}", tape.read(f"x{i}"))
+
+    names = tuple(f"x{i}" for i in range(chains))
+    program = Program(
+        1.0, (Run(Phase("start", start)),), (Run(Phase("chains", tick)),), (Run(Phase("end", end)),), ("x",), 0, names
+    )
+    made = kernel.compile(program)
+    cases = np.ones((blocks * made.lanes, 1))
+    work = partial(made.run, cases, ticks - 1, record=False, threads=1)
+    return work, chains * length * ticks * len(cases)
+
+
+def hoisted(experiment: Experiment, recording: Recording) -> Iterator[Input]:
+    """What of the work that depends on each coordinate is done before the first step, and what is left to a step."""
+    sections = {step.section for step in _all(recording.start) if isinstance(step, Straight)}
+    ticking = {step.section for step in _all(recording.tick) if isinstance(step, (Straight, Recorded))}
+    for coordinate in experiment.cases.coordinates:
+        count, kept = 0, set()
+        for section in (recording.sections[i] for i in sections):
+            needs: set[int] = set()
+            for i in section.order:
+                node = section.nodes[i]
+                refs = node[1 : 1 + OPERANDS[node[0]]]
+                if node == ("input", coordinate.path) or any(ref >> 1 in needs for ref in refs):
+                    needs.add(i)
+                    count += node[0] not in LEAVES
+            kept |= {name for name, ref in section.stores if ref >> 1 in needs and name.startswith((PARAMETER, TREE))}
+        readers = sum(_reads(recording.sections[i], kept) for i in ticking)
+        yield Input(coordinate.path, len(coordinate.sets), count, len(kept), readers)
+
+
+def _reads(section: Section, cells: set[str]) -> int:
+    """Live operations that take one of these cells."""
+    found = 0
+    for i in operations(section):
+        node = section.nodes[i]
+        operands = (section.nodes[ref >> 1] for ref in node[1 : 1 + OPERANDS[node[0]]])
+        found += any(each[0] == "cell" and each[1] in cells for each in operands)
+    return found
+
+
+def by_part(section: Section) -> dict[str, tuple[int, int]]:
+    """Live operations and flops of a section by the part that they belong to, in order of first appearance."""
+    found: dict[str, tuple[int, int]] = {}
+    parts = iter((*section.parts, (len(section.nodes), "")))
+    name, (until, following) = "", next(parts)
+    for i in operations(section):
+        while i >= until:
+            name, (until, following) = following, next(parts)
+        count, flops = found.get(name, (0, 0))
+        found[name] = (count + 1, flops + FLOPS.get(section.nodes[i][0], 0))
+    return found
+
+
+# Times
+
+
+def _parts(
+    recording: Recording, calls: Mapping[tuple[int, bool], float], alone: Mapping[int, float]
+) -> tuple[Part, ...]:
+    """Every kind of work of a step, in the order in which a step comes to it.
+
+    calls  of a section a step, by its number and whether within a loop;  alone: ns of a call of it and case
+    """
+    found: dict[tuple[str, str, bool], Part] = {}
+    for (number, event), rate in calls.items():
+        section = recording.sections[number]
+        shares = by_part(section) or {section.parts[0][1]: (0, 0)}  # what only moves numbers has no operations
+        whole = sum(ops for ops, _ in shares.values()) or 1
+        for path, (ops, flops) in shares.items():
+            phase, _, part = path.partition("/")
+            key = (_work(phase), part, event)
+            old = found.get(key, Part(*key, 0.0, 0.0, 0.0, 0.0))
+            ns = alone[number] * rate * (ops / whole if ops else 1.0)
+            found[key] = Part(*key, max(old.calls, rate), old.operations + ops * rate, old.flops + flops * rate,
+                              old.ns + ns)  # fmt: skip
+    return tuple(sorted(found.values(), key=_place))
+
+
+def _work(phase: str) -> str:
+    """What a phase's work is called; its own name where it is no phase of a step's."""
+    return next((work for begin, work in WORK.items() if phase.startswith(begin)), phase)
+
+
+def _place(part: Part) -> tuple[bool, int, int]:
+    """Where a part stands in the table: in the order of a step, what is none of a stage's parts after those."""
+    works = list(WORK.values())
+    return (
+        part.event,
+        works.index(part.work) if part.work in works else len(works),
+        WITHIN.index(part.part) if part.part in WITHIN else len(WITHIN),
+    )
+
+
+def _calls(made: Kernel, cases: np.ndarray, ticks: int) -> dict[tuple[int, bool], float]:
+    """How often each section was called in a run, by (section, whether within a loop), on average over the blocks."""
+    program, loops = counting(made.program)
+    counter = kernel.compile(program, lanes=made.lanes)
+    _, outputs = counter.run(cases, ticks, record=False, threads=1)
+    turns = iter([float(outputs[:: made.lanes, program.outputs.index(loop.turns)].mean()) for loop in loops])
+    found: dict[tuple[int, bool], float] = {}
+
+    def ticks_of(first: int, divisor: int) -> int:
+        """Ticks from the first to the last that the divisor divides."""
+        return ticks // divisor - (first + divisor - 1) // divisor + 1
+
+    def note(body: tuple[Step, ...], first: int, divisor: int, event: float | None) -> None:
+        """event: how often a loop turns that the body stands in."""
+        for node in body:
+            match node:
+                case Straight(section):
+                    key = (section, event is not None)
+                    found[key] = found.get(key, 0.0) + (ticks_of(first, divisor) if event is None else event)
+                case Recorded(section, own):
+                    found[section, False] = ticks_of(0, own)
+                case Block(Every(own), inner):
+                    note(inner, first, math.lcm(divisor, own), event)
+                case Block(Unless0(), inner):
+                    note(inner, max(first, 1), divisor, event)
+                case Block(WhileAny(), inner):
+                    note(inner, first, divisor, next(turns))
+
+    note(made.recording.start, 0, 1, None)
+    found.clear()  # of the start only the loops' counters were of interest: they come first
+    note(made.recording.tick, 0, 1, None)
+    return found
+
+
+def _alone(made: Kernel, number: int, state: Cases) -> Work:
+    """Work that calls a section many times in a row, from copies of this state."""
+    recording = made.recording
+    section = recording.sections[number]
+    program, step = recording.program, Straight(0)
+    if section.records:
+        only = next(node for node in walk(program.tick) if isinstance(node, Record))
+        program, step = replace(program, tick=(replace(only, divisor=1),)), Recorded(0, 1)  # type: ignore[assignment]
+    else:
+        program = replace(program, tick=())
+    single = Recording(program, (section,), (), (step,), (), recording.cells)
+    # Not inlined: within a loop of its own, a compiler would find that nothing changes, and do much of it once.
+    alone = kernel.from_recording(single, lanes=made.lanes, inline=False).block(state.inputs.T)
+
+    def work() -> None:
+        for _ in range(_STARTS):
+            alone.state[:] = state.state
+            if section.records:
+                alone.recorded(1, _CALLS)
+            else:
+                alone.step(1, _CALLS)
+
+    return work
+
+
+def _cases(experiment: Experiment, lanes: int) -> np.ndarray:
+    """Inputs of a few whole blocks, [case, input], taken evenly from the case table; few cases are repeated."""
+    count = experiment.cases.count
+    blocks = min(_BLOCKS, -(-count // lanes))
+    return inputs(experiment, np.linspace(0, count - 1, blocks * lanes).round().astype(np.int64))
+
+
+def _best(works: Sequence[Work]) -> list[float]:
+    """Least seconds of the core of several turns each, after one to warm up: what else the machine does hits all alike.
+
+    The core's own time, not the clock's: waiting for a core that another process has is not counted.
+    """
+    least = [math.inf] * len(works)
+    for turn in range(_TURNS + 1):
+        for i, work in enumerate(works):
+            begun = time.thread_time()
+            work()
+            if turn:
+                least[i] = min(least[i], time.thread_time() - begun)
+    return least
+
+
+def _all(body: tuple[Step, ...]) -> Iterator[Step]:
+    for node in body:
+        yield node
+        if isinstance(node, Block):
+            yield from _all(node.body)
+
+
+def as_data(found: Profile) -> Mapping[str, Any]:
+    """The profile as JSON can hold it."""
+    return {**asdict(found), "flops": found.flops, "share_of_peak": found.share_of_peak}

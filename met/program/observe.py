@@ -1,0 +1,120 @@
+"""Derived channels: what a record or a metric asks of the arm at an instant (docs/physics.md, section 1).
+
+They follow from the state at the instant, in the modes in which its derivative was taken. They are pieces of the
+program by themselves, which take the derivative anew: so no bit of another channel depends on what is asked for here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+from met.channel import WXYZ, XYZ, Channel
+from met.dynamics.effective_inertia import effective_inertia
+from met.dynamics.energy import Energy, energy
+from met.dynamics.kinematics import LinkMotion, jacobian, link_motions, quaternion
+from met.dynamics.recursion import Wrench, reactions
+from met.dynamics.spatial import Vector, choose
+from met.dynamics.tree import Tree
+from met.integrators.integrator import Motion
+from met.program.evaluation import Derivative
+from met.program.machine import Machine
+from met.trace import Real
+
+
+def derived(machine: Machine) -> tuple[list[Channel], list[Channel]]:
+    """The derived channels that are asked for: those computed at every instant, and those at recorded rows alone.
+
+    A metric sees every instant. So does a record whose rows lie between instants, for they show the last one's value.
+    """
+    structure = machine.structure
+    paths = [path for recorded in structure.record for path in recorded.channels]
+    watched = [channel for _, _, channel in machine.metrics if channel.derived]
+    recorded = [channel for channel in map(machine.channels.__getitem__, paths) if channel.derived]
+    between = structure.schedule.record % structure.schedule.dynamics != 0
+    held = {channel.path: channel for channel in (watched + recorded if between else watched)}
+    rows = {channel.path: channel for channel in recorded if channel.path not in held}
+    return list(held.values()), list(rows.values())
+
+
+class Observed:
+    """The arm at one instant. What no channel needs is not computed.
+
+    y      the state;  found  gives its derivative
+    """
+
+    def __init__(self, machine: Machine, tree: Tree, y: Motion, found: Callable[[], Derivative]) -> None:
+        self.joints = tuple(joint.name for joint in machine.joints)
+        self.tree, self.y = tree, y
+        self._found = found
+        self._jacobians: dict[str, tuple[tuple[Vector, Vector], ...]] = {}
+
+    def value(self, channel: Channel) -> Real:
+        """A derived channel, in its unit."""
+        parts = channel.path.split(".")
+        if parts[0] == "links":
+            return self._of_link(channel, parts[1:])
+        return self._of_joint(channel.joint, parts[1:]) if channel.joint else self._of_arm(parts)
+
+    def _of_joint(self, joint: str, parts: list[str]) -> Real:
+        i, solved = self.joints.index(joint), self.derivative.solved
+        match parts:
+            case ["tau_load"]:
+                return solved.tau_load[i]
+            case ["J_eff"]:
+                return self.effective[i][0]
+            case ["b"]:
+                return self.effective[i][1]
+            case ["mode"]:
+                return choose(solved.mode[i], 1.0, 0.0)
+            case ["reaction", kind, axis]:
+                moment, force = self.reactions[i]
+                return (moment if kind == "moment" else force)[XYZ.index(axis)]
+        raise KeyError(f"{joint}.{'.'.join(parts)}")
+
+    def _of_link(self, channel: Channel, parts: list[str]) -> Real:
+        link, kind, *rest = parts
+        if kind == "jacobian":
+            angular, linear = self._jacobian(link)[self.joints.index(channel.joint)]
+            return (angular if rest[0] == "angular" else linear)[XYZ.index(rest[-1])]
+        motion = self.motions[link]
+        if kind == "orientation":
+            return quaternion(motion.pose.R)[WXYZ.index(rest[0])]
+        vectors = {"position": motion.position, "velocity": motion.velocity, "rate": motion.rate}
+        return vectors[kind]()[XYZ.index(rest[0])]
+
+    def _of_arm(self, parts: list[str]) -> Real:
+        match parts:
+            case ["energy", "kinetic"]:
+                return self.energy.kinetic
+            case ["energy", "potential"]:
+                return self.energy.potential
+            case ["momentum", kind, axis]:
+                return (self.energy.linear if kind == "linear" else self.energy.angular)[XYZ.index(axis)]
+        raise KeyError(".".join(parts))
+
+    def _jacobian(self, link: str) -> tuple[tuple[Vector, Vector], ...]:
+        if link not in self._jacobians:
+            self._jacobians[link] = jacobian(self.tree, self.y.q, link)
+        return self._jacobians[link]
+
+    @cached_property
+    def derivative(self) -> Derivative:
+        return self._found()
+
+    @cached_property
+    def effective(self) -> tuple[tuple[Real, Real], ...]:
+        return effective_inertia(self.tree, self.derivative.solved)
+
+    @cached_property
+    def reactions(self) -> tuple[Wrench, ...]:
+        return reactions(self.tree, self.derivative.solved)
+
+    @cached_property
+    def motions(self) -> dict[str, LinkMotion]:
+        return link_motions(self.tree, self.y.q, self.y.qd)
+
+    @cached_property
+    def energy(self) -> Energy:
+        found = self.derivative
+        return energy(self.tree, self.y.q, self.y.qd, rotor=found.solved.rotor, gravity=found.gravity)

@@ -1,0 +1,381 @@
+"""One step of the dynamics: friction's modes, derivatives, the integrator's stages, and what friction does on the way.
+
+The derivative is most of a program, so its code is there twice, however often a step calls it: `derive`, of the state
+at hand with all that is recorded of it, and `slope`, of a stage on the way, with nothing but the slopes. Both read and
+write cells. What they leave for a case that did not ask (another one of the block did) is overwritten, before anything
+reads it, by `derive` at the next instant.
+
+An integrator's `advance` is one function that asks for slopes on its way. It is recorded in pieces, one to each
+question and one to the end: each piece runs `advance` anew, answers the questions that are settled from cells, and
+stops at the next one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from met.integrators.integrator import Motion, Slope
+from met.program import cells, friction
+from met.program.evaluation import Derivative, derivative, drive_of, state_names
+from met.program.machine import Actuator, Machine
+from met.program.observe import Observed
+from met.program.values import Values
+from met.servos.servo import Drive
+from met.trace import Real, Truth, any_of, both, either, isfinite, not_, sign, where
+from met.trace.program import Call, Control, Phase, Run, Tape, WhileAny
+
+SINGULAR, NOT_FINITE = 1.0, 2.0
+"""Causes of a failed case (output `failure`); 0 is none."""
+
+EVENTS = ("friction.splits", "friction.clamped", "friction.undecided")
+"""Counts a case: steps split where a joint came to rest, crossings clamped, decisions at rest left open."""
+
+FROM, STAGE = "from:", "stage:"
+"""Prefixes of copies of the state: at the start of the (sub)step that was just done, and at a stage on the way."""
+
+
+class Step:
+    """The phases of a step of one machine. Every method that takes a tape is the body of a phase."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.schedule = machine.structure.schedule
+        self.joints = tuple(joint.name for joint in machine.joints)
+        self.states = state_names(machine)
+        self._derive = Call(Phase("derive", self.derive))
+        self._slope = Call(Phase("slope", self.slope))
+        self._decide = WhileAny(
+            "undecided", friction.passes(len(machine.sticking)), (self._derive, Run(Phase("decide", self.decide)))
+        )
+        self._split = WhileAny("crossing", 1, (Run(Phase("split", self.split)),))
+
+    def begin(self) -> tuple[Control, ...]:
+        """What happens at an instant once the servos have ticked: modes, then the step's first stage."""
+        decide = (self._decide,) if self.machine.sticking else ()
+        return (Run(Phase("modes", self.modes)), *decide, self._derive, Run(Phase("watch", self.watch)))
+
+    def finish(self) -> tuple[Control, ...]:
+        """The rest of the step, at its end."""
+        parts = self._stages(again=False)
+        if self.machine.sticking:
+            again = (
+                Run(Phase("modes_again", self.modes_again)),
+                self._decide,
+                self._derive,
+                Run(Phase("watch_again", self.watch_again)),
+                *self._stages(again=True),
+                self._split,
+            )
+            parts = (*parts, self._split, WhileAny("again", friction.SPLITS, again))
+        return (*parts, Run(Phase("carry", self.carry))) if self.machine.between else parts
+
+    # Modes.
+
+    def modes(self, tape: Tape) -> None:
+        """What begins at an instant: held values for the first stage, friction modes from the rates."""
+        for actuator in self.machine.between:
+            for memory in actuator.servo.memory:
+                channel = f"{actuator.path}.{memory.name}"
+                tape.write(f"first:{channel}", tape.read(channel))
+            joint = self.joints[actuator.index]
+            tape.write(f"before:{joint}", tape.read(f"{joint}.qd"))
+        tape.write("instant", tape.time)
+        tape.write("fraction", 0.0)
+        tape.write("splits", 0.0)
+        self._modes(tape, True)
+
+    def modes_again(self, tape: Tape) -> None:
+        self._modes(tape, tape.read_mask("again"))
+
+    def _modes(self, tape: Tape, active: Truth) -> None:
+        """s = sign(qd), and whether any joint is at rest so that its mode must be decided."""
+        any_at_rest: Truth = False
+        for actuator in self.machine.sticking:
+            joint = self.joints[actuator.index]
+            qd = tape.read(f"{joint}.qd")
+            rubs = self._dry(tape, actuator) > 0.0
+            if not isinstance(rubs, bool):
+                tape.write_mask(f"rubs:{joint}", rubs)
+            cells.keep(tape, active, f"friction:{joint}", where(rubs, sign(qd), 1.0))
+            any_at_rest = either(any_at_rest, both(rubs, qd == 0.0))
+        tape.write_mask("undecided", both(active, any_at_rest))
+
+    def _dry(self, tape: Tape, actuator: Actuator) -> Real:
+        """The level of dry friction at the state, N m (N)."""
+        held = self._held(tape, actuator, 0.0)
+        return self._drive(tape, actuator, self._state(tape), held, tape.time, tape.time).dry
+
+    def rubs(self, tape: Tape, actuator: Actuator) -> Truth:
+        """Whether a joint has dry friction, as `modes` found it; False for a case whose level is zero."""
+        if not actuator.dry:
+            return False
+        return True if actuator.level is not None else tape.read_mask(f"rubs:{self.joints[actuator.index]}")
+
+    def decide(self, tape: Tape) -> None:
+        """One decision at rest, on the derivative just taken: who breaks away, who turns back."""
+        active = tape.read_mask("undecided")
+        y, fraction = self._state(tape), tape.read("fraction")
+        changed: Truth = False
+        for actuator in self.machine.sticking:
+            joint = self.joints[actuator.index]
+            s = tape.read(f"friction:{joint}")
+            held = self._held(tape, actuator, fraction)
+            dry = self._drive(tape, actuator, y, held, self._time(tape, fraction), tape.read("instant")).dry
+            at_rest = both(self.rubs(tape, actuator), y.qd[actuator.index] == 0.0)
+            s_new = friction.decide(s, at_rest, tape.read(f"need:{joint}"), dry, tape.read(f"{joint}.qdd"))
+            changed = either(changed, s_new != s)
+            cells.keep(tape, active, f"friction:{joint}", s_new)
+        tape.write_mask("undecided", both(active, changed))
+
+    # Derivatives.
+
+    def derive(self, tape: Tape) -> None:
+        """The derivative at the state, with everything that is recorded of it, and what is wrong with it."""
+        y = self._state(tape)
+        found = self._derivative(tape, y, tape.read("fraction"))
+        for i, joint in enumerate(self.joints):
+            tape.write(f"{joint}.qdd", found.slope.qdd[i])
+            tape.write(f"{joint}.tau", found.tau[i])
+        for actuator in self.machine.sticking:
+            tape.write(f"need:{self.joints[actuator.index]}", found.need[actuator.index])
+        for name, slope in zip(self.states, found.slope.xd, strict=True):
+            tape.write(f"slope:{name}", slope)
+        for actuator in self.machine.working:
+            drive = found.drives[actuator.index]
+            assert drive is not None
+            for name, value in drive.signals.items():
+                tape.write(f"{actuator.path}.{name}", value)
+        cause, joint_number = _fault(y, found)
+        tape.write("fault", cause)
+        tape.write("fault.joint", joint_number)
+
+    def slope(self, tape: Tape) -> None:
+        """The derivative at a stage on the way, its slopes alone."""
+        found = self._derivative(tape, self._state(tape, STAGE), tape.read(f"{STAGE}fraction"))
+        for joint, qdd in zip(self.joints, found.slope.qdd, strict=True):
+            tape.write(f"{STAGE}{joint}.qdd", qdd)
+        for name, slope in zip(self.states, found.slope.xd, strict=True):
+            tape.write(f"{STAGE}slope:{name}", slope)
+
+    def watch(self, tape: Tape) -> None:
+        self._watch(tape, True)
+
+    def watch_again(self, tape: Tape) -> None:
+        self._watch(tape, tape.read_mask("again"))
+
+    def _watch(self, tape: Tape, active: Truth) -> None:
+        """The first failure of a case, and decisions that were left open."""
+        cause = tape.read("fault")
+        news = both(active, both(tape.read("failure") == 0.0, cause != 0.0))
+        cells.keep(tape, news, "failure.joint", tape.read("fault.joint"))
+        cells.keep(tape, news, "failure.tick", tape.tick)
+        cells.keep(tape, news, "failure", cause)
+        if self.machine.sticking:
+            cells.count(tape, tape.read_mask("undecided"), "friction.undecided")
+
+    def observed(self, tape: Tape) -> Observed:
+        """The arm at an instant, with the derivative that `derive` took of it."""
+        y = self._state(tape)
+        return Observed(self.machine, self.machine.tree(tape.read), y, lambda: self._derivative(tape, y, 0.0))
+
+    def _derivative(self, tape: Tape, y: Motion, fraction: Real) -> Derivative:
+        """The derivative at the state y, at the share `fraction` of the dynamics step that began last."""
+        held = [
+            Values("no servo", {}) if actuator is None else self._held(tape, actuator, fraction)
+            for actuator in self.machine.actuators
+        ]
+        return derivative(
+            self.machine, tape.read, y=y, held=held, friction=self._friction(tape),
+            time=self._time(tape, fraction), begin=tape.read("instant"), part=tape.part,
+        )
+
+    def _drive(
+        self, tape: Tape, actuator: Actuator, y: Motion, held: Values, time: Real, begin: Real
+    ) -> Drive:
+        return drive_of(self.machine, actuator, tape.read, y, held, time, begin)
+
+    def _time(self, tape: Tape, fraction: Real) -> Real:
+        return tape.read("instant") + fraction * self.schedule.step
+
+    def _held(self, tape: Tape, actuator: Actuator, fraction: Real) -> Values:
+        """What the servo's computer holds; between the first and last tick of a step for a servo that is faster."""
+        numbers: dict[str, Real] = {}
+        for memory in actuator.servo.memory:
+            channel = f"{actuator.path}.{memory.name}"
+            now = tape.read(channel)
+            if actuator in self.machine.between:
+                first = tape.read(f"first:{channel}")
+                now = first + fraction * (now - first)
+            numbers[memory.name] = now
+        return Values(actuator.owner, numbers)
+
+    # The integrator's stages.
+
+    def _stages(self, *, again: bool) -> tuple[Control, ...]:
+        """The step (the substep, if `again`) after its first stage: pieces of the integrator, a slope between each."""
+        name, asked = ("advance_again" if again else "advance"), self._questions()
+        parts: list[Control] = []
+        for settled in range(asked):
+            parts += [Run(Phase(f"{name}_{settled + 1}", self._towards(settled, again))), self._slope]
+        return (*parts, Run(Phase(name, self._arrival(asked, again))))
+
+    def _questions(self) -> int:
+        """How many slopes the integrator asks for, the first stage's aside."""
+        zeros = (0.0,) * len(self.joints)
+        rest = (0.0,) * len(self.states)
+        asked = 0
+
+        def slope(c: float, there: Motion) -> Slope:
+            nonlocal asked
+            asked += 1
+            return Slope(zeros, zeros, rest)
+
+        self.machine.integrator.advance(slope, 1.0, Motion(zeros, zeros, rest), Slope(zeros, zeros, rest))
+        return asked
+
+    def _towards(self, settled: int, again: bool) -> Callable[[Tape], None]:
+        """The body of the piece that ends at a question, `settled` of them being answered before."""
+
+        def body(tape: Tape) -> None:
+            fraction = tape.read("fraction") if again else 0.0
+            try:
+                self._integrate(tape, settled, fraction)
+            except _Asked as asked:
+                cells.store(tape, True, self.joints, self.states, asked.there, STAGE)
+                tape.write(f"{STAGE}fraction", fraction + asked.share * (1.0 - fraction))
+            else:
+                raise AssertionError(f"integrator {self.machine.integrator.name} asks for fewer slopes than before")
+
+        return body
+
+    def _arrival(self, settled: int, again: bool) -> Callable[[Tape], None]:
+        """The body of the last piece: the state at the end, and whether a rate came to zero on the way."""
+
+        def body(tape: Tape) -> None:
+            active: Truth = tape.read_mask("again") if again else True
+            y = self._state(tape)
+            y_new = self._integrate(tape, settled, tape.read("fraction") if again else 0.0)
+            if self.machine.sticking:
+                crossed = any_of(friction.crossings(self._sliding(tape), y_new))
+                cells.store(tape, True, self.joints, self.states, y, FROM)
+                tape.write_mask("crossing", both(active, crossed))
+                tape.write_mask("again", False)
+            cells.store(tape, active, self.joints, self.states, y_new)
+
+        return body
+
+    def _integrate(self, tape: Tape, settled: int, fraction: Real) -> Motion:
+        """Runs the integrator with the first `settled` slopes from cells; at the next one it raises `_Asked`."""
+        y = self._state(tape)
+        if settled:
+            for joint in self.joints:
+                for part in ("qd", "qdd"):
+                    tape.write(f"k{settled}:{joint}.{part}", tape.read(f"{STAGE}{joint}.{part}"))
+            for name in self.states:
+                tape.write(f"k{settled}:{name}", tape.read(f"{STAGE}slope:{name}"))
+        asked = 0
+
+        def slope(c: float, there: Motion) -> Slope:
+            nonlocal asked
+            asked += 1
+            if asked > settled:
+                raise _Asked(c, there)
+            return Slope(
+                tuple(tape.read(f"k{asked}:{joint}.qd") for joint in self.joints),
+                tuple(tape.read(f"k{asked}:{joint}.qdd") for joint in self.joints),
+                tuple(tape.read(f"k{asked}:{name}") for name in self.states),
+            )
+
+        h = (1.0 - fraction) * self.schedule.step
+        return self.machine.integrator.advance(slope, h, y, self._first_slope(tape, y.qd))
+
+    def _first_slope(self, tape: Tape, qd: tuple[Real, ...]) -> Slope:
+        """The first stage's slope, as `derive` left it; qd are the rates then."""
+        return Slope(
+            qd,
+            tuple(tape.read(f"{joint}.qdd") for joint in self.joints),
+            tuple(tape.read(f"slope:{name}") for name in self.states),
+        )
+
+    def split(self, tape: Tape) -> None:
+        """Go back to where the first rate came to zero; the rest of the step follows as a substep."""
+        active = tape.read_mask("crossing")
+        fraction, splits = tape.read("fraction"), tape.read("splits")
+        left = 1.0 - fraction
+        may_split = splits < float(friction.SPLITS)
+        y = self._state(tape, FROM)
+        reached = friction.split_at_rest(
+            y,
+            self._first_slope(tape, y.qd),
+            self._state(tape),
+            left * self.schedule.step,
+            self._sliding(tape),
+            may_split=may_split,
+        )
+        fraction_new = fraction + reached.share * left
+        cells.keep(tape, active, "fraction", fraction_new)
+        tape.write_mask("again", both(active, both(may_split, fraction_new < 1.0)))
+        cells.count(tape, both(active, may_split), "splits")
+        cells.count(tape, both(active, may_split), "friction.splits")
+        cells.count(tape, both(active, not_(may_split)), "friction.clamped")
+        cells.store(tape, active, self.joints, self.states, reached.y)
+
+    def carry(self, tape: Tape) -> None:
+        """The acceleration of the step just done, for servos that tick before the next; none for a joint at rest."""
+        for actuator in self.machine.between:
+            joint = self.joints[actuator.index]
+            qd = tape.read(f"{joint}.qd")
+            a = (qd - tape.read(f"before:{joint}")) / self.schedule.step
+            at_rest = both(self.rubs(tape, actuator), qd == 0.0)
+            tape.write(f"carry:{joint}", where(at_rest, 0.0, a))
+
+    # What the phases share.
+
+    def _state(self, tape: Tape, copy: str = "") -> Motion:
+        return cells.state(tape, self.joints, self.states, copy)
+
+    def _friction(self, tape: Tape) -> list[Real | None]:
+        modes: list[Real | None] = [None] * len(self.joints)
+        for actuator in self.machine.sticking:
+            modes[actuator.index] = tape.read(f"friction:{self.joints[actuator.index]}")
+        return modes
+
+    def _sliding(self, tape: Tape) -> list[Real | None]:
+        """Friction modes as crossings count them: zero, so that it never crosses, where a case has no friction."""
+        modes = self._friction(tape)
+        for actuator in self.machine.sticking:
+            mode = modes[actuator.index]
+            assert mode is not None
+            modes[actuator.index] = where(self.rubs(tape, actuator), mode, 0.0)
+        return modes
+
+
+class _Asked(Exception):
+    """An integrator asks for the slope at `there`, the share `share` of its step on."""
+
+    def __init__(self, share: float, there: Motion) -> None:
+        super().__init__()
+        self.share = share
+        self.there = there
+
+
+def _fault(y: Motion, found: Derivative) -> tuple[Real, Real]:
+    """What is wrong at a state or with its derivative, and with which joint first; 0 where nothing is.
+
+    `need` tells where a joint that sticks hides it, the state where no acceleration depends on it.
+    """
+    joints = range(len(found.need))
+    cause: Real = 0.0
+    number: Real = 0.0
+    for i in reversed(joints):
+        # Infinities that cancel leave not a number, so a plain sum misses none.
+        total = found.slope.qdd[i] + found.need[i] + y.q[i] + y.qd[i]
+        drive = found.drives[i]
+        for slope in drive.slopes.values() if drive is not None else ():
+            total = total + slope
+        bad = not_(isfinite(total))
+        cause, number = where(bad, NOT_FINITE, cause), where(bad, float(i), number)
+    for i in reversed(joints):
+        singular = found.solved.singular[i]
+        cause, number = where(singular, SINGULAR, cause), where(singular, float(i), number)
+    return cause, number

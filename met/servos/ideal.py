@@ -1,0 +1,72 @@
+"""Ideal servo: the joint follows its command whatever the arm, and the torque that this takes is what comes out.
+
+    r(t) = value + slope (t - t_k)                    the command, carried on along its slope from the tick at t_k
+    rate            qdd = slope + w (r - qd)
+    position        qdd = 2 w (slope - qd) + w^2 (r - q)
+    acceleration    qdd = r
+
+Value and slope are taken at the servo's ticks and held; the law is evaluated at every stage. w is `bandwidth`: an
+error dies away as exp(-w t), without overshoot, and at a step of a command the joint goes there so. The second
+derivative of a position command is not known, so a position whose rate changes is followed (its acceleration)/w^2
+behind. tau is from inverse dynamics, the rotor's share included; there is no limit.
+
+Not a motor, and not a controller: no torque in the world is needed to be this good. A joint that is moved so shakes
+the other joints like any other, but nothing shakes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from met.parameter import Memory, Parameter
+from met.servos.servo import Drive, JointMotion, Seen, Servo
+from met.trace import Real
+
+
+def tick(p: Any, held: Any, seen: Seen) -> Mapping[str, Real]:
+    """The servo's computer: it hands the command on."""
+    return {"value": seen.asked.value, "slope": seen.asked.slope, "since": seen.time}
+
+
+def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
+    """The acceleration that follows the command."""
+    asked = held.value + held.slope * (joint.time - held.since)
+    w = p.bandwidth
+    if joint.command == "rate":
+        qdd = held.slope + w * (asked - joint.qd)
+    elif joint.command == "position":
+        qdd = 2.0 * w * (held.slope - joint.qd) + w * w * (asked - joint.q)
+    else:
+        qdd = asked
+    return Drive(given=True, qdd=qdd, rotor=p.rotor)
+
+
+def fastest(p: Any) -> Real:
+    """Both laws have all their roots at -bandwidth, 1/s; under an acceleration command nothing decays."""
+    return p.bandwidth
+
+
+SERVO = Servo(
+    name="ideal",
+    doc=__doc__,
+    commands=("rate", "position", "acceleration"),
+    parameters=(
+        Parameter(
+            name="bandwidth", unit="1/s", default=0.0, at_least=0.0, needed_for=("rate", "position"),
+            doc="how fast an error dies away, used under a rate or position command",
+        ),
+        Parameter(
+            name="rotor", unit="effort*s^2/joint", default=0.0, at_least=0.0,
+            doc="inertia of the drive, seen at the joint: its share of tau",
+        ),
+    ),
+    memory=(
+        Memory(name="value", unit="command", doc="what was asked at the last tick"),
+        Memory(name="slope", unit="command/s", doc="its rate of change then"),
+        Memory(name="since", unit="s", doc="time of the last tick"),
+    ),
+    tick=tick,
+    drive=drive,
+    fastest=fastest,
+)

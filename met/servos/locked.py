@@ -1,0 +1,42 @@
+"""Locked joint: it does not move, whatever the arm does, until it is released; then it is free.
+
+    t < release     qdd = 0; tau is what the lock takes
+    afterwards      tau = 0
+
+It begins at rest where its case begins locked. The mode is one for each step of the dynamics: locked in all that begin
+before `release`, so a release between two steps waits for the next one.
+
+Not a brake: it holds any torque, and does not slow down what moves. For that see the friction of `passive`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from met.parameter import Parameter
+from met.servos.servo import Drive, JointMotion, Servo
+from met.trace import Truth
+
+
+def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
+    return Drive(given=joint.begin < p.release, qdd=0.0)
+
+
+def at_rest(p: Any) -> Truth:
+    """Locked at the start: a locked joint that moved would move for ever."""
+    return p.release > 0.0
+
+
+SERVO = Servo(
+    name="locked",
+    doc=__doc__,
+    parameters=(
+        Parameter(
+            name="release", unit="s", default=math.inf, at_least=0.0,
+            doc="time at which the joint is set free; inf: never",
+        ),
+    ),
+    drive=drive,
+    at_rest=at_rest,
+)

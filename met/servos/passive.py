@@ -1,0 +1,43 @@
+"""Passive joint: no motor and no command; damping, dry friction that sticks, a spring, and what turns with it.
+
+    tau = -damping qd - stiffness (q - rest) - s friction,  s in {0, +1, -1} (stuck, forward, backward)
+
+With all parameters left at zero it is a joint without a servo. It has no bound of its own on how fast the joint moves,
+since that depends on the inertia behind it: nothing warns of a spring or damper that is too stiff for the step.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from met.parameter import Parameter
+from met.servos.servo import Drive, JointMotion, Servo
+
+
+def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
+    """The damper, the spring and friction."""
+    return Drive(
+        torque=-p.damping * joint.qd - p.stiffness * (joint.q - p.rest),
+        dry=p.friction,
+        rotor=p.rotor,
+    )
+
+
+SERVO = Servo(
+    name="passive",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="damping", unit="effort*s/joint", default=0.0, at_least=0.0, doc="torque per joint rate"),
+        Parameter(name="friction", unit="effort", default=0.0, at_least=0.0, doc="dry friction, which sticks"),
+        Parameter(
+            name="stiffness", unit="effort/joint", default=0.0, at_least=0.0,
+            doc="torque of the spring per way from its rest",
+        ),
+        Parameter(name="rest", unit="joint", default=0.0, doc="position at which the spring does nothing"),
+        Parameter(
+            name="rotor", unit="effort*s^2/joint", default=0.0, at_least=0.0,
+            doc="inertia that moves with the joint and is not the arm's",
+        ),
+    ),
+    drive=drive,
+)

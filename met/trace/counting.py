@@ -1,0 +1,78 @@
+"""How often the loops of a program run: the same program with counters in every `WhileAny`.
+
+A loop runs for a whole block of cases as long as one of them asks, so its counters are a block's: all cases of a
+block count alike, and what a case computes is left as it was.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from met.frozen import frozen
+from met.trace.graph import Real
+from met.trace.program import Control, Every, Phase, Program, Run, Tape, Unless0, WhileAny
+
+
+@frozen
+class Loop:
+    """A loop of a program: the cell that it goes by, and the outputs that count it.
+
+    entries   times that it was come to and ran at all
+    turns     times that its body ran
+    outer     whether it stands in no other loop
+    """
+
+    cell: str
+    entries: str
+    turns: str
+    outer: bool
+
+
+def counting(program: Program) -> tuple[Program, tuple[Loop, ...]]:
+    """The program with two more outputs a loop, and its loops in order of control (start, tick, end)."""
+    loops: list[Loop] = []
+
+    def counted(body: tuple[Control, ...], outer: bool) -> tuple[Control, ...]:
+        made: list[Control] = []
+        for node in body:
+            if isinstance(node, WhileAny):
+                number = len(loops)
+                loop = Loop(node.cell, f"loop.{number}.entries", f"loop.{number}.turns", outer)
+                loops.append(loop)
+                inner = counted(node.body, False)
+                made += [Run(_come_to(loop)), WhileAny(node.cell, node.at_most, (Run(_turn(loop)), *inner))]
+            elif isinstance(node, (Every, Unless0)):
+                made.append(replace(node, body=counted(node.body, outer)))
+            else:
+                made.append(node)
+        return tuple(made)
+
+    start, tick = counted(program.start, True), counted(program.tick, True)
+    names = tuple(name for loop in loops for name in (loop.entries, loop.turns))
+    end = (*program.end, Run(_told(names)))
+    return replace(program, start=start, tick=tick, end=end, outputs=(*program.outputs, *names)), tuple(loops)
+
+
+def _come_to(loop: Loop) -> Phase:
+    def body(tape: Tape) -> None:
+        tape.write(f"{loop.entries}.fresh", 1.0)
+
+    return Phase(f"come to {loop.cell}", body)
+
+
+def _turn(loop: Loop) -> Phase:
+    def body(tape: Tape) -> None:
+        fresh: Real = tape.read(f"{loop.entries}.fresh")
+        tape.write(loop.entries, tape.read(loop.entries) + fresh)
+        tape.write(loop.turns, tape.read(loop.turns) + 1.0)
+        tape.write(f"{loop.entries}.fresh", 0.0)
+
+    return Phase(f"turn of {loop.cell}", body)
+
+
+def _told(names: tuple[str, ...]) -> Phase:
+    def body(tape: Tape) -> None:
+        for name in names:
+            tape.output(name, tape.read(name))
+
+    return Phase("count", body)

@@ -1,0 +1,73 @@
+"""Decks of the arms that are measured, every joint driven by a `rigid_gearbox` with friction that sticks."""
+
+from __future__ import annotations
+
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import ic
+from benchmarks.arms import GRAVITY, Arm
+from met.plan import Experiment
+
+CASES = 512
+RATE = 0.5  # rad/s
+
+# A drive of a robot's size: N^2 J_m = 0.6 kg m^2, 1 N m of friction at the joint, h lambda = 0.33 at 1 kHz; a torque
+# limit that no arm here comes near, so that no joint falls and turns back unasked.
+SERVO = """servo gearbox {
+    model = rigid_gearbox;
+    ratio = 100;  kp = 0.5 V*s/rad;  ki = 5 V/rad;  v_max = 1000 V;  resistance = 0.5 ohm;  kt = 0.1 N*m/A;
+    tau_max = 100 N*m;  j_m = 6e-5 kg*m^2;  f_c = 0.01 N*m;  f_v = 1e-5 N*m*s/rad;
+}
+"""
+
+COMMANDS = {
+    # all joints turn on and on, and start as fast as they are told to
+    "steady": (f"rate({RATE} rad/s)", RATE),
+    # every joint turns back fifty times a second, no two joints of an arm at one time
+    "reversing": (f"rate(sine(amplitude = {RATE} rad/s, frequency = 25 Hz, phase = {{phase}} rad))", 0.0),
+}
+
+
+@cache
+def experiment(arm: Arm, command: str, record: bool = False) -> Experiment:
+    """512 cases from 512 poses, 2 s in steps of 1 ms, servos at 1 kHz. command: `steady` or `reversing`.
+
+    record   keeps q and qd of each step; else as little as a deck may
+    """
+    text, start = COMMANDS[command]
+    lines, uses, states, poses = [SERVO, "arm measured {"], [], [], []
+    for i, body in enumerate(arm.bodies()):
+        vectors = {
+            "at": (body.at, "m"), "rpy": (body.rpy, "rad"), "com": (body.com, "m"), "inertia": (body.inertia, "kg*m^2"),
+        }  # fmt: skip
+        at, rpy, com, inertia = (
+            f"[{', '.join(f'{x:.17g}' for x in values)}] {unit}" for values, unit in vectors.values()
+        )
+        parent = "base" if body.parent < 0 else arm.bodies()[body.parent].name
+        axis = "" if body.kind == "fixed" else " axis = z;"
+        lines.append(f"    link {body.name} {{ mass = {body.mass:.17g} kg; com = {com}; inertia = {inertia}; }}")
+        lines.append(
+            f"    joint {body.joint} {body.kind} {{ parent = {parent}; child = {body.name}; at = {at}; rpy = {rpy};"
+            f"{axis} }}"
+        )
+        if body.kind != "fixed":
+            uses.append(f"{body.joint} = gearbox {{ command = {text.format(phase=f'{0.7 * i:.1f}')}; }}")
+            states.append(f"{body.joint}.qd = {start} rad/s;")
+            poses.append(f"initial.{body.joint}.q = linspace({-3.0 + 0.1 * i:g}, {3.0 - 0.07 * i:g}, {CASES}) rad;")
+    lines += [
+        "}", "run one {", "    arm = measured;",
+        f"    servos {{ {' '.join(uses)} }}",
+        f"    initial {{ {' '.join(states)} }}",
+        f"    environment {{ gravity = [{', '.join(map(str, GRAVITY))}] m/s^2; }}",
+        "    rates { dynamics = 1 kHz; servos = 1 kHz; record = 1 kHz; }",
+        "    duration = 2 s;",
+        "    record = [q, qd];" if record else f"    record = [{arm.joints[0]}.q];",
+        "}",
+        f"sweep poses of one {{ zip {{ {' '.join(poses)} }} }}",
+    ]  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "measured.ic"
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return ic.compile(path, select=["poses"]).experiments[0]

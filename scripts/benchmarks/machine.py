@@ -1,0 +1,71 @@
+"""What figures were measured on, and with which MET."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+
+
+def machine() -> dict[str, Any]:
+    """Processor, cores that this process may use, load before the first figure, versions and MET's commit."""
+    from met.trace import llvm
+
+    target = llvm.machine()
+    return {
+        "processor": _processor(),
+        "code_for": target.cpu,
+        "avx512": _has_flag("avx512f"),
+        "cores": len(os.sched_getaffinity(0)),
+        "load": round(os.getloadavg()[0], 2),
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        "compiler": llvm.versions(),
+        "commit": _git("rev-parse", "--short", "HEAD"),
+        "changed": bool(_git("status", "--porcelain", "--untracked-files=no")),
+    }
+
+
+SAME = ("processor", "code_for", "avx512", "cores")
+"""What two reports must have in common for their figures to be compared as one machine's."""
+
+
+def told(here: dict[str, Any]) -> str:
+    """The machine in two lines."""
+    vectors = "AVX-512" if here["avx512"] else "no AVX-512"
+    cores = f"{here['cores']} core{'' if here['cores'] == 1 else 's'}"
+    commit = f"commit {here['commit'] or 'unknown'}{', changed since' if here['changed'] else ''}"
+    return (
+        f"{here['processor']} ({here['code_for']}), {cores}, {vectors}, load {here['load']:g}\n"
+        f"{here['system']}, Python {here['python']}, {here['compiler']}; {commit}"
+    )
+
+
+def _processor() -> str:
+    for line in Path("/proc/cpuinfo").read_text().splitlines():
+        key, _, value = line.partition(":")
+        if key.strip() in ("model name", "Processor", "Model"):
+            return value.strip()
+    return platform.processor() or platform.machine()
+
+
+def _has_flag(name: str) -> bool:
+    """Whether the processor says that it has this; other architectures than x86 list other words."""
+    for line in Path("/proc/cpuinfo").read_text().splitlines():
+        key, _, value = line.partition(":")
+        if key.strip() == "flags":
+            return name in value.split()
+    return False
+
+
+def _git(*words: str) -> str:
+    """What git says of the checkout; nothing where there is no git, or no checkout of it."""
+    try:
+        done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True)
+    except OSError:
+        return ""
+    return done.stdout.strip() if done.returncode == 0 else ""

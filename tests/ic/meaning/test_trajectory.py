@@ -1,0 +1,517 @@
+"""Commands from CSV files: what is read, where it is looked for, and whole messages for every mistake."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import ic
+from met import models, plan_file
+from met import run as engine
+from met.plan import Experiment
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, experiment, told
+
+# ruff: noqa: E501 - messages are as wide as they are
+
+MOVES = """\
+time [s], hinge [deg], other [rad]
+0,        0,           1
+0.5,      30,          2
+1,        45,          -3e-1
+"""
+
+
+def servo(course: str = 'trajectory(file = "moves.csv")') -> str:
+    return changed(SERVO, ("rate(0.1 rad/s)", f"position({course})"), ("ki = 1", "k_position = 10 1/s; ki = 1"))
+
+
+def parameters(made: Experiment) -> dict[str, Any]:
+    head = "hinge.servo.command."
+    return {path.removeprefix(head): q.value for path, q in made.parameters.items() if path.startswith(head)}
+
+
+def read(folder: Path, text: str | bytes, course: str = 'trajectory(file = "moves.csv")') -> Experiment:
+    (folder / "moves.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
+    return experiment(folder, ARM, servo(course), RUN)
+
+
+def shown(folder: Path, text: str | bytes | None, course: str = 'trajectory(file = "moves.csv")') -> str:
+    """What is said of a deck with this CSV file beside it, without the counting line."""
+    if text is not None:
+        (folder / "moves.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
+    return told(check(folder, ARM, servo(course), RUN)).rpartition("\n\n")[0] + "\n"
+
+
+# what is read
+
+
+def test_the_column_of_the_joints_name_is_taken_in_si(tmp_path: Path) -> None:
+    found = parameters(read(tmp_path, MOVES))
+    assert found["times"] == (0.0, 0.5, 1.0)
+    assert found["values"] == tuple(np.radians([0.0, 30.0, 45.0]))
+    assert (found["interpolation"], found["begin"]) == ("linear", 0.0)
+    assert set(found) == {"times", "values", "interpolation", "begin"}  # the file's name is none of the plan's
+
+
+def test_the_files_name_may_stand_alone(tmp_path: Path) -> None:
+    short = read(tmp_path, MOVES, 'trajectory("moves.csv", column = other, interpolation = cubic)')
+    long = read(tmp_path, MOVES, 'trajectory(interpolation = cubic, column = other, file = "moves.csv")')
+    assert parameters(short) == parameters(long)
+
+
+@pytest.mark.parametrize("written", ["other", '"other"'])
+def test_another_column_is_taken_by_its_name(tmp_path: Path, written: str) -> None:
+    found = parameters(read(tmp_path, MOVES, f'trajectory(file = "moves.csv", column = {written}, interpolation = cubic)'))
+    assert found["values"] == (1.0, 2.0, -0.3) and found["interpolation"] == "cubic"
+
+
+@pytest.mark.parametrize("text", [
+    pytest.param("\ufeff" + MOVES, id="byte order mark"),
+    pytest.param(MOVES.replace("\n", "\r\n"), id="CRLF"),
+    pytest.param(MOVES.replace("\n", "\r"), id="CR"),
+    pytest.param("# recorded\n\n" + MOVES.replace("0.5,", "# pause\n \n0.5,"), id="comments and empty lines"),
+    pytest.param(MOVES.replace("hinge [deg]", '"hinge [deg]"').replace("30", '" 30 "'), id="quotes"),
+    pytest.param(MOVES.replace(" ", "").replace("[", " [ ").replace("]", " ] "), id="spaces"),
+    pytest.param(MOVES.rstrip("\n"), id="no newline at the end"),
+    pytest.param(MOVES.replace("[s]", "[ms]").replace("0.5,", "500.0,").replace("1, ", "+1e3, "), id="milliseconds"),
+    pytest.param(MOVES.replace("2\n", "out\n"), id="a text in another column"),
+])  # fmt: skip
+def test_a_file_is_read_however_it_was_saved(tmp_path: Path, text: str) -> None:
+    found = parameters(read(tmp_path, text))
+    assert found["times"] == (0.0, 0.5, 1.0) and found["values"] == tuple(np.radians([0.0, 30.0, 45.0]))
+
+
+def test_a_file_is_looked_for_beside_the_deck_that_names_it_then_where_i_says(tmp_path: Path) -> None:
+    beside, library = tmp_path / "parts", tmp_path / "library"
+    beside.mkdir()
+    library.mkdir()
+    (beside / "drive.ic").write_text("#pragma once\n" + servo())
+    (tmp_path / "deck.ic").write_text(ARM + '#include "parts/drive.ic"\n' + RUN)
+    (library / "moves.csv").write_text(MOVES)
+    only = parameters(ic.compile(tmp_path / "deck.ic", include_dirs=[library]).experiments[0])
+    assert only["values"][-1] == np.radians(45.0)
+    (beside / "moves.csv").write_text(MOVES.replace("45", "60"))
+    (tmp_path / "moves.csv").write_text(MOVES.replace("45", "90"))
+    nearer = parameters(ic.compile(tmp_path / "deck.ic", include_dirs=[library]).experiments[0])
+    assert nearer["values"][-1] == np.radians(60.0)
+
+
+def test_a_file_that_a_macro_of_the_command_line_names_is_beside_the_deck(tmp_path: Path) -> None:
+    (tmp_path / "moves.csv").write_text(MOVES)
+    compiled = check(tmp_path, ARM, servo("trajectory(file = FILE)"), RUN, defines=['FILE="moves.csv"'])
+    assert compiled.plan is not None, told(compiled)
+
+
+def test_the_file_is_kept_whole_and_the_plan_runs_without_it(tmp_path: Path) -> None:
+    (tmp_path / "moves.csv").write_text(MOVES)
+    (tmp_path / "deck.ic").write_text(ARM + servo() + RUN)
+    plan = ic.compile(tmp_path / "deck.ic")
+    assert [Path(source.name).name for source in plan.sources] == ["deck.ic", "moves.csv"]
+    assert plan.sources[1].text == MOVES and len(plan.sources[1].sha256) == 64
+    plan_file.write(plan, tmp_path / "plan.json")
+    (tmp_path / "moves.csv").unlink()
+    again = plan_file.read(tmp_path / "plan.json")
+    assert again == plan
+    np.testing.assert_array_equal(engine.run(again.experiments[0]).signals["q"], engine.run(plan.experiments[0]).signals["q"])
+
+
+def test_the_values_come_from_the_column(tmp_path: Path) -> None:
+    origin = read(tmp_path, MOVES).parameters["hinge.servo.command.values"].origin
+    assert origin.place is not None
+    assert (Path(origin.place.file).name, origin.place.line, origin.place.column) == ("moves.csv", 1, 11)
+    assert origin.kind == "deck" and origin.note.startswith("column `hinge` of ") and origin.note.endswith("moves.csv")
+
+
+def test_a_name_of_a_file_changes_no_key(tmp_path: Path) -> None:
+    from met.keys import case_ids
+
+    first = read(tmp_path, MOVES)
+    (tmp_path / "other.csv").write_text(MOVES)
+    second = experiment(tmp_path, ARM, servo('trajectory(file = "other.csv")'), RUN)
+    assert case_ids(first) == case_ids(second)
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+def test_a_servo_is_asked_for_the_curve_of_each_case_at_every_tick(tmp_path: Path, interpolation: str) -> None:
+    """11 cases: more than a vector has lanes, and a rest."""
+    run = changed(RUN, ("record = 100 Hz", "record = 1 kHz"), ("record = [q]", "record = [servo.command]"))
+    (tmp_path / "moves.csv").write_text(MOVES)
+    course = f'trajectory(file = "moves.csv", interpolation = {interpolation})'
+    sweep = "sweep shifted of hold { vary drive.command.begin = linspace(0, 1, 11) s; }\n"
+    made = experiment(tmp_path, ARM, servo(course), run, sweep, select=["shifted"])
+    found = engine.run(made).signals["servo.command"].reshape(11, 1001)
+    profile = models.find_own("command")["trajectory"]
+    for case, begin in enumerate(np.linspace(0.0, 1.0, 11)):
+        p = SimpleNamespace(**{**parameters(made), "begin": float(begin)})
+        wanted = [profile.course(p, k / 1000.0)[0] for k in range(1001)]
+        np.testing.assert_allclose(found[case], wanted, rtol=0.0, atol=4e-16)  # a kernel fuses multiply-adds
+
+
+def test_a_sweep_may_move_the_beginning_and_nothing_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "moves.csv").write_text(MOVES)
+    sweep = "sweep several of hold { vary hinge.servo.command.values = [1, 2] rad; vary drive.command.begin = [0, 1] s; }\n"
+    assert told(check(tmp_path, ARM, servo(), RUN, sweep, select=["several"])) == """\
+error[D122]: `hinge.servo.command.values` cannot vary
+  --> deck.ic:18:30
+   |
+18 | sweep several of hold { vary hinge.servo.command.values = [1, 2] rad; vary drive.command.begin = [0, 1] s; }
+   |                              ^^^^^^^^^^^^^^^^^^^^^^^^^^
+   = help: it is read from a file, and is one for the whole sweep
+
+1 error
+"""
+
+
+# mistakes
+
+
+def test_no_such_file(tmp_path: Path) -> None:
+    (tmp_path / "moves.csv").write_text(MOVES)
+    said = shown(tmp_path, None, 'trajectory(file = "move.csv")')
+    assert said.replace(str(tmp_path), "DIR") == """\
+error[D190]: cannot find "move.csv"
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = "move.csv"));
+  |                                          ^^^^^^^^^^
+  = help: did you mean `moves.csv`?
+  = help: looked in `DIR`, the standard library
+"""
+
+
+MISTAKES: list[tuple[str, str | bytes, str, str]] = []  # what, the file's text, the command's course, what is said
+
+
+def mistake(what: str, text: str | bytes, message: str, course: str = 'trajectory(file = "moves.csv")') -> None:
+    MISTAKES.append((what, text, course, message))
+
+
+mistake("a column without a unit", MOVES.replace("hinge [deg]", "hinge"), """\
+error[D193]: column `hinge` has no unit
+ --> moves.csv:1:11
+  |
+1 | time [s], hinge, other [rad]
+  |           ^^^^^
+ ::: deck.ic:9:42  read here for joint `hinge`
+  = help: write `hinge [deg]` or `hinge [rad]`
+""")
+mistake("a unit that is none", MOVES.replace("[deg]", "[degree]"), """\
+error[D193]: `degree` is not a unit
+ --> moves.csv:1:11
+  |
+1 | time [s], hinge [degree], other [rad]
+  |           ^^^^^^^^^^^^^^
+ ::: deck.ic:9:42  read here for joint `hinge`
+  = help: did you mean `hinge [deg]`?
+""")
+mistake("a unit that is none and like none", MOVES.replace("[deg]", "[degs]"), """\
+error[D193]: `degs` is not a unit
+ --> moves.csv:1:11
+  |
+1 | time [s], hinge [degs], other [rad]
+  |           ^^^^^^^^^^^^
+ ::: deck.ic:9:42  read here for joint `hinge`
+  = help: write `hinge [deg]` or `hinge [rad]`
+""")
+mistake("a unit of another dimension", MOVES.replace("[deg]", "[mm]"), """\
+error[D193]: column `hinge` is in m, and rad is needed
+ --> moves.csv:1:11
+  |
+1 | time [s], hinge [mm], other [rad]
+  |           ^^^^^^^^^^
+ ::: deck.ic:9:42  read here for joint `hinge`
+  = help: write `hinge [deg]` or `hinge [rad]`, with numbers in that unit
+""")
+mistake("a pure number", MOVES.replace("[deg]", "[1]"), """\
+error[D193]: column `hinge` is a pure number, and rad is needed
+ --> moves.csv:1:11
+  |
+1 | time [s], hinge [1], other [rad]
+  |           ^^^^^^^^^
+ ::: deck.ic:9:42  read here for joint `hinge`
+  = help: write `hinge [deg]` or `hinge [rad]`, with numbers in that unit
+""")
+mistake("a unit of the times", MOVES.replace("[s]", "[rad]"), """\
+error[D193]: column `time` is in rad, and s is needed
+ --> moves.csv:1:1
+  |
+1 | time [rad], hinge [deg], other [rad]
+  | ^^^^^^^^^^
+ ::: deck.ic:9:42  read here
+  = help: write `time [s]`, with numbers in that unit
+""")
+mistake("no column of the joint's name", MOVES.replace("hinge", "hinges"), """\
+error[D192]: `moves.csv` has no column `hinge`
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = "moves.csv"));
+  |                                          ^^^^^^^^^^^
+ ::: moves.csv:1:1  its first line
+  = help: did you mean `hinges`?
+  = help: columns: time, hinges, other
+""")
+mistake("no column of the name that is written", MOVES, """\
+error[D192]: `moves.csv` has no column `elbow`
+ --> deck.ic:9:64
+  |
+9 |     command = position(trajectory(file = "moves.csv", column = "elbow"));
+  |                                                                ^^^^^^^
+ ::: moves.csv:1:1  its first line
+  = help: columns: time, hinge, other
+""", 'trajectory(file = "moves.csv", column = "elbow")')
+mistake("no times", MOVES.replace("time", "when"), """\
+error[D192]: `moves.csv` has no column `time`
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = "moves.csv"));
+  |                                          ^^^^^^^^^^^
+ ::: moves.csv:1:1  its first line
+  = help: columns: when, hinge, other
+  = help: the times of the rows stand in a column `time [s]`
+""")
+mistake("not a number", MOVES.replace("30", "nan"), """\
+error[D194]: `nan` is not a number
+ --> moves.csv:3:11
+  |
+3 | 0.5,      nan,          2
+  |           ^^^
+ ::: moves.csv:1:11  column `hinge`
+  = help: a number is written as 12.5 or -1e-3, with a point and without a unit
+""")
+mistake("an empty cell", MOVES.replace("30,", "   ,"), """\
+error[D194]: there is no number here
+ --> moves.csv:3:5
+  |
+3 | 0.5,         ,          2
+  |     ^
+ ::: moves.csv:1:11  column `hinge`
+  = help: a number is written as 12.5 or -1e-3, with a point and without a unit
+""")
+mistake("a number that is too large", MOVES.replace("30", "1e999"), """\
+error[D194]: this number is too large: the largest is 1.8e308
+ --> moves.csv:3:11
+  |
+3 | 0.5,      1e999,          2
+  |           ^^^^^
+ ::: moves.csv:1:11  column `hinge`
+  = help: a number is written as 12.5 or -1e-3, with a point and without a unit
+""")
+mistake("times that fall", MOVES.replace("0.5,", "1.5,"), """\
+error[D195]: times of a file rise, and 1 s follows 1.5 s
+ --> moves.csv:4:1
+  |
+4 | 1,        45,          -3e-1
+  | ^
+ ::: moves.csv:3:1  the row before
+  = help: sort the rows; for a jump, two times close together
+""")
+mistake("times that stand still", MOVES.replace("0.5,", "1,  "), """\
+error[D195]: times of a file rise, and 1 s follows 1 s
+ --> moves.csv:4:1
+  |
+4 | 1,        45,          -3e-1
+  | ^
+ ::: moves.csv:3:1  the row before
+  = help: sort the rows; for a jump, two times close together
+""")
+mistake("no rows", MOVES.splitlines()[0], """\
+error[D196]: `moves.csv` has no rows
+ --> moves.csv:1:1
+  |
+1 | time [s], hinge [deg], other [rad]
+  | ^^^^^^^^
+ ::: deck.ic:9:42  read here
+  = help: a trajectory has 2 at least; `table` takes a single point
+""")
+mistake("one row", "\n".join(MOVES.splitlines()[:2]), """\
+error[D196]: `moves.csv` has 1 row
+ --> moves.csv:1:1
+  |
+1 | time [s], hinge [deg], other [rad]
+  | ^^^^^^^^
+ ::: deck.ic:9:42  read here
+  = help: a trajectory has 2 at least; `table` takes a single point
+""")
+mistake("a row that is too short", MOVES.replace("30,          2", "30"), """\
+error[D197]: this row has 2 cells, and the first line names 3 columns
+ --> moves.csv:3:1
+  |
+3 | 0.5,      30
+  | ^^^^^^^^^^^^
+ ::: moves.csv:1:1  the columns
+  = help: commas part the cells, and a number has a decimal point
+""")
+mistake("a decimal comma", MOVES.replace("30", "12,5"), """\
+error[D197]: this row has 4 cells, and the first line names 3 columns
+ --> moves.csv:3:1
+  |
+3 | 0.5,      12,5,          2
+  | ^^^^^^^^^^^^^^^^^^^^^^^^^^
+ ::: moves.csv:1:1  the columns
+  = help: commas part the cells, and a number has a decimal point
+""")
+mistake("an empty file", "", """\
+error[D191]: `moves.csv` is empty
+ --> moves.csv:1:1
+  |
+1 |
+  | ^
+  = help: its first line names the columns, as in `time [s], shoulder [deg]`
+""")
+mistake("not UTF-8", MOVES.replace("other", "\xf6ther").encode("latin-1"), """\
+error[D002]: `moves.csv` is not UTF-8: byte 0xf6
+ --> moves.csv:1:24
+  |
+1 | time [s], hinge [deg], �ther [rad]
+  |                        ^
+  = help: save the file as UTF-8
+""")
+mistake("UTF-16", MOVES.encode("utf-16"), """\
+error[D002]: `moves.csv` is UTF-16, but CSV files are UTF-8
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = "moves.csv"));
+  |                                          ^^^^^^^^^^^
+  = help: save it as UTF-8
+""")
+mistake("semicolons", MOVES.replace(",", ";"), """\
+error[D191]: `time [s]; hinge [deg]; other [rad]` does not name a column
+ --> moves.csv:1:1
+  |
+1 | time [s]; hinge [deg]; other [rad]
+  | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+  = help: commas part the columns, as in `time [s], shoulder [deg]`
+""")
+mistake("a column that is there twice", MOVES.replace("other", "hinge"), """\
+error[D198]: column `hinge` is there twice
+ --> moves.csv:1:24
+  |
+1 | time [s], hinge [deg], hinge [rad]
+  |                        ^^^^^^^^^^^
+ ::: moves.csv:1:11  first
+  = help: give one of them another name
+""")
+mistake("a column with a unit and no name", MOVES.replace("hinge ", ""), """\
+error[D191]: `[deg]` does not name a column
+ --> moves.csv:1:11
+  |
+1 | time [s], [deg], other [rad]
+  |           ^^^^^
+  = help: write the unit in square brackets behind the name, as in `shoulder [deg]`
+""")
+mistake("a column without a name", MOVES.replace("hinge [deg]", ""), """\
+error[D191]: a column without a name
+ --> moves.csv:1:10
+  |
+1 | time [s], , other [rad]
+  |          ^
+  = help: write the unit in square brackets behind the name, as in `shoulder [deg]`
+""")
+mistake("a file's name without quotes", MOVES, """\
+error[D076]: `file` of `trajectory` is the name of a file, in quotes
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = moves));
+  |                                          ^^^^^
+  = help: write `file = "NAME.csv"`
+""", 'trajectory(file = moves)')
+mistake("no file", MOVES, """\
+error[D075]: `trajectory` has no `file`
+ --> deck.ic:9:24
+  |
+9 |     command = position(trajectory(interpolation = cubic));
+  |                        ^^^^^^^^^^
+  = help: write `file = "NAME.csv"`
+""", 'trajectory(interpolation = cubic)')
+mistake("two files", MOVES, """\
+error[D153]: `trajectory` takes its values by name
+ --> deck.ic:9:35
+  |
+9 |     command = position(trajectory("moves.csv", "others.csv"));
+  |                                   ^^^^^^^^^^^
+  = help: write `trajectory(file = ..., column = ..., interpolation = ..., begin = ...)`
+""", 'trajectory("moves.csv", "others.csv")')
+mistake("a file that is written twice", MOVES, """\
+error[D040]: `file` is written twice
+ --> deck.ic:9:48
+  |
+9 |     command = position(trajectory("moves.csv", file = "others.csv"));
+  |                                                ^^^^ again
+ ::: deck.ic:9:35  first
+  = help: remove one of the two
+""", 'trajectory("moves.csv", file = "others.csv")')
+mistake("a column that is a number", MOVES, """\
+error[D076]: `column` of `trajectory` is the name of a column, in quotes
+ --> deck.ic:9:64
+  |
+9 |     command = position(trajectory(file = "moves.csv", column = 3));
+  |                                                                ^
+  = help: write `column = "NAME"`
+""", 'trajectory(file = "moves.csv", column = 3)')
+mistake("a list that the file has", MOVES, """\
+error[D141]: `trajectory` has no `times`
+ --> deck.ic:9:55
+  |
+9 |     command = position(trajectory(file = "moves.csv", times = [1, 2] s));
+  |                                                       ^^^^^
+  = help: it has: file, column, interpolation, begin
+""", 'trajectory(file = "moves.csv", times = [1, 2] s)')
+
+
+@pytest.mark.parametrize(("text", "course", "message"), [m[1:] for m in MISTAKES], ids=[m[0] for m in MISTAKES])
+def test_a_mistake_is_told_where_it_is(tmp_path: Path, text: str | bytes, course: str, message: str) -> None:
+    assert shown(tmp_path, text, course) == message
+
+
+def test_a_file_of_too_many_rows(tmp_path: Path) -> None:
+    rows = "".join(f"{i},0\n" for i in range(100_001))
+    assert shown(tmp_path, "time [s], hinge [rad]\n" + rows) == """\
+error[D018]: a CSV file has at most 100000 rows
+      --> moves.csv:100002:1
+       |
+100002 | 100000,0
+       | ^
+       = help: thin them out, or split the file
+"""
+
+
+@pytest.mark.parametrize(("named", "message"), [
+    (".", "error[D001]: `DIR` is a directory, not a CSV file"),
+    ("/dev/zero", "error[D001]: `/dev/zero` is not a regular file"),
+    ("large.csv", "error[D018]: `DIR/large.csv` has 17.0 MiB; a CSV file has at most 16"),
+])  # fmt: skip
+def test_what_is_no_file_of_text_is_not_read(tmp_path: Path, named: str, message: str) -> None:
+    with open(tmp_path / "large.csv", "wb") as stream:
+        stream.truncate(17 << 20)
+    said = told(check(tmp_path, ARM, servo(f'trajectory(file = "{named}")'), RUN)).replace(str(tmp_path), "DIR")
+    assert said.splitlines()[:2] == [message, " --> deck.ic:9:42"]
+
+
+def test_one_mistake_of_a_file_is_told_once_however_many_joints_read_it(tmp_path: Path) -> None:
+    arm = changed(ARM, ("axis = z; }", "axis = z; }\n    link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n"
+                        "    joint other revolute { parent = bar; child = tip; axis = x; }"))  # fmt: skip
+    (tmp_path / "moves.csv").write_text(MOVES.replace("0.5,", "1.5,"))
+    said = check(tmp_path, arm, servo(), changed(RUN, ("hinge = drive;", "hinge = drive; other = drive;")))
+    assert [d.code for d in said.diagnostics] == ["D195"]
+
+
+def test_a_broken_file_is_told_with_a_place_whatever_is_wrong_with_it(tmp_path: Path) -> None:
+    pick = random.Random(190)
+    odd = b'0123456789.,;[]"#\n\r\t -+eE\xff\x00am/^*'
+    told_codes = set()
+    for _ in range(150):
+        text = bytearray(MOVES.encode())
+        for _ in range(pick.randint(1, 6)):
+            at = pick.randrange(len(text))
+            text[at : at + pick.randint(0, 3)] = bytes(pick.choices(odd, k=pick.randint(0, 2)))
+        (tmp_path / "moves.csv").write_bytes(bytes(text))
+        compiled = check(tmp_path, ARM, servo(), RUN)
+        assert all(diagnostic.at is not None for diagnostic in compiled.diagnostics)
+        assert (compiled.plan is None) == bool(compiled.diagnostics)
+        told_codes |= {diagnostic.code for diagnostic in compiled.diagnostics}
+    assert {"D002", "D191", "D192", "D194", "D197"} <= told_codes
