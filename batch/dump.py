@@ -58,14 +58,12 @@ def _emitted(asked: Asked) -> Iterator[tuple[Machine, str]]:
     from met import kernel as engine
     from met.program.build import build
     from met.trace import llvm
-    from met.trace.ir import emit
     from met.trace.program import record
 
     machine = llvm.machine()
     for experiment in _experiments(asked):
-        recording = record(build(experiment))
-        lanes = engine.choose_lanes(recording, machine)
-        yield machine, emit(recording, lanes, vector=min(lanes, machine.width), width=machine.width)
+        _, text = engine.written(record(build(experiment)), machine)
+        yield machine, text
 
 
 def _experiments(asked: Asked) -> Sequence[Experiment]:

@@ -27,8 +27,8 @@ from met.trace.program import Program, Recording, record
 if TYPE_CHECKING:
     from met.trace.llvm import Machine
 
-# live operations of the largest section up to which four parts of a block take turns rather than two: the shorter
-# the code, the more of it a processor has in flight at once
+# live operations of the largest section up to which a block is four registers wide, two of them side by side in each
+# piece of code: the shorter the code, the more of it fits into registers and is in flight at once
 _SMALL = 400
 # blocks, and blocks times ticks, that one call into machine code runs at most: calls cannot be interrupted, and
 # progress is told between them; a tenth of a second or so
@@ -62,20 +62,25 @@ def from_recording(
     machine = llvm.machine(cpu)
     if not machine.fma:
         _refuse_or_warn(machine)
-    if lanes is None:
-        lanes = choose_lanes(recording, machine)
-    if lanes not in (2, 4, 8, 16, 32):
-        raise ValueError(f"{lanes} lanes")
-    text = emit(recording, lanes, vector=min(lanes, machine.width), width=machine.width, inline=inline)
+    lanes, text = written(recording, machine, lanes, inline=inline)
     name = cache.key(text, llvm.versions(), machine.cpu, machine.features, str(level))
     code, hit = cache.kept(name, lambda: llvm.assemble(text, machine, level=level))
     return Kernel(recording, lanes, machine, llvm.Loaded(code, machine), hit)
 
 
-def choose_lanes(recording: Recording, machine: Machine) -> int:
-    """Cases a block: several registers' worth, which take turns and so hide each other's latency."""
+def written(
+    recording: Recording, machine: Machine, lanes: int | None = None, *, inline: bool = True
+) -> tuple[int, str]:
+    """Cases a block, chosen where none are asked for, and the IR: several registers' worth of cases, which hide each
+    other's latency."""
     largest = max((len(operations(section)) for section in recording.sections), default=0)
-    return machine.width * (4 if largest <= _SMALL else 2)
+    small = largest <= _SMALL
+    if lanes is None:
+        lanes = machine.width * (4 if small else 2)
+    if lanes not in (2, 4, 8, 16, 32):
+        raise ValueError(f"{lanes} lanes")
+    vector = min(lanes, machine.width * (2 if small else 1))
+    return lanes, emit(recording, lanes, vector=vector, width=machine.width, inline=inline)
 
 
 def _refuse_or_warn(machine: Machine) -> None:

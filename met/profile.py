@@ -56,7 +56,7 @@ FLOPS = {"add": 1, "sub": 1, "mul": 1, "div": 1, "sqrt": 1, "fma": 2}
 
 WORK = {
     "servos_": "servo computers", "modes": "friction modes", "decide": "friction decisions", "derive": "first stage",
-    "watch": "failure watch", "advance": "integrator", "carry": "integrator", "slope": "further stages",
+    "judge": "failures", "left_open": "friction decisions", "advance": "integrator", "carry": "integrator", "slope": "further stages",
     "split": "friction splits", "metrics_": "metrics", "record": "recorder",
 }  # fmt: skip
 """What a phase's work is called, by the beginning of its name; in the order of an instant and the step after it."""

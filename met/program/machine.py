@@ -35,6 +35,7 @@ class Actuator:
     """A servo at work on a moving joint: its declaration, use, and number in the order of moving joints.
 
     level    of its dry friction, where it is the same at all times and for all cases, N m (N); None where it varies
+    gives    whether it may give the joint's acceleration
     """
 
     index: int
@@ -42,6 +43,7 @@ class Actuator:
     servo: Servo
     profile: Profile | None
     level: float | None
+    gives: bool
 
     @property
     def dry(self) -> bool:
@@ -201,13 +203,13 @@ class Machine:
     def _actuator(self, index: int, use: ServoUse) -> Actuator:
         servo = models.find("servo", use.model, use.place)
         profile = models.find("command", use.command.model, use.place) if use.command is not None else None
-        bare = Actuator(index, use, servo, profile, None)
+        bare = Actuator(index, use, servo, profile, None, False)
         drive, level = self._probe(bare)
         if drive.given is not None and level != 0.0:
             message = f"{bare.owner} gives both an acceleration and dry friction"
             help = "a joint that is told its acceleration has no use for friction"
             raise Problem(error("E219", message, use.place, help=help))
-        return Actuator(index, use, servo, profile, level)
+        return Actuator(index, use, servo, profile, level, drive.given is not None)
 
     def _probe(self, actuator: Actuator) -> tuple[Drive, float | None]:
         """The servo's physics recorded once, to see what it uses; and its level of dry friction, where known now."""

@@ -44,15 +44,21 @@ class Step:
         self.states = state_names(machine)
         self._derive = Call(Phase("derive", self.derive))
         self._slope = Call(Phase("slope", self.slope))
-        self._decide = WhileAny(
-            "undecided", friction.passes(len(machine.sticking)), (self._derive, Run(Phase("decide", self.decide)))
+        self._decide = (
+            WhileAny(
+                "undecided", friction.passes(len(machine.sticking)), (self._derive, Run(Phase("decide", self.decide)))
+            ),
+            WhileAny("undecided", 1, (Run(Phase("left_open", self.left_open)),)),
         )
+        # joints whose torque may hide that a number is none: their acceleration is given
+        self._needs = tuple(a.index for a in machine.working if a.dry or a.gives)
         self._split = WhileAny("crossing", 1, (Run(Phase("split", self.split)),))
 
     def begin(self) -> tuple[Control, ...]:
         """What happens at an instant once the servos have ticked: modes, then the step's first stage."""
-        decide = (self._decide,) if self.machine.sticking else ()
-        return (Run(Phase("modes", self.modes)), *decide, self._derive, Run(Phase("watch", self.watch)))
+        decide = self._decide if self.machine.sticking else ()
+        judge = WhileAny("suspect", 1, (Run(Phase("judge", self.judge)),))
+        return (Run(Phase("modes", self.modes)), *decide, self._derive, judge)
 
     def finish(self) -> tuple[Control, ...]:
         """The rest of the step, at its end."""
@@ -60,9 +66,9 @@ class Step:
         if self.machine.sticking:
             again = (
                 Run(Phase("modes_again", self.modes_again)),
-                self._decide,
+                *self._decide,
                 self._derive,
-                Run(Phase("watch_again", self.watch_again)),
+                WhileAny("suspect", 1, (Run(Phase("judge_again", self.judge_again)),)),
                 *self._stages(again=True),
                 self._split,
             )
@@ -127,17 +133,21 @@ class Step:
             cells.keep(tape, active, f"friction:{joint}", s_new)
         tape.write_mask("undecided", both(active, changed))
 
+    def left_open(self, tape: Tape) -> None:
+        """Counts decisions that did not settle."""
+        cells.count(tape, tape.read_mask("undecided"), "friction.undecided")
+
     # Derivatives.
 
     def derive(self, tape: Tape) -> None:
-        """The derivative at the state, with everything that is recorded of it, and what is wrong with it."""
+        """The derivative at the state, with everything that is recorded of it, and whether all is well with it."""
         y = self._state(tape)
         found = self._derivative(tape, y, tape.read("fraction"))
         for i, joint in enumerate(self.joints):
             tape.write(f"{joint}.qdd", found.slope.qdd[i])
             tape.write(f"{joint}.tau", found.tau[i])
-        for actuator in self.machine.sticking:
-            tape.write(f"need:{self.joints[actuator.index]}", found.need[actuator.index])
+        for i in self._needs:
+            tape.write(f"need:{self.joints[i]}", found.need[i])
         for name, slope in zip(self.states, found.slope.xd, strict=True):
             tape.write(f"slope:{name}", slope)
         for actuator in self.machine.working:
@@ -145,9 +155,14 @@ class Step:
             assert drive is not None
             for name, value in drive.signals.items():
                 tape.write(f"{actuator.path}.{name}", value)
-        cause, joint_number = _fault(y, found)
-        tape.write("fault", cause)
-        tape.write("fault.joint", joint_number)
+        singular: Real = 0.0
+        for i in reversed(range(len(self.joints))):
+            singular = where(found.solved.singular[i], float(i + 1), singular)
+        tape.write("singular", singular)
+        # Infinities that cancel leave not a number, so a plain sum misses none; a sum of numbers that is none only
+        # makes `judge` look.
+        total: Real = sum((*found.slope.qdd, *found.slope.xd, *y.q, *y.qd, *(found.need[i] for i in self._needs)), 0.0)
+        tape.write_mask("suspect", either(not_(isfinite(total)), singular != 0.0))
 
     def slope(self, tape: Tape) -> None:
         """The derivative at a stage on the way, its slopes alone."""
@@ -157,21 +172,30 @@ class Step:
         for name, slope in zip(self.states, found.slope.xd, strict=True):
             tape.write(f"{STAGE}slope:{name}", slope)
 
-    def watch(self, tape: Tape) -> None:
-        self._watch(tape, True)
+    def judge(self, tape: Tape) -> None:
+        self._judge(tape, True)
 
-    def watch_again(self, tape: Tape) -> None:
-        self._watch(tape, tape.read_mask("again"))
+    def judge_again(self, tape: Tape) -> None:
+        self._judge(tape, tape.read_mask("again"))
 
-    def _watch(self, tape: Tape, active: Truth) -> None:
-        """The first failure of a case, and decisions that were left open."""
-        cause = tape.read("fault")
+    def _judge(self, tape: Tape, active: Truth) -> None:
+        """The first failure of a case: what is wrong with its state or derivative, and with which joint first.
+
+        `need` tells where a joint that sticks hides it, the state where no acceleration depends on it.
+        """
+        cause: Real = 0.0
+        number: Real = 0.0
+        for i, joint in reversed(list(enumerate(self.joints))):
+            told = [f"{joint}.qdd", f"{joint}.q", f"{joint}.qd"] + [f"need:{joint}"] * (i in self._needs)
+            told += [f"slope:{name}" for name in self.states if name.startswith(f"{joint}.servo.")]
+            bad = not_(isfinite(sum((tape.read(name) for name in told), 0.0)))
+            cause, number = where(bad, NOT_FINITE, cause), where(bad, float(i), number)
+        singular = tape.read("singular")
+        cause, number = where(singular != 0.0, SINGULAR, cause), where(singular != 0.0, singular - 1.0, number)
         news = both(active, both(tape.read("failure") == 0.0, cause != 0.0))
-        cells.keep(tape, news, "failure.joint", tape.read("fault.joint"))
+        cells.keep(tape, news, "failure.joint", number)
         cells.keep(tape, news, "failure.tick", tape.tick)
         cells.keep(tape, news, "failure", cause)
-        if self.machine.sticking:
-            cells.count(tape, tape.read_mask("undecided"), "friction.undecided")
 
     def observed(self, tape: Tape) -> Observed:
         """The arm at an instant, with the derivative that `derive` took of it."""
@@ -357,25 +381,3 @@ class _Asked(Exception):
         super().__init__()
         self.share = share
         self.there = there
-
-
-def _fault(y: Motion, found: Derivative) -> tuple[Real, Real]:
-    """What is wrong at a state or with its derivative, and with which joint first; 0 where nothing is.
-
-    `need` tells where a joint that sticks hides it, the state where no acceleration depends on it.
-    """
-    joints = range(len(found.need))
-    cause: Real = 0.0
-    number: Real = 0.0
-    for i in reversed(joints):
-        # Infinities that cancel leave not a number, so a plain sum misses none.
-        total = found.slope.qdd[i] + found.need[i] + y.q[i] + y.qd[i]
-        drive = found.drives[i]
-        for slope in drive.slopes.values() if drive is not None else ():
-            total = total + slope
-        bad = not_(isfinite(total))
-        cause, number = where(bad, NOT_FINITE, cause), where(bad, float(i), number)
-    for i in reversed(joints):
-        singular = found.solved.singular[i]
-        cause, number = where(singular, SINGULAR, cause), where(singular, float(i), number)
-    return cause, number

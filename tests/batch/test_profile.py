@@ -87,7 +87,6 @@ brief: # joints, # case, modified_euler, steps of #
   first stage  #  #  #  #  # %
   servo physics  #  #  #  # %
   dynamics  #  #  #  # %
-  failure watch  #  #  #  #  # %
   integrator  #  #  #  #  # %
   further stages  #  #  #  #  # %
   servo physics  #  #  #  # %
