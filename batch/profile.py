@@ -39,7 +39,7 @@ def told(found: Profile, experiment: Experiment) -> Iterator[str]:
 
 
 def _table(found: Profile) -> Iterator[tuple[str, ...]]:
-    """A row a kind of work, its parts under it; friction's events in one row."""
+    """A row a kind of work, its parts under it; what is done seldom in one row."""
     yield "a step of a case", "times", "operations", "flops", "ns", "share"
     steady = [part for part in found.parts if not part.event]
     for work, group in groupby(steady, key=lambda part: part.work):
@@ -49,7 +49,7 @@ def _table(found: Profile) -> Iterator[tuple[str, ...]]:
             for part in parts:
                 if part.part:
                     yield _row(f"  {part.part}", [part], found.ns, times=False)
-    events = [part for part in found.parts if part.event]
+    events = [part for part in found.parts if part.event and part.calls > 0.0]
     if events:
         yield _row(EVENTS, events, found.ns, times=False)
     yield _row("all parts, each alone", found.parts, found.ns, times=False)
@@ -71,7 +71,7 @@ def _events(parts: Sequence[Part]) -> str:
     """How often friction made a block decide anew, and go back."""
     rate = {part.work: part.calls for part in parts if part.event}
     decided, split = rate.get("friction decisions", 0.0), rate.get("friction splits", 0.0)
-    if not rate:
+    if "friction decisions" not in rate:
         return "no joint has dry friction: no events"
     return f"friction events of a block: {_number(decided)} decisions at rest and {_number(split)} splits a step"
 

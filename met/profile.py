@@ -56,15 +56,15 @@ FLOPS = {"add": 1, "sub": 1, "mul": 1, "div": 1, "sqrt": 1, "fma": 2}
 
 WORK = {
     "servos_": "servo computers", "modes": "friction modes", "decide": "friction decisions", "derive": "first stage",
-    "judge": "failures", "left_open": "friction decisions", "advance": "integrator", "carry": "integrator", "slope": "further stages",
-    "split": "friction splits", "metrics_": "metrics", "record": "recorder",
+    "judge": "failures", "left_open": "friction decisions", "advance": "integrator", "carry": "integrator",
+    "slope": "further stages", "split": "friction splits", "metrics_": "metrics", "record": "recorder",
 }  # fmt: skip
 """What a phase's work is called, by the beginning of its name; in the order of an instant and the step after it."""
 
 WITHIN = ("servo physics", "environment", "dynamics")
 """Parts of a stage (met/program/evaluation.py), in order."""
 
-_BLOCKS = 4  # blocks of cases that are timed together
+_BLOCKS, _MANY = 4, 256  # blocks of cases that are timed together, and of a short run at most
 _STEPS = 5_000  # steps times blocks of the run that is timed, at most: well under a second, some 100 MB of rows
 _CALLS, _STARTS = 1000, 4  # calls of a section alone from one state, and how often from that state again
 _TURNS = 9  # times that each is timed
@@ -77,7 +77,7 @@ class Part:
     """One kind of work. All numbers are a step's and a case's, averages over the run.
 
     work        `first stage`;  part: `dynamics` of it, or "" for what is none of its parts
-    event       whether it is friction's: done only where a joint of the block comes to rest or breaks away
+    event       whether it is done seldom: where a joint of the block comes to rest or breaks away, or a case fails
     calls       how often it is done
     operations  of the graph;  flops: of these, a fused multiply-add counting as two
     ns          its time alone
@@ -158,8 +158,8 @@ def profile(experiment: Experiment) -> Profile:
     made = kernel.from_recording(recording)
     compiled = time.perf_counter()
 
-    cases = _cases(experiment, made.lanes)
     schedule = experiment.structure.schedule
+    cases = _cases(experiment, made.lanes, max(1, schedule.ticks // schedule.dynamics))
     blocks = len(cases) // made.lanes
     ticks = min(schedule.ticks, max(1, _STEPS // blocks) * schedule.dynamics)
     steps = max(1, ticks // schedule.dynamics)
@@ -364,10 +364,13 @@ def _alone(made: Kernel, number: int, state: Cases) -> Work:
     return work
 
 
-def _cases(experiment: Experiment, lanes: int) -> np.ndarray:
-    """Inputs of a few whole blocks, [case, input], taken evenly from the case table; few cases are repeated."""
+def _cases(experiment: Experiment, lanes: int, steps: int) -> np.ndarray:
+    """Inputs of whole blocks, [case, input], taken evenly from the case table; few cases are repeated.
+
+    A few blocks; as many more as a short run needs for its time to be that of its steps, not of the call.
+    """
     count = experiment.cases.count
-    blocks = min(_BLOCKS, -(-count // lanes))
+    blocks = max(min(_BLOCKS, -(-count // lanes)), min(_MANY, -(-_STEPS // steps)))
     return inputs(experiment, np.linspace(0, count - 1, blocks * lanes).round().astype(np.int64))
 
 

@@ -99,7 +99,7 @@ brief: # joints, # case, modified_euler, steps of #
   # Gflop/s, # % of the # Gflop/s that this core does at most; a fused multiply-add counts as two
   no joint has dry friction: no events
 
-  timed  # steps of # block on one core, best of several
+  timed  # steps of # blocks on one core, best of several
   block  # cases, # of them in a register #
   code  # in # pieces
   made  recorded in #, come by in #

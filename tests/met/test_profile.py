@@ -67,7 +67,7 @@ def test_friction_is_counted_apart_and_as_often_as_it_comes(gains: Profile) -> N
 
 
 def test_the_numbers_are_a_profiles(gains: Profile) -> None:
-    assert gains.lanes % gains.vector == 0 and gains.blocks == -(-36 // gains.lanes)
+    assert gains.lanes % gains.vector == 0 and gains.blocks * gains.steps == 5000  # as many blocks as a short run needs
     assert gains.code_bytes > 1000 and gains.pieces >= 10
     assert 0.0 < gains.share_of_peak < 1.0
     assert all(part.ns > 0.0 for part in gains.parts if part.calls > 0.0)
