@@ -20,6 +20,7 @@ A vector is one channel a component: `links.tip.position.x`, `links.tip.orientat
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 from met import models
 from met.frozen import frozen
@@ -127,8 +128,12 @@ def _factor(unit: str, before: str) -> str:
     return f"({unit})" if before.endswith("/") and ("*" in unit or "/" in unit) else unit
 
 
-def channels(structure: Structure) -> dict[str, Channel]:
-    """Every channel of the structure, by path: joint by joint, then the links', then the arm's."""
+def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Channel]:
+    """Every channel of the structure, by path: joint by joint, then the links', then the arm's.
+
+    Jacobians, which are as many as links times joints, are there of the first link and of links that are mentioned: in
+    these names, or by the structure's own record and metrics.
+    """
     servos = {use.joint: use for use in structure.servos}
     dynamics = structure.schedule.dynamics
     found: dict[str, Channel] = {}
@@ -159,12 +164,17 @@ def channels(structure: Structure) -> dict[str, Channel]:
         for part in (*servo.states, *servo.signals):
             unit = joint_unit(part.unit, joint, kind)
             add(f"{joint.name}.servo.{part.name}", unit, part.doc, dynamics, joint.name)
-    carrying = _carrying(structure)
+    told = (*names, *(recorded.name for recorded in structure.record), *(metric.of for metric in structure.metrics))
+    mentioned = {name.split(".")[1] for name in told if name.startswith("links.")}
+    mentioned |= {link.name for link in structure.links[:1]}
     for link in structure.links:
         for name, unit, doc, parts, frame in OF_LINK:
             derive(f"links.{link.name}.{name}", unit, doc, parts, frame)
+        if link.name not in mentioned:
+            continue
+        carrying = _carrying(structure, link.name)
         for name, unit, doc in JACOBIAN:
-            for joint in carrying[link.name]:
+            for joint in carrying:
                 path = f"links.{link.name}.{name}.{joint.name}"
                 derive(path, joint_unit(unit, joint), doc, XYZ, WORLD_AXES, joint.name)
     for name, unit, doc, components, frame in OF_ARM:
@@ -172,18 +182,14 @@ def channels(structure: Structure) -> dict[str, Channel]:
     return found
 
 
-def _carrying(structure: Structure) -> dict[str, list[Joint]]:
-    """By link: the moving joints between it and the base, in the order of `moving`."""
+def _carrying(structure: Structure, link: str) -> list[Joint]:
+    """The moving joints between a link and the base, in the order of `moving`."""
     holds = {joint.child: joint for joint in structure.joints}
-    found: dict[str, list[Joint]] = {}
-    for link in structure.links:
-        chain: set[str] = set()
-        at = link.name
-        while at in holds and holds[at].name not in chain:  # a tree that does not stand is told elsewhere
-            chain.add(holds[at].name)
-            at = holds[at].parent
-        found[link.name] = [joint for joint in structure.moving if joint.name in chain]
-    return found
+    chain: set[str] = set()
+    while link in holds and holds[link].name not in chain:  # a tree that does not stand is told elsewhere
+        chain.add(holds[link].name)
+        link = holds[link].parent
+    return [joint for joint in structure.moving if joint.name in chain]
 
 
 def channel_paths(name: str, joints: tuple[str, ...], components: tuple[str, ...]) -> tuple[str, ...]:
@@ -200,13 +206,13 @@ def joint_of(name: str) -> str:
     return name.partition(".")[0]
 
 
-def recordable(structure: Structure) -> dict[str, tuple[Recorded, ...]]:
-    """Every name that a record may write, with the variables that it stands for.
+def recordable(structure: Structure, names: Iterable[str] = ()) -> dict[str, tuple[Recorded, ...]]:
+    """Every name that a record may write, with the variables that it stands for (names: as of `channels`).
 
     A name stands for one number (`elbow.q`, `elbow.reaction.force.x`), for a vector (`links.tip.position`), for that of
     all joints that have it (`q`, `reaction.force`), or for several variables (`reaction`, `energy`).
     """
-    known = channels(structure)
+    known = channels(structure, names)
     own: dict[str, Channel] = {}  # numbers and vectors, a vector before its components
     joints: dict[str, list[str]] = {}
     for path, channel in known.items():

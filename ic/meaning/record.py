@@ -33,23 +33,23 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
         scope.complaints.error("D124", f"{run.label} records nothing", run.place,
                                help="write `record = [q, qd, tau];`, or `record = [];` where metrics are all you want")
         return ()
-    known = recordable(structure)
+    asked = [name for expression in (item.value, *item.appended) for name in _names(scope, item, expression)]
+    known = recordable(structure, [name.text for name in asked])
     found: dict[str, tuple[Recorded, Place]] = {}
-    for expression in (item.value, *item.appended):
-        for name in _names(scope, item, expression):
-            made = known.get(name.text)
-            if made is None and scope.lost and "servo" in [word.text for word in name.path]:
-                continue
-            if made is None and scope.gone and (name.path[0].text in scope.gone or not structure.moving):
-                continue
-            if made is None:
-                scope.complaints.error("D125", f"no channel `{name.text}`", name.place, help=_nearest(name, known))
-            for each in made or ():
-                if each.name in found:
-                    scope.complaints.error("D040", f"`{each.name}` is recorded twice", name.place,
-                                           also=[Label(found[each.name][1], "first")], help="leave one out")
-                else:
-                    found[each.name] = (each, name.place)
+    for name in asked:
+        made = known.get(name.text)
+        if made is None and scope.lost and "servo" in [word.text for word in name.path]:
+            continue
+        if made is None and scope.gone and (name.path[0].text in scope.gone or not structure.moving):
+            continue
+        if made is None:
+            scope.complaints.error("D125", f"no channel `{name.text}`", name.place, help=_nearest(name, known))
+        for each in made or ():
+            if each.name in found:
+                scope.complaints.error("D040", f"`{each.name}` is recorded twice", name.place,
+                                       also=[Label(found[each.name][1], "first")], help="leave one out")
+            else:
+                found[each.name] = (each, name.place)
     return tuple(recorded for recorded, _ in found.values())
 
 
@@ -95,7 +95,8 @@ def _nearest(name: Name, known: dict[str, tuple[Recorded, ...]]) -> list[str]:
 
 
 def resolve_metrics(scope: Scope, block: Block, structure: Structure) -> tuple[MetricUse, ...]:
-    known = channels(structure)
+    watched = [item.body.get("of") for item in block.of_kind("metric") if item.body is not None]
+    known = channels(structure, [of.value.text for of in watched if of is not None and isinstance(of.value, Name)])
     found = (_metric(scope, item, structure, known) for item in block.of_kind("metric"))
     return tuple(use for use in found if use is not None)
 
@@ -122,7 +123,9 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
         name = of.value if isinstance(of.value, Name) else None
         if name is not None and name.path[0].text in scope.lost | scope.gone:
             return None
-        message, helps = _not_one(name, recordable(structure)) if name is not None else ("a channel is needed here", [])
+        message, helps = "a channel is needed here", []
+        if name is not None:
+            message, helps = _not_one(name, recordable(structure, [name.text]))
         scope.complaints.error("D125", message, place_of(of.value) if of.value is not None else of.place, help=helps)
     else:
         channel = known[of.value.text]
