@@ -123,7 +123,7 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
         name = of.value if isinstance(of.value, Name) else None
         if name is not None and name.path[0].text in scope.lost | scope.gone:
             return None
-        message, helps = "a channel is needed here", []
+        message, helps = "a channel is needed here", list[str]()
         if name is not None:
             message, helps = _not_one(name, recordable(structure, [name.text]))
         scope.complaints.error("D125", message, place_of(of.value) if of.value is not None else of.place, help=helps)
