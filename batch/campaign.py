@@ -12,7 +12,7 @@ import os
 import shlex
 import shutil
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -142,10 +142,14 @@ def default_output(
 
 
 def perform(
-    campaign: Campaign, *, threads: int | None = None, progress: Progress | None = None
-) -> list[dict[str, Any]]:
+    campaign: Campaign, *, threads: int | None = None, progress: Progress | None = None,
+    ready: Callable[[], None] | None = None,
+) -> list[dict[str, Any]]:  # fmt: skip
     """Run a campaign into its archive. What is unlike from one making to the next (times) is returned, and
-    written beside the archive as `<archive>.run.json`. However this ends, no half file is left."""
+    written beside the archive as `<archive>.run.json`. However this ends, no half file is left.
+
+    ready  called once the first kernel is there, so that something will be written
+    """
     from batch.archive.provenance import machine
     from batch.archive.write import Writer
 
@@ -154,7 +158,8 @@ def perform(
     try:
         writer = Writer(temporary, campaign.plan, [(p.experiment, p.rows, p.recorded) for p in campaign.parts])
         try:
-            timings = [_run_part(writer, index, part, threads, progress) for index, part in enumerate(campaign.parts)]
+            timings = [_run_part(writer, index, part, threads, progress, ready if index == 0 else None)
+                       for index, part in enumerate(campaign.parts)]
             writer.finish()
             sidecar = {
                 "archive": campaign.output.name,
@@ -176,7 +181,10 @@ def perform(
     return timings
 
 
-def _run_part(writer: Any, index: int, part: Part, threads: int | None, progress: Progress | None) -> dict[str, Any]:
+def _run_part(
+    writer: Any, index: int, part: Part, threads: int | None, progress: Progress | None,
+    ready: Callable[[], None] | None,
+) -> dict[str, Any]:  # fmt: skip
     """Run one experiment; its wall time."""
     from met import run as engine
 
@@ -184,6 +192,8 @@ def _run_part(writer: Any, index: int, part: Part, threads: int | None, progress
     if progress is not None:
         progress.begin(part.experiment.name, len(part.rows))
     prepared = engine.prepare(part.experiment)
+    if ready is not None:
+        ready()
     for first, rows in _batches(part):
         report = None if progress is None else _from(progress, first)
         writer.put(index, first, engine.run(prepared, rows, threads=threads, record=part.recorded, progress=report))

@@ -1,4 +1,4 @@
-"""`met run`, `met show`, `met plot`, `met profile`: faces of batch.campaign, batch.show, batch.plot, met.profile."""
+"""`met run`, `show`, `plot`, `profile`, `margin`: faces of batch.campaign, .show, .plot, met.profile and met.margin."""
 
 from __future__ import annotations
 
@@ -130,3 +130,37 @@ def profile(
         return YES
     click.echo("\n\n".join("\n".join(told(*each)) for each in found))
     return YES
+
+
+@click.command(short_help="Say whether a law keeps a motor on a bed stable, and with what margin.")
+@click.argument("source", metavar="DECK|PLAN.json")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@deck_options
+@format_option
+def margin(
+    source: str, names: tuple[str, ...], defines: tuple[str, ...], include_dirs: tuple[str, ...], form: str
+) -> int:
+    """Predict, for each joint whose motor is on a bed, how heavy the arm may be for its law, rate and delay.
+
+    The loop of bed, servo and law is taken round once by the functions that run it, and its eigenvalues are looked at.
+    Exit status: 0 all joints are stable in all cases; 1 one is not; 2 the input is wrong, or no joint is on a bed.
+    """
+    import json
+
+    from batch.campaign import experiments_named
+    from batch.margin import as_data, told
+    from batch.running import read_plan
+    from met.diagnostic import Problem, error
+    from met.margin import margins
+
+    check_options(source, names, defines=defines, include_dirs=include_dirs)
+    plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, quiet=form == "json")
+    asked = [each for each in experiments_named(plan, names or None) if each.structure.substitutions]
+    if not asked:
+        raise Problem(error("E333", "no joint is on a bed here", help="a run says so: `substitute JOINT { }`"))
+    found = [(each, margins(each)) for each in asked]
+    if form == "json":
+        click.echo(json.dumps([as_data(*each) for each in found], indent=1))
+    else:
+        click.echo("\n\n".join("\n".join(told(*each)) for each in found))
+    return YES if all(one.stable for _, cases in found for case in cases for one in case) else NO

@@ -43,7 +43,9 @@ def run_and_tell(
     )
     campaign = prepare(plan, output=output, experiments=names or None, cases=cases or None, histories=histories)
     say("\n".join(announcement(campaign, verbose, notes=verbose or is_plan(source))))
-    timings = perform(campaign, threads=threads, progress=None if quiet or json else Bar())
+    timings = perform(
+        campaign, threads=threads, progress=None if quiet or json else Bar(), ready=lambda: say(writing(campaign))
+    )
     with ArchiveFile(campaign.output) as file:
         summaries = summarise(file)
         worst = worst_cases(file)
@@ -111,8 +113,12 @@ def announcement(campaign: Campaign, verbose: bool = False, *, notes: bool = Fal
         out += _part_lines(part, verbose)
         out += [f"  note: {note}" for note in part.experiment.notes] if notes else []
     out += [f"note: {note}" for note in campaign.notes]
-    out.append(f"writing {campaign.output}, about {size_text(campaign.bytes)}")
     return out
+
+
+def writing(campaign: Campaign) -> str:
+    """Where the archive will be, and how large: said once there is a kernel to fill it."""
+    return f"writing {campaign.output}, about {size_text(campaign.bytes)}"
 
 
 def _part_lines(part: Part, verbose: bool) -> list[str]:

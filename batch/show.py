@@ -41,6 +41,8 @@ def show(
         out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, width), ""]
         if plots and (signals or position is not None or not all_cases):
             out += _plots(group, signals, position, width, colour)
+        elif signals:
+            panels(group, signals)  # a name that is none is told, drawn or not
     return "\n".join(out).rstrip() + "\n"
 
 

@@ -4,6 +4,11 @@
     <joint>.tau                     torque on the joint from its servo, rotor's share included (N m; N)
     <joint>.servo.<name>            a servo's memory, state or signal, by its declaration
     <joint>.servo.command           what the servo was asked at its last tick, in the command's unit
+    <joint>.bed.<name>              of a joint whose motor is on a bed: the bed's memory, by its declaration
+    <joint>.bed.drive_voltage .load_current                     what the bed's amplifiers hold (V, A)
+    <joint>.law.<name>              the law's memory, by its declaration
+    <joint>.law.torque .rate        load torque that the law asks (N m), rate of the shaft that it believes (rad/s)
+    <joint>.law.unknown_torque .reference_rate                  of a law with an observer
 
 Derived, that is computed from the state only where a record or a metric asks for them (docs/physics.md, section 1):
 
@@ -21,6 +26,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from typing import Any
 
 from met import models
 from met.frozen import frozen
@@ -39,6 +45,20 @@ DIMENSIONS = {XYZ: "axis", WXYZ: "quaternion"}
 
 JOINT_AXIS = "about or along the joint's axis"
 WORLD_AXES = "world axes"
+
+# What the engine holds of a bed and a law, besides their own memory: name, unit, meaning.
+OF_BED = (
+    ("drive_voltage", "V", "voltage that is on the drive motor"),
+    ("load_current", "A", "current that is in the load motor"),
+)
+OF_LAW = (
+    ("torque", "N*m", "load torque that the law asks"),
+    ("rate", "rad/s", "rate of the shaft that the law believes"),
+)
+OF_OBSERVER = (
+    ("unknown_torque", "N*m", "torque on the shaft that the motor's parameters do not tell"),
+    ("reference_rate", "rad/s", "rate that the shaft would have on the joint itself"),
+)
 
 # Name, unit, meaning, components, frame.
 OF_JOINT = (
@@ -135,6 +155,7 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
     these names, or by the structure's own record and metrics.
     """
     servos = {use.joint: use for use in structure.servos}
+    on_beds = {use.joint: use for use in structure.substitutions}
     dynamics = structure.schedule.dynamics
     found: dict[str, Channel] = {}
 
@@ -164,6 +185,12 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
         for part in (*servo.states, *servo.signals):
             unit = joint_unit(part.unit, joint, kind)
             add(f"{joint.name}.servo.{part.name}", unit, part.doc, dynamics, joint.name)
+        if joint.name in on_beds:
+            bed, law = (models.find(kind, getattr(on_beds[joint.name], kind)) for kind in ("bed", "law"))
+            for name, unit, doc in of_bed(bed):
+                add(f"{joint.name}.bed.{name}", joint_unit(unit, joint), doc, use.divisor, joint.name)
+            for name, unit, doc in of_law(law):
+                add(f"{joint.name}.law.{name}", joint_unit(unit, joint), doc, use.divisor, joint.name)
     told = (*names, *(recorded.name for recorded in structure.record), *(metric.of for metric in structure.metrics))
     mentioned = {name.split(".")[1] for name in told if name.startswith("links.")}
     mentioned |= {link.name for link in structure.links[:1]}
@@ -182,6 +209,16 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
     return found
 
 
+def of_bed(bed: Any) -> tuple[tuple[str, str, str], ...]:
+    """Name, unit and meaning of what there is of a bed, its own memory first."""
+    return (*((memory.name, memory.unit, memory.doc) for memory in bed.memory), *OF_BED)
+
+
+def of_law(law: Any) -> tuple[tuple[str, str, str], ...]:
+    """Name, unit and meaning of what there is of a law, its own memory first."""
+    return (*((memory.name, memory.unit, memory.doc) for memory in law.memory), *OF_LAW, *OF_OBSERVER * law.observer)
+
+
 def _carrying(structure: Structure, link: str) -> list[Joint]:
     """The moving joints between a link and the base, in the order of `moving`."""
     holds = {joint.child: joint for joint in structure.joints}
@@ -190,6 +227,11 @@ def _carrying(structure: Structure, link: str) -> list[Joint]:
         chain.add(holds[link].name)
         link = holds[link].parent
     return [joint for joint in structure.moving if joint.name in chain]
+
+
+def carries(structure: Structure, link: str, joint: str) -> bool:
+    """Whether a moving joint lies between the link and the base."""
+    return joint in {each.name for each in _carrying(structure, link)}
 
 
 def channel_paths(name: str, joints: tuple[str, ...], components: tuple[str, ...]) -> tuple[str, ...]:

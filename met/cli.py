@@ -104,8 +104,9 @@ def met() -> None:
 def deck_options(face: Face) -> Face:
     """The options of whatever reads a deck: -D and -I, given on as `defines` and `include_dirs`."""
     face = click.option(
-        "-I", "include_dirs", multiple=True, metavar="DIR", help="Look for included files here too; may be repeated."
-    )(face)
+        "-I", "include_dirs", multiple=True, metavar="DIR", type=click.Path(exists=True, file_okay=False),
+        help="Look for included files here too; may be repeated.",
+    )(face)  # fmt: skip
     return click.option(
         "-D", "defines", multiple=True, metavar="NAME[=VALUE]", help="Define a macro as #define does; may be repeated."
     )(face)

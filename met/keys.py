@@ -27,6 +27,9 @@ DIGEST_BYTES = 8
 SILENT_FIELDS = frozenset({"place", "definition", "shape", "doc", "unit", "components"})
 """Fields of a structure that change no number: where it was written, its names and units for the reader."""
 
+LATER_FIELDS = frozenset({"substitutions"})
+"""Fields that structures have got since: left out where empty, so that the keys of older archives stay."""
+
 
 def structure_key(structure: Structure, inputs: Iterable[str] = ()) -> str:
     """Key of the program that a structure makes. inputs: what each case brings instead of being folded in."""
@@ -83,7 +86,8 @@ def _described(value: Any) -> Any:
     """Plain data of a structure, without what changes no number."""
     if dataclasses.is_dataclass(value):
         fields = [f.name for f in dataclasses.fields(value) if f.name not in SILENT_FIELDS]
-        return {name: _described(getattr(value, name)) for name in fields}
+        told = {name: getattr(value, name) for name in fields}
+        return {name: _described(part) for name, part in told.items() if part or name not in LATER_FIELDS}
     if isinstance(value, tuple):
         return [_described(part) for part in value]
     return value

@@ -12,6 +12,7 @@ offer the same name are an error, never a race.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import cache
 from typing import Any, Literal, Protocol
 
@@ -21,7 +22,11 @@ from met.entry_points import offered
 from met.frozen import frozen
 from met.parameter import Parameter
 
-Kind = Literal["servo", "environment", "command", "metric", "integrator"]
+Kind = Literal["servo", "environment", "command", "metric", "integrator", "bed", "law"]
+
+
+FAULTS = "faults"
+"""The parameter of a bed that a deck writes as a word: what its presets are called."""
 
 
 class Model(Protocol):
@@ -71,12 +76,26 @@ def _integrators() -> tuple[Iterable[Any], type]:
     return INTEGRATORS, Integrator
 
 
+def _beds() -> tuple[Iterable[Any], type]:
+    from met.substitution import BEDS, Bed
+
+    return BEDS, Bed
+
+
+def _laws() -> tuple[Iterable[Any], type]:
+    from met.substitution import LAWS, Law
+
+    return LAWS, Law
+
+
 GROUPS: dict[Kind, Group] = {
     "servo": Group("met.servos", _servos),
     "environment": Group("met.environments", _environments),
     "command": Group("met.profiles", _commands),
     "metric": Group("met.metrics", _metrics),
     "integrator": Group("met.integrators", _integrators),
+    "bed": Group("met.beds", _beds),
+    "law": Group("met.laws", _laws),
 }
 
 
@@ -100,7 +119,7 @@ def available(kind: Kind) -> dict[str, Any]:
             message = f"{found_at} is a {type(loaded).__name__}, not a {declaration.__module__}.{declaration.__name__}"
             raise Problem(error("E215", message, help=f"let it name the {declaration.__name__} that the file declares"))
         model: Any = loaded
-        _check_names(model, found_at)
+        _check_names(kind, model, found_at)
         _check_units(model, found_at)
         if model.name in found and found[model.name] is not model:
             message = f"{found_at} offers {kind} `{model.name}`, which exists already"
@@ -109,10 +128,14 @@ def available(kind: Kind) -> dict[str, Any]:
     return found
 
 
-def _check_names(model: Any, found_at: str) -> None:
-    """What a model holds and shows is recorded under its name, so names are apart; `command` is the engine's."""
+def _check_names(kind: Kind, model: Any, found_at: str) -> None:
+    """What a model holds and shows is recorded under its name, so names are apart, and from those of the engine."""
+    from met.channel import OF_BED, OF_LAW, OF_OBSERVER
+
+    own = {"bed": OF_BED, "law": OF_LAW + OF_OBSERVER}.get(kind, ())
+    taken = [name for name, *_ in own] or ["command"]
     shown = [part.name for group in ("memory", "states", "signals") for part in getattr(model, group, ())]
-    for names in (["command", *shown], [parameter.name for parameter in getattr(model, "parameters", ())]):
+    for names in ([*taken, *shown], [parameter.name for parameter in getattr(model, "parameters", ())]):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             message = f"{found_at} declares `{twice[0]}` twice"
@@ -146,6 +169,21 @@ def find(kind: Kind, name: str, place: Place | None = None) -> Any:
 def find_own(kind: Kind) -> dict[str, Any]:
     """MET's own models of this kind by name: found without loading what other packages offer."""
     return {model.name: model for model in GROUPS[kind].own()[0]}
+
+
+def written(model: Any) -> tuple[Parameter, ...]:
+    """The parameters as a deck writes them, where they are others than a plan's.
+
+    Of a profile from a file its name stands for the rows; a bed's `faults` is a word, one of its presets.
+    """
+    parameters: tuple[Parameter, ...] = getattr(model, "written", getattr(model, "parameters", ()))
+    presets = tuple(getattr(model, "presets", ()))
+    return tuple(replace(p, shape="word", words=presets) if presets and p.name == FAULTS else p for p in parameters)
+
+
+def has_motor(servo: Any) -> bool:
+    """Whether a bed may take the place of this servo's motor: it has one, and its computer sets the voltage."""
+    return servo.motor is not None and any(memory.name == "voltage" for memory in servo.memory)
 
 
 def parameter(model: Any, name: str) -> Parameter | None:

@@ -10,6 +10,7 @@ and `of` (the unit of the channel that a metric watches).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 from met.frozen import frozen
@@ -22,9 +23,11 @@ class Parameter:
     """One number (or vector of three, list, word or text) that a deck may set on a model.
 
     `default` None means that the deck must write it. The bounds are in SI: `above` and `below` exclude their
-    value, `at_least` and `at_most` include it. `words` lists what a word may be. A list, a word or a text (in quotes;
-    for the compiler alone, no plan holds one) cannot vary in a sweep. `needed_for` names the kinds of command of a
-    servo under which it must be written, default or not.
+    value, `at_least` and `at_most` include it; `whole` takes whole numbers alone. `words` lists what a word may be.
+    A list, a word or a text (in quotes; for the compiler alone, no plan holds one) cannot vary in a sweep.
+    `needed_for` names the kinds of command of a servo under which it must be written, default or not, and lie above
+    `above_where_needed` where that is given. `of_servo` names
+    the parameter of the joint's servo that a bed's parameter is where a deck does not write it.
     """
 
     name: str
@@ -35,10 +38,20 @@ class Parameter:
     at_least: float | None = None
     below: float | None = None
     at_most: float | None = None
+    whole: bool = False
     shape: Shape = "number"
     words: tuple[str, ...] = ()
     needed_for: tuple[str, ...] = ()
+    above_where_needed: float | None = None
+    of_servo: str = ""
     source: str = ""
+
+
+def under(parameter: Parameter, command: str) -> Parameter:
+    """The parameter with the bound that holds under this kind of command."""
+    if command not in parameter.needed_for or parameter.above_where_needed is None:
+        return parameter
+    return replace(parameter, above=parameter.above_where_needed)
 
 
 @frozen(kw_only=True)

@@ -15,6 +15,8 @@ Parameters are named by paths, the ones a deck uses inside a run:
     <joint>.pivot.x|y|z                    m, joint frame: a point of a revolute joint's axis; not there: the origin
     <joint>.servo.<parameter>              as the servo declares
     <joint>.servo.command.<parameter>      as the command declares
+    <joint>.bed.<parameter>                as the bed declares that the joint's motor is on
+    <joint>.law.<parameter>                as the law declares that drives the bed's load
     initial.<joint>.q|qd                   rad, rad/s (m, m/s)
     environment.<name>.<parameter>         as the environment model declares; uniform gravity is `gravity`, `g`
     metrics.<name>.<parameter>             as the metric declares
@@ -104,6 +106,19 @@ class ServoUse:
     model: str
     command: Command | None
     divisor: int
+    place: Place | None = None
+
+
+@frozen
+class Substitution:
+    """A joint whose motor is on a bed: the models of bed and law. Its servo stays what it is.
+
+    All substituted joints of a structure have one law, and servos that tick together.
+    """
+
+    joint: str
+    bed: str
+    law: str
     place: Place | None = None
 
 
@@ -205,6 +220,7 @@ class Structure:
     integrator: str
     schedule: Schedule
     record: tuple[Recorded, ...]
+    substitutions: tuple[Substitution, ...] = ()
 
     @property
     def moving(self) -> tuple[Joint, ...]:

@@ -21,7 +21,7 @@ from met.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.parameter import Parameter
 from met.plan import Coordinate, Experiment, Formula, Quantity, Requirement, Structure
 from met.plan_codec import Damaged
-from met.plan_defaults import INERTIA, declared
+from met.plan_defaults import INERTIA, declared, heads_of_models
 from met.trace.graph import TRUTHS, Formulas
 
 NAME = re.compile(r"[^\W\d]\w*")
@@ -160,7 +160,7 @@ def _check_uses(structure: Structure, where: str) -> None:
                 raise Damaged(f"{path}.command", f"a {use.model} needs one")
         elif use.command.kind not in servo.commands or use.command.kind not in COMMAND_UNIT:
             known = ", ".join(servo.commands) or "none"
-            raise Damaged(f"{path}.command.kind", f"a {use.model} takes no command `{use.command.kind}`, but {known}")
+            raise Damaged(f"{path}.command.kind", f"{use.model} takes no command `{use.command.kind}`, but {known}")
     names: list[str] = []
     for index, environment in enumerate(structure.environment):
         _name(environment.name, f"{where}.environment[{index}].name", names)
@@ -173,6 +173,36 @@ def _check_uses(structure: Structure, where: str) -> None:
         if metric.of not in known_channels:
             raise Damaged(f"{where}.metrics[{index}].of", f"there is no channel `{metric.of}`")
     models.find("integrator", structure.integrator)
+    _check_substitutions(structure, where)
+
+
+def _check_substitutions(structure: Structure, where: str) -> None:
+    """Motors on beds are there, once each; one law for all, and servos that tick together."""
+    kinds = {joint.name: joint.kind for joint in structure.joints}
+    servos = {use.joint: use for use in structure.servos}
+    on_beds: set[str] = set()
+    for index, use in enumerate(structure.substitutions):
+        path = f"{where}.substitutions[{index}]"
+        if use.joint not in kinds:
+            raise Damaged(f"{path}.joint", f"there is no joint `{use.joint}`")
+        if kinds[use.joint] == "fixed":
+            raise Damaged(f"{path}.joint", f"joint `{use.joint}` is fixed")
+        if use.joint not in servos:
+            raise Damaged(f"{path}.joint", f"joint `{use.joint}` has no servo")
+        if use.joint in on_beds:
+            raise Damaged(f"{path}.joint", f"joint `{use.joint}` is on a bed already")
+        on_beds.add(use.joint)
+        servo = servos[use.joint]
+        if not models.has_motor(models.find("servo", servo.model, servo.place)):
+            raise Damaged(f"{path}.joint", f"the servo of joint `{use.joint}`, {servo.model}, has no motor for a bed")
+        for kind in ("bed", "law"):
+            models.find(kind, getattr(use, kind), use.place)
+        first = structure.substitutions[0]
+        if use.law != first.law:
+            raise Damaged(f"{path}.law", f"it should be {first.law}, that of the first substituted joint")
+        if servo.divisor != servos[first.joint].divisor:
+            message = f"the servo of joint `{use.joint}` should tick with that of `{first.joint}`, the first on a bed"
+            raise Damaged(f"{path}.joint", message)
 
 
 def _check_record(structure: Structure, where: str) -> None:
@@ -268,11 +298,7 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
     """Every parameter is one of the arm's or a model's, of its unit, and within its bounds. (Missing ones: E304.)"""
     structure, parameters = experiment.structure, experiment.parameters
     known: set[str] = set()
-    models_of = tuple(
-        [f"{use.joint}.servo." for use in structure.servos]
-        + [f"environment.{use.name}." for use in structure.environment]
-        + [f"metrics.{use.name}." for use in structure.metrics]
-    )
+    models_of = heads_of_models(structure)
     for path, unit, _, parameter in declared(structure):
         if path in known:
             raise Damaged(where, f"two things are called `{path}`")
@@ -316,6 +342,8 @@ def _check_quantity(quantity: Quantity, unit: str, parameter: Parameter | None, 
     elif shape == "list":
         if not isinstance(value, tuple):
             raise Damaged(f"{where}.value", "it should be a list of numbers")
+        if not all(math.isfinite(number) for number in value):
+            raise Damaged(f"{where}.value", "one of its numbers is not finite")
     elif isinstance(value, str | tuple):
         raise Damaged(f"{where}.value", "it should be a number")
     elif isinstance(value, float):
@@ -339,7 +367,8 @@ def _bounds(parameter: Parameter) -> list[tuple[Callable[[np.ndarray], np.ndarra
         (parameter.below, "below", np.less),
         (parameter.at_most, "at most", np.less_equal),
     )
-    return [
+    whole = [(_is_whole, "it should be a whole number")] if parameter.whole else []
+    return whole + [
         (partial(_within, holds, limit), f"it should be {words} {limit:g}")
         for limit, words, holds in written
         if limit is not None
@@ -348,6 +377,10 @@ def _bounds(parameter: Parameter) -> list[tuple[Callable[[np.ndarray], np.ndarra
 
 def _within(holds: np.ufunc, limit: float, values: np.ndarray) -> np.ndarray:
     return np.asarray(holds(values[:, 0], limit))
+
+
+def _is_whole(values: np.ndarray) -> np.ndarray:
+    return np.asarray(values[:, 0] == np.rint(values[:, 0]))
 
 
 def _same_unit(one: str, other: str) -> bool:

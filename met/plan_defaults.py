@@ -7,30 +7,45 @@ from collections.abc import Iterator
 from met import models
 from met.channel import channels, joint_unit
 from met.diagnostic import nearest
-from met.parameter import Parameter
+from met.parameter import Parameter, under
 from met.plan import Experiment, Origin, Quantity, Structure
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
 def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity | None]]:
-    """Paths that the experiment lacks, each with its model's default, None where there is none."""
-    for path, unit, default, _ in declared(experiment.structure):
-        if path not in experiment.parameters:
-            note = "not in the plan file" if default is not None else ""
-            yield path, None if default is None else Quantity(default, unit, Origin("default", note=note))
+    """Paths that the experiment lacks, each with its model's default or the servo's value, None where neither is."""
+    defaults: dict[str, Quantity] = {}
+    for path, unit, default, parameter in declared(experiment.structure):
+        if path in experiment.parameters:
+            continue
+        found = None if default is None else Quantity(default, unit, Origin("default", note="not in the plan file"))
+        if found is None and parameter is not None and parameter.of_servo:
+            of_servo = f"{path.partition('.')[0]}.servo.{parameter.of_servo}"
+            found = experiment.parameters.get(of_servo, defaults.get(of_servo))
+        if found is not None:
+            defaults[path] = found
+        yield path, found
 
 
 def unknown_parameters(experiment: Experiment) -> Iterator[tuple[str, str | None]]:
     """Paths under a model of the experiment that its declaration does not have, with the nearest that it has."""
     structure = experiment.structure
     known = {path for path, *_ in declared(structure)}
-    models_of = [f"{use.joint}.servo." for use in structure.servos]
-    models_of += [f"environment.{use.name}." for use in structure.environment]
-    models_of += [f"metrics.{use.name}." for use in structure.metrics]
+    heads = heads_of_models(structure)
     for path in experiment.parameters:
-        if path not in known and path.startswith(tuple(models_of)):
+        if path not in known and path.startswith(heads):
             yield path, nearest(path, known, cutoff=0.8)
+
+
+def heads_of_models(structure: Structure) -> tuple[str, ...]:
+    """What the paths of parameters begin with that a model of the structure declares."""
+    return (
+        *(f"{use.joint}.servo." for use in structure.servos),
+        *(f"{use.joint}.{kind}." for use in structure.substitutions for kind in ("bed", "law")),
+        *(f"environment.{use.name}." for use in structure.environment),
+        *(f"metrics.{use.name}." for use in structure.metrics),
+    )
 
 
 Declared = tuple[str, str, float | tuple[float, ...] | str | None, Parameter | None]
@@ -57,11 +72,20 @@ def declared(structure: Structure) -> Iterator[Declared]:
     for use in structure.servos:
         joint = kinds[use.joint]
         for parameter in models.find("servo", use.model, use.place).parameters:
-            yield from _numbers(f"{use.joint}.servo", parameter, joint_unit(parameter.unit, joint))
+            held = parameter if use.command is None else under(parameter, use.command.kind)
+            yield from _numbers(f"{use.joint}.servo", held, joint_unit(parameter.unit, joint))
         if use.command is not None:
             for parameter in models.find("command", use.command.model, use.place).parameters:
                 unit = joint_unit(parameter.unit, joint, use.command.kind)
                 yield from _numbers(f"{use.joint}.servo.command", parameter, unit)
+    for on_bed in structure.substitutions:
+        joint = kinds[on_bed.joint]
+        for head, model in (
+            ("bed", models.find("bed", on_bed.bed, on_bed.place)), ("law", models.find("law", on_bed.law, on_bed.place))
+        ):  # fmt: skip
+            for parameter in model.parameters:
+                if parameter.shape != "text":  # for the compiler alone
+                    yield from _numbers(f"{on_bed.joint}.{head}", parameter, joint_unit(parameter.unit, joint))
     for environment in structure.environment:
         for parameter in models.find("environment", environment.model, environment.place).parameters:
             yield from _numbers(f"environment.{environment.name}", parameter, parameter.unit)

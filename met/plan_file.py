@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from met.diagnostic import Problem, error
-from met.plan import Experiment, Plan
+from met.plan import Experiment, Formula, Plan
 from met.plan_codec import Damaged, decode, encode
 
 SCHEMA = "met.plan"
@@ -150,6 +150,8 @@ def completed(plan: Plan, name: str = "plan", version: int = VERSION) -> Plan:
                 continue
             added[path] = quantity
             shown = quantity.value if isinstance(quantity.value, str) else f"{quantity.value!r} {quantity.unit}"
+            if isinstance(quantity.value, Formula):
+                shown = "that of the joint's servo"
             notes.append(f"`{path}` is not in the plan (schema {version}): its default, {shown}, is taken")
         if len(added) > len(experiment.parameters):
             experiment = replace(experiment, parameters=added, notes=tuple(notes))

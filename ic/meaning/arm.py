@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ic.grammar.syntax import Expression, Name, Unary
-from ic.meaning.complaints import known_words
+from ic.grammar.syntax import Call, Expression, Name, Unary
+from ic.meaning.complaints import belongs, known_words
 from ic.meaning.dh import use_dh
-from ic.meaning.models import check_keys, word_of
+from ic.meaning.models import check_keys, refuse_values, word_of
 from ic.meaning.resolve import RESERVED, Block, Definition, Item
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.shapes import SHAPES, Solid
@@ -80,7 +80,8 @@ def _stray(scope: Scope, item: Item, block: Block) -> None:
     known = [other.name for other in block.items.values() if other.kind in ("link", "joint")]
     if item.kind:
         scope.complaints.error("D082", f"no `{item.kind}` in an arm", item.place,
-                               help=[*did_you_mean(item.kind, ("link", "joint")), "an arm holds links and joints"])
+                               help=[*did_you_mean(item.kind, ("link", "joint")), *belongs(item.kind),
+                                     "an arm holds links and joints"])
     else:
         scope.complaints.error(
             "D083", f"nothing named `{item.name}` to change in this arm", item.place,
@@ -143,6 +144,9 @@ def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
         scope.checks.fail(f"{owner.path}.shape")
         return None
     kind = SHAPES[name]
+    if refuse_values(scope, item.value, [p.name for p in kind.parameters]):
+        scope.checks.fail(f"{owner.path}.shape")
+        return None
     inner = Owner(f"the {name} of {owner.label}", item.place, f"{owner.path}.shape", homes=owner.homes)
     body = item.body or Block()
     check_keys(scope, body, [p.name for p in kind.parameters], inner)
@@ -266,7 +270,7 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: list[st
     if item is None:
         scope.complaints.error("D092", f"{owner.label} has no {key}", owner.place, help=f"write `{key} = LINK;`")
         return None
-    name = word_of(item.value)
+    name = None if isinstance(item.value, Call) else word_of(item.value)
     if name in known:
         return name
     if name == "base":

@@ -68,6 +68,11 @@ class Complaints:
             raise Problem(self.all)
 
 
+def belongs(word: str) -> list[str]:
+    """Where a word of the language stands that stands elsewhere only."""
+    return ["`substitute JOINT { ... }`, in a run, puts a joint's motor on a bed"] if word == "substitute" else []
+
+
 def an(word: str) -> str:
     """`an arm`, `a servo`."""
     return f"an {word}" if word[:1] in tuple("aeiou") else f"a {word}"

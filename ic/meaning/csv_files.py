@@ -28,7 +28,9 @@ from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, erro
 from met.frozen import frozen
 from met.units import PURE, Dimension, Measure
 
-_HEADER = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
+LONGEST_NAME = 40  # characters of a column's name that a message shows
+
+_HEADER = re.compile(r"(?P<name>[^\[\]]*)(?:\[(?P<unit>[^\[\]]*)\])?")  # spaces are cut off later, not tried here
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 
@@ -154,6 +156,10 @@ def _table(file: str, text: str) -> Table:
 
 
 def _columns(file: str, line: int, row: str) -> Iterator[Column]:
+    if all(_NUMBER.fullmatch(_stripped(cell)[0]) for cell in row.split(",")):
+        raise Problem(error("D191", "the first line names no columns: it holds numbers",
+                            Place(file, line, 1, max(len(row), 1)),
+                            help="put a line above them, as in `time [s], shoulder [deg]`"))
     seen: dict[str, Place] = {}
     start = 0
     for number, cell in enumerate(row.split(",")):
@@ -161,17 +167,18 @@ def _columns(file: str, line: int, row: str) -> Iterator[Column]:
         place = Place(file, line, start + gap + 1, max(len(text), 1))
         start += len(cell) + 1
         match = _HEADER.fullmatch(text)
-        if match is None or not match["name"]:
+        name, unit = (match["name"].strip(), (match["unit"] or "").strip()) if match is not None else ("", "")
+        if not name:
             helps = ["write the unit in square brackets behind the name, as in `shoulder [deg]`"]
             if number == 0 and "," not in row and re.search(r"[;\t]", row):
                 helps = ["commas part the columns, as in `time [s], shoulder [deg]`"]
             raise Problem(error("D191", f"`{text[:40]}` does not name a column" if text else "a column without a name",
                                 place, help=helps))
-        if match["name"] in seen:
-            raise Problem(error("D198", f"column `{match['name']}` is there twice", place,
-                                also=[Label(seen[match["name"]], "first")], help="give one of them another name"))
-        seen[match["name"]] = place
-        yield Column(number, match["name"], match["unit"], place)
+        if name in seen:
+            raise Problem(error("D198", f"column `{name}` is there twice", place,
+                                also=[Label(seen[name], "first")], help="give one of them another name"))
+        seen[name] = place
+        yield Column(number, name, unit or None, place)
 
 
 def _stripped(cell: str) -> tuple[str, int]:
@@ -209,9 +216,17 @@ def _measure(column: Column, text: str, dimension: Dimension, label: Label) -> M
     return measure
 
 
+def _short(name: str) -> str:
+    return name if len(name) <= LONGEST_NAME else name[:LONGEST_NAME] + "..."
+
+
 def missing_column(table: Table, name: str, place: Place, why: str = "") -> Problem:
     """Says that a file has no column of this name, which is asked for at this place. why: in words, it is needed."""
-    names = [column.name for column in table.columns]
+    names = [_short(column.name) for column in table.columns]
+    round_brackets = next((each for each in names if each.startswith(f"{name} (") and each.endswith(")")), None)
+    near = did_you_mean(name, names)
+    if round_brackets is not None:
+        near = (f"a unit stands in square brackets: write `{name} [{round_brackets[len(name) + 2 : -1]}]`",)
     return Problem(error("D192", f"`{table.file}` has no column `{name}`", place,
                          also=[Label(table.columns[0].place, "its first line")],
-                         help=[*did_you_mean(name, names), known_words("columns", names), *([why] if why else [])]))
+                         help=[*near, known_words("columns", names), *([why] if why else [])]))

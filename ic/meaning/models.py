@@ -6,9 +6,10 @@ from collections.abc import Iterable
 from typing import Any
 
 from ic.grammar.syntax import Call, Expression, Name
-from ic.meaning.complaints import an, known_words
-from ic.meaning.resolve import Block
+from ic.meaning.complaints import an, belongs, known_words
+from ic.meaning.resolve import Block, Item
 from ic.meaning.scope import Owner, Scope
+from ic.meaning.values import place_of
 from met import models
 from met.diagnostic import Place, Problem, did_you_mean
 from met.parameter import Parameter
@@ -23,19 +24,43 @@ def word_of(expression: Expression | None) -> str | None:
     return None
 
 
+def refuse_values(scope: Scope, expression: Expression | None, names: Iterable[str]) -> bool:
+    """Tells of values without a name, of which nobody can say what they are for; whether there are any."""
+    if not isinstance(expression, Call) or not expression.positional:
+        return False
+    name = word_of(expression)
+    usage = f"{name}({', '.join(f'{each} = ...' for each in names)})"
+    scope.complaints.error("D153", f"`{name}` takes its values by name", place_of(expression.positional[0]),
+                           help=f"write `{usage}`")
+    return True
+
+
 def check_keys(scope: Scope, body: Block, known: Iterable[str], owner: Owner) -> None:
     """Tells every entry of the body that is none of the known plain keys."""
     known = list(known)
     for item in body.items.values():
         if item.kind:
             scope.complaints.error("D141", f"no `{item.kind}` in {owner.label}", item.place,
-                                   help=known_words("it has", known))
+                                   help=[*belongs(item.kind), known_words("it has", known)])
         elif item.name not in known:
             scope.complaints.error("D141", f"{owner.label} has no `{item.name}`", item.place,
                                    help=[*did_you_mean(item.name, known), known_words("it has", known)])
     for statement in body.statements:
         scope.complaints.error("D142", f"`{statement.words[0].text}` inside {owner.label}", statement.place,
                                help="it belongs to a run or a sweep")
+
+
+def find_bare_model(scope: Scope, kind: models.Kind, item: Item, remedy: str) -> Any:
+    """The declaration that an entry names with nothing in parentheses or braces; None where that failed, and was told.
+
+    remedy  what to write in the stead of parameters behind the name, with `{}` for the name
+    """
+    name, place = word_of(item.value), place_of(item.value) if item.value is not None else item.place
+    if name is not None and isinstance(item.value, Call):
+        scope.complaints.error("D143", f"`{item.name} = {name}` takes neither parentheses nor braces", place,
+                               help=remedy.format(name))
+        return None
+    return find_model(scope, kind, name, place)
 
 
 def find_model(scope: Scope, kind: models.Kind, name: str | None, place: Place) -> Any:

@@ -8,17 +8,20 @@ from typing import Any, Literal
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Binary, Expression, List, Name, Statement
 from ic.meaning.complaints import known_words
-from ic.meaning.models import find_model, use_model, word_of
+from ic.meaning.models import find_model, refuse_values, use_model, word_of
 from ic.meaning.resolve import Block, Item
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.values import place_of
 from met import models
-from met.channel import FAMILIES, Channel, channels, recordable
+from met.channel import FAMILIES, Channel, carries, channels, recordable
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import MetricUse, Recorded, Requirement, Structure
 from met.trace import Scalar
+
+OF_SERVO = frozenset({"servo", "bed", "law"})
+"""Heads of channels that a joint has only with a servo, or with its motor on a bed."""
 
 FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
@@ -38,12 +41,12 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
     found: dict[str, tuple[Recorded, Place]] = {}
     for name in asked:
         made = known.get(name.text)
-        if made is None and scope.lost and "servo" in [word.text for word in name.path]:
+        if made is None and scope.lost and not OF_SERVO.isdisjoint(word.text for word in name.path):
             continue
         if made is None and scope.gone and (name.path[0].text in scope.gone or not structure.moving):
             continue
         if made is None:
-            scope.complaints.error("D125", f"no channel `{name.text}`", name.place, help=_nearest(name, known))
+            scope.complaints.error("D125", f"no channel `{name.text}`", name.place, help=_nearest(name, known, structure))
         for each in made or ():
             if each.name in found:
                 scope.complaints.error("D040", f"`{each.name}` is recorded twice", name.place,
@@ -72,8 +75,12 @@ def _names(scope: Scope, item: Item, expression: Expression | None) -> Iterator[
                                    help="write `record = [q, qd, tau];`")
 
 
-def _nearest(name: Name, known: dict[str, tuple[Recorded, ...]]) -> list[str]:
-    """What was meant, and what there is: of the same joint or link, else of all; vectors and families as a whole."""
+def _nearest(name: Name, known: dict[str, tuple[Recorded, ...]], structure: Structure) -> list[str]:
+    """Why there is none; or what was meant, and what there is: of the same joint or link, else of all; vectors and
+    families as a whole."""
+    why = _why_none([word.text for word in name.path], structure)
+    if why:
+        return [why]
     whole = [each for each in known if each.rpartition(".")[0] not in known]
     first = name.path[0].text
     head = ".".join(word.text for word in name.path[:2]) if first == "links" else first
@@ -89,6 +96,18 @@ def _nearest(name: Name, known: dict[str, tuple[Recorded, ...]]) -> list[str]:
         known_words("channels of all joints", joints),
         known_words("channels of the arm, and of a link", [*arm, *some]),
     ]
+
+
+def _why_none(words: list[str], structure: Structure) -> str:
+    """Why a fixed joint has no channel, and a joint none of a link that it does not carry; "" where that is not it."""
+    if words[0] in {joint.name for joint in structure.joints if joint.kind == "fixed"}:
+        return (f"joint `{words[0]}` is fixed: its two links move as one body, and nothing is computed between them; "
+                "what they take shows in the reaction of the moving joint that carries them")
+    moving, links = ({each.name for each in group} for group in (structure.moving, structure.links))
+    if words[0] == "links" and words[2:3] == ["jacobian"] and len(words) > 4 and words[1] in links:
+        if words[4] in moving and words[3] in FAMILIES["jacobian"] and not carries(structure, words[1], words[4]):
+            return f"joint `{words[4]}` does not carry link `{words[1]}`, so it does not move it"
+    return ""
 
 
 # Metrics
@@ -111,7 +130,7 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
                                      known_words("metric models", sorted(models.available("metric")))])
         return None
     metric = find_model(scope, "metric", word_of(item.value), place_of(item.value))
-    if metric is None:
+    if metric is None or refuse_values(scope, item.value, ["of", *(p.name for p in metric.parameters)]):
         return None
     body = item.body or Block()
     of = body.get("of")
@@ -123,9 +142,9 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
         name = of.value if isinstance(of.value, Name) else None
         if name is not None and name.path[0].text in scope.lost | scope.gone:
             return None
-        message, helps = "a channel is needed here", list[str]()
+        message, helps = "a channel is needed here", ["write `of = CHANNEL;`, such as `of = shoulder.qd;`"]
         if name is not None:
-            message, helps = _not_one(name, recordable(structure, [name.text]))
+            message, helps = _not_one(name, structure)
         scope.complaints.error("D125", message, place_of(of.value) if of.value is not None else of.place, help=helps)
     else:
         channel = known[of.value.text]
@@ -136,10 +155,11 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
     return MetricUse(item.name, metric.name, channel.path, item.place)
 
 
-def _not_one(name: Name, known: dict[str, tuple[Recorded, ...]]) -> tuple[str, list[str]]:
+def _not_one(name: Name, structure: Structure) -> tuple[str, list[str]]:
     """What to say of a name that is no single channel: which ones it stands for, or else what was meant."""
+    known = recordable(structure, [name.text])
     if name.text not in known:
-        return f"no channel `{name.text}`", _nearest(name, known)
+        return f"no channel `{name.text}`", _nearest(name, known, structure)
     numbers = [f"`{path}`" for variable in known[name.text] for path in variable.channels]
     return f"`{name.text}` is {len(numbers)} channels", [known_words("a metric watches one of them", numbers)]
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field, replace
 
 from ic.grammar.syntax import Call, Deck, Entry, Expression, Group, Let, Name, Setting, Statement, Word
-from ic.meaning.complaints import Complaints, an, known_words
+from ic.meaning.complaints import Complaints, an, belongs, known_words
 from ic.meaning.csv_files import CsvFiles
 from ic.text.files import library_defines
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error
@@ -190,7 +190,8 @@ class Definitions:
                                 help=f"write `{meant}`: the language's words are in lower case"))
         if kind.text not in KINDS:
             raise Problem(error("D045", f"no kind of definition `{kind.text}`", kind.place,
-                                help=[*did_you_mean(kind.text, KINDS), "kinds: arm, servo, run, sweep"]))
+                                help=[*did_you_mean(kind.text, KINDS), *belongs(kind.text),
+                                      "kinds: arm, servo, run, sweep"]))
         if len(words) == 1:
             raise Problem(error("D046", f"this {kind.text} has no name", kind.place,
                                 help=f"write `{kind.text} NAME {{ ... }}`"))

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 from ic.grammar.syntax import Call, Name, Word
 from ic.meaning.arm import Arm, resolve_arm
-from ic.meaning.complaints import known_words
-from ic.meaning.models import find_model, use_model, word_of
+from ic.meaning.complaints import belongs, known_words
+from ic.meaning.models import find_bare_model, find_model, refuse_values, use_model, word_of
 from ic.meaning.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
 from ic.meaning.resolve import Block, Definition, Item
 from ic.meaning.schedule import Rate, base_rate, check_stability, divisor, make_schedule
 from ic.meaning.scope import Owner, Scope
-from ic.meaning.servos import RATE, Use, check_rest, fixed_rate, resolve_servos
+from ic.meaning.servos import RATE, Use, check_rest, check_start, fixed_rate, resolve_servos
+from ic.meaning.substitution import check_ticks, resolve_substitutions
 from ic.meaning.values import Value, Values, place_of
 from met import models, units
 from met.diagnostic import Label, Place, did_you_mean
@@ -67,17 +69,21 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         return None
     scope.gone = arm.lost
     uses, scope.lost = resolve_servos(scope, _body(scope, block.get("servos")), arm)
-    environment, products = _environment(scope, _body(scope, block.get("environment")), arm)
+    substitutions = resolve_substitutions(scope, block, arm, uses)
+    environment, products = _environment(scope, _body(scope, block.get("environment")), arm, duration)
     _initial(scope, _body(scope, block.get("initial")), arm)
     for use in uses:
         check_rest(scope, use)
+        check_start(scope, use)
     schedule, divisors = _schedule(scope, run, block, rates, uses, duration)
     if schedule is None or integrator is None:
         return None
+    check_ticks(scope, substitutions, divisors, schedule)
     _keep_settings(scope, block, arm, integrator, rates, schedule)
     stability = []
+    on_beds = [each.joint for each in substitutions]
     for use in uses:
-        if use.parameters is not None:
+        if use.parameters is not None and use.joint not in on_beds:  # there the motor is no part of the step
             x = check_stability(
                 scope, f"servo `{use.definition}`", use.servo, use.parameters, schedule, integrator, rates["dynamics"]
             )
@@ -86,8 +92,9 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     servos = tuple(ServoUse(use.joint, use.definition, use.servo.name, use.command, divisors[use.joint], use.place)
                    for use in uses)
     structure = Structure(
-        arm.name, arm.links, arm.joints, servos, environment, (), products, integrator.name, schedule, ()
-    )
+        arm.name, arm.links, arm.joints, servos, environment, (), products, integrator.name, schedule, (),
+        substitutions,
+    )  # fmt: skip
     metrics = resolve_metrics(scope, block, structure)
     record = resolve_record(scope, run, block.get("record"), structure)
     structure = replace(structure, metrics=metrics, record=record)
@@ -112,19 +119,22 @@ def _keep_settings(scope: Scope, block: Block, arm: Arm, integrator: Any, rates:
 
 
 def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
-    metrics = [item.name for item in block.of_kind("metric")]
+    metrics = [item.name for kind in ("metric", "substitute") for item in block.of_kind(kind)]
     for item in block.items.values():
-        if item.kind == "metric" or (not item.kind and item.name in KEYS):
+        if item.kind in ("metric", "substitute") or (not item.kind and item.name in KEYS):
             continue
         if item.kind:
             scope.complaints.error("D108", f"no `{item.kind}` in a run", item.place,
-                                   help=[*did_you_mean(item.kind, ("metric", *KEYS)),
-                                         known_words("a run has", (*KEYS, "metric NAME", "require"))]
-                                   if item.kind != "substitute" else "motor substitution is not in this version")
+                                   help=[*did_you_mean(item.kind, ("metric", "substitute", *KEYS)),
+                                         known_words("a run has", (*KEYS, "metric NAME", "substitute JOINT", "require"))
+                                         ])
         elif item.body is not None:
+            adds = f"`metric {item.name} = ...` would add a metric"
+            if not {"bed", "law"}.isdisjoint(item.body.items):
+                adds = f"`substitute {item.name} {{ ... }}` would put this joint's motor on a bed"
             scope.complaints.error(
                 "D109", f"nothing named `{item.name}` in run `{definition.name}` to change", item.place,
-                help=[*did_you_mean(item.name, (*metrics, *KEYS)), f"`metric {item.name} = ...` would add a metric"])
+                help=belongs(item.name) or [*did_you_mean(item.name, (*metrics, *KEYS)), adds])
         else:
             scope.complaints.error("D109", f"a run has no `{item.name}`", item.place,
                                    help=[*did_you_mean(item.name, (*KEYS, *metrics)), known_words("a run has", KEYS)])
@@ -137,7 +147,8 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
                 statement.place,
                 help=["`exclude when` stands in a sweep"]
                 if words == "exclude when"
-                else [*did_you_mean(words, ("require", "remove")), "statements of a run: require, remove"],
+                else belongs(words)
+                or [*did_you_mean(words, ("require", "remove")), "statements of a run: require, remove"],
             )
 
 
@@ -173,7 +184,7 @@ def _integrator(scope: Scope, item: Item | None):  # type: ignore[no-untyped-def
     scope.whole["integrator"] = "decides the program, which is one for the whole sweep in this version"
     if item is None:
         return models.find_own("integrator")["modified_euler"]
-    return find_model(scope, "integrator", word_of(item.value), place_of(item.value) if item.value else item.place)
+    return find_bare_model(scope, "integrator", item, "write `integrator = {};`: an integrator has no parameters")
 
 
 def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
@@ -189,7 +200,7 @@ def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
 # Environment and initial state
 
 
-def _environment(scope: Scope, body: Block, arm: Arm) -> tuple[tuple[EnvironmentUse, ...], bool]:
+def _environment(scope: Scope, body: Block, arm: Arm, duration: float | None) -> tuple[tuple[EnvironmentUse, ...], bool]:
     uses = []
     products = True
     for item in body.items.values():
@@ -201,7 +212,7 @@ def _environment(scope: Scope, body: Block, arm: Arm) -> tuple[tuple[Environment
             owner = Owner("the environment", item.place, "environment")
             products = scope.word(owner, ON_OFF, item) != "off"
         else:
-            use = _environment_use(scope, item, arm)
+            use = _environment_use(scope, item, arm, duration)
             if use is not None:
                 uses.append(use)
     for statement in body.statements:
@@ -210,7 +221,7 @@ def _environment(scope: Scope, body: Block, arm: Arm) -> tuple[tuple[Environment
     return tuple(uses), products
 
 
-def _environment_use(scope: Scope, item: Item, arm: Arm) -> EnvironmentUse | None:
+def _environment_use(scope: Scope, item: Item, arm: Arm, duration: float | None) -> EnvironmentUse | None:
     owner = Owner(f"environment `{item.name}`", item.place, f"environment.{item.name}", homes=item.homes)
     name = word_of(item.value)
     if item.name == "gravity" and name in (None, "gravity", *scope.definitions.lets):
@@ -233,7 +244,7 @@ def _environment_use(scope: Scope, item: Item, arm: Arm) -> EnvironmentUse | Non
                                      known_words("models", sorted(models.available("environment")))])
         return None
     environment = find_model(scope, "environment", name, place_of(item.value))
-    if environment is None:
+    if environment is None or refuse_values(scope, item.value, [p.name for p in environment.parameters]):
         return None
     values = use_model(scope, owner, environment.parameters, item.body or Block())
     if values is not None:
@@ -246,7 +257,23 @@ def _environment_use(scope: Scope, item: Item, arm: Arm) -> EnvironmentUse | Non
                 scope.complaints.error("D159", f"no {wanted.name} `{values[wanted.name]}` in arm `{arm.name}`", place,
                                        help=[*did_you_mean(values[wanted.name], known),
                                              known_words(f"{wanted.name}s", known)])
+        if duration is not None:
+            _remark_idle(scope, environment, item, values, duration)
     return EnvironmentUse(item.name, environment.name, None, item.place)
+
+
+def _remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str, Any], duration: float) -> None:
+    """Tells of a model whose written constants make it nothing, all through the run."""
+    numbers = [x for value in values.values() for x in (value if isinstance(value, tuple) else (value,))]
+    if environment.idle is None or any(isinstance(x, Scalar) for x in numbers):
+        return
+    found = environment.idle(SimpleNamespace(**values), duration)
+    if found is not None:
+        body = item.body or Block()
+        written = [part for name in found[0] if (part := body.get(name)) is not None and part.value is not None]
+        place = place_of(written[0].value) if written and written[0].value is not None else item.place
+        scope.complaints.remark("D168", f"environment `{item.name}` never acts: {found[1]}", place,
+                                help="change that, or leave it out")
 
 
 def _initial(scope: Scope, body: Block, arm: Arm) -> None:

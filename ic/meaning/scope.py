@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ic.grammar.syntax import Call, Expression, Name
+from ic.grammar.syntax import Call, Expression, Name, String
 from ic.meaning.checks import Checks, Varied
 from ic.meaning.complaints import Complaints
 from ic.meaning.names import Names
@@ -188,6 +188,9 @@ class Scope:
             raise Problem(error("D060", f"{owner.what(wanted)} is in {text}, and these are bare numbers", found.place,
                                 help=f"write {either(f'[...] {each}' for each in in_degrees(text))}: "
                                      "a unit after the bracket is for all of them"))
+        dimensions = {value.dimension for value in numbers}
+        if found.unit is not None and len(dimensions) == 1:  # one unit for all: where it is wrong, it is so once
+            self.check_dimension(owner, wanted, replace(numbers[0], place=found.place))
         numbers += [Value(0.0, dimension, found.place)] * (count - len(numbers))
         return numbers
 
@@ -263,6 +266,8 @@ class Scope:
                 helps = [*(did_you_mean(named, wanted.words) if named else ()),
                          "one of: " + ", ".join(wanted.words) if wanted.words else "write a name, without quotes"]
                 message = f"`{wanted.name}` of {owner.label} is a word"
+                if isinstance(item.value, String):
+                    message += ", without quotes"
                 if named:
                     message = f"`{wanted.name}` of {owner.label} cannot be `{named}`"
                 self.complaints.error("D076", message, place, help=helps)
@@ -300,6 +305,21 @@ class Scope:
         wanted = Parameter(name=name, unit=unit, doc=note)
         origin = Origin("derived", owner.place, (), note)
         return self._finish(owner, wanted, name, owner.homes, self._plain(value), origin, owner.place, True)
+
+    def taken(self, owner: Owner, wanted: Parameter, of: str) -> Real | None:
+        """A parameter that is another's, of this path, unless a sweep varies it itself; None where the other failed."""
+        other = self.parameters.get(of)
+        if other is None or isinstance(other.value, str | tuple) or self.checks.failed(of):
+            self.checks.fail(owner.join(wanted.name))
+            return None
+        own = self._coordinate(owner, wanted.name, owner.homes) is not None
+        origin = replace(other.origin, note="" if own else f"that of `{of}`")
+        value = self._finish(owner, wanted, wanted.name, owner.homes, other.value, origin, origin.place or owner.place,
+                             True, other.expression, needs=(of,))
+        for paths in self.sets.values():
+            if not own and of in paths:
+                paths.append(owner.join(wanted.name))
+        return value
 
     def follows(self, path: str, value: Real, unit: str, item: Item, note: str) -> None:
         """Keeps a parameter that an item makes of numbers of its own, which are varied in its stead."""
@@ -358,7 +378,8 @@ class Scope:
         return self._finish(owner, wanted, name, homes, value, origin, place, record, expression)
 
     def _finish(self, owner: Owner, wanted: Parameter, name: str, homes: tuple[str, ...], value: Real | None,
-                origin: Origin, place: Place, record: bool, expression: Expression | None = None) -> Real:
+                origin: Origin, place: Place, record: bool, expression: Expression | None = None,
+                needs: tuple[str, ...] = ()) -> Real:
         path = owner.join(name)
         for known in owner.paths(name, homes):
             self.known.setdefault(known, []).append(path)
@@ -376,7 +397,7 @@ class Scope:
                 self.checks.fail(coordinate.path)
         assert value is not None
         if origin.kind != "default" or value != math.inf:  # a model's own default may be: never
-            self._check_range(owner, wanted, value, place, path)
+            self._check_range(owner, wanted, value, place, path, needs)
         kept = self.parameters if record else self.beside
         if record or owner.called is None:
             kept[path] = Settled(value, self.unit(owner, wanted)[0], origin, wanted.doc, expression)
@@ -430,7 +451,8 @@ class Scope:
         message = f"{what} is " + ("a pure number" if dimension == PURE else f"in {text}") + f", and this is in {found}"
         raise Problem(error("D061", message, value.place, also=also, help=mended(value, text, dimension)))
 
-    def _check_range(self, owner: Owner, wanted: Parameter, value: Real, place: Place, path: str = "") -> None:
+    def _check_range(self, owner: Owner, wanted: Parameter, value: Real, place: Place, path: str = "",
+                     needs: tuple[str, ...] = ()) -> None:
         bounds = [(bound, word, sign) for bound, word, sign in (
             (wanted.above, "above", np.greater), (wanted.at_least, "at least", np.greater_equal),
             (wanted.below, "below", np.less), (wanted.at_most, "at most", np.less_equal)) if bound is not None]
@@ -441,12 +463,16 @@ class Scope:
             bad = ~np.isfinite(values[:, 0])
             for bound, _, holds in bounds:
                 bad |= ~holds(values[:, 0], bound)
+            if wanted.whole:
+                bad |= values[:, 0] != np.rint(values[:, 0])
             return bad, [f"this is {x:g}{unit}" for x in values[bad, 0][:1]]
 
         limits = " and ".join(f"{word} {bound:g}" for bound, word, _ in bounds) or "finite"
         remedy = f"write a number {limits}{unit}" if bounds else "write a finite number"
+        if wanted.whole:
+            limits, remedy = f"whole and {limits}", remedy.replace("a number", "a whole number")
         self.checks.hold((value,), test, code="D077", message=f"{owner.what(wanted)} must be {limits}{unit}",
-                         place=place, path=path, help=remedy + (f" ({wanted.doc})" if wanted.doc else ""))
+                         place=place, path=path, needs=needs, help=remedy + (f" ({wanted.doc})" if wanted.doc else ""))
 
     def quantities(self, *, beside: bool = False) -> tuple[dict[str, Any], list[Scalar]]:
         """The parameters as a plan holds them, and the scalars of its formulas, in order. beside: the others too."""

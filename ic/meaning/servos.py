@@ -7,10 +7,12 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-from ic.grammar.syntax import Call, Name, Word
+import numpy as np
+
+from ic.grammar.syntax import Call, Expression, Name, String, Word
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import an, known_words
-from ic.meaning.models import check_keys, find_model, use_model, word_of
+from ic.meaning.models import check_keys, find_bare_model, find_model, refuse_values, use_model, word_of
 from ic.meaning.resolve import Block, Item, open_call, overlay
 from ic.meaning.schedule import Rate
 from ic.meaning.scope import Owner, Scope
@@ -20,15 +22,17 @@ from ic.meaning.values import place_of
 from ic.text.files import library_defines
 from met import models
 from met.channel import COMMAND_UNIT
-from met.diagnostic import Label, Place, Problem, did_you_mean
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Command
-from met.trace import where
+from met.trace import Scalar, where
 
 SLOWEST, FASTEST = 1e-3, 1e9
+APART = 1e-9  # rad or m: far above rounding of a deck's numbers, far below what anyone sees
 RATE = Parameter(name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, doc="how often the servo's computer ticks")
 NOT_PARAMETERS = ("model", "command", "rate")
+BESIDE = "write `model = {};`, and its parameters beside it"
 
 
 @frozen
@@ -57,18 +61,10 @@ def resolve_servos(scope: Scope, body: Block, arm: Arm) -> tuple[list[Use], froz
 
 
 def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
-    kind = arm.kind(item.name)
-    moving = [joint.name for joint in arm.moving]
     if item.name in arm.lost and not item.kind:
         return None
-    if item.kind or kind is None:
-        scope.complaints.error("D144", f"no joint `{item.name}` in arm `{arm.name}`", item.place,
-                               help=[*did_you_mean(item.name, moving), known_words("joints", moving)])
-        return None
-    if kind == "fixed":
-        scope.complaints.error("D145", f"joint `{item.name}` is fixed, so no servo can move it", item.place,
-                               also=[Label(place, "fixed here") for j in arm.joints if j.name == item.name
-                                     and (place := j.place)], help="make the joint revolute or prismatic")
+    kind = moving_kind(scope, item, arm, "so no servo can move it")
+    if kind is None:
         return None
     name = word_of(item.value)
     if name is None or (isinstance(item.value, Call) and item.value.positional):
@@ -104,7 +100,7 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
             help=["write `model = MODEL;`", known_words("servo models", sorted(models.find_own("servo")))],
         )
         return None
-    servo = find_model(scope, "servo", word_of(model.value), place_of(model.value) if model.value else model.place)
+    servo = find_bare_model(scope, "servo", model, BESIDE)
     if servo is None:
         return None
     parameters = use_model(scope, owner, servo.parameters, block, NOT_PARAMETERS)
@@ -121,6 +117,21 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
     return Use(item.name, name, servo, command, rate, parameters, item.place)
 
 
+def moving_kind(scope: Scope, item: Item, arm: Arm, so: str) -> str | None:
+    """The kind of the joint that an entry names; None where it is none or fixed, which was told. so: if it is fixed."""
+    kind = arm.kind(item.name) if item.kind in ("", "substitute") else None
+    if kind is None:
+        moving = [joint.name for joint in arm.moving]
+        scope.complaints.error("D144", f"no joint `{item.name}` in arm `{arm.name}`", item.place,
+                               help=[*did_you_mean(item.name, moving), known_words("joints", moving)])
+    if kind == "fixed":
+        scope.complaints.error("D145", f"joint `{item.name}` is fixed, {so}", item.place,
+                               also=[Label(place, "fixed here") for j in arm.joints if j.name == item.name
+                                     and (place := j.place)], help="make the joint revolute or prismatic")
+        return None
+    return kind
+
+
 def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, block: Block, used: Place) -> None:
     """What this kind of command needs is written."""
     item = block.get("command")
@@ -134,6 +145,28 @@ def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, bloc
                 place,
                 help=f"write `{parameter.name} = ... {in_deck(scope.unit(owner, parameter)[0])};`: {parameter.doc}",
             )
+        elif command.kind in parameter.needed_for and parameter.above_where_needed is not None:
+            _check_above(scope, owner, parameter, command, parameter.above_where_needed)
+
+
+def _check_above(scope: Scope, owner: Owner, parameter: Parameter, command: Command, bound: float) -> None:
+    """A number that does nothing under other commands is above its bound under this one, in every case."""
+    path = owner.join(parameter.name)
+    settled = scope.parameters.get(path)
+    if settled is None or settled.origin.place is None or isinstance(settled.value, str | tuple):
+        return
+    unit = "" if settled.unit == "1" else f" {settled.unit}"
+    limit = f"above {bound:g}{unit}"
+
+    def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+        bad = values[:, 0] <= bound
+        return bad, [f"this is {x:g}{unit}" for x in values[bad, 0][:1]]
+
+    scope.checks.hold(
+        (settled.value,), test, code="D077", place=settled.origin.place, path=f"{path}.needed", needs=(path,),
+        message=f"{owner.what(parameter)} must be {limit} under a {command.kind} command",
+        help=f"write a number {limit} ({parameter.doc})",
+    )
 
 
 def check_rest(scope: Scope, use: Use) -> None:
@@ -155,6 +188,30 @@ def check_rest(scope: Scope, use: Use) -> None:
             path=f"{path}.rest",
             needs=(path, f"{use.joint}.servo"),
         )
+
+
+def check_start(scope: Scope, use: Use) -> None:
+    """Remarks where the joint of a servo that follows whatever the arm does not begin where its command does."""
+    command = use.command
+    if not use.servo.follows or command is None or command.kind != "position" or scope.complaints.errors:
+        return
+    begins = scope.parameters.get(f"initial.{use.joint}.q")
+    head = f"{use.joint}.servo.command."
+    asked = {path.removeprefix(head): each for path, each in scope.parameters.items() if path.startswith(head)}
+    profile = models.find_own("command").get(command.model)  # another package's is called only to be recorded
+    values = [each.value for each in asked.values()]
+    if begins is None or profile is None or {p.name for p in profile.parameters} - set(asked):
+        return
+    if isinstance(begins.value, Scalar) or any(isinstance(value, Scalar) for value in values):
+        return  # a sweep varies one of them
+    value, _ = profile.course(SimpleNamespace(**{name: each.value for name, each in asked.items()}), 0.0)
+    if abs(value - begins.value) > APART:
+        places = [each.origin.place for each in asked.values() if each.origin.place is not None]
+        also = [] if begins.origin.place is None else [Label(begins.origin.place, "the joint begins here")]
+        scope.complaints.remark(
+            "D169", f"the command of joint `{use.joint}` begins at {value:g} {begins.unit}, and the joint at "
+            f"{begins.value:g} {begins.unit}: it jumps", places[0] if places else use.place, also=also,
+            help=f"write `{use.joint}.q = {value:.12g} {begins.unit};` in `initial`, or begin the command elsewhere")
 
 
 def fixed_rate(scope: Scope, owner: Owner, item: Item, label: str, name: str = "rate") -> Rate | None:
@@ -192,6 +249,12 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     if not servo.commands:
         scope.complaints.error("D150", f"{an(servo.name)} takes no command", place, help="leave `command` out")
         return None
+    course = word_of(call)
+    if course is not None and course not in COMMAND_UNIT and course in models.available("command"):
+        kind = "position" if "position" in servo.commands else servo.commands[0]
+        scope.complaints.error("D152", f"`{course}` is a course in time, and a command is of a kind", place,
+                               help=[f"write `{kind}({course}(...))`", f"{servo.name} takes {known}"])
+        return None
     if not isinstance(call, Call) or item.body is not None or len(call.positional) != 1:
         scope.complaints.error("D151", "a command is its kind and one value or course in time", place,
                                help=f"{servo.name} takes {known}: `{servo.commands[0]}(0.03 rad/s)` or "
@@ -202,7 +265,7 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
         scope.complaints.error("D152", f"{an(servo.name)} takes no command `{kind}`", call.name.place,
                                help=[*did_you_mean(kind, servo.commands), f"it takes {known}"])
         return None
-    inner = call.positional[0]
+    inner = _asked(scope, call)
     told = f"the command of {owner.label}"
     spot = replace(owner, label=told, called=told, place=place, path=f"{owner.path}.command", local="command",
                    homes=item.homes, command=kind)
@@ -218,9 +281,7 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     if profile is None:
         return None
     inner = with_file_named(inner) if profile.from_file else inner
-    if inner.positional:
-        scope.complaints.error("D153", f"`{name}` takes its values by name", place_of(inner.positional[0]),
-                               help=f"write `{name}({', '.join(f'{p.name} = ...' for p in profile.written)})`")
+    if refuse_values(scope, inner, [p.name for p in profile.written]):
         return None
     _, body = open_call(inner, None, scope.complaints)
     opened = Block({key: replace(part, homes=item.homes, overrides=item.overrides)
@@ -233,6 +294,17 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     if values is not None and profile.name == "table":
         _check_table(scope, opened, values)
     return Command(kind, profile.name)
+
+
+def _asked(scope: Scope, command: Call) -> Expression:
+    """What the command is about: the name of a course alone is that course with nothing written. Raises Problem."""
+    inner = command.positional[0]
+    if isinstance(inner, String):
+        raise Problem(error("D151", "a command is about a value or a course in time, and this is text", inner.place,
+                            help=f"write `{command.name.text}(trajectory(...))` for a column of a CSV file"))
+    if isinstance(inner, Name) and inner.text in models.available("command") and not scope.names.knows(inner.text):
+        return Call(inner, (), (), None, inner.place)
+    return inner
 
 
 def _check_table(scope: Scope, body: Block, values: dict[str, Any]) -> None:
@@ -268,13 +340,15 @@ def check_servo_definition(scope: Scope, name: str) -> None:
         owner = Owner(f"servo `{name}`", definition.place, "")
         if model is None:
             return
-        servo = find_model(scope, "servo", word_of(model.value), place_of(model.value) if model.value else model.place)
+        servo = find_bare_model(scope, "servo", model, BESIDE)
         if servo is not None:
             check_keys(scope, block, [*(p.name for p in servo.parameters), *NOT_PARAMETERS], owner)
             command = block.get("command")
-            if command is not None and isinstance(command.value, Call) and len(command.value.positional) == 1 \
-                    and not isinstance(command.value.positional[0], Call):
-                scope.names.evaluate(command.value.positional[0])
+            if (command is not None and isinstance(command.value, Call) and len(command.value.positional) == 1
+                    and command.value.name.text in COMMAND_UNIT):
+                inner = _asked(scope, command.value)
+                if not isinstance(inner, Call):
+                    scope.names.evaluate(inner)
             for key, item in block.items.items():
                 if key in NOT_PARAMETERS or item.value is None:
                     continue

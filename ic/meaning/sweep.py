@@ -12,9 +12,9 @@ from contextlib import suppress
 
 import numpy as np
 
-from ic.grammar.syntax import Binary, Expression, Group, Name, Setting, Statement, Unary
+from ic.grammar.syntax import Binary, Expression, Group, List, Name, Setting, Statement, String, Unary
 from ic.meaning.checks import Varied
-from ic.meaning.complaints import Complaints, known_words
+from ic.meaning.complaints import Complaints, belongs, known_words
 from ic.meaning.names import Names
 from ic.meaning.resolve import Definition, Definitions
 from ic.meaning.scope import Scope
@@ -28,7 +28,7 @@ from met.trace import Formulas, Graph, Scalar
 MOST_CASES = 10_000_000
 MOST_NAMED = 4
 ROUNDING = 1e-12  # relative: some thousand roundings, and far below what anyone means to tell apart
-LATER = ("sample", "repeat", "seeds", "substitute", "design")
+LATER = ("sample", "repeat", "seeds", "design")
 
 
 @frozen
@@ -109,7 +109,8 @@ def _refuse(entry: object, words: list[str]) -> None:
                                   "or set it in a run `like` this one, and sweep that"]))
     known = ("vary", "zip", "exclude when")
     raise Problem(error("D136", f"no `{' '.join(words)}` in a sweep", place,
-                        help=[*did_you_mean(" ".join(words), known), known_words("a sweep has", known)]))
+                        help=[*did_you_mean(" ".join(words), known), *belongs(words[0] if words else ""),
+                              known_words("a sweep has", known)]))
 
 
 def _zip(definitions: Definitions, complaints: Complaints, group: Group, written: dict[str, Place], paths: set[str],
@@ -142,6 +143,13 @@ def _varied(definitions: Definitions, entry: Setting, written: dict[str, Place],
     if entry.operator == "+=":
         raise Problem(error("D056", "nothing to append to in a sweep", entry.place, help="write `=`"))
     names = Names(definitions, {}, watched=paths)
+    word = _word_in(entry.value, names)
+    if word is not None:
+        raise Problem(error("D122", f"`{path}` cannot vary over words", place_of(word),
+                            help=["a word, a model and a file are one for the whole sweep in this version: write a run "
+                                  "for each, `like` the first",
+                                  *([f"where a number is meant, define it: `let {word.text} = ...;`"]
+                                    if isinstance(word, Name) else [])]))
     found = names.evaluate(entry.value)
     if names.followed:
         raise Problem(
@@ -173,6 +181,19 @@ def _varied(definitions: Definitions, entry: Setting, written: dict[str, Place],
     if not [word for word in entry.words if word.text != "vary"] and entry.words:
         _check_repeats([varied])
     return varied
+
+
+def _word_in(listed: Expression, names: Names) -> Name | String | None:
+    """The first item of a list of texts, or of names that have no value and are like none that has."""
+
+    def is_word(item: Expression) -> bool:
+        if not isinstance(item, Name):
+            return isinstance(item, String)
+        known = names.knows(item.text) or units.is_unit(item.text) or did_you_mean(item.text, names.definitions.lets)
+        return len(item.path) == 1 and not known
+
+    items = listed.items if isinstance(listed, List) else ()
+    return next((item for item in items if all(is_word(each) for each in items)), None)  # type: ignore[return-value]
 
 
 def _unit(value: Value) -> str:

@@ -23,8 +23,8 @@ FEWEST = 2  # rows: a curve goes from one to the next
 
 
 def with_file_named(call: Call) -> Call:
-    """`trajectory("moves.csv")` is short for `trajectory(file = "moves.csv")`."""
-    if len(call.positional) != 1 or not isinstance(call.positional[0], String):
+    """`trajectory("moves.csv")` is short for `trajectory(file = "moves.csv")`; a name is one without its quotes."""
+    if len(call.positional) != 1 or not isinstance(call.positional[0], String | Name):
         return call
     named = call.positional[0]
     return replace(call, positional=(), named=((Word(FILE.name, named.place), named), *call.named))
@@ -55,7 +55,7 @@ def _columns(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: s
     if not isinstance(item.value, String):
         raise Problem(error("D076", f"`file` of {owner.label} is the name of a file, in quotes",
                             place_of(item.value) if item.value is not None else item.place,
-                            help='write `file = "NAME.csv"`'))
+                            help=f'write `file = "{item.value.text if isinstance(item.value, Name) else "NAME.csv"}"`'))
     named = item.value
     wanted, place = _column_name(owner, body.get(COLUMN.name), joint), named.place
     if body.get(COLUMN.name) is not None:

@@ -12,10 +12,11 @@ import numpy as np
 from ic.printing.columns import columns, number, quantity, vector
 from ic.printing.settings import settings
 from met import models, render
+from met.channel import recordable
 from met.diagnostic import Diagnostic, Label, Place, Problem, error, nearest
 from met.models import parameter as declared
 from met.parameter import Parameter
-from met.plan import Coordinate, Experiment, Formula, Quantity
+from met.plan import Coordinate, Experiment, Formula, Origin, Quantity
 
 SAID = {
     "deck": "written here",
@@ -71,6 +72,13 @@ def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[st
         found = [name for name in known for joint in joints if name.startswith(f"{joint}.servo.")]
     if found:
         return found
+    if path in recordable(experiment.structure, [path]):
+        raise Problem(error("D170", f"no parameter `{path}` in `{experiment.name}`",
+                            help=f"it is a channel, which only a run computes: `record = [{path}];` keeps it"))
+    driven = {use.joint for use in experiment.structure.servos}
+    if rest.partition(".")[0] == "servo" and definition in {each.name for each in experiment.structure.moving} - driven:
+        raise Problem(error("D170", f"no parameter `{path}` in `{experiment.name}`",
+                            help=f"joint `{definition}` has no servo here: it is free"))
     near = _three_nearest(path, known)
     helps = [f"did you mean `{'`, `'.join(near)}`?"] if near else []
     last = path.rpartition(".")[2]
@@ -147,10 +155,15 @@ def explain_json(
 def _in_short(experiment: Experiment, name: str) -> tuple[str, ...]:
     found = experiment.parameters[name]
     place = found.origin.place
-    said = found.origin.note or SAID[found.origin.kind].removesuffix(" here").rstrip(",")
+    said = _note(found.origin) or SAID[found.origin.kind].removesuffix(" here").rstrip(",")
     if place is None and found.origin.kind == "deck":
         said = IN_PLAN
     return name, f"= {_shown(experiment, found)}", said, "" if place is None else str(render.shown_place(place))
+
+
+def _note(origin: Origin) -> str:
+    """What else is to say of where a value comes from; a varied one's note is about what the sweep overrides."""
+    return "" if origin.kind == "case" else origin.note
 
 
 def _is_vector(experiment: Experiment, names: list[str]) -> bool:
@@ -178,7 +191,7 @@ def _one(
     for coordinate in _varied_by(experiment, name):
         unit = "" if coordinate.unit == "1" else f" {coordinate.unit}"
         yield f"  varied by {coordinate.path}: {_series(coordinate.values / coordinate.scale)}{unit}"
-    said = SAID[origin.kind] + (f": {origin.note}" if origin.note else "")
+    said = SAID[origin.kind] + (f": {note}" if (note := _note(origin)) else "")
     if origin.place is None and origin.kind == "deck":
         said = IN_PLAN
     if origin.place is None:
@@ -189,13 +202,28 @@ def _one(
 
 
 def _written_at(place: Place, sources: Mapping[str, str]) -> str:
-    """The entry, or the value, that begins at a place: up to its semicolon, or the end of its line."""
+    """The entry, or the value, that begins at a place: up to its semicolon, or the end of its line.
+
+    Not past a bracket or comma of what holds it, as in `classic(a = l2, d = 0 m)`.
+    """
     lines = sources.get(place.file, "").split("\n")
     rest = lines[place.line - 1][place.column - 1 :] if place.line <= len(lines) else ""
-    ends = (rest[place.length :].find(end) for end in (";", "}", "//"))
-    text = rest[: place.length + min((end for end in ends if end >= 0), default=len(rest))]
+    text = rest[: place.length + _end(rest[place.length :])]
     text = " ".join(text.split())
     return f"`{text}`" if text else "this"
+
+
+def _end(rest: str) -> int:
+    """Where what was begun ends: before a semicolon, a comment, or the bracket or comma of what holds it."""
+    depth = 0
+    for at, character in enumerate(rest):
+        if character in "([":
+            depth += 1
+        elif character in ")]":
+            depth -= 1
+        if depth < 0 or character in ";}" or (character == "," and depth == 0) or rest.startswith("//", at):
+            return at
+    return len(rest)
 
 
 def _with_source(place: Place, said: str, also: tuple[Label, ...], sources: Mapping[str, str]) -> Iterator[str]:
@@ -246,6 +274,11 @@ def _declaration(experiment: Experiment, name: str) -> tuple[Parameter | None, s
             model, own = models.find("command", use.command.model), words[len(use.joint.split(".")) + 2]
         elif name.startswith(f"{use.joint}.servo."):
             model, own = models.find("servo", use.model), words[len(use.joint.split(".")) + 1]
+    for on_bed in structure.substitutions:
+        if name.startswith(f"{on_bed.joint}.bed."):
+            model, own = models.find("bed", on_bed.bed), words[2]
+        elif name.startswith(f"{on_bed.joint}.law."):
+            model, own = models.find("law", on_bed.law), words[2]
     for environment in structure.environment:
         if name.startswith(f"environment.{environment.name}."):
             model, own = models.find("environment", environment.model), words[2]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Iterator
 from typing import Any, get_args
 
 from ic.printing.columns import columns, number, vector
 from met import models
+from met.channel import of_bed, of_law
 from met.diagnostic import Problem, did_you_mean, error
 from met.parameter import Parameter
 
@@ -18,6 +20,8 @@ HOW = {
     "environment": "environment { NAME = MODEL { ... } }, in a run",
     "metric": "metric NAME = MODEL { of = CHANNEL; ... }, in a run",
     "integrator": "integrator = MODEL, in a run",
+    "bed": "substitute JOINT { bed = MODEL(...); ... }, in a run",
+    "law": "substitute JOINT { law = MODEL(...); ... }, in a run",
 }
 
 WORDS = {
@@ -73,7 +77,7 @@ def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
             yield f"{text}: {', '.join(value) if isinstance(value, tuple) else number(value)}"
     if kind == "metric":
         yield f"Unit of the result: {WORDS.get(model.unit, unit_in_words(model.unit))}"
-    parameters = _written(model)
+    parameters = models.written(model)
     if parameters:
         yield ""
         yield "Parameters"
@@ -92,13 +96,18 @@ def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
             yield ""
             yield f"{text}; recorded as JOINT.servo.NAME"
             yield from columns([(part.name, unit_in_words(part.unit), part.doc) for part in parts])
+    shown = list(of_bed(model) if kind == "bed" else of_law(model) if kind == "law" else ())
+    if shown:
+        yield ""
+        yield f"Held from tick to tick; recorded as JOINT.{kind}.NAME"
+        yield from columns([(name, unit_in_words(unit), doc) for name, unit, doc in shown])
 
 
 def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
     """All that a model declares, for programs."""
     fields = ("name", "unit", "doc", "default", "above", "at_least", "below", "at_most", "shape", "words", "source")
     told: dict[str, Any] = {"kind": kind, "name": model.name, "doc": textwrap.dedent(model.doc).strip()}
-    told["parameters"] = [{field: getattr(p, field) for field in fields} for p in _written(model)]
+    told["parameters"] = [{field: getattr(p, field) for field in fields} for p in models.written(model)]
     for words in ("commands", "unit", "order", "real_limit"):
         if hasattr(model, words):
             told[words] = getattr(model, words)
@@ -107,16 +116,10 @@ def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
     return told
 
 
-def _written(model: Any) -> tuple[Parameter, ...]:
-    """The parameters as a deck writes them."""
-    written: tuple[Parameter, ...] = getattr(model, "written", getattr(model, "parameters", ()))
-    return written
-
-
 def summary(model: Any) -> str:
     """The first sentence of a model's own words."""
     first = " ".join(model.doc.strip().split("\n\n")[0].split())
-    return first.split(". ")[0].rstrip(".:")
+    return re.split(r"(?<!\beq)\. ", first)[0].rstrip(".:")
 
 
 def unit_in_words(unit: str) -> str:
@@ -127,6 +130,8 @@ def unit_in_words(unit: str) -> str:
 def default(parameter: Parameter) -> str:
     """The default; `needed` where the deck must write the parameter."""
     value = parameter.default
+    if parameter.of_servo:
+        return "the servo's" if parameter.of_servo == parameter.name else f"the servo's {parameter.of_servo}"
     if value is None:
         return "needed"
     if isinstance(value, str):
@@ -138,8 +143,9 @@ def range_(parameter: Parameter) -> str:
     """The bounds in SI, or the words that are possible."""
     if parameter.words:
         return " | ".join(parameter.words)
+    whole = ["whole"] if parameter.whole else []
     bounds = (("> ", parameter.above), (">= ", parameter.at_least), ("< ", parameter.below), ("<= ", parameter.at_most))
-    return ", ".join(f"{sign}{number(bound)}" for sign, bound in bounds if bound is not None)
+    return ", ".join(whole + [f"{sign}{number(bound)}" for sign, bound in bounds if bound is not None])
 
 
 def meaning(parameter: Parameter) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterator
 
 import numpy as np
@@ -12,6 +13,8 @@ from met import models
 from met.plan import Experiment, Formula, Joint, Plan, Structure
 
 NUMBER_BYTES = 8
+CHOSEN = 88  # columns, of parameters that stand in one cell
+FIXED_SPACE = "\u00a0"  # no line ends at one
 STABILITY = "stability of "  # how the compiler's notes on it begin
 
 
@@ -72,6 +75,9 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
     yield ""
     yield from _schedule(experiment)
     yield ""
+    if structure.substitutions:
+        yield from _substitutions(experiment)
+        yield ""
     yield from _environment(experiment)
     yield ""
     yield from _channels(structure)
@@ -179,6 +185,33 @@ def _schedule(experiment: Experiment) -> Iterator[str]:
         limit = number(models.find("integrator", structure.integrator).real_limit)
         yield f"Stability: step times the servo's fastest rate constant; {structure.integrator} is stable below {limit}"
         yield from columns([note.removeprefix("joint ").partition(": ")[::2] for note in stability])
+
+
+def _substitutions(experiment: Experiment) -> Iterator[str]:
+    """Motors on beds, with what was chosen of each bed and law: neither the default nor the servo's."""
+    values, parameters = _Values(experiment), experiment.parameters
+    joints = ", ".join(use.joint for use in experiment.structure.substitutions)
+    motors = "motor" if len(experiment.structure.substitutions) == 1 else "motors"
+    yield f"On a bed: the {motors} of {joints}; what is not told here is the servo's, or the default"
+    rows = []
+    for use in experiment.structure.substitutions:
+        for joint, kind, model in ((use.joint, "bed", models.find("bed", use.bed)),
+                                   ("", "law", models.find("law", use.law))):  # fmt: skip
+            chosen = []
+            for parameter in model.parameters:
+                path, of_servo = f"{use.joint}.{kind}.{parameter.name}", f"{use.joint}.servo.{parameter.of_servo}"
+                found, servos = parameters.get(path), parameters.get(of_servo)
+                if found is None or found.origin.kind == "default":
+                    continue
+                if servos is None or (found.origin.place, values.shown(path)) != (
+                    servos.origin.place, values.shown(of_servo)
+                ):  # fmt: skip
+                    chosen.append(f"{parameter.name} = {values.shown(path)}")
+            whole = ", ".join(each.replace(" ", FIXED_SPACE) for each in chosen)
+            first, *more = textwrap.wrap(whole, CHOSEN, break_on_hyphens=False) or [""]
+            lines = [(joint, kind, model.name, first), *(("", "", "", line) for line in more)]
+            rows += [tuple(cell.replace(FIXED_SPACE, " ") for cell in line) for line in lines]
+    yield from columns(rows)
 
 
 def _environment(experiment: Experiment) -> Iterator[str]:

@@ -28,6 +28,9 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
         word(f"{use.joint}.servo.model", use.model, use.place)
         if models.find("servo", use.model).tick is not None:
             number(f"{use.joint}.servo.rate", schedule.base_hz / use.divisor, "Hz", f"{use.divisor} base ticks a tick")
+    for on_bed in structure.substitutions:
+        word(f"{on_bed.joint}.bed.model", on_bed.bed, on_bed.place)
+        word(f"{on_bed.joint}.law.model", on_bed.law, on_bed.place)
     for environment in structure.environment:
         word(f"environment.{environment.name}.model", environment.model, environment.place)
     word("environment.velocity_products", "on" if structure.velocity_products else "off")

@@ -99,7 +99,8 @@ class Files:
                 if at.count(os.sep) - directory.path.count(os.sep) >= 2:
                     folders.clear()
                 beside = os.path.relpath(at, directory.path or ".")
-                names += [os.path.normpath(os.path.join(beside, f)) for f in sorted(files) if f.endswith(ending)]
+                names += [os.path.normpath(os.path.join(beside, f)) for f in sorted(files)
+                          if f.endswith(ending) and os.path.exists(os.path.join(at, f))]  # not a link to nowhere
                 if len(names) > MOST_LISTED:
                     return names[:MOST_LISTED]
         return names

@@ -53,6 +53,7 @@ class Macros(Pcpp):
         self._depth = 0
         super().__init__(Lexer())
         self.macros: dict[str, Any] = {}
+        self.refused: dict[str, bool] = {}  # macros that were refused, which was told; whether with parameters
         self.auto_pragma_once_enabled = False
         self.expand_filemacro = False
 
@@ -70,9 +71,13 @@ class Macros(Pcpp):
         if isinstance(tokens, str):  # pcpp's own macros, and the clock: a deck must mean the same tomorrow
             return
         body = self._checked_definition(tokens)
-        if body is None:
-            return
         name = tokens[0]
+        if body is None:
+            takes = len(tokens) > 1 and tokens[1].text == "("
+            if name.kind == NAME and name.text not in PREDEFINED and (takes or not units.is_unit(name.text)):
+                self.refused[name.text] = takes
+            return
+        self.refused.pop(name.text, None)
         old = self.macros.get(name.text)
         super().define([*tokens[: len(tokens) - len(body)], *_without_space_at_paste(body)])
         macro = self.macros[name.text]
@@ -178,6 +183,7 @@ class Macros(Pcpp):
             return
         self._nothing_after(tokens[1:], f"#undef {tokens[0].text}")
         self.macros.pop(tokens[0].text, None)
+        self.refused.pop(tokens[0].text, None)
 
     def expand_macros(self, tokens: list[Token], expanding_from: object = ()) -> list[Token]:
         """The tokens with every macro expanded; at the outermost level without white space."""
@@ -195,6 +201,9 @@ class Macros(Pcpp):
                 macro = macros.get(text)
                 if macro is not None and text not in token.hidden:
                     self._use(token, macro, pending, out)
+                    continue
+                if macro is None and text in self.refused:
+                    self._use_refused(token, pending, out)
                     continue
                 if text[:2] == "__":
                     token = self._predefined(token)
@@ -216,6 +225,26 @@ class Macros(Pcpp):
             )
             made.kind, made.text = BAD, ""
         return made
+
+    def _use_refused(self, token: Token, pending: list[Token], out: list[Token]) -> None:
+        """Of a macro that was refused nothing is known but that it was meant: no more is said of what it makes."""
+        if self.refused[token.text]:
+            at = len(pending) - 1
+            while at >= 0 and pending[at].kind in (SPACE, JOINED):
+                at -= 1
+            if at < 0 or pending[at].text != "(":
+                out.append(token)
+                return
+            depth = 0
+            while at >= 0:
+                depth += {"(": 1, ")": -1}.get(pending[at].text, 0)
+                if depth == 0:
+                    break
+                at -= 1
+            del pending[max(at, 0):]
+        bad = token.__copy__()
+        bad.kind, bad.text = BAD, ""
+        out.append(bad)
 
     def _use(self, token: Token, macro: Any, pending: list[Token], out: list[Token]) -> None:
         """Puts a macro's replacement in front of what is pending, or the name itself out where it is no use."""

@@ -73,9 +73,12 @@ class Environment:
     """The declaration of an environment model; one a file.
 
     loads  (p, world) -> Loads. A parameter of shape "word" whose name is `joint` or `link` names one of the arm's.
+    idle   (p, duration) -> the parameters because of which it never acts in a run of that length (s), and why, in
+           words; None where it may act. Asked where all its numbers are constants. None: it always may
     """
 
     name: str
     doc: str
     parameters: tuple[Parameter, ...] = ()
     loads: Callable[[Any, World], Loads]
+    idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None

@@ -26,6 +26,20 @@ def loads(p: Any, world: World) -> Loads:
     return Loads(forces=(Force(p.link, force=acting(p.force), moment=acting(p.moment), point=p.point),))
 
 
+def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
+    """Why these numbers make it nothing in a run of this length, with the parameters that say so."""
+    begins = getattr(p, "from")
+    if not any((*p.force, *p.moment)):
+        return ("force", "moment"), "it has neither force nor moment"
+    if begins >= p.until:
+        return ("until", "from"), f"it would begin at {begins:g} s and end at {p.until:g} s"
+    if begins >= duration:
+        return ("from",), f"it would begin at {begins:g} s, and the run ends at {duration:g} s"
+    if p.until <= 0.0:
+        return ("until",), f"it would end at {p.until:g} s, and the run begins at 0 s"
+    return None
+
+
 def _passed(world: World, time: Real) -> Real:
     """The share of the step that lies before this time."""
     return clip((time - world.begin) / world.step, 0.0, 1.0)
@@ -46,7 +60,8 @@ ENVIRONMENT = Environment(
             doc="axes of force and moment: the world's, or the link's, which turn with it",
         ),
         Parameter(name="from", unit="s", default=0.0, doc="time at which it begins"),
-        Parameter(name="until", unit="s", default=math.inf, doc="time at which it ends; inf: never"),
+        Parameter(name="until", unit="s", default=math.inf, doc="time at which it ends; never unless written"),
     ),
     loads=loads,
+    idle=idle,
 )

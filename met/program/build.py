@@ -28,28 +28,34 @@ COORDINATE, METRIC = "coordinate:", "metric:"
 """Prefixes of the outputs, and cells, that are named by a deck: no name of a deck's is one of the engine's."""
 
 
-def build(experiment: Experiment) -> Program:
-    """The program of an experiment: inputs are its coordinates, columns its recorded channels."""
-    return Builder(Machine(experiment)).program()
+def build(experiment: Experiment, *, wire: bool = False) -> Program:
+    """The program of an experiment: inputs are its coordinates, columns its recorded channels.
+
+    wire  for real beds: no bed is in the program. The filtered rate that each has read is an input of every tick,
+          `wire:<joint>.rate` (rad/s); what its amplifiers are told are outputs, `wire:<joint>.voltage` (V) and
+          `wire:<joint>.current` (A)
+    """
+    return Builder(Machine(experiment), wire=wire).program()
 
 
 class Builder:
     """The phases of one machine. Every method that takes a tape is the body of a phase."""
 
-    def __init__(self, machine: Machine) -> None:
+    def __init__(self, machine: Machine, *, wire: bool = False) -> None:
         self.machine = machine
         self.schedule = machine.structure.schedule
         self.joints = tuple(joint.name for joint in machine.joints)
-        self.step = Step(machine)
+        self.step = Step(machine, wire=wire)
 
     def program(self) -> Program:
         instant = self.schedule.dynamics
         columns = [channel for recorded in self.machine.structure.record for channel in recorded.channels]
         held, at_rows = derived(self.machine)
         tick: list[Control] = [Unless0((Every(instant, self.step.finish()),))]
+        tick += self.step.beds.before_servos()
         for divisor in sorted({actuator.use.divisor for actuator in self.machine.working}):
             tick.append(Every(divisor, (Run(Phase(f"servos_{divisor}", self._servos(divisor))),)))
-        tick.append(Every(instant, self.step.begin()))
+        tick += self.step.begin()
         if held:
             tick.append(Every(instant, (Call(Phase("observe", self._observe(held))),)))
         for divisor in sorted({channel.divisor for _, _, channel in self.machine.metrics}):
@@ -60,15 +66,16 @@ class Builder:
         coordinates = tuple(coordinate.path for coordinate in self.machine.experiment.cases.coordinates)
         return Program(
             base_hz=self.schedule.base_hz,
-            start=(Run(Phase("start", self.start)),),
+            start=(Run(Phase("start", self.start)), *self.step.beds.begin_run()),
             tick=tuple(tick),
             end=(Run(Phase("end", self.end)),),
-            inputs=coordinates,
+            inputs=(*coordinates, *self.step.beds.wire_inputs),
             columns=len(columns),
             outputs=(
                 *OUTPUTS,
                 *(METRIC + name for name, _, _ in self.machine.metrics),
                 *(COORDINATE + path for path in coordinates),
+                *self.step.beds.wire_outputs,
             ),
         )
 
@@ -101,6 +108,8 @@ class Builder:
             tape.output(METRIC + name, answer(f"metric `{name}`", metric.result, p, held, tape.time))
         for coordinate in self.machine.experiment.cases.coordinates:
             tape.output(COORDINATE + coordinate.path, tape.input(coordinate.path))
+        for name, cell in self.step.beds.wire_outputs.items():
+            tape.output(name, tape.read(cell))
 
     # Servos.
 
@@ -128,7 +137,11 @@ class Builder:
             tape.write(f"{actuator.path}.command", value)
         if servo.tick is None:
             return
-        q, qd = self._carried(tape, actuator) if actuator in self.machine.between else self._state_of(tape, joint)
+        on_bed = self.step.beds.seen(tape, actuator)
+        if on_bed is not None:
+            q, qd = on_bed
+        else:
+            q, qd = self._carried(tape, actuator) if actuator in self.machine.between else self._state_of(tape, joint)
         held = Values(actuator.owner, {m.name: tape.read(f"{actuator.path}.{m.name}") for m in servo.memory})
         seen = Seen(q, qd, asked, actuator.use.divisor / self.schedule.base_hz, tape.time)
         new = answer(actuator.owner, servo.tick, self.machine.servo_values(actuator, tape.read), held, seen)

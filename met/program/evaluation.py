@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 
 from met.dynamics.recursion import Solved, solve
@@ -47,11 +47,13 @@ def derivative(
     time: Real,
     begin: Real,
     part: Callable[[str], AbstractContextManager[None]],
+    told: Mapping[int, Real] | None = None,
 ) -> Derivative:
     """The derivative at state y (`held`, `friction`: one for each moving joint).
 
     begin     time at which the dynamics step began that this stage is part of, s
     friction  None for a joint without dry friction; else s in {0, +1, -1}: stuck, sliding forward, backward
+    told      accelerations of joints whose motors are on a bed, by number: the servo does nothing to these
     part      of the tape: tells servos, environment and dynamics apart where a profile asks
     """
     with part("servo physics"):
@@ -63,11 +65,17 @@ def derivative(
     with part("environment"):
         gravity, torques, wrenches = _environment(machine, tree, read, y, time, begin)
 
+    told = told or {}
     given: list[Real] = []
     mode: list[Truth] = []
     dry: list[Real] = []
     for i, drive in enumerate(drives):
         s = friction[i]
+        if i in told:
+            mode.append(False)
+            given.append(told[i])
+            dry.append(0.0)
+            continue
         in_torque_mode: Truth = True
         if drive is not None and drive.given is not None:
             in_torque_mode = not_(drive.given)
@@ -77,7 +85,9 @@ def derivative(
         given.append(drive.qdd if drive is not None else 0.0)
         dry.append(0.0 if drive is None or s is None else s * drive.dry)
 
-    smooth = [torques[i] + (0.0 if drive is None else drive.torque) for i, drive in enumerate(drives)]
+    smooth = [
+        torques[i] + (0.0 if drive is None or i in told else drive.torque) for i, drive in enumerate(drives)
+    ]
     with part("dynamics"):
         solved = solve(
             tree,

@@ -22,6 +22,7 @@ from met.metrics.metric import Metric
 from met.plan import Experiment, Formula, Joint, ServoUse, Structure
 from met.program.values import Values, answer, parameters
 from met.servos.servo import Drive, JointMotion, Servo
+from met.substitution import Bed, Law
 from met.trace import Graph, Real, Scalar
 
 PARAMETER, TREE = "parameter:", "tree:"
@@ -119,8 +120,18 @@ class Machine:
 
     @cached_property
     def sticking(self) -> tuple[Actuator, ...]:
-        """The actuators with dry friction."""
-        return tuple(actuator for actuator in self.working if actuator.dry)
+        """The actuators with dry friction; a substituted joint's is the bed's."""
+        on_bed = [actuator.index for actuator, _, _ in self.mounted]
+        return tuple(actuator for actuator in self.working if actuator.dry and actuator.index not in on_bed)
+
+    @cached_property
+    def mounted(self) -> tuple[tuple[Actuator, Bed, Law], ...]:
+        """The actuators whose motors are on a bed, in the order of joints, with their beds and laws."""
+        uses = {use.joint: use for use in self.structure.substitutions}
+        return tuple(
+            (a, models.find("bed", uses[a.use.joint].bed), models.find("law", uses[a.use.joint].law))
+            for a in self.working if a.use.joint in uses
+        )  # fmt: skip
 
     @cached_property
     def varying(self) -> tuple[str, ...]:

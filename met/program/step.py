@@ -16,13 +16,15 @@ from collections.abc import Callable
 
 from met.integrators.integrator import Motion, Slope
 from met.program import cells, friction
+from met.program.asking import Question, advanced, asked, inconstant
 from met.program.evaluation import Derivative, derivative, drive_of, state_names
 from met.program.machine import Actuator, Machine
 from met.program.observe import Observed
+from met.program.substituted import Substituted
 from met.program.values import Values
 from met.servos.servo import Drive
 from met.trace import Real, Truth, any_of, both, either, isfinite, not_, sign, where
-from met.trace.program import Call, Control, Phase, Run, Tape, WhileAny
+from met.trace.program import Call, Control, Every, Phase, Run, Tape, WhileAny
 
 SINGULAR, NOT_FINITE = 1.0, 2.0
 """Causes of a failed case (output `failure`); 0 is none."""
@@ -37,11 +39,13 @@ FROM, STAGE = "from:", "stage:"
 class Step:
     """The phases of a step of one machine. Every method that takes a tape is the body of a phase."""
 
-    def __init__(self, machine: Machine) -> None:
+    def __init__(self, machine: Machine, *, wire: bool = False) -> None:
         self.machine = machine
+        self.beds = Substituted(machine, self.loads, wire=wire)
         self.schedule = machine.structure.schedule
         self.joints = tuple(joint.name for joint in machine.joints)
         self.states = state_names(machine)
+        self._asked = asked(machine.integrator, len(self.joints), len(self.states), self.schedule.step)
         self._derive = Call(Phase("derive", self.derive))
         self._slope = Call(Phase("slope", self.slope))
         self._decide = (
@@ -58,7 +62,11 @@ class Step:
         """What happens at an instant once the servos have ticked: modes, then the step's first stage."""
         decide = self._decide if self.machine.sticking else ()
         judge = WhileAny("suspect", 1, (Run(Phase("judge", self.judge)),))
-        return (Run(Phase("modes", self.modes)), *decide, self._derive, judge)
+        modes: tuple[Control, ...] = (Run(Phase("modes", self.modes)), *decide)
+        if not self.beds.mounted:
+            return (Every(self.schedule.dynamics, (*modes, self._derive, judge)),)
+        due = self.schedule.dynamics
+        return (Every(due, modes), *self.beds.after_modes(), Every(due, (self._derive, judge)))
 
     def finish(self) -> tuple[Control, ...]:
         """The rest of the step, at its end."""
@@ -101,15 +109,18 @@ class Step:
             qd = tape.read(f"{joint}.qd")
             rubs = self._dry(tape, actuator) > 0.0
             if not isinstance(rubs, bool):
-                tape.write_mask(f"rubs:{joint}", rubs)
-            cells.keep(tape, active, f"friction:{joint}", where(rubs, sign(qd), 1.0))
+                cells.keep(tape, active, f"rubs:{joint}", where(rubs, 1.0, 0.0))
+            # without friction at rest it moves freely; a level that rises later in the step opposes the motion at once
+            cells.keep(tape, active, f"friction:{joint}", where(either(rubs, qd != 0.0), sign(qd), 1.0))
             any_at_rest = either(any_at_rest, both(rubs, qd == 0.0))
         tape.write_mask("undecided", both(active, any_at_rest))
 
     def _dry(self, tape: Tape, actuator: Actuator) -> Real:
-        """The level of dry friction at the state, N m (N)."""
-        held = self._held(tape, actuator, 0.0)
-        return self._drive(tape, actuator, self._state(tape), held, tape.time, tape.time).dry
+        """The level of dry friction at the state, where a step or substep begins, N m (N)."""
+        fraction = tape.read("fraction")
+        held = self._held(tape, actuator, fraction)
+        time, begin = self._time(tape, fraction), tape.read("instant")
+        return self._drive(tape, actuator, self._state(tape), held, time, begin).dry
 
     def rubs(self, tape: Tape, actuator: Actuator) -> Truth:
         """Whether a joint has dry friction, as `modes` found it; False for a case whose level is zero."""
@@ -197,13 +208,28 @@ class Step:
         cells.keep(tape, news, "failure.tick", tape.tick)
         cells.keep(tape, news, "failure", cause)
 
+    def loads(self, tape: Tape) -> tuple[list[list[Real]], list[Real]]:
+        """What the arm is to the substituted joints: tau_load = Lambda qdd + b_0, all other joints in their modes."""
+        y, numbers = self._state(tape), [each.index for each in self.beds.mounted]
+        at_rest = self._derivative(tape, y, 0.0, dict.fromkeys(numbers, 0.0)).solved.tau_load
+        columns = []
+        for j in numbers:
+            moved = self._derivative(tape, y, 0.0, {i: float(i == j) for i in numbers}).solved.tau_load
+            columns.append([moved[i] - at_rest[i] for i in numbers])
+        return [[column[i] for column in columns] for i in range(len(numbers))], [at_rest[i] for i in numbers]
+
     def observed(self, tape: Tape) -> Observed:
         """The arm at an instant, with the derivative that `derive` took of it."""
         y = self._state(tape)
         return Observed(self.machine, self.machine.tree(tape.read), y, lambda: self._derivative(tape, y, 0.0))
 
-    def _derivative(self, tape: Tape, y: Motion, fraction: Real) -> Derivative:
-        """The derivative at the state y, at the share `fraction` of the dynamics step that began last."""
+    def _derivative(
+        self, tape: Tape, y: Motion, fraction: Real, told: dict[int, Real] | None = None
+    ) -> Derivative:
+        """The derivative at the state y, at the share `fraction` of the dynamics step that began last.
+
+        told  accelerations of the substituted joints; None: those that the law gives
+        """
         held = [
             Values("no servo", {}) if actuator is None else self._held(tape, actuator, fraction)
             for actuator in self.machine.actuators
@@ -211,6 +237,7 @@ class Step:
         return derivative(
             self.machine, tape.read, y=y, held=held, friction=self._friction(tape),
             time=self._time(tape, fraction), begin=tape.read("instant"), part=tape.part,
+            told=self.beds.given(tape, fraction) if told is None else told,
         )
 
     def _drive(
@@ -237,38 +264,22 @@ class Step:
 
     def _stages(self, *, again: bool) -> tuple[Control, ...]:
         """The step (the substep, if `again`) after its first stage: pieces of the integrator, a slope between each."""
-        name, asked = ("advance_again" if again else "advance"), self._questions()
+        name = "advance_again" if again else "advance"
         parts: list[Control] = []
-        for settled in range(asked):
+        for settled in range(self._asked):
             parts += [Run(Phase(f"{name}_{settled + 1}", self._towards(settled, again))), self._slope]
-        return (*parts, Run(Phase(name, self._arrival(asked, again))))
-
-    def _questions(self) -> int:
-        """How many slopes the integrator asks for, the first stage's aside."""
-        zeros = (0.0,) * len(self.joints)
-        rest = (0.0,) * len(self.states)
-        asked = 0
-
-        def slope(c: float, there: Motion) -> Slope:
-            nonlocal asked
-            asked += 1
-            return Slope(zeros, zeros, rest)
-
-        self.machine.integrator.advance(slope, 1.0, Motion(zeros, zeros, rest), Slope(zeros, zeros, rest))
-        return asked
+        return (*parts, Run(Phase(name, self._arrival(self._asked, again))))
 
     def _towards(self, settled: int, again: bool) -> Callable[[Tape], None]:
         """The body of the piece that ends at a question, `settled` of them being answered before."""
 
         def body(tape: Tape) -> None:
             fraction = tape.read("fraction") if again else 0.0
-            try:
-                self._integrate(tape, settled, fraction)
-            except _Asked as asked:
-                cells.store(tape, True, self.joints, self.states, asked.there, STAGE)
-                tape.write(f"{STAGE}fraction", fraction + asked.share * (1.0 - fraction))
-            else:
-                raise AssertionError(f"integrator {self.machine.integrator.name} asks for fewer slopes than before")
+            question = self._integrate(tape, settled, fraction)
+            if not isinstance(question, Question):
+                raise inconstant(self.machine.integrator)
+            cells.store(tape, True, self.joints, self.states, question.there, STAGE)
+            tape.write(f"{STAGE}fraction", fraction + question.share * (1.0 - fraction))
 
         return body
 
@@ -279,6 +290,8 @@ class Step:
             active: Truth = tape.read_mask("again") if again else True
             y = self._state(tape)
             y_new = self._integrate(tape, settled, tape.read("fraction") if again else 0.0)
+            if isinstance(y_new, Question):
+                raise inconstant(self.machine.integrator)
             if self.machine.sticking:
                 crossed = any_of(friction.crossings(self._sliding(tape), y_new))
                 cells.store(tape, True, self.joints, self.states, y, FROM)
@@ -288,8 +301,8 @@ class Step:
 
         return body
 
-    def _integrate(self, tape: Tape, settled: int, fraction: Real) -> Motion:
-        """Runs the integrator with the first `settled` slopes from cells; at the next one it raises `_Asked`."""
+    def _integrate(self, tape: Tape, settled: int, fraction: Real) -> Motion | Question:
+        """Runs the integrator with the first `settled` slopes from cells, up to the next question or to its end."""
         y = self._state(tape)
         if settled:
             for joint in self.joints:
@@ -297,21 +310,16 @@ class Step:
                     tape.write(f"k{settled}:{joint}.{part}", tape.read(f"{STAGE}{joint}.{part}"))
             for name in self.states:
                 tape.write(f"k{settled}:{name}", tape.read(f"{STAGE}slope:{name}"))
-        asked = 0
-
-        def slope(c: float, there: Motion) -> Slope:
-            nonlocal asked
-            asked += 1
-            if asked > settled:
-                raise _Asked(c, there)
-            return Slope(
-                tuple(tape.read(f"k{asked}:{joint}.qd") for joint in self.joints),
-                tuple(tape.read(f"k{asked}:{joint}.qdd") for joint in self.joints),
-                tuple(tape.read(f"k{asked}:{name}") for name in self.states),
+        answers = [
+            Slope(
+                tuple(tape.read(f"k{n}:{joint}.qd") for joint in self.joints),
+                tuple(tape.read(f"k{n}:{joint}.qdd") for joint in self.joints),
+                tuple(tape.read(f"k{n}:{name}") for name in self.states),
             )
-
+            for n in range(1, settled + 1)
+        ]
         h = (1.0 - fraction) * self.schedule.step
-        return self.machine.integrator.advance(slope, h, y, self._first_slope(tape, y.qd))
+        return advanced(self.machine.integrator, answers, h, y, self._first_slope(tape, y.qd))
 
     def _first_slope(self, tape: Tape, qd: tuple[Real, ...]) -> Slope:
         """The first stage's slope, as `derive` left it; qd are the rates then."""
@@ -372,12 +380,3 @@ class Step:
             assert mode is not None
             modes[actuator.index] = where(self.rubs(tape, actuator), mode, 0.0)
         return modes
-
-
-class _Asked(Exception):
-    """An integrator asks for the slope at `there`, the share `share` of its step on."""
-
-    def __init__(self, share: float, there: Motion) -> None:
-        super().__init__()
-        self.share = share
-        self.there = there

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
+import numpy as np
+
 from met.diagnostic import Place, Problem, error
 from met.parameter import Parameter
 from met.trace import Real
@@ -54,17 +56,20 @@ def parameters(owner: str, prefix: str, declared: Iterable[Parameter], read: Rea
 def answer(owner: str, function: Callable[..., T], *arguments: Any) -> T:
     """What a model's function gives back. Whatever it raises is said at the model's own line, Problem E213."""
     try:
-        return function(*arguments)
+        with np.errstate(all="ignore"):  # what comes of constants is in the program, as what comes of a run is
+            return function(*arguments)
     except Problem:
         raise
     except Exception as reason:  # a model is its author's code: whatever it raises is for the author to read
         frames = traceback.extract_tb(reason.__traceback__)
-        own = [frame for frame in frames if frame.filename == function.__code__.co_filename] or frames
+        # the first frame is this function's own, the next one the model's, unless it called nothing written in Python
+        own = [frame for frame in frames[1:] if frame.filename == frames[1].filename] or frames
         frame = own[-1]
         place = Place(frame.filename, frame.lineno or 1, (frame.colno or 0) + 1)
         if frame.end_colno is not None and frame.colno is not None and frame.end_lineno == frame.lineno:
             place = replace(place, length=max(frame.end_colno - frame.colno, 1))
-        message = f"{owner}: `{function.__name__}` raises {type(reason).__name__}: {reason}"
+        name = getattr(getattr(function, "func", function), "__name__", type(function).__name__)
+        message = f"{owner}: `{name}` raises {type(reason).__name__}: {reason}"
         sources = {frame.filename: "".join(linecache.getlines(frame.filename))}
         raise Problem(error("E213", message, place, help="mend the model, or tell its author"), sources) from reason
 

@@ -54,6 +54,7 @@ SERVO = Servo(
     parameters=(
         Parameter(
             name="bandwidth", unit="1/s", default=0.0, at_least=0.0, needed_for=("rate", "position"),
+            above_where_needed=0.0,
             doc="how fast an error dies away, used under a rate or position command",
         ),
         Parameter(
@@ -69,4 +70,5 @@ SERVO = Servo(
     tick=tick,
     drive=drive,
     fastest=fastest,
+    follows=True,
 )

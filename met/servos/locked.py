@@ -34,7 +34,7 @@ SERVO = Servo(
     parameters=(
         Parameter(
             name="release", unit="s", default=math.inf, at_least=0.0,
-            doc="time at which the joint is set free; inf: never",
+            doc="time at which the joint is set free; never unless written",
         ),
     ),
     drive=drive,

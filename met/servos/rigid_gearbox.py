@@ -20,6 +20,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from met.parameter import Memory, Parameter, Signal
+from met.servos.motor import Motor, torque
 from met.servos.servo import Asked, Drive, JointMotion, Seen, Servo
 from met.trace import Real, both, clip, either, where
 
@@ -43,8 +44,7 @@ def tick(p: Any, held: Any, seen: Seen) -> Mapping[str, Real]:
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
     """The motor, the gearbox and their friction, under the voltage held."""
     w_m = p.ratio * joint.qd
-    # kt / R together: one number where no case varies them, and no division at each stage.
-    tau_m = clip(p.kt / p.resistance * (held.voltage - p.kt * w_m), -p.tau_max, p.tau_max)
+    tau_m = torque(p.kt, p.resistance, p.tau_max, held.voltage, w_m)
     return Drive(
         torque=p.ratio * (tau_m - p.f_v * w_m),
         dry=p.ratio * p.f_c,
@@ -55,7 +55,14 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
 
 def fastest(p: Any) -> Real:
     """Back-EMF and viscous friction brake the rotor at most this fast: (Kt^2/R + F_v)/J_m, 1/s."""
-    return (p.kt * p.kt / p.resistance + p.f_v) / p.j_m
+    return motor(p).damping / p.j_m
+
+
+def motor(p: Any) -> Motor:
+    """The motor, which a bed may take the place of."""
+    return Motor(
+        ratio=p.ratio, kt=p.kt, resistance=p.resistance, tau_max=p.tau_max, inertia=p.j_m, f_c=p.f_c, f_v=p.f_v
+    )
 
 
 def _rate_asked(p: Any, q: Real, asked: Asked) -> Real:
@@ -109,4 +116,5 @@ SERVO = Servo(
     tick=tick,
     drive=drive,
     fastest=fastest,
+    motor=motor,
 )

@@ -16,6 +16,7 @@ from typing import Any
 
 from met.frozen import frozen
 from met.parameter import Memory, Parameter, Signal, State
+from met.servos.motor import Motor
 from met.trace import Real, Truth
 
 
@@ -99,6 +100,10 @@ class Servo:
     drive     (p, held, states, joint) -> Drive
     fastest   (p) -> upper bound of the fastest rate constant of the joint's motion under this servo, 1/s, whatever
               arm it carries; for the plan's stability figure. None: no such bound
+    motor     (p) -> the motor that a bed may take the place of (met/substitution): the servo's computer then sets
+              `voltage`, one of its memories, on the bed. None: there is none to substitute
+    follows   whether the joint goes with its command whatever the arm, so that a position command that begins
+              elsewhere than the joint makes it jump, which is told (D169)
     at_rest   (p) -> whether its joint must begin at rest: another initial rate is an error. None: it need not
     """
 
@@ -112,4 +117,6 @@ class Servo:
     tick: Callable[[Any, Any, Seen], Mapping[str, Real]] | None = None
     drive: Callable[[Any, Any, Any, JointMotion], Drive]
     fastest: Callable[[Any], Real] | None = None
+    follows: bool = False
+    motor: Callable[[Any], Motor] | None = None
     at_rest: Callable[[Any], Truth] | None = None

@@ -1,4 +1,25 @@
-"""Motor substitution: one joint's motor is real, on a motor bed, or the emulated bed (docs/physics.md, section 6).
+"""Motor substitution: one joint's motor is real, on a motor bed, or the emulated bed (docs/physics.md).
 
-Everything here is on the motor's side of the gearbox: w is the shaft's rate, torques are the shaft's.
+Laws and beds, one a file. To add one: write its file, add it to `LAWS` or `BEDS`. Everything here is on the motor's
+side of the gearbox: w is the shaft's rate, torques are the shaft's.
 """
+
+from met.substitution import (
+    bare,
+    emulated,
+    measured_acceleration,
+    torque_balance,
+    torque_balance_observer,
+    velocity_tracking,
+)
+from met.substitution.bed import Bed
+from met.substitution.law import Law
+
+LAWS: tuple[Law, ...] = (
+    velocity_tracking.LAW,
+    torque_balance_observer.LAW,
+    torque_balance.LAW,
+    bare.LAW,
+    measured_acceleration.LAW,
+)
+BEDS: tuple[Bed, ...] = (emulated.BED,)

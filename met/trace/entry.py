@@ -19,6 +19,9 @@ ENTRY = "met_run"
 
 # doubles of each case that are gathered before they are spread over the cases' own rows: a few cache lines each
 _TILE = 64
+# bytes of scratch and tile together up to which they stand on the stack: a thread's may be 512 KiB in all, and a row of
+# 100,000 columns takes 12 MiB
+_STACK = 1 << 18
 
 
 def number(value: float) -> str:
@@ -204,20 +207,33 @@ class _Entry:
         self.put("  br label %block.end", "block.end:",
                  "  %b.next = add i64 %b, 1",
                  "  %more = icmp slt i64 %b.next, %blocks",
-                 "  br i1 %more, label %block, label %out", "out:", "  ret void", "}")
-        tile = max(1, self.tile_rows * self.program.columns)
+                 "  br i1 %more, label %block, label %out", "out:")
+        work, done = self._work()
+        self.put(*done, "  ret void", "}")
         head = [
             f"define void @{ENTRY}(ptr noalias readonly %inputs, ptr noalias %state, ptr noalias %rows, "
             "ptr noalias %outputs, i64 %blocks, i64 %first, i64 %last, i64 %cases, i64 %stride, "
             "i64 %state.stride) #3 {", "entry:",
-            f"  %scratch = alloca [{max(1, self.scratch) * self.lanes} x double], align 64",
-            f"  %tile = alloca [{tile * self.lanes} x double], align 64",
-            "  %filled = alloca i64", "  %target = alloca ptr", *self.counters,
+            *work, "  %filled = alloca i64", "  %target = alloca ptr", *self.counters,
             "  %recording = icmp ne ptr %rows, null",
             "  %ending = icmp ne ptr %outputs, null",
             "  %tick.last = sitofp i64 %last to double",
             f"  %time.last = fdiv double %tick.last, {base_hz}"]
         return "\n".join([*head, *self.lines])
+
+    def _work(self) -> tuple[list[str], list[str]]:
+        """Lines that make `scratch` and `tile`, aligned to 64 bytes, and lines that give them back."""
+        tile = max(1, self.tile_rows * self.program.columns) * self.lanes
+        scratch = -(-max(1, self.scratch) * self.lanes // 8) * 8
+        if 8 * (scratch + tile) <= _STACK:
+            return [f"  %scratch = alloca [{scratch} x double], align 64",
+                    f"  %tile = alloca [{tile} x double], align 64"], []
+        return [f"  %work = call ptr @malloc(i64 {8 * (scratch + tile) + 64})",
+                "  %work.past = ptrtoint ptr %work to i64",
+                "  %work.low = and i64 %work.past, 63",
+                "  %work.skip = sub i64 64, %work.low",
+                "  %scratch = getelementptr i8, ptr %work, i64 %work.skip",
+                f"  %tile = getelementptr i8, ptr %scratch, i64 {8 * scratch}"], ["  call void @free(ptr %work)"]
 
     def _start(self) -> None:
         if self.state:
@@ -233,7 +249,8 @@ def entry(recording: Recording, calls: Sequence[Sequence[str]], lanes: int, vect
     scratch  slots that pieces share
     """
     text = _Entry(recording, calls, lanes, vector, scratch).text()
-    return text + "\ndeclare void @llvm.memset.p0.i64(ptr, i8, i64, i1)"
+    return (text + "\ndeclare void @llvm.memset.p0.i64(ptr, i8, i64, i1)"
+            "\ndeclare ptr @malloc(i64)\ndeclare void @free(ptr)")
 
 
 def spread(lanes: int, width: int) -> str:

@@ -67,15 +67,16 @@ def execute(program: Program, inputs: Mapping[str, float] | Sequence[float], tic
         inputs = dict(zip(program.inputs, inputs, strict=True))
     tape = PlainTape(program, inputs, ticks // program.record_divisor + 1)
     with np.errstate(all="ignore"):
-        _run(tape, program.start)
+        follow(tape, program.start)
         for k in range(ticks + 1):
             tape.k = k
-            _run(tape, program.tick)
-        _run(tape, program.end)
+            follow(tape, program.tick)
+        follow(tape, program.end)
     return tape.rows, tape.outputs
 
 
-def _run(tape: PlainTape, body: tuple[Control, ...]) -> None:
+def follow(tape: PlainTape, body: tuple[Control, ...]) -> None:
+    """Runs the body once, at the tape's tick."""
     for node in body:
         match node:
             case Run(phase) | Call(phase):
@@ -86,15 +87,15 @@ def _run(tape: PlainTape, body: tuple[Control, ...]) -> None:
                     phase.body(tape)
             case Every(divisor, inner):
                 if tape.k % divisor == 0:
-                    _run(tape, inner)
+                    follow(tape, inner)
             case Unless0(inner):
                 if tape.k > 0:
-                    _run(tape, inner)
+                    follow(tape, inner)
             case WhileAny(cell, at_most, inner):
                 for _ in range(at_most):
                     if not tape.read_mask(cell):
                         break
-                    _run(tape, inner)
+                    follow(tape, inner)
 
 
-__all__: list[Any] = ["PlainTape", "execute"]
+__all__: list[Any] = ["PlainTape", "execute", "follow"]

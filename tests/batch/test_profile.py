@@ -124,7 +124,7 @@ def test_a_plan_file_is_measured_too(here: Path, capsys: pytest.CaptureFixture[s
     assert capsys.readouterr().err == (
         "error[E310]: no run or sweep `nominl` in <two_link.ic>\n"
         " = help: did you mean `nominal`?\n"
-        " = help: runs and sweeps of <two_link.ic>: nominal, gains\n\n1 error\n"
+        " = help: runs and sweeps of <two_link.ic>: nominal, hybrid, gains\n\n1 error\n"
     )
 
 

@@ -22,6 +22,7 @@ from ic.meaning.complaints import Complaints
 from ic.meaning.resolve import Definitions
 from ic.meaning.scope import Scope
 from ic.meaning.shapes import SHAPES
+from ic.meaning.substitution import DEFAULTS
 from ic.meaning.values import FUNCTIONS, Values
 from ic.read import read
 from met import models, render, units
@@ -179,7 +180,8 @@ def test_every_function_shape_key_and_model_is_on_the_page() -> None:
     assert {word for row in table("key of a link") for word in ticked(row[0])} == set(arm.LINK_KEYS)
     assert {word for row in table("key of a joint") for word in ticked(row[0])} == set(arm.JOINT_KEYS)
     entries = {entry.split()[0] for row in table("entry of a run") for entry in ticked(row[0])}
-    assert entries == {*run.KEYS, "metric", "require"}
+    assert {word for row in table("key of `substitute`") for word in ticked(row[0])} == set(DEFAULTS)
+    assert entries == {*run.KEYS, "metric", "require", "substitute"}
     words = ticked(re.sub(r"```.*?```", "", PAGE, flags=re.DOTALL))
     assert set(run.RATES) <= words
     for kind in ("servo", "environment", "metric", "integrator"):

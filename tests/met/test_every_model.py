@@ -46,6 +46,7 @@ run it {{
     duration    = 0.2 s;
     record      = [q, qd, qdd, tau];
     metric m    = {metric};
+    {substitute}
 }}
 sweep cases of it {{ vary initial.hinge.q = linspace(-1, 1, 7) rad; }}
 """
@@ -86,9 +87,16 @@ SMALLEST: dict[tuple[str, str], dict[str, str]] = {
     ("metric", "rms"): {"metric": "rms { of = hinge.tau; }", "servos": DRIVEN.format("rate(0.5 rad/s)")},
     ("metric", "settling_time"): {"metric": "settling_time { of = slide.q; target = 0.1 m; within = 5 cm; }"},
     **{("integrator", name): {"integrator": name} for name in models.find_own("integrator")},
+    **{
+        (kind, name): {
+            "servos": DRIVEN.format("rate(0.5 rad/s)"), "substitute": f"substitute hinge {{ {kind} = {name}; }}"
+        }
+        for kind in ("bed", "law") for name in models.find_own(kind)
+    },
 }
 PLAIN = {
-    "more": "", "servos": "", "environment": "", "integrator": "modified_euler", "metric": "final { of = slide.q; }"
+    "more": "", "servos": "", "environment": "", "integrator": "modified_euler", "metric": "final { of = slide.q; }",
+    "substitute": "",
 }  # fmt: skip
 
 

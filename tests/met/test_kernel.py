@@ -206,6 +206,29 @@ BINARY = [lambda a, b: a + b, lambda a, b: a - b, lambda a, b: a * b, lambda a, 
           lambda a, b: where(both(a > 0.0, is_nan(b)), 7.0, a), lambda a, b: a * 3.0 + b]
 
 
+def test_a_row_may_be_longer_than_a_threads_stack():
+    """Threads have 512 KiB on some systems; of 32 lanes, 3,000 columns take 750 KiB."""
+    columns = 3000
+
+    def rows(t):
+        for column in range(columns):
+            t.record(column, t.input("a") * t.tick + float(column))
+
+    program = Program(10.0, (), (Record(Phase("rows", rows), 1),), (), ("a",), columns)
+    made = kernel.compile(program, 32)
+    cases = np.arange(40.0)
+    found = []
+    before = threading.stack_size(1 << 19)
+    try:
+        thread = threading.Thread(target=lambda: found.append(made.run(cases[:, None], 2, threads=1)[0]))
+        thread.start()
+        thread.join()
+    finally:
+        threading.stack_size(before)
+    expected = cases[:, None, None] * np.arange(3.0)[:, None] + np.arange(float(columns))
+    assert np.array_equal(found[0], expected)
+
+
 @st.composite
 def expressions(draw):
     """Functions of three numbers, as lists of steps over what is there already."""

@@ -93,7 +93,7 @@ def coordinate(**new: Any) -> Change:
         (lambda e: e["structure"]["record"].append(e["structure"]["record"][0]),
          "structure.record[4].name: `q` is there twice"),
         (structure("servos", command={"kind": "voltage", "model": "constant"}),
-         "structure.servos[1].command.kind: a rigid_gearbox takes no command `voltage`, but rate, position, torque"),
+         "structure.servos[1].command.kind: rigid_gearbox takes no command `voltage`, but rate, position, torque"),
         (structure("servos", command=None), "structure.servos[1].command: a rigid_gearbox needs one"),
         (structure("servos", joint="wrist"), "structure.servos[1].joint: there is no joint `wrist`"),
         (structure("servos", joint="shoulder"), "structure.servos[1].joint: joint `shoulder` has a servo already"),
@@ -172,9 +172,14 @@ def test_a_table_of_a_command_is_one(times: list[float], values: list[float]) ->
 
 @pytest.mark.parametrize(
     ("times", "said"),
-    [([0.0], "values: there are 1 for 1 times, and 2 are needed"), ([1.0, 1.0], "times: they do not rise")],
+    [
+        ([0.0], "values: there are 1 for 1 times, and 2 are needed"),
+        ([1.0, 1.0], "times: they do not rise"),
+        ([0.0, "inf"], "times.value: one of its numbers is not finite"),
+        ([0.0, "nan"], "times.value: one of its numbers is not finite"),
+    ],
 )
-def test_a_trajectory_has_two_points_or_more(times: list[float], said: str) -> None:
+def test_a_trajectory_has_two_points_or_more(times: list[float | str], said: str) -> None:
     def change(e: dict[str, Any]) -> None:
         e["structure"]["servos"][1]["command"]["model"] = "trajectory"
         given = e["parameters"].pop("elbow.servo.command.value")

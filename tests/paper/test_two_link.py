@@ -112,5 +112,5 @@ def test_both_joints_settle_at_the_commanded_rate_at_the_papers_rates(joint):
 
 def test_the_figures_can_be_drawn(tmp_path):
     written = draw(tmp_path)
-    assert [path.name for path in written] == ["paper_figure_5.png", "paper_figure_6.png"]
+    assert [path.name for path in written] == [f"paper_figure_{number}.png" for number in (5, 6, 7, 8)]
     assert all(path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 10_000 for path in written)

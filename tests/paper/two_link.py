@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from pathlib import Path
 
@@ -10,7 +11,9 @@ from met import run as engine
 from met.plan import Experiment
 
 SLOW = 0.03  # rad/s, the rate that the paper commands to both joints
-DRY = 0.0205 * 1570.0  # Coulomb friction of table 1 at the joint, N m
+RATIO = 1570.0  # of the gearbox, table 1
+DRY = 0.0205 * RATIO  # Coulomb friction of table 1 at the joint, N m
+ONCE_A_TURN = RATIO * SLOW / (2.0 * math.pi)  # turns of the motor's shaft a second at that rate, 7.5 Hz
 
 
 def experiment(
@@ -52,3 +55,12 @@ def run(**changes: object) -> engine.Run:
     result = engine.run(experiment(**changes))  # type: ignore[arg-type]
     assert result.cause == [""], result.cause
     return result
+
+
+def hybrid(faults: str = "typical", **changes: object) -> engine.Run:
+    """The same with the shoulder's motor on an emulated bed; `faults` is the bed's parameter, and others if need be."""
+    body = f"""
+        substitute shoulder {{ bed = emulated(faults = {faults});  law = velocity_tracking; }}
+        record += [qdd, shoulder.bed.shaft_rate];
+    """
+    return run(run=body, **changes)

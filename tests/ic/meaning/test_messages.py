@@ -206,6 +206,84 @@ error[D140]: no servo model `rigid_gearbx`
 """
 
 
+def test_a_model_with_its_parameters_behind_its_name(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, changed(SERVO, ("model = rigid_gearbox;", "model = rigid_gearbox(f_c = 1 N*m);")), RUN) == """\
+error[D143]: `model = rigid_gearbox` takes neither parentheses nor braces
+ --> deck.ic:6:13
+  |
+6 |     model = rigid_gearbox(f_c = 1 N*m);
+  |             ^^^^^^^^^^^^^^^^^^^^^^^^^^
+  = help: write `model = rigid_gearbox;`, and its parameters beside it
+"""
+
+
+def test_an_integrator_with_parameters(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("duration", "integrator = rk4 { step = 1 ms; }  duration"))) == """\
+error[D143]: `integrator = rk4` takes neither parentheses nor braces
+  --> deck.ic:15:18
+   |
+15 |     integrator = rk4 { step = 1 ms; }  duration = 1 s;
+   |                  ^^^
+   = help: write `integrator = rk4;`: an integrator has no parameters
+"""
+
+
+def test_a_parent_with_arguments(tmp_path: Path) -> None:
+    assert shown(tmp_path, changed(ARM, ("parent = base;", "parent = base(2);")), SERVO, RUN) == """\
+error[D094]: a link's name is needed for parent
+ --> deck.ic:3:28
+  |
+3 |     joint hinge revolute { parent = base(2); child = bar; axis = z; }
+  |                            ^^^^^^
+  = help: links: base, bar
+"""
+
+
+def test_a_shape_with_a_value_without_a_name(tmp_path: Path) -> None:
+    assert shown(tmp_path, changed(ARM, ("rod(length = 1 m,", "rod(2 m, length = 1 m,")), SERVO, RUN) == """\
+error[D153]: `rod` takes its values by name
+ --> deck.ic:2:41
+  |
+2 |     link bar { mass = 2 kg; shape = rod(2 m, length = 1 m, along = x); }
+  |                                         ^^^
+  = help: write `rod(length = ..., along = ...)`
+"""
+
+
+def test_an_environment_with_a_value_without_a_name(tmp_path: Path) -> None:
+    run = changed(RUN, ("duration", "environment { oil = joint_damping(2, damping = 1 N*m*s/rad); }\n    duration"))
+    assert shown(tmp_path, ARM, SERVO, run) == """\
+error[D153]: `joint_damping` takes its values by name
+  --> deck.ic:15:39
+   |
+15 |     environment { oil = joint_damping(2, damping = 1 N*m*s/rad); }
+   |                                       ^
+   = help: write `joint_damping(damping = ..., sliding = ...)`
+"""
+
+
+def test_a_metric_with_a_value_without_a_name(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("duration", "metric top = max(hinge.q, of = hinge.qd);\n    duration"))) == """\
+error[D153]: `max` takes its values by name
+  --> deck.ic:15:22
+   |
+15 |     metric top = max(hinge.q, of = hinge.qd);
+   |                      ^^^^^^^
+   = help: write `max(of = ...)`
+"""
+
+
+def test_a_metric_of_what_is_no_channel(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("duration", "metric top = max { of = [hinge.q]; }\n    duration"))) == """\
+error[D125]: a channel is needed here
+  --> deck.ic:15:29
+   |
+15 |     metric top = max { of = [hinge.q]; }
+   |                             ^^^^^^^^^
+   = help: write `of = CHANNEL;`, such as `of = shoulder.qd;`
+"""
+
+
 def test_a_servo_without_a_command(tmp_path: Path) -> None:
     assert shown(tmp_path, ARM, changed(SERVO, ("    command = rate(0.1 rad/s);\n", "")), RUN) == """\
 error[D149]: servo `drive` has no command
@@ -312,6 +390,29 @@ error[D122]: `rates.servos` cannot vary
 18 | default sweep it of hold { vary rates.servos = [1, 2] kHz; }
    |                                 ^^^^^^^^^^^^
    = help: it decides the program, which is one for the whole sweep in this version
+"""
+
+
+def test_a_sweep_over_words(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, SERVO, RUN, "default sweep it of hold { vary integrator = [midpoint, rk4]; }\n") == """\
+error[D122]: `integrator` cannot vary over words
+  --> deck.ic:18:47
+   |
+18 | default sweep it of hold { vary integrator = [midpoint, rk4]; }
+   |                                               ^^^^^^^^
+   = help: a word, a model and a file are one for the whole sweep in this version: write a run for each, `like` the first
+   = help: where a number is meant, define it: `let midpoint = ...;`
+"""
+
+
+def test_a_misspelt_value_of_a_sweep_is_no_word(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, SERVO, RUN, "let heavy = 2 kg;\ndefault sweep it of hold { vary links.bar.mass = [heavi]; }\n") == """\
+error[D065]: no value `heavi`
+  --> deck.ic:19:51
+   |
+19 | default sweep it of hold { vary links.bar.mass = [heavi]; }
+   |                                                   ^^^^^
+   = help: did you mean `heavy`?
 """
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -184,6 +185,18 @@ error[D190]: cannot find "move.csv"
 """
 
 
+def test_a_link_to_nowhere_is_not_what_was_meant(tmp_path: Path) -> None:
+    (tmp_path / "moves.csv").symlink_to(tmp_path / "gone.csv")
+    assert shown(tmp_path, None).replace(str(tmp_path), "DIR") == """\
+error[D190]: cannot find "moves.csv"
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = "moves.csv"));
+  |                                          ^^^^^^^^^^^
+  = help: looked in `DIR`, the standard library
+"""
+
+
 MISTAKES: list[tuple[str, str | bytes, str, str]] = []  # what, the file's text, the command's course, what is said
 
 
@@ -301,6 +314,66 @@ error[D194]: this number is too large: the largest is 1.8e308
  ::: moves.csv:1:11  column `hinge`
   = help: a number is written as 12.5 or -1e-3, with a point and without a unit
 """)
+mistake("brackets without a unit", MOVES.replace("hinge [deg]", "hinge []"), """\
+error[D193]: column `hinge` has no unit
+ --> moves.csv:1:11
+  |
+1 | time [s], hinge [], other [rad]
+  |           ^^^^^^^^
+ ::: deck.ic:9:42  read here for joint `hinge`
+  = help: write `hinge [deg]` or `hinge [rad]`
+""")
+mistake("a unit in round brackets", MOVES.replace("hinge [deg]", "hinge (deg)"), """\
+error[D192]: `moves.csv` has no column `hinge`
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = "moves.csv"));
+  |                                          ^^^^^^^^^^^
+ ::: moves.csv:1:1  its first line
+  = help: a unit stands in square brackets: write `hinge [deg]`
+  = help: columns: time, hinge (deg), other
+""")
+mistake("no line that names the columns", "0, 0\n1, 1\n", """\
+error[D191]: the first line names no columns: it holds numbers
+ --> moves.csv:1:1
+  |
+1 | 0, 0
+  | ^^^^
+  = help: put a line above them, as in `time [s], shoulder [deg]`
+""")
+mistake("a column with a name that is a book", MOVES.replace("other", 50 * "o"), f"""\
+error[D192]: `moves.csv` has no column `knee`
+ --> deck.ic:9:64
+  |
+9 |     command = position(trajectory(file = "moves.csv", column = "knee"));
+  |                                                                ^^^^^^
+ ::: moves.csv:1:1  its first line
+  = help: columns: time, hinge, {40 * "o"}...
+""", 'trajectory(file = "moves.csv", column = "knee")')
+mistake("a command about a file", MOVES, """\
+error[D151]: a command is about a value or a course in time, and this is text
+ --> deck.ic:9:24
+  |
+9 |     command = position("moves.csv");
+  |                        ^^^^^^^^^^^
+  = help: write `position(trajectory(...))` for a column of a CSV file
+""", '"moves.csv"')
+mistake("the name of a course alone", MOVES, """\
+error[D075]: `trajectory` has no `file`
+ --> deck.ic:9:24
+  |
+9 |     command = position(trajectory);
+  |                        ^^^^^^^^^^
+  = help: write `file = "NAME.csv"`
+""", "trajectory")
+mistake("a word in quotes", MOVES, """\
+error[D076]: `interpolation` of `trajectory` is a word, without quotes
+ --> deck.ic:9:64
+  |
+9 |     command = position(trajectory("moves.csv", interpolation = "cubic"));
+  |                                                                ^^^^^^^
+  = help: one of: linear, cubic
+""", 'trajectory("moves.csv", interpolation = "cubic")')
 mistake("times that fall", MOVES.replace("0.5,", "1.5,"), """\
 error[D195]: times of a file rise, and 1 s follows 1.5 s
  --> moves.csv:4:1
@@ -418,8 +491,16 @@ error[D076]: `file` of `trajectory` is the name of a file, in quotes
   |
 9 |     command = position(trajectory(file = moves));
   |                                          ^^^^^
-  = help: write `file = "NAME.csv"`
+  = help: write `file = "moves"`
 """, 'trajectory(file = moves)')
+mistake("a file's name alone without quotes", MOVES, """\
+error[D076]: `file` of `trajectory` is the name of a file, in quotes
+ --> deck.ic:9:35
+  |
+9 |     command = position(trajectory(moves.csv));
+  |                                   ^^^^^^^^^
+  = help: write `file = "moves.csv"`
+""", 'trajectory(moves.csv)')
 mistake("no file", MOVES, """\
 error[D075]: `trajectory` has no `file`
  --> deck.ic:9:24
@@ -515,3 +596,12 @@ def test_a_broken_file_is_told_with_a_place_whatever_is_wrong_with_it(tmp_path: 
         assert (compiled.plan is None) == bool(compiled.diagnostics)
         told_codes |= {diagnostic.code for diagnostic in compiled.diagnostics}
     assert {"D002", "D191", "D192", "D194", "D197"} <= told_codes
+
+
+@pytest.mark.parametrize("head", ["a" + 60_000 * " " + "b [ " + 60_000 * " " + "x", 100_000 * "[ ", "a [" + 100_000 * " "])
+def test_a_first_line_of_spaces_is_read_as_soon_as_another(tmp_path: Path, head: str) -> None:
+    """No pattern tries each way of cutting them: that took minutes."""
+    began = time.monotonic()
+    said = shown(tmp_path, head + "\n1\n")
+    assert said.startswith("error[D191]: `") and " does not name a column\n --> moves.csv:1:1\n" in said
+    assert time.monotonic() - began < 5.0  # s; in fact some hundredths

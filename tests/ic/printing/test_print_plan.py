@@ -304,6 +304,16 @@ def test_explain_of_an_unknown_path_says_what_was_meant(capsys: pytest.CaptureFi
     )
 
 
+@pytest.mark.parametrize("path", ["knee.qdd", "tau", "knee.reaction", "links.first.position.z", "energy.kinetic"])
+def test_explain_of_a_channel_says_that_only_a_run_has_it(path: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert complained(capsys, "explain", "swing.ic", path) == (
+        f"error[D170]: no parameter `{path}` in `free`\n"
+        f" = help: it is a channel, which only a run computes: `record = [{path}];` keeps it\n"
+        "\n"
+        "1 error\n"
+    )
+
+
 def test_explain_as_json_has_the_places(capsys: pytest.CaptureFixture[str]) -> None:
     (told,) = json.loads(printed(capsys, "explain", "swing.ic", "knee.servo.kp", "--format", "json"))
     assert (told["path"], told["value"], told["unit"], told["origin"]) == ("knee.servo.kp", 0.02, "V*s/rad", "deck")

@@ -156,3 +156,13 @@ def test_a_state_that_no_acceleration_depends_on_hides_nothing(tmp_path: Path, p
     run = engine.run(changed(experiment, 1, path, np.nan))
     assert run.status.tolist() == [0, 1, 0] and run.n_valid.tolist() == [11, 0, 11]
     assert np.isnan(run.signals["qd"][1]).all() and np.isfinite(run.signals["q"][[0, 2]]).all()
+
+
+@pytest.mark.filterwarnings("error")
+def test_constants_that_overflow_say_nothing_while_a_program_is_made(tmp_path: Path) -> None:
+    """They are folded as a kernel would compute them: infinity, and no warning of numpy's beside what MET prints."""
+    path = tmp_path / "deck.ic"
+    path.write_text(DECK.replace("sine(amplitude = 0.5 rad/s, frequency = 2 Hz)", "trapezoid(to = 1e200 rad/s, "
+                                 "max_rate = 1e-200 rad/s^2, max_acceleration = 1e-300 rad/s^3)"))
+    made = engine.run(engine.prepare(ic.compile(path, select=["swung"]).experiments[0]))
+    assert made.status.tolist() == [0]

@@ -1,0 +1,201 @@
+"""Whether a motor on a bed stays stable: how heavy the arm may be for its law, rate and delay, and how heavy it is.
+
+The measure is r = J_eff/(N^2 J_m), the arm's inertia at the joint against the rotor's. The loop of bed, filter,
+converter-free wire, servo and law is taken round once by the functions that run it, at a steady rate of the shaft where
+no limit is reached and no friction changes its sign: there it is an affine map from tick to tick. It is stable where no
+eigenvalue of its matrix, found by differences, is larger than one. So there is no second model that could differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from met.frozen import frozen
+from met.plan import Experiment
+from met.program.build import Builder
+from met.program.machine import Machine
+from met.program.substituted import Mounted
+from met.program.values import Values, answer
+from met.run import inputs
+from met.servos.servo import Asked, Seen
+from met.trace.reference import PlainTape, follow
+
+GROWS = 1.0 + 1e-6
+"""Eigenvalues above it grow; the slow modes of a servo with a heavy arm come that near to one."""
+
+LIGHTEST, HEAVIEST, STEPS = 0.05, 2000.0, 40
+"""Range of r that is searched, and how many values of it, a constant share apart."""
+
+# cells that hold a rate of the shaft; and angles, which only add up and come back to nothing
+_RATES = ("shaft_rate", "bed.filtered", ":read", ":before", ":w", ":w_ref", "observer.w", "observer.y")
+_ANGLES = ("angle",)
+
+
+@frozen
+class Margin:
+    """One substituted joint of a case.
+
+    r       of the arm at the start of the run
+    limit   smallest r at which the loop is unstable; None: none found up to `HEAVIEST`
+    """
+
+    case: int
+    joint: str
+    law: str
+    bed: str
+    rate_hz: float
+    delay: float
+    r: float
+    limit: float | None
+
+    @property
+    def factor(self) -> float | None:
+        """How many times heavier the arm might be; None where no limit was found."""
+        return None if self.limit is None else self.limit / self.r
+
+    @property
+    def stable(self) -> bool:
+        return self.limit is None or self.r < self.limit
+
+
+def margins(
+    experiment: Experiment, cases: Sequence[int] | None = None, progress: Callable[[int], None] | None = None
+) -> tuple[tuple[Margin, ...], ...]:
+    """Every substituted joint of an experiment, each by itself: one tuple a case (all by default).
+
+    progress  called with the number of cases done so far. A limit is looked for once for all cases that share the
+              parameters of servo, bed and law
+    """
+    plain = _faultless(experiment)
+    known: dict[tuple[Any, ...], float | None] = {}
+    found = []
+    for done, case in enumerate(range(experiment.cases.count) if cases is None else cases, start=1):
+        found.append(tuple(_margins(plain, case, known)))
+        if progress is not None:
+            progress(done)
+    return tuple(found)
+
+
+def _margins(experiment: Experiment, case: int, known: dict[tuple[Any, ...], float | None]) -> Iterator[Margin]:
+    builder, tape = _begun(experiment, case)
+    beds = builder.step.beds
+    # All of them first: a loop is taken round over the same cells, with loads of its own.
+    felt = [float(tape.read(f"{each.joint}:Lambda.{each.joint}")) for each in beds.mounted]
+    for each, load in zip(beds.mounted, felt, strict=True):
+        loop = _Loop(builder, tape, each)
+        r = load / loop.rotor
+        heads = (f"{each.joint}.servo.", f"{each.joint}.bed.", f"{each.joint}.law.")
+        own = [path for path in experiment.parameters if path.startswith(heads) and ".command." not in path]
+        key = (each.joint, *(builder.machine.value(path, tape.read) for path in own))
+        if key not in known:
+            known[key] = loop.limit()
+        delay = float(builder.machine.value(f"{each.joint}.bed.delay", tape.read))
+        rate_hz = builder.schedule.base_hz / beds.divisor
+        yield Margin(case, each.joint, each.law.name, each.bed.name, rate_hz, delay, r, known[key])
+
+
+def _faultless(experiment: Experiment) -> Experiment:
+    """The experiment with beds that have no faults: noise and converters would be taken for slopes."""
+    from met import models
+
+    parameters = dict(experiment.parameters)
+    for use in experiment.structure.substitutions:
+        bed = models.find("bed", use.bed, use.place)
+        for name in {name for preset in bed.presets.values() for name in preset}:
+            path = f"{use.joint}.bed.{name}"
+            parameters[path] = replace(parameters[path], value=0.0)
+    return replace(experiment, parameters=parameters)
+
+
+def _begun(experiment: Experiment, case: int) -> tuple[Builder, PlainTape]:
+    """The program after its first tick, in plain numbers."""
+    builder = Builder(Machine(experiment))
+    program = builder.program()
+    values = inputs(experiment, np.array([case]))[0]
+    tape = PlainTape(program, dict(zip(program.inputs, values, strict=True)), 1)
+    with np.errstate(all="ignore"):
+        follow(tape, program.start)
+        follow(tape, program.tick)
+    return builder, tape
+
+
+class _Noting(dict[str, Any]):
+    """Cells that note which of them are written."""
+
+    def __init__(self, cells: Mapping[str, Any]) -> None:
+        super().__init__(cells)
+        self.written: set[str] = set()
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        self.written.add(name)
+        super().__setitem__(name, value)
+
+
+class _Loop:
+    """The loop of one joint at a tick, over the cells of a tape."""
+
+    def __init__(self, builder: Builder, tape: PlainTape, each: Mounted) -> None:
+        self.machine, self.tape, self.each = builder.machine, tape, each
+        self.beds = builder.step.beds.alone(each)
+        self.motor = self.beds.motor(tape, each)
+        self.rotor = float(self.motor.ratio * self.motor.ratio * self.motor.inertia)
+        # back-EMF alone then takes half of the torque there is
+        self.rate = 0.5 * float(self.motor.tau_max * self.motor.resistance / (self.motor.kt * self.motor.kt))
+        own = (f"{each.joint}:", f"{each.joint}.bed.", f"{each.joint}.law.", f"{each.actuator.path}.")
+        cells = {name: float(value) for name, value in tape.cells.items() if name.startswith(own)}
+        tape.k = self.beds.divisor
+        tape.cells = _Noting(tape.cells)
+        self._around(cells, self.rotor)
+        self.names = [name for name in cells if name in tape.cells.written and not name.endswith(_ANGLES)]
+        # The shaft turns on at one rate, and nothing else is under way.
+        self.start = cells | {name: self.rate if name.endswith(_RATES) else 0.0 for name in self.names}
+
+    def _around(self, cells: Mapping[str, float], load: float) -> dict[str, float]:
+        """The cells a tick later, with an arm of this inertia on the joint (kg m^2; kg)."""
+        tape, joint, actuator = self.tape, self.each.joint, self.each.actuator
+        tape.cells.update({name: np.float64(value) for name, value in cells.items()})
+        tape.cells.update({f"{joint}:Lambda.{joint}": np.float64(load), f"{joint}:b_0": np.float64(0.0)})
+        self.beds.advance(tape)
+        self.beds.read(tape)
+        asked = Asked("rate", self.rate / self.motor.ratio, 0.0)
+        q, qd = self.beds.seen(tape, actuator) or (0.0, 0.0)
+        held = Values(actuator.owner, {m.name: tape.read(f"{actuator.path}.{m.name}") for m in actuator.servo.memory})
+        seen = Seen(q, qd, asked, self.beds.period, tape.time)
+        assert actuator.servo.tick is not None
+        new = answer(actuator.owner, actuator.servo.tick, self.machine.servo_values(actuator, tape.read), held, seen)
+        for name, value in new.items():
+            tape.write(f"{actuator.path}.{name}", value)
+        self.beds.act(tape)
+        return {name: float(tape.cells[name]) for name in cells}
+
+    def radius(self, r: float) -> float:
+        """The largest size of an eigenvalue of the map from tick to tick."""
+        load = r * self.rotor
+        with np.errstate(all="ignore"):
+            base = self._around(self.start, load)
+            columns = []
+            for name in self.names:
+                size = 1e-4 * max(1.0, abs(self.start[name]))
+                moved = self._around({**self.start, name: self.start[name] + size}, load)
+                columns.append([(moved[other] - base[other]) / size for other in self.names])
+        matrix = np.array(columns).T
+        return float("inf") if not np.isfinite(matrix).all() else float(np.abs(np.linalg.eigvals(matrix)).max())
+
+    def limit(self) -> float | None:
+        """Smallest r at which the loop grows, to a hundredth; None where there is none."""
+        low = LIGHTEST
+        for r in np.geomspace(LIGHTEST, HEAVIEST, STEPS):
+            if self.radius(float(r)) > GROWS:
+                high = float(r)
+                break
+            low = float(r)
+        else:
+            return None
+        while high > 1.005 * low:
+            middle = (low * high) ** 0.5
+            low, high = (low, middle) if self.radius(middle) > GROWS else (middle, high)
+        return (low * high) ** 0.5

@@ -1,0 +1,107 @@
+"""An integrator's `advance`, run up to the first question that has no answer yet, or to its end.
+
+A question is a call of `slope`. `advance` runs anew for each piece of the program, so it must ask the same questions
+every time. What it catches does not matter: once a question is open, nothing that it does is looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.integrators.integrator import Integrator, Motion, Slope
+from met.program.values import answer
+from met.trace import Graph, Real, Scalar
+
+
+@frozen
+class Question:
+    """An integrator asks for the slope at `there`, the share `share` of its step on."""
+
+    share: Real
+    there: Motion
+
+
+def advanced(integrator: Integrator, settled: Sequence[Slope], h: Real, y: Motion, k1: Slope) -> Motion | Question:
+    """The state at the end of a step of h s from y, or the first question beyond the answers `settled`.
+
+    Raises Problem E213 where `advance` raises anything, E214 where it gives back what is no state of the arm.
+    """
+    questions: list[Question] = []
+
+    def slope(c: Real, there: Motion) -> Slope:
+        if not isinstance(c, (float, int, Scalar)):
+            raise TypeError(f"slope(c, y) was given a {type(c).__name__} for the share of the step")
+        wrong = _wrong(there, y)
+        if wrong:
+            raise TypeError(f"slope(c, y) was given {wrong}")
+        questions.append(Question(c, there))
+        if len(questions) > len(settled):
+            raise _Open
+        return settled[len(questions) - 1]
+
+    try:
+        end = answer(f"integrator `{integrator.name}`", integrator.advance, slope, h, y, k1)
+    except (_Open, Problem):
+        if len(questions) <= len(settled):
+            raise
+    if len(questions) > len(settled):
+        return questions[len(settled)]
+    if len(questions) < len(settled):
+        raise inconstant(integrator)
+    wrong = _wrong(end, y)
+    if wrong:
+        message = f"integrator `{integrator.name}`: `advance` gives back {wrong}"
+        raise Problem(error("E214", message, help="give back a state with all parts of the one it was given"))
+    return end
+
+
+def asked(integrator: Integrator, joints: int, states: int, h: float) -> int:
+    """How many slopes it asks for on its way through a step of h s, the first stage's aside."""
+    graph = Graph()
+
+    def numbers(name: str, count: int) -> tuple[Scalar, ...]:
+        return tuple(graph.input(f"{name}{i}") for i in range(count))
+
+    def motion(name: str) -> Motion:
+        return Motion(numbers(f"{name}.q", joints), numbers(f"{name}.qd", joints), numbers(f"{name}.x", states))
+
+    y = motion("y")
+    answers: list[Slope] = []
+    k = motion("k0")
+    k1 = Slope(y.qd, k.qd, k.x)
+    while isinstance(advanced(integrator, answers, h, y, k1), Question):
+        k = motion(f"k{len(answers) + 1}")
+        answers.append(Slope(k.q, k.qd, k.x))
+        if len(answers) > MOST:
+            raise inconstant(integrator)
+    return len(answers)
+
+
+MOST = 100
+"""Slopes that an integrator asks for at most: one that asks for more each time would never end."""
+
+
+def inconstant(integrator: Integrator) -> Problem:
+    """It asked for another number of slopes than before."""
+    message = f"integrator `{integrator.name}`: `advance` asks for more slopes at one time than at another"
+    return Problem(error("E214", message, help=(
+        f"ask for the same number, at most {MOST}, whatever the step's length is, and whether it is known",
+        "keep nothing from call to call: `advance` is called once for each slope that it asks for, and more",
+    )))  # fmt: skip
+
+
+def _wrong(y: object, like: Motion) -> str:
+    """What is wrong with a state: what it is, and what it should be; empty where nothing is."""
+    if not isinstance(y, Motion):
+        return f"a {type(y).__name__}, not a Motion"
+    sizes, wanted = ([len(part) for part in (m.q, m.qd, m.x)] for m in (y, like))
+    if sizes == wanted:
+        return ""
+    told = [f"{a} positions, {b} rates and {c} other states" for a, b, c in (sizes, wanted)]
+    return f"a Motion of {told[0]}; the arm has {told[1]}"
+
+
+class _Open(BaseException):
+    """A question has no answer yet. No Exception: a model that catches those is not to catch this."""

@@ -1,0 +1,410 @@
+"""Joints whose motors are on a bed: what happens at each tick of their servos (docs/physics.md, motor substitution).
+
+At a servo's tick, in this order: the bed has come to this instant under what its amplifiers held; its filtered rate is
+read, and the observer corrected; joint position and rate of the arm are made the shaft's (at an instant of the
+dynamics: between two the step under way keeps its own); the servo sets the voltage from the filtered rate. At an
+instant the arm is then asked what it is to these joints: tau_load = Lambda qdd + b_0, all other joints in their modes.
+Then the law gives the load torque and the joint's acceleration, and the observer looks ahead to the next tick.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from met.frozen import frozen
+from met.parameter import Parameter
+from met.program.machine import Actuator, Machine
+from met.program.values import Values, answer, parameters, returned
+from met.servos.motor import Motor, torque
+from met.substitution import balance, observer
+from met.substitution.bed import Bed, Wire
+from met.substitution.law import Given, Law, Told
+from met.substitution.shaft import lasting
+from met.trace import Real, absolute, clip, sign, where
+from met.trace.noise import Stream, normal
+from met.trace.program import Control, Every, Phase, Run, Tape, Unless0, WhileAny
+
+QUEUE = 3
+"""Ticks of delay that there is room for (parameter `delay` of a bed)."""
+
+SETTLING = 0.25
+"""Time in which the observer's covariance settles, s: some thirty of its slowest time constants."""
+
+# covariance of the observer's state before the first reading: of rates (rad/s)^2, of a slope, of a torque
+_UNKNOWN = (1e4, 1e4, 1e8, 1e-2)
+
+
+@frozen
+class Mounted:
+    """A substituted joint: its servo, the bed that its motor is on, and the law."""
+
+    actuator: Actuator
+    joint: str
+    bed: Bed
+    law: Law
+
+    @property
+    def index(self) -> int:
+        """Number of the joint among those that move."""
+        return self.actuator.index
+
+
+Loads = Callable[[Tape], tuple[list[list[Real]], list[Real]]]
+"""From the state at an instant: Lambda (a row a substituted joint) and b_0."""
+
+
+class Substituted:
+    """The phases of a machine's substituted joints, which tick together. wire: a real bed stands at the wire."""
+
+    def __init__(self, machine: Machine, loads: Loads, *, wire: bool = False) -> None:
+        self.machine = machine
+        self.loads = loads
+        self.wire = wire
+        self.mounted = tuple(Mounted(a, machine.joints[a.index].name, bed, law) for a, bed, law in machine.mounted)
+        self.dynamics = machine.structure.schedule.dynamics
+        self.base_hz = machine.structure.schedule.base_hz
+        self.divisor = self.mounted[0].actuator.use.divisor if self.mounted else 1
+        self.law = self.mounted[0].law if self.mounted else None
+        self.period = self.divisor / self.base_hz
+
+    def alone(self, each: Mounted) -> Substituted:
+        """The same for one joint by itself."""
+        found = copy.copy(self)
+        found.mounted = (each,)
+        return found
+
+    @property
+    def wire_inputs(self) -> tuple[str, ...]:
+        """What comes over the wires at each tick."""
+        return tuple(f"wire:{each.joint}.rate" for each in self.mounted) if self.wire else ()
+
+    @property
+    def wire_outputs(self) -> dict[str, str]:
+        """What goes over the wires, by the cells that hold it."""
+        sent = (("voltage", "drive_voltage"), ("current", "load_current"))
+        return {
+            f"wire:{each.joint}.{name}": f"{each.joint}.bed.{cell}" for each in self.mounted for name, cell in sent
+        } if self.wire else {}  # fmt: skip
+
+    # Control.
+
+    def begin_run(self) -> tuple[Control, ...]:
+        """What is done before the first tick."""
+        if not self.mounted:
+            return ()
+        parts: tuple[Control, ...] = (Run(Phase("beds", self.start)),)
+        if self.law is not None and self.law.observer:
+            turns = max(100, math.ceil(SETTLING / self.period))
+            settle = WhileAny("always", turns, (Run(Phase("covariance", self.covariance)),))
+            parts = (*parts, settle, Run(Phase("gain", self.gain)))
+        return parts
+
+    def before_servos(self) -> tuple[Control, ...]:
+        """At the servos' ticks, before they see anything."""
+        if not self.mounted:
+            return ()
+        moved: tuple[Control, ...] = ()
+        if not self.wire:
+            moved = (Unless0((Every(self.divisor, (Run(Phase("bed", self.advance)),)),)),)
+        both_due = math.lcm(self.divisor, self.dynamics)
+        follow = Every(both_due, (Run(Phase("follow", self.follow)),))
+        return (*moved, Every(self.divisor, (Run(Phase("read", self.read)),)), follow)
+
+    def after_modes(self) -> tuple[Control, ...]:
+        """At an instant, once modes are decided, and at the servos' ticks after that."""
+        if not self.mounted:
+            return ()
+        arm, law, first = (
+            Every(due, (Run(Phase(name, body)),))
+            for due, name, body in (
+                (self.dynamics, "arm", self.arm), (self.divisor, "law", self.act), (self.dynamics, "given", self.first)
+            )
+        )  # fmt: skip
+        return arm, law, first
+
+    # The run's start.
+
+    def start(self, tape: Tape) -> None:
+        tape.write("always", 1.0)
+        for each in self.mounted:
+            motor = self.motor(tape, each)
+            w = motor.ratio * tape.read(f"{each.joint}.qd")
+            for memory in each.bed.memory:
+                tape.write(f"{each.joint}.bed.{memory.name}", w if memory.unit == "rad/s" else memory.start)
+            for name in ("read", "before", "w", "w_ref", "observer.w", "observer.y"):
+                tape.write(f"{each.joint}:{name}", w)
+            tape.write(f"{each.joint}:angle", motor.ratio * tape.read(f"{each.joint}.q"))
+            for i in range(4):
+                for j in range(i + 1):
+                    tape.write(f"{each.joint}:P.{i}.{j}", _UNKNOWN[i] if i == j else 0.0)
+
+    def covariance(self, tape: Tape) -> None:
+        """One turn of the Riccati recursion."""
+        for each in self.mounted:
+            P = observer.next_covariance(self._model(tape, each), self._covariance(tape, each), self._noise(tape, each))
+            for i in range(4):
+                for j in range(i + 1):
+                    tape.write(f"{each.joint}:P.{i}.{j}", P[i][j])
+
+    def gain(self, tape: Tape) -> None:
+        for each in self.mounted:
+            found = observer.gain_of(self._covariance(tape, each), self._noise(tape, each))
+            for i, value in enumerate(found):
+                tape.write(f"{each.joint}:gain.{i}", value)
+
+    # A tick.
+
+    def advance(self, tape: Tape) -> None:
+        """The emulated beds, from the last tick to this one."""
+        tick = tape.tick / float(self.divisor) - 1.0
+        for each in self.mounted:
+            p = self._bed_values(tape, each)
+            wire = Wire(tape.read(f"{each.joint}.bed.drive_voltage"), tape.read(f"{each.joint}.bed.load_current"))
+
+            def draw(name: str, each: Mounted = each) -> Real:
+                seed = float(self.machine.experiment.cases.seed)
+                return normal(Stream(seed, 0.0, f"{each.joint}.bed.{name}"), tick)
+
+            new = answer(self._owner(each), each.bed.advance, p, self._bed(tape, each), wire, self.period, draw)
+            returned(self._owner(each), "advance", new, (memory.name for memory in each.bed.memory))
+            for name, value in new.items():
+                tape.write(f"{each.joint}.bed.{name}", value)
+
+    def read(self, tape: Tape) -> None:
+        """The filtered rate, the observer's correction, and the shaft's angle."""
+        for each in self.mounted:
+            name = each.joint
+            rate = (
+                tape.input(f"wire:{name}.rate") if self.wire
+                else answer(self._owner(each), each.bed.read, self._bed_values(tape, each), self._bed(tape, each))
+            )  # fmt: skip
+            w: Real = rate
+            if each.law.observer:
+                gain = tuple(tape.read(f"{name}:gain.{i}") for i in range(4))
+                x = observer.corrected(self._observed(tape, each), gain, rate)  # type: ignore[arg-type]
+                self._observe(tape, each, x)
+                w = x[0]
+                tape.write(f"{name}.law.unknown_torque", x[3])
+            turned = 0.5 * self.period * (w + tape.read(f"{name}:w"))
+            tape.write(f"{name}:angle", tape.read(f"{name}:angle") + where(tape.tick == 0.0, 0.0, turned))
+            tape.write(f"{name}:before", tape.read(f"{name}:read"))
+            tape.write(f"{name}:read", rate)
+            tape.write(f"{name}:w", w)
+            tape.write(f"{name}.law.rate", w)
+
+    def follow(self, tape: Tape) -> None:
+        """The arm's joints are where the shafts are."""
+        for each in self.mounted:
+            ratio = self.motor(tape, each).ratio
+            tape.write(f"{each.joint}.q", tape.read(f"{each.joint}:angle") / ratio)
+            tape.write(f"{each.joint}.qd", tape.read(f"{each.joint}:w") / ratio)
+
+    def seen(self, tape: Tape, actuator: Actuator) -> tuple[Real, Real] | None:
+        """What the servo's computer sees of a substituted joint: position, and the filtered rate. None: not one."""
+        for each in self.mounted:
+            if each.actuator is actuator:
+                ratio = self.motor(tape, each).ratio
+                return tape.read(f"{each.joint}:angle") / ratio, tape.read(f"{each.joint}:read") / ratio
+        return None
+
+    def arm(self, tape: Tape) -> None:
+        """What the arm is to the substituted joints, at this instant."""
+        Lambda, b_0 = self.loads(tape)
+        for each, row, b in zip(self.mounted, Lambda, b_0, strict=True):
+            tape.write(f"{each.joint}:b_0", b)
+            for other, entry in zip(self.mounted, row, strict=True):
+                tape.write(f"{each.joint}:Lambda.{other.joint}", entry)
+
+    def act(self, tape: Tape) -> None:
+        """The law: load torque, what goes over the wire, the joint's acceleration; the observer looks ahead."""
+        assert self.law is not None
+        Lambda = [[tape.read(f"{a.joint}:Lambda.{b.joint}") for b in self.mounted] for a in self.mounted]
+        b_0 = [tape.read(f"{each.joint}:b_0") for each in self.mounted]
+        ahead = [self._ahead(tape, each) for each in self.mounted]
+        found: Sequence[balance.Balanced | None] = [None] * len(self.mounted)
+        if self.law.balance != "none":
+            sides = [self._side(tape, each, w, self._voltage(tape, each), self._band(tape, each))
+                     for each, w in zip(self.mounted, ahead, strict=True)]  # fmt: skip
+            solve = balance.bare if self.law.balance == "bare" else balance.balanced
+            found = solve(sides, Lambda, b_0)
+        told = [self._told(tape, each, one) for each, one in zip(self.mounted, found, strict=True)]
+        p = [self._law_values(tape, each) for each in self.mounted]
+        held = [Values(f"law `{each.law.name}`", {m.name: tape.read(f"{each.joint}.law.{m.name}")
+                for m in each.law.memory}) for each in self.mounted]  # fmt: skip
+        owner = f"law `{self.law.name}`"
+        given = answer(owner, self.law.give, p, held, told, lambda qdd: balance.loads(Lambda, b_0, qdd))
+        applied = []
+        for each, (one, memory) in zip(self.mounted, given, strict=True):
+            returned(owner, "give", memory, (m.name for m in each.law.memory))
+            for name, value in memory.items():
+                tape.write(f"{each.joint}.law.{name}", value)
+            applied.append(self._send(tape, each, one))
+            tape.write(f"{each.joint}:given", one.qdd)
+            tape.write(f"{each.joint}.law.torque", one.torque)
+        if self.law.observer:
+            self._look_ahead(tape, Lambda, b_0, applied)
+
+    def first(self, tape: Tape) -> None:
+        """The acceleration with which the step begins; a servo faster than the dynamics changes it on the way."""
+        for each in self.mounted:
+            tape.write(f"{each.joint}:given.first", tape.read(f"{each.joint}:given"))
+
+    def given(self, tape: Tape, fraction: Real) -> dict[int, Real]:
+        """Accelerations of the substituted joints at a share of the step, by number."""
+        found = {}
+        for each in self.mounted:
+            now = tape.read(f"{each.joint}:given")
+            if self.divisor % self.dynamics:
+                first = tape.read(f"{each.joint}:given.first")
+                now = first + fraction * (now - first)
+            found[each.index] = now
+        return found
+
+    # Parts of a tick.
+
+    def _ahead(self, tape: Tape, each: Mounted) -> Real:
+        """The rate that the output computed now will meet: the observer's, over the delay; else the one just read."""
+        if not each.law.observer:
+            return tape.read(f"{each.joint}:read")
+        delay, x = self._delay(tape, each), self._observed(tape, each)
+        for turn in range(QUEUE):
+            new = self._predicted(tape, each, x, self._queued(tape, each, delay - float(turn)))
+            w, y, z, d = (where(delay > float(turn), b, a) for a, b in zip(x, new, strict=True))
+            x = (w, y, z, d)
+        return x[0]
+
+    def _queued(self, tape: Tape, each: Mounted, ago: Real) -> Wire:
+        """The pair that was asked for this many ticks ago, from 1 to `QUEUE`."""
+        voltage: Real = 0.0
+        current: Real = 0.0
+        for i in range(QUEUE):
+            due = ago == float(i + 1)
+            voltage = where(due, tape.read(f"{each.joint}:queue.{i}.voltage"), voltage)
+            current = where(due, tape.read(f"{each.joint}:queue.{i}.current"), current)
+        return Wire(voltage, current)
+
+    def _send(self, tape: Tape, each: Mounted, given: Given) -> Wire:
+        """Puts a command on the wire, and gives back what the amplifiers hold from now on: an older one, if delayed."""
+        name = each.joint
+        p = self._bed_values(tape, each)
+        asked = Wire(self._voltage(tape, each), given.torque / p.kt_load)
+        asked = answer(self._owner(each), each.bed.taken, p, asked)
+        delay = self._delay(tape, each)
+        late = self._queued(tape, each, delay)
+        at_once = delay == 0.0
+        applied = Wire(where(at_once, asked.voltage, late.voltage), where(at_once, asked.current, late.current))
+        for i in reversed(range(1, QUEUE)):
+            tape.write(f"{name}:queue.{i}.voltage", tape.read(f"{name}:queue.{i - 1}.voltage"))
+            tape.write(f"{name}:queue.{i}.current", tape.read(f"{name}:queue.{i - 1}.current"))
+        tape.write(f"{name}:queue.0.voltage", asked.voltage)
+        tape.write(f"{name}:queue.0.current", asked.current)
+        tape.write(f"{name}.bed.drive_voltage", applied.voltage)
+        tape.write(f"{name}.bed.load_current", applied.current)
+        return applied
+
+    def _look_ahead(
+        self, tape: Tape, Lambda: list[list[Real]], b_0: list[Real], applied: Sequence[Wire]
+    ) -> None:
+        """The observer's state at the next tick, and the rate that the joint's own motor would have then."""
+        sides = []
+        for each, wire in zip(self.mounted, applied, strict=True):
+            w_ref = tape.read(f"{each.joint}:w_ref")
+            sides.append(self._side(tape, each, w_ref, wire.voltage, 0.0))
+            self._observe(tape, each, self._predicted(tape, each, self._observed(tape, each), wire))
+        for each, side, one in zip(self.mounted, sides, balance.balanced(sides, Lambda, b_0), strict=True):
+            after = side.w + self.period * side.ratio * one.qdd
+            after = where(one.s * after < 0.0, 0.0, after)
+            tape.write(f"{each.joint}:w_ref", after)
+            tape.write(f"{each.joint}.law.reference_rate", side.w)
+
+    def _side(self, tape: Tape, each: Mounted, w: Real, voltage: Real, band: Real) -> balance.Side:
+        """A joint's side of the balance at a rate of its shaft and a voltage."""
+        motor = self.motor(tape, each)
+        mean = 0.0 if each.law.balance == "bare" else 0.5 * motor.damping * self.period
+        unknown = self._observed(tape, each)[3] if each.law.observer else 0.0
+        viscous = 0.0 if each.law.balance == "bare" else motor.f_v * w
+        net = torque(motor.kt, motor.resistance, motor.tau_max, voltage, w) + unknown - viscous
+        return balance.Side(motor.ratio, motor.ratio * motor.ratio * (motor.inertia + mean), net, motor.f_c, w, band)
+
+    def _told(self, tape: Tape, each: Mounted, found: balance.Balanced | None) -> Told:
+        motor, p, name = self.motor(tape, each), self._bed_values(tape, each), each.joint
+        mean = each.law.balance == "full"
+        extra = p.inertia * (self.period / lasting(motor.damping / p.inertia, self.period) - 1.0) if mean else 0.0
+        return Told(
+            motor=motor, inertia=p.inertia, rate=tape.read(f"{name}:read"), before=tape.read(f"{name}:before"),
+            w=tape.read(f"{name}:w"), d=self._observed(tape, each)[3] if each.law.observer else 0.0,
+            w_ref=tape.read(f"{name}:w_ref") if each.law.observer else 0.0,
+            period=self.period, balance=found, extra=extra,
+        )  # fmt: skip
+
+    def _predicted(self, tape: Tape, each: Mounted, x: observer.Four, wire: Wire) -> observer.Four:
+        """The observer's state a tick on, under what the amplifiers hold."""
+        motor, band = self.motor(tape, each), self._band(tape, each)
+        load = self._bed_values(tape, each).kt_load * wire.current
+        w, d = x[0], x[3]
+        drive = torque(motor.kt, motor.resistance, motor.tau_max, wire.voltage, w)
+        rest = clip(drive + d + load - motor.f_v * w, -motor.f_c, motor.f_c)
+        dry = where(absolute(w) > band, sign(w) * motor.f_c, rest)
+        # Back-EMF is in the model; where the drive is at its limit this takes it out again.
+        u = drive + motor.kt * motor.kt / motor.resistance * w - dry + load
+        return observer.predicted(self._model(tape, each), x, u)
+
+    # What is known of a joint.
+
+    def motor(self, tape: Tape, each: Mounted) -> Motor:
+        """The joint's motor as its servo believes it."""
+        assert each.actuator.servo.motor is not None
+        p = self.machine.servo_values(each.actuator, tape.read)
+        return answer(each.actuator.owner, each.actuator.servo.motor, p)
+
+    def _model(self, tape: Tape, each: Mounted) -> observer.Model:
+        p = self._bed_values(tape, each)
+        damping = self.motor(tape, each).damping
+        return observer.model(inertia=p.inertia, damping=damping, f_cut=p.f_cut, period=self.period)
+
+    def _noise(self, tape: Tape, each: Mounted) -> observer.Noise:
+        p, T = self._law_values(tape, each), self.period
+        return observer.Noise(torque=p.torque_noise / T, drift=p.drift * T, reading=p.reading_noise / T)
+
+    def _covariance(self, tape: Tape, each: Mounted) -> observer.Square:
+        entries = [[tape.read(f"{each.joint}:P.{max(i, j)}.{min(i, j)}") for j in range(4)] for i in range(4)]
+        return tuple(tuple(row) for row in entries)  # type: ignore[return-value]
+
+    def _observed(self, tape: Tape, each: Mounted) -> observer.Four:
+        w, y, z, d = (tape.read(f"{each.joint}:observer.{name}") for name in "wyzd")
+        return w, y, z, d
+
+    def _observe(self, tape: Tape, each: Mounted, x: observer.Four) -> None:
+        for name, value in zip("wyzd", x, strict=True):
+            tape.write(f"{each.joint}:observer.{name}", value)
+
+    def _voltage(self, tape: Tape, each: Mounted) -> Real:
+        return tape.read(f"{each.actuator.path}.voltage")
+
+    def _band(self, tape: Tape, each: Mounted) -> Real:
+        p = self._law_values(tape, each)
+        return p.band if each.law.balance == "full" else 0.0
+
+    def _delay(self, tape: Tape, each: Mounted) -> Real:
+        delay: Real = self._bed_values(tape, each).delay
+        return delay
+
+    def _bed_values(self, tape: Tape, each: Mounted) -> Any:
+        declared = [parameter for parameter in each.bed.parameters if parameter.shape != "text"]
+        return self._values(tape, self._owner(each), f"{each.joint}.bed", declared)
+
+    def _law_values(self, tape: Tape, each: Mounted) -> Any:
+        owner = f"law `{each.law.name}` of joint `{each.joint}`"
+        return self._values(tape, owner, f"{each.joint}.law", each.law.parameters)
+
+    def _values(self, tape: Tape, owner: str, prefix: str, declared: Iterable[Parameter]) -> Any:
+        return parameters(owner, prefix, declared, lambda path: self.machine.value(path, tape.read))
+
+    def _bed(self, tape: Tape, each: Mounted) -> Values:
+        return Values(self._owner(each), {m.name: tape.read(f"{each.joint}.bed.{m.name}") for m in each.bed.memory})
+
+    def _owner(self, each: Mounted) -> str:
+        return f"bed `{each.bed.name}` of joint `{each.joint}`"

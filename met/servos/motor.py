@@ -1,0 +1,37 @@
+"""A direct-current motor behind a rigid gearbox, as its data sheet has it, seen from its shaft."""
+
+from __future__ import annotations
+
+from met.frozen import frozen
+from met.trace import Real, clip
+
+
+@frozen
+class Motor:
+    """What is believed of a motor; shaft side.
+
+    ratio       turns of the shaft a turn of the joint N (rad/m on a prismatic joint)
+    kt          torque constant, and back-EMF constant (N m/A, V s/rad);  resistance: of the armature, ohm
+    tau_max     largest torque, before friction, N m
+    inertia     of the shaft J_m, kg m^2
+    f_c, f_v    Coulomb friction N m, viscous friction N m s/rad
+    """
+
+    ratio: Real
+    kt: Real
+    resistance: Real
+    tau_max: Real
+    inertia: Real
+    f_c: Real
+    f_v: Real
+
+    @property
+    def damping(self) -> Real:
+        """What brakes the shaft for each unit of its rate: back-EMF and viscous friction, N m s/rad."""
+        return self.kt * self.kt / self.resistance + self.f_v
+
+
+def torque(kt: Real, resistance: Real, tau_max: Real, voltage: Real, w: Real) -> Real:
+    """Torque of a motor at a voltage (V) and a shaft rate w (rad/s), before friction, N m."""
+    # kt / R together: one number where no case varies them, and no division at each stage.
+    return clip(kt / resistance * (voltage - kt * w), -tau_max, tau_max)

@@ -1,0 +1,86 @@
+"""What a law is to the engine: how the load motor is driven, so that the shaft turns as if it carried the arm.
+
+At a tick the engine has read the filtered rate of every substituted joint, has run its servo for the voltage, and knows
+what the arm is to these joints: tau_load = Lambda qdd + b_0, all together. A law says what load torque each is given,
+and what acceleration the arm is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from met.frozen import frozen
+from met.parameter import Memory, Parameter
+from met.servos.motor import Motor
+from met.substitution.balance import Balanced
+from met.trace import Real
+
+
+@frozen
+class Told:
+    """What is known of one substituted joint at a tick; shaft side but for b_0.
+
+    motor    as the servo believes it;  inertia: of the bed's shaft, kg m^2
+    rate     filtered rate read now, before: at the tick before, rad/s
+    w, d     rate and unknown torque: the observer's where the law has one, else the filtered rate and 0
+    w_ref    the rate that the joint's own motor would have, rad/s; 0 without an observer
+    period   from tick to tick, s
+    balance  the motion that balances all torques, of this joint; None where the law takes no balance
+    extra    what the bed's shaft must be given besides its inertia, for the mean over the tick, kg m^2
+    """
+
+    motor: Motor
+    inertia: Real
+    rate: Real
+    before: Real
+    w: Real
+    d: Real
+    w_ref: Real
+    period: float
+    balance: Balanced | None
+    extra: Real
+
+
+@frozen
+class Given:
+    """What a law gives: load torque on the shaft (N m), acceleration of the joint for the arm (rad/s^2; m/s^2)."""
+
+    torque: Real
+    qdd: Real
+
+
+@frozen(kw_only=True)
+class Law:
+    """The declaration of a law; one a file. All substituted joints of a run have the same.
+
+    observer  whether it has one: parameters `torque_noise`, `drift`, `reading_noise`
+    balance   "full": friction is part of the balance, means over the tick; "bare": neither; "none": there is none
+    memory    of its own, one a joint
+    give      (p, held, told, load) -> Given of each joint, and its new memory by name. p, held, told: one a joint;
+              load: joint accelerations -> Lambda qdd + b_0, N m (N)
+    """
+
+    name: str
+    doc: str
+    parameters: tuple[Parameter, ...] = ()
+    observer: bool = False
+    balance: str = "full"
+    memory: tuple[Memory, ...] = ()
+    give: Callable[
+        [Sequence[Any], Sequence[Any], Sequence[Told], Callable[[Sequence[Real]], Sequence[Real]]],
+        Sequence[tuple[Given, Mapping[str, Real]]],
+    ]
+
+
+BAND = Parameter(
+    name="band", unit="rad/s", default=0.5, at_least=0.0,
+    doc="rate of the shaft below which it counts as at rest: friction is then what holds it",
+)  # fmt: skip
+
+OBSERVER = (
+    Parameter(name="torque_noise", unit="N^2*m^2*s", default=1e-9, above=0.0, doc="density of torques that are noise"),
+    Parameter(name="drift", unit="N^2*m^2/s", default=1e-5, above=0.0, doc="density of steps of the unknown torque"),
+    Parameter(name="reading_noise", unit="rad^2/s", default=1e-5, above=0.0, doc="density of the reading's noise"),
+)
+"""How far the observer trusts what it believes. 1e-5 rad^2/s is 0.1 rad/s, rms, at 1 kHz."""

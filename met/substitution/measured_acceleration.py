@@ -1,0 +1,45 @@
+"""The baseline: the load is J_eff times the acceleration that is measured, by the difference of two readings.
+
+    a = (y_k - y_{k-1})/T,  low-pass at will;   tau_l = -(Lambda a/N + b_0)/N + (J_bed - J_m) a
+
+Stable only while the arm is light against the rotor: the filter's lag and the loop's delay set the limit, and a better
+estimate of the acceleration lowers it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from met.parameter import Memory, Parameter
+from met.substitution.law import Given, Law, Told
+from met.trace import Real, exp
+
+
+def give(
+    p: Sequence[Any], held: Sequence[Any], told: Sequence[Told], load: Callable[[Sequence[Real]], Sequence[Real]]
+) -> Sequence[tuple[Given, Mapping[str, Real]]]:
+    shaft = []
+    for own, memory, joint in zip(p, held, told, strict=True):
+        new = (joint.rate - joint.before) / joint.period
+        share = 1.0 - exp(-2.0 * math.pi * own.low_pass * joint.period)
+        shaft.append(memory.acceleration + share * (new - memory.acceleration))
+    qdd = [a / joint.motor.ratio for a, joint in zip(shaft, told, strict=True)]
+    given = []
+    for a, joint_a, joint, taken in zip(shaft, qdd, told, load(qdd), strict=True):
+        torque = -taken / joint.motor.ratio + (joint.inertia - joint.motor.inertia) * a
+        given.append((Given(torque, joint_a), {"acceleration": a}))
+    return given
+
+
+LAW = Law(
+    name="measured_acceleration",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="low_pass", unit="Hz", default=math.inf, above=0.0, doc="cut-off of a low-pass; inf: none"),
+    ),
+    balance="none",
+    memory=(Memory(name="acceleration", unit="rad/s^2", doc="acceleration of the shaft, as measured"),),
+    give=give,
+)

@@ -1,0 +1,34 @@
+"""Torque balance (eq. 10 of the paper, with friction): the load is what makes the shaft turn as the arm's share asks.
+
+    tau_l = (J_bed + c_b) N qdd - (net - friction),  qdd from the balance of all torques (met/substitution/balance.py)
+
+Nothing is differentiated to find the load. The arm is told the backward difference of the filtered rate. What the
+motor does besides what its data sheet says is not known, so a motor that differs is followed badly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from met.substitution.law import BAND, Given, Law, Told
+from met.trace import Real
+
+
+def load_torque(told: Told) -> Real:
+    """Torque of the load motor that gives the shaft its part in the balance, N m."""
+    found = told.balance
+    assert found is not None
+    return (told.inertia + told.extra) * (told.motor.ratio * found.qdd) - (found.net - found.friction)
+
+
+def give(
+    p: Sequence[Any], held: Sequence[Any], told: Sequence[Told], load: Callable[[Sequence[Real]], Sequence[Real]]
+) -> Sequence[tuple[Given, Mapping[str, Real]]]:
+    return [
+        (Given(load_torque(joint), (joint.rate - joint.before) / (joint.period * joint.motor.ratio)), {})
+        for joint in told
+    ]
+
+
+LAW = Law(name="torque_balance", doc=__doc__, parameters=(BAND,), give=give)

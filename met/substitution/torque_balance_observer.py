@@ -1,0 +1,25 @@
+"""Torque balance on what an observer knows: the shaft's rate, and the torque that the data sheet does not tell.
+
+    as `torque_balance`, with the observer's rate and unknown torque d in `net`; the arm is told qdd of the balance
+
+d is shared between bed and arm as the motor's torque is, so that the run follows the motor there is, not its data
+sheet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from met.substitution.law import BAND, OBSERVER, Given, Law, Told
+from met.substitution.torque_balance import load_torque
+from met.trace import Real
+
+
+def give(
+    p: Sequence[Any], held: Sequence[Any], told: Sequence[Told], load: Callable[[Sequence[Real]], Sequence[Real]]
+) -> Sequence[tuple[Given, Mapping[str, Real]]]:
+    return [(Given(load_torque(joint), joint.balance.qdd if joint.balance else 0.0), {}) for joint in told]
+
+
+LAW = Law(name="torque_balance_observer", doc=__doc__, parameters=(BAND, *OBSERVER), observer=True, give=give)
