@@ -22,7 +22,7 @@ def told(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> Iterator[
         worst = min(each, key=_room)
         rows.append([
             worst.joint, worst.law, f"{worst.rate_hz:g} Hz", f"{worst.delay:g}", f"{worst.r:.3g}",
-            f"more than {HEAVIEST:g}" if worst.limit is None else f"{worst.limit:.3g}", _verdict(worst),
+            _limit(worst), _verdict(worst),
         ])  # fmt: skip
     yield from columns(rows, right=(2, 3, 4, 5))
     yield ""
@@ -40,11 +40,19 @@ def as_data(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> dict[s
     return {"experiment": experiment.name, "searched_to": HEAVIEST, "margins": rows}
 
 
+def _limit(one: Margin) -> str:
+    return f"more than {one.searched:.4g}" if one.limit is None else f"{one.limit:.3g}"
+
+
 def _room(one: Margin) -> float:
-    return one.factor if one.factor is not None else HEAVIEST / one.r
+    """How many times heavier the arm might be at least; nothing is tighter than an arm whose r is no number."""
+    room = one.factor if one.factor is not None else one.searched / one.r
+    return room if room == room else 0.0
 
 
 def _verdict(one: Margin) -> str:
+    if not one.stable and one.r != one.r:
+        return "NONE: r is no number"
     if one.factor is None:
         return "no limit found"
     return f"{one.factor:.2g} times" if one.stable else "NONE: unstable"

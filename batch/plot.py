@@ -26,6 +26,10 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 OVERLAID = 8
 INK, FAINT = "#22282e", "#8a939c"
 PANEL_INCHES, MARKER = 1.85, 14
+FLAT = 0.3
+"""Height of a row that is zero throughout, against the others."""
+LEGEND_EVERY = 4
+"""Panels under one another that a legend serves at most."""
 MOST_COLUMNS = 3
 COMMAND = "command"
 SOFTWARE = "MET"
@@ -146,7 +150,8 @@ def _histories(archive: ArchiveFile, group: Group, signals: Sequence[str], cases
     by_joint = single or len(rows[0]) > MOST_COLUMNS
     if by_joint:
         rows = [[Cell(panel, tuple(range(len(panel.lines))), panel.axis, panel.about)] for panel in found]
-    figure, axes = _grid(rows)
+    flat = [not fan and _is_zero(group, row, positions) for row in rows]
+    figure, axes = _grid(rows, flat)
     time = group.values("time")
     joints = joints_of(group)
     for cells, row in zip(rows, axes, strict=True):
@@ -167,13 +172,21 @@ def _histories(archive: ArchiveFile, group: Group, signals: Sequence[str], cases
                 _draw_command(ax, time, group, commands.get((cell.panel.name, cell.panel.unit, line)), positions)
             ax.margins(x=0.0)
     _dress(axes, rows)
-    _legend(figure, axes, group, rows, single=single, fan=fan, by_joint=by_joint)
+    _legend(figure, axes, group, rows, flat, single=single, fan=fan, by_joint=by_joint)
     if single:
         below = case_text(group, positions[0]) if group.attributes["cases_in_table"] > 1 else ""
     else:
         below = f"{len(positions):,} cases" + (": median, nine in ten, and all" if fan else "")
     _title(figure, archive, group, below)
     return figure
+
+
+def _is_zero(group: Group, row: Sequence[Cell | None], positions: Sequence[int]) -> bool:
+    """Whether nothing of a row is ever other than zero."""
+    cells = [cell for cell in row if cell is not None]
+    return not any(
+        np.any(history(group, cell.panel, position)[:, list(cell.lines)]) for cell in cells for position in positions
+    )
 
 
 def _recorded_position(group: Group, case: str) -> int:
@@ -348,16 +361,22 @@ def _scatter(ax: Any, group: Group, x: np.ndarray, y: np.ndarray, by: Stored | N
 # Dress
 
 
-def _grid(rows: Sequence[Sequence[Cell | None]]) -> tuple[Any, list[list[Any]]]:
-    """Panels under and beside one another; time shared, and in a row the scale of what has the same unit."""
+def _grid(rows: Sequence[Sequence[Cell | None]], flat: Sequence[bool] = ()) -> tuple[Any, list[list[Any]]]:
+    """Panels under and beside one another; time shared, and in a row the scale of what has the same unit.
+
+    flat  which rows are zero throughout, and low; none where that is not said
+    """
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     columns = len(rows[0])
     width = 8.6 if columns == 1 else 3.6 * columns + 2.2
     engine = ConstrainedLayoutEngine(h_pad=0.05, w_pad=0.06, hspace=0.02)
-    figure = Figure(figsize=(width, PANEL_INCHES * max(len(rows), 1.5) + 1.0), layout=engine)
-    axes = [list(row) for row in figure.subplots(len(rows), columns, sharex=True, squeeze=False)]
+    heights = [FLAT if low else 1.0 for low in flat or [False] * len(rows)]
+    figure = Figure(figsize=(width, PANEL_INCHES * max(sum(heights), 1.5) + 1.0), layout=engine)
+    axes = [list(row) for row in figure.subplots(len(rows), columns, sharex=True, squeeze=False, height_ratios=heights)]
+    for ax in (ax for row, height in zip(axes, heights, strict=True) for ax in row if height < 1.0):
+        ax.set_yticks([0.0])
     for cells, row in zip(rows, axes, strict=True):
         first: dict[str, Any] = {}
         for cell, ax in zip(cells, row, strict=True):
@@ -393,17 +412,19 @@ def _broken(label: str) -> str:
 
 
 def _legend(
-    figure: Any, axes: list[list[Any]], group: Group, rows: Sequence[Sequence[Cell | None]], *,
+    figure: Any, axes: list[list[Any]], group: Group, rows: Sequence[Sequence[Cell | None]], flat: Sequence[bool], *,
     single: bool, fan: bool, by_joint: bool,
 ) -> None:  # fmt: skip
-    """Beside the panels, once for all that share it."""
+    """Beside the panels, once for some that share it; not beside a flat one, where it has no room."""
     if by_joint:
         last: list[str] = []
-        for row in axes:
+        since = 0
+        for row, low in zip(axes, flat, strict=True):
             labels = row[0].get_legend_handles_labels()[1]
-            if labels and labels != last:
+            since += 1
+            if labels and (labels != last or (since > LEGEND_EVERY and not low)):
                 row[0].legend(loc="upper left", bbox_to_anchor=(1.005, 1.06), fontsize=8.5, handlelength=1.4)
-                last = labels
+                last, since = labels, 1
         return
     known: dict[str, Any] = {}
     for cells, row in zip(rows, axes, strict=True):

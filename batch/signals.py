@@ -114,9 +114,11 @@ def _panels(group: Group, choice: Choice) -> list[Panel]:
         line = ("" if alone else label, joint, column)
         gathered.setdefault((name, units[column // width]), []).append(line)
     out = []
+    frame = str(variable.attributes.get("frame", "")) if components else ""  # a joint's own number is about its axis
+    about = ", ".join(part for part in (variable.long_name, frame) if part)
     for (name, unit), lines in gathered.items():
         labels, owners, columns = zip(*lines, strict=True)
-        out.append(Panel(name, variable.long_name, unit, variable.name, labels, columns, owners))
+        out.append(Panel(name, about, unit, variable.name, labels, columns, owners))
     return out
 
 

@@ -189,13 +189,22 @@ def explain(
 def doc(words: tuple[str, ...], form: str) -> None:
     """Show the models there are and what each declares.
 
-    KIND is servo, command, environment, metric or integrator; MODEL one of them by name.
+    KIND is servo, command, environment, metric, integrator, bed or law; MODEL one of them by name. `met doc channels`
+    lists what can be recorded, `met doc dh` says what Denavit-Hartenberg numbers are.
     """
     from ic.printing import models as print_models
+    from ic.printing.subjects import SUBJECTS
     from met import models
 
     if len(words) > 2:
         raise click.UsageError("at most a kind and a model")
+    if len(words) == 1 and words[0] in SUBJECTS:
+        text, data = SUBJECTS[words[0]]
+        if form == "json":
+            _print_json(data())
+        else:
+            _print(text())
+        return
     found = print_models.chosen(words)
     if form == "json":
         _print_json([print_models.model_json(kind, model) for kind, model in found])

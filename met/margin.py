@@ -28,7 +28,7 @@ GROWS = 1.0 + 1e-6
 """Eigenvalues above it grow; the slow modes of a servo with a heavy arm come that near to one."""
 
 LIGHTEST, HEAVIEST, STEPS = 0.05, 2000.0, 40
-"""Range of r that is searched, and how many values of it, a constant share apart."""
+"""Range of r that is searched, wider for an arm that lies outside it; and how many values, a constant share apart."""
 
 # cells that hold a rate of the shaft; and angles, which only add up and come back to nothing
 _RATES = ("shaft_rate", "bed.filtered", ":read", ":before", ":w", ":w_ref", "observer.w", "observer.y")
@@ -40,7 +40,7 @@ class Margin:
     """One substituted joint of a case.
 
     r       of the arm at the start of the run
-    limit   smallest r at which the loop is unstable; None: none found up to `HEAVIEST`
+    limit   smallest r at which the loop is unstable; None: none found up to `searched`; below r, if so light already
     """
 
     case: int
@@ -51,6 +51,7 @@ class Margin:
     delay: float
     r: float
     limit: float | None
+    searched: float
 
     @property
     def factor(self) -> float | None:
@@ -59,7 +60,8 @@ class Margin:
 
     @property
     def stable(self) -> bool:
-        return self.limit is None or self.r < self.limit
+        """Of an arm whose r is no number nothing is known: False."""
+        return self.r < (self.searched if self.limit is None else self.limit)
 
 
 def margins(
@@ -90,12 +92,16 @@ def _margins(experiment: Experiment, case: int, known: dict[tuple[Any, ...], flo
         r = load / loop.rotor
         heads = (f"{each.joint}.servo.", f"{each.joint}.bed.", f"{each.joint}.law.")
         own = [path for path in experiment.parameters if path.startswith(heads) and ".command." not in path]
-        key = (each.joint, *(builder.machine.value(path, tape.read) for path in own))
+        # Its own r is always among those searched. Where a loop grows, or not, beyond them is not known.
+        lightest, heaviest = LIGHTEST, HEAVIEST
+        if 0.0 < r < np.inf:
+            lightest, heaviest = min(lightest, 0.5 * r), max(heaviest, 2.0 * r)
+        key = (each.joint, lightest, heaviest, *(builder.machine.value(path, tape.read) for path in own))
         if key not in known:
-            known[key] = loop.limit()
+            known[key] = loop.limit(lightest, heaviest)
         delay = float(builder.machine.value(f"{each.joint}.bed.delay", tape.read))
         rate_hz = builder.schedule.base_hz / beds.divisor
-        yield Margin(case, each.joint, each.law.name, each.bed.name, rate_hz, delay, r, known[key])
+        yield Margin(case, each.joint, each.law.name, each.bed.name, rate_hz, delay, r, known[key], heaviest)
 
 
 def _faultless(experiment: Experiment) -> Experiment:
@@ -150,7 +156,10 @@ class _Loop:
         tape.k = self.beds.divisor
         tape.cells = _Noting(tape.cells)
         self._around(cells, self.rotor)
-        self.names = [name for name in cells if name in tape.cells.written and not name.endswith(_ANGLES)]
+        # Under a position command the angle acts back; else it only adds up.
+        back = f"{each.joint}:angle" if each.actuator.asked == "position" else ""
+        written = tape.cells.written
+        self.names = [name for name in cells if name in written and (name == back or not name.endswith(_ANGLES))]
         # The shaft turns on at one rate, and nothing else is under way.
         self.start = cells | {name: self.rate if name.endswith(_RATES) else 0.0 for name in self.names}
 
@@ -161,7 +170,7 @@ class _Loop:
         tape.cells.update({f"{joint}:Lambda.{joint}": np.float64(load), f"{joint}:b_0": np.float64(0.0)})
         self.beds.advance(tape)
         self.beds.read(tape)
-        asked = Asked("rate", self.rate / self.motor.ratio, 0.0)
+        asked = self._asked()
         q, qd = self.beds.seen(tape, actuator) or (0.0, 0.0)
         held = Values(actuator.owner, {m.name: tape.read(f"{actuator.path}.{m.name}") for m in actuator.servo.memory})
         seen = Seen(q, qd, asked, self.beds.period, tape.time)
@@ -171,6 +180,13 @@ class _Loop:
             tape.write(f"{actuator.path}.{name}", value)
         self.beds.act(tape)
         return {name: float(tape.cells[name]) for name in cells}
+
+    def _asked(self) -> Asked:
+        """The command, of the deck's kind, under which the shaft turns on at the steady rate."""
+        rate = self.rate / self.motor.ratio
+        kind = self.each.actuator.asked
+        value = {"position": self.beds.period * rate, "rate": rate}.get(kind, 0.0)
+        return Asked(kind, value, rate if kind == "position" else 0.0)
 
     def radius(self, r: float) -> float:
         """The largest size of an eigenvalue of the map from tick to tick."""
@@ -185,10 +201,10 @@ class _Loop:
         matrix = np.array(columns).T
         return float("inf") if not np.isfinite(matrix).all() else float(np.abs(np.linalg.eigvals(matrix)).max())
 
-    def limit(self) -> float | None:
-        """Smallest r at which the loop grows, to a hundredth; None where there is none."""
-        low = LIGHTEST
-        for r in np.geomspace(LIGHTEST, HEAVIEST, STEPS):
+    def limit(self, lightest: float, heaviest: float) -> float | None:
+        """Smallest r of this range at which the loop grows, to a hundredth; None where there is none."""
+        low = lightest
+        for r in np.geomspace(lightest, heaviest, STEPS):
             if self.radius(float(r)) > GROWS:
                 high = float(r)
                 break

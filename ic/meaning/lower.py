@@ -102,14 +102,16 @@ def chosen(definitions: Definitions, complaints: Complaints, select: Select) -> 
                 complaints.error("D164", f"no run or sweep `{name}` in this deck",
                                  help=[*did_you_mean(name, known), known_words("it has", known)])
         return [known[name] for name in names if name in known]
-    defaults = [definition for definition in known.values() if definition.default]
-    if len(known) == 1 or defaults:
-        return defaults[:1] or list(known.values())
+    default = definitions.default()
+    if len(known) == 1 or default is not None:
+        return [default] if default is not None else list(known.values())
     if complaints.errors and not known:
         return []
     if not known:
         raise Problem(error("D161", "this deck has no run", help="write `run NAME { ... }`"))
-    raise Problem(error("D162", f"this deck has {len(known)} runs and sweeps, and none is marked `default`",
+    none = "several included files mark a `default`" if any(d.default for d in known.values()) else \
+        "none is marked `default`"
+    raise Problem(error("D162", f"this deck has {len(known)} runs and sweeps, and {none}",
                         also=[Label(d.place, d.name) for d in known.values()],
                         help=[known_words("name one", known), "or write `default run ...` for one of them"]))
 

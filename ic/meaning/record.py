@@ -46,7 +46,8 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
         if made is None and scope.gone and (name.path[0].text in scope.gone or not structure.moving):
             continue
         if made is None:
-            scope.complaints.error("D125", f"no channel `{name.text}`", name.place, help=_nearest(name, known, structure))
+            scope.complaints.error("D125", f"no channel `{name.text}`", name.place,
+                                   help=_nearest(name, known, structure))
         for each in made or ():
             if each.name in found:
                 scope.complaints.error("D040", f"`{each.name}` is recorded twice", name.place,
@@ -104,10 +105,12 @@ def _why_none(words: list[str], structure: Structure) -> str:
         return (f"joint `{words[0]}` is fixed: its two links move as one body, and nothing is computed between them; "
                 "what they take shows in the reaction of the moving joint that carries them")
     moving, links = ({each.name for each in group} for group in (structure.moving, structure.links))
-    if words[0] == "links" and words[2:3] == ["jacobian"] and len(words) > 4 and words[1] in links:
-        if words[4] in moving and words[3] in FAMILIES["jacobian"] and not carries(structure, words[1], words[4]):
-            return f"joint `{words[4]}` does not carry link `{words[1]}`, so it does not move it"
-    return ""
+    if len(words) < 5 or (words[0], words[2]) != ("links", "jacobian") or words[3] not in FAMILIES["jacobian"]:
+        return ""
+    link, joint = words[1], words[4]
+    if link not in links or joint not in moving or carries(structure, link, joint):
+        return ""
+    return f"joint `{joint}` does not carry link `{link}`, so it does not move it"
 
 
 # Metrics

@@ -88,6 +88,7 @@ class Definitions:
         self._merged: dict[tuple[str, str], Block] = {}
         self._failed: set[tuple[str, str]] = set()
         self._complaints = complaints
+        self._file = deck.file
         for entry in deck.entries:
             with complaints.gather():
                 self._enter(entry)
@@ -216,10 +217,21 @@ class Definitions:
         self._by_kind[kind.text][name.text] = Definition(kind.text, name.text, group, default)
 
     def _check_defaults(self) -> None:
-        defaults = [d for kind in ("run", "sweep") for d in self._by_kind[kind].values() if d.default]
-        for extra in defaults[1:]:
-            self._complaints.error("D050", f"`{extra.name}` is a second default", extra.place,
-                                   also=[Label(defaults[0].place, "the first")], help="keep one `default`")
+        first: dict[str, Definition] = {}  # of each file: decks that can be included together have one each
+        for each in self._defaults():
+            known = first.setdefault(each.place.file, each)
+            if known is not each:
+                self._complaints.error("D050", f"`{each.name}` is a second default", each.place,
+                                       also=[Label(known.place, "the first")], help="keep one `default`")
+
+    def _defaults(self) -> list[Definition]:
+        return [d for kind in ("run", "sweep") for d in self._by_kind[kind].values() if d.default]
+
+    def default(self) -> Definition | None:
+        """The run or sweep marked `default`: the deck's own, else that of the one included file that has one."""
+        found = self._defaults()
+        own = [each for each in found if each.place.file == self._file]
+        return own[0] if own else found[0] if len({each.place.file for each in found}) == 1 else None
 
 
 def merge(base: Block | None, body: tuple[Entry, ...], *, home: str | None, base_name: str | None,

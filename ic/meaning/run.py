@@ -200,7 +200,9 @@ def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
 # Environment and initial state
 
 
-def _environment(scope: Scope, body: Block, arm: Arm, duration: float | None) -> tuple[tuple[EnvironmentUse, ...], bool]:
+def _environment(
+    scope: Scope, body: Block, arm: Arm, duration: float | None
+) -> tuple[tuple[EnvironmentUse, ...], bool]:
     uses = []
     products = True
     for item in body.items.values():

@@ -249,11 +249,11 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     if not servo.commands:
         scope.complaints.error("D150", f"{an(servo.name)} takes no command", place, help="leave `command` out")
         return None
-    course = word_of(call)
-    if course is not None and course not in COMMAND_UNIT and course in models.available("command"):
+    word = word_of(call)
+    if word is not None and word not in COMMAND_UNIT and word in models.available("command"):
         kind = "position" if "position" in servo.commands else servo.commands[0]
-        scope.complaints.error("D152", f"`{course}` is a course in time, and a command is of a kind", place,
-                               help=[f"write `{kind}({course}(...))`", f"{servo.name} takes {known}"])
+        scope.complaints.error("D152", f"`{word}` is a course in time, and a command is of a kind", place,
+                               help=[f"write `{kind}({word}(...))`", f"{servo.name} takes {known}"])
         return None
     if not isinstance(call, Call) or item.body is not None or len(call.positional) != 1:
         scope.complaints.error("D151", "a command is its kind and one value or course in time", place,

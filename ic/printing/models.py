@@ -24,6 +24,9 @@ HOW = {
     "law": "substitute JOINT { law = MODEL(...); ... }, in a run",
 }
 
+OTHERS = ("channels", "dh")
+"""What else `met doc` has a page on (ic/printing/subjects.py)."""
+
 WORDS = {
     "joint": "rad, or m on a prismatic joint",
     "effort": "N*m, or N on a prismatic joint",
@@ -45,8 +48,8 @@ def chosen(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
     found = [(k, model) for k, model in everything if model.name == words[0]]
     if found and len(words) == 1:
         return found
-    known = [*KINDS, *(model.name for _, model in everything)]
-    helps = [*did_you_mean(words[0], known), f"kinds: {', '.join(KINDS)}"]
+    known = [*KINDS, *OTHERS, *(model.name for _, model in everything)]
+    helps = [*did_you_mean(words[0], known), f"kinds: {', '.join(KINDS)}; also: {', '.join(OTHERS)}"]
     raise Problem(error("D171", f"no kind of model and no model `{words[0]}`", help=helps))
 
 
@@ -58,7 +61,7 @@ def print_list(found: list[tuple[models.Kind, Any]]) -> Iterator[str]:
             yield f"{kind}: {HOW[kind]}"
             yield from columns(rows)
             yield ""
-    yield "`met doc MODEL` says all that one declares."
+    yield "`met doc MODEL` says all that one declares; `met doc channels` what can be recorded."
 
 
 def print_model(kind: models.Kind, model: Any) -> Iterator[str]:

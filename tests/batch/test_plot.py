@@ -9,7 +9,7 @@ import pytest
 
 import batch
 from batch.archive.read import ArchiveFile
-from batch.plot import COLOURS, plot
+from batch.plot import COLOURS, FLAT, plot
 from met.diagnostic import Problem
 from tests.batch import plans
 
@@ -241,3 +241,24 @@ def test_nothing_to_draw_is_said(here: Path) -> None:
     with ArchiveFile("a.h5") as file, pytest.raises(Problem) as caught:
         plot(file, "a.png")
     assert caught.value.diagnostics[0].message == "nothing to draw in `nominal`: it has neither histories nor metrics"
+
+
+def test_a_row_that_is_zero_throughout_is_low_and_the_others_are_not(
+    here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from batch import plot as module
+
+    real = module.history
+    monkeypatch.setattr(module, "history", lambda group, panel, position: real(group, panel, position)
+                        * (panel.name != "qd"))
+    with archive(1) as file:
+        plot(file, "a.png", ["q", "qd"])
+    grid = figures[0].axes[0].get_subplotspec().get_gridspec()
+    assert [ax.get_ylabel() for ax in shown(figures[0])] == ["q  (rad)", "qd  (rad/s)"]
+    assert grid.get_height_ratios() == [1.0, FLAT]
+
+
+def test_under_many_panels_the_legend_is_there_again(here: Path, figures: list[Any]) -> None:
+    with archive(1) as file:
+        plot(file, "a.png", ["q", "qd", "tau", "q", "qd", "tau"])
+    assert [ax.get_legend() is not None for ax in shown(figures[0])] == [True, False, False, False, True, False]

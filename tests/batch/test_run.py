@@ -570,3 +570,20 @@ class TestTheRealEngine:
         ):
             np.testing.assert_array_equal(one.qd.values[0], whole.qd.values[5])
             assert one.case_id.values[0] == whole.case_id.values[5]
+
+
+def test_where_it_will_be_written_is_said_once_there_is_a_kernel(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from met import cli
+    from met import run as engine
+    from met.diagnostic import error
+
+    def refuse(*_: object) -> None:
+        raise Problem(error("E200", "a model asks for the truth of a recorded condition"))
+
+    monkeypatch.setattr(engine, "prepare", refuse)
+    plan_file.write(plans.plan(plans.nominal()), Path("p.json"))
+    assert cli.main(["run", "p.json", "-o", "a.h5"]) == 2
+    assert "writing" not in capsys.readouterr().out
+    assert not Path("a.h5").exists()

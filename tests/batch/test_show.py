@@ -201,3 +201,10 @@ def test_numbers_are_short(value: float, text: str) -> None:
 @pytest.mark.parametrize(("unit", "text"), [("kg*m^2", "kg·m²"), ("1/s^10", "1/s¹⁰"), ("m*s^-2", "m·s⁻²"), ("1", "1")])
 def test_units_are_typeset(unit: str, text: str) -> None:
     assert pretty_unit(unit) == text
+
+
+def test_an_unknown_signal_is_told_without_plots_too(sweep: ArchiveFile) -> None:
+    for plots in (True, False):
+        with pytest.raises(Problem) as caught:
+            show(sweep, ["nothing"], plots=plots)
+        assert caught.value.diagnostics[0].code == "E324"

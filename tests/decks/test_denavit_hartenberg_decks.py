@@ -9,7 +9,9 @@ import pinocchio as pin
 import pytest
 
 import ic
+from ic.find import standard_decks
 from met import run as engine
+from met.diagnostic import Problem
 from met.dynamics.kinematics import link_motions
 from met.plan import Experiment
 from met.program.machine import Machine
@@ -61,3 +63,25 @@ def test_the_decks_run_meets_its_requirements(deck: str) -> None:
     (made,) = ic.compile(deck).experiments
     result = engine.run(made)
     assert result.status.tolist() == [0] and (np.array(list(result.met.values())) == 1).all()
+
+
+def test_the_standard_decks_can_be_included_together(tmp_path: Path) -> None:
+    together = tmp_path / "all.ic"
+    together.write_text("".join(f"#include <{each}>\n" for each in standard_decks()), encoding="utf-8")
+    compiled = ic.check(together, select="all")
+    assert compiled.plan is not None, compiled.diagnostics
+    arms = {each.structure.arm for each in compiled.plan.experiments}
+    assert arms == {"panda", "puma_560", "stanford_arm", "two_link"}
+
+
+def test_of_decks_included_together_none_is_the_default_but_the_decks_own(tmp_path: Path) -> None:
+    both = "#include <puma_560.ic>\n#include <stanford_arm.ic>\n"
+    (tmp_path / "none.ic").write_text(both, encoding="utf-8")
+    with pytest.raises(Problem) as caught:
+        ic.compile(tmp_path / "none.ic")
+    (told,) = caught.value.diagnostics
+    assert (told.code, told.message) == ("D162", "this deck has 2 runs and sweeps, and several included files mark a "
+                                                 "`default`")
+    (tmp_path / "own.ic").write_text(both + "default run mine like puma_reach { duration = 1 s; }\n", encoding="utf-8")
+    (made,) = ic.compile(tmp_path / "own.ic").experiments
+    assert made.name == "mine"

@@ -224,3 +224,12 @@ def test_check_does_not_import_the_engine() -> None:
     imported = set(done.stdout.split())
     assert "ic.meaning.lower" in imported
     assert not imported & {"met.kernel", "met.run", "met.program.build", "met.trace.llvm", "batch"}
+
+
+@pytest.mark.parametrize("command", [
+    ["check", "d.ic"], ["plan", "d.ic"], ["cases", "d.ic"], ["explain", "d.ic", "q"], ["dump", "plan", "d.ic"],
+    ["run", "d.ic"], ["profile", "d.ic"], ["margin", "d.ic"],
+])  # fmt: skip
+def test_a_folder_of_i_that_is_not_there_is_an_error(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([*command, "-I", "no/such"]) == 2
+    assert "Error: Invalid value for '-I': Directory 'no/such' does not exist.\n" in capsys.readouterr().err

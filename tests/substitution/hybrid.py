@@ -17,12 +17,13 @@ SLOW = 0.03  # rad/s, the rate that the paper commands
 RATIO = 1570.0  # of the gearbox, table 1
 ROTOR = RATIO**2 * 6.38e-5  # N^2 J_m of table 1, kg m^2
 
-# Factors on both rods' masses of two_link.ic for r = J_eff/(N^2 J_m) of 0.5, 1.5, 5, 20 and 50 while the elbow moves.
-R = (0.5, 1.5, 5.0, 20.0, 50.0)
-LOADS = (0.34054, 1.1037, 4.74586, 31.5946, 94.6067)
+R = (0.5, 1.5, 5.0, 20.0)  # r = J_eff/(N^2 J_m) of the table of what to expect (docs/physics.md, motor substitution)
 
-# From 0.03 rad/s to -0.03 rad/s and back, every 1.5 s, within one tick of 1 kHz.
-REVERSING = "table(times = [0, 1.4995, 1.5, 2.9995, 3, 4.4995, 4.5, 5] s, values = [slow, slow, -slow, -slow, slow, slow, -slow, -slow])"
+# From 0.03 rad/s to -0.03 rad/s and back, every 1.5 s, between two ticks of 1 kHz.
+REVERSING = (
+    "table(times = [0, 1.4995, 1.5, 2.9995, 3, 4.4995, 4.5, 5] s, "
+    "values = [slow, slow, -slow, -slow, slow, slow, -slow, -slow])"
+)
 
 TWO_LINK = ("two_link", ("shoulder", "elbow"), "")
 
@@ -54,6 +55,7 @@ def deck(
     command: str = "slow",
     duration: float = 5.0,
     base: float | None = None,
+    fast: float = 1000.0,
     servo: Mapping[str, str] | None = None,
     sweep: str = "",
     swept: str = "",
@@ -61,9 +63,9 @@ def deck(
     pure: str = "",
     hybrid: str = "",
 ) -> str:
-    """A deck with the sweeps `own` and `bench` (runs `on_own` and `on_bench`): these joints' motors their own, or on beds.
+    """A deck with the sweeps `own` and `bench` (runs `on_own`, `on_bench`): joints on their own motors, or on beds.
 
-    The run on its own motors has the same servos, and dynamics at 1 kHz or faster. Rates in Hz, duration in s.
+    The run on its own motors has the same servos, and dynamics of rate `fast`. Rates in Hz, duration in s.
     arm     name, joints, and text that defines it; without velocity products for two_link.ic alone, as there
     pure    more of the bodies of both runs;  hybrid: of the second
     sweep   body of both sweeps;  swept: more of that of `bench`, before it
@@ -73,7 +75,6 @@ def deck(
     both = "\n".join(f"    substitute {joint} {{ bed = {bed};  law = {law}; }}" for joint in joints)
     shafts = ", ".join(f"{joint}.bed.shaft_rate" for joint in joints)
     used = " ".join(f"{joint} = {(servo or {}).get(joint, 'told')};" for joint in moving)
-    fast = max(dynamics, servos, 1000.0)
     return f"""
         #include <two_link.ic>
         {text}
@@ -82,7 +83,7 @@ def deck(
             arm      = {name};
             servos   {{ {used} }}
             rates    {{ base = {fast} Hz; dynamics = {fast} Hz; servos = {servos} Hz; record = {record or servos} Hz; }}
-            environment {{ velocity_products = {"off" if arm is TWO_LINK else "on"}; }}
+            {"environment { velocity_products = off; }" if arm is TWO_LINK else ""}
             duration = {duration} s;
             record   = [q, qd, J_eff];
             {pure}
@@ -98,10 +99,30 @@ def deck(
     """
 
 
-def loads(factors: Sequence[float]) -> str:
-    """Body of a sweep: both rods of two_link.ic heavier by one factor."""
-    upper, lower = (", ".join(f"{mass * each:.9g}" for each in factors) for mass in (40.0, 20.0))
+def loads(heaviness: Sequence[float]) -> str:
+    """Body of a sweep: both rods of two_link.ic heavier by one factor, for these r of the shoulder (see `inertias`)."""
+    found = [factor(r) for r in heaviness]
+    upper, lower = (", ".join(f"{mass * each:.9g}" for each in found) for mass in (40.0, 20.0))
     return f"zip {{ links.upper.mass = [{upper}] kg;  links.lower.mass = [{lower}] kg; }}"
+
+
+def inertias(heavier: float) -> np.ndarray:
+    """Inertia matrix of the straight arm of two_link.ic about its joints, both rods heavier by a factor: kg m^2."""
+    length, upper, lower = 2.0, 40.0 * heavier, 20.0 * heavier
+    elbow = lower * length**2 / 3.0
+    both = lower * length**2 / 2.0
+    return np.array([[upper * length**2 / 3.0 + lower * length**2 + 2.0 * both + elbow, both + elbow],
+                     [both + elbow, elbow]])  # fmt: skip
+
+
+def factor(r: float) -> float:
+    """How much heavier both rods are, where the shoulder's r is this while the elbow turns freely but for its rotor."""
+    low, high = 1e-3, 1e4
+    for _ in range(60):
+        middle = (low * high) ** 0.5
+        (shoulder, both), (_, elbow) = inertias(middle)
+        low, high = (middle, high) if (shoulder - both**2 / (elbow + ROTOR)) / ROTOR < r else (low, middle)
+    return low
 
 
 def shaft(run: engine.Run, joint: str) -> np.ndarray:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import ic
 from ic.find import find, standard_decks
 from ic.printing.cases import prefixes
 from ic.printing.columns import columns, number, size
@@ -500,3 +501,56 @@ def test_a_default_has_no_source(capsys: pytest.CaptureFixture[str]) -> None:
     (told,) = json.loads(printed(capsys, "explain", "swing.ic", "knee.servo.f_c", "--format", "json"))
     assert (told["origin"], told["note"]) == ("default", "")
     assert "Hill, Hopping, Price 1989" in printed(capsys, "doc", "rigid_gearbox")
+
+
+def test_explain_of_a_varied_number_stops_at_the_bracket_that_holds_what_it_overrides(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "d.ic").write_text("""\
+let span = 0.5 m;
+arm a {
+    link bar { mass = 1 kg; shape = sphere(radius = 1 cm); }
+    joint hinge revolute { parent = base; child = bar; dh = classic(a = span); }
+}
+run r { arm = a; rates { dynamics = 1 kHz; } duration = 1 s; record = [q]; }
+sweep s of r { vary hinge.dh.a = [0.4, 0.6] m; }
+""")
+    deck = str(tmp_path / "d.ic")
+    assert printed(capsys, "explain", deck, "hinge.dh.a", "--run", "s") == f"""\
+hinge.dh.a = 0.4 to 0.6 m, varies with the case
+ --> {deck}:7:21
+  |
+7 | sweep s of r {{ vary hinge.dh.a = [0.4, 0.6] m; }}
+  |                     ^^^^^^^^^^ a sweep varies it, here
+ ::: {deck}:1:5  span = 0.5 m
+ ::: {deck}:4:73  overrides `span`
+"""
+    assert complained(capsys, "explain", deck, "hinge.servo", "--run", "r") == (
+        "error[D170]: no parameter `hinge.servo` in `r`\n"
+        " = help: joint `hinge` has no servo here: it is free\n"
+        "\n1 error\n"
+    )
+
+
+def test_doc_lists_every_channel_that_an_arm_has(capsys: pytest.CaptureFixture[str]) -> None:
+    from met.channel import channels
+
+    out = printed(capsys, "doc", "channels")
+    (run,) = ic.compile("puma_560.ic").experiments
+    heads = {f"{joint.name}.": "JOINT." for joint in run.structure.moving}
+    heads |= {f"links.{link.name}.": "links.LINK." for link in run.structure.links}
+    for path, channel in channels(run.structure).items():
+        whole = path.rpartition(".")[0] if channel.components else path
+        for head, said in heads.items():
+            whole = whole.replace(head, said, 1) if whole.startswith(head) else whole
+        if ".servo." not in path and ".jacobian." not in path:
+            assert f"\n  {whole} " in out
+    assert "links.LINK.jacobian.linear.JOINT" in out
+
+
+def test_doc_says_what_denavit_hartenberg_numbers_are(capsys: pytest.CaptureFixture[str]) -> None:
+    out = printed(capsys, "doc", "dh")
+    assert "classic     Rz(theta) Tz(d) Tx(a) Rx(alpha)" in out
+    assert [each["name"] for each in json.loads(printed(capsys, "doc", "dh", "--format", "json"))] == [
+        "a", "alpha", "d", "theta",
+    ]  # fmt: skip

@@ -1,0 +1,63 @@
+"""docs/substitution.md says what runs: its deck, its limits, what its laws are off."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ic
+from met import run as engine
+from met.plan import Experiment
+from tests.paper.stability_map import limits
+
+PAGE = (Path(__file__).parents[2] / "docs" / "substitution.md").read_text(encoding="utf-8")
+(DECK,) = re.findall(r"```c\n(.*?)```", PAGE, re.DOTALL)
+RATIO, SLOW = 1570.0, 0.03
+LIGHT_TO_HEAVY = (0.5, 1.5, 5.0, 20.0)
+
+
+def experiment(folder: Path, more: str, name: str) -> Experiment:
+    deck = folder / "page.ic"
+    deck.write_text(DECK + more, encoding="utf-8")
+    return ic.compile(deck, select=[name]).experiments[0]
+
+
+def test_the_deck_of_the_page_runs(tmp_path: Path) -> None:
+    result = engine.run(experiment(tmp_path, "", "bench"))
+    assert result.cause == [""]
+    shaft = result.signals["swing.bed.shaft_rate"].ravel()
+    # After 5 s, with an arm of five rotors; the error of the whole course is held to below.
+    assert abs(shaft[-1] / RATIO / SLOW - 1.0) < 0.01
+
+
+@pytest.mark.parametrize("rate", ["100 Hz", "200 Hz", "1 kHz", "2 kHz"])
+def test_the_limits_of_the_page_are_those_that_are_predicted(rate: str) -> None:
+    (row,) = re.findall(rf"^\| {rate} \| (\S+) \| (\S+) \| (\S+) \|$", PAGE, re.MULTILINE)
+    found = limits("measured_acceleration", float(rate.split()[0]) * (1000.0 if "kHz" in rate else 1.0))
+    assert row == tuple(f"{limit:#.3g}" for limit in found if limit is not None)
+
+
+@pytest.mark.parametrize("law", ["velocity_tracking", "torque_balance_observer", "torque_balance", "bare"])
+def test_the_errors_of_the_page_are_those_of_its_deck(law: str, tmp_path: Path) -> None:
+    """At 1 kHz, without faults and delay; the third digit is the page's rounding."""
+    (row,) = re.findall(rf"^\| `{law}` \| ([^|]*/[^|]*) % \|.*% \|.*% \|$", PAGE, re.MULTILINE)
+    more = f"""
+        run ideal like bench {{
+            swing {{ bed = emulated;  law = {law}; }}
+            rates {{ record = 1 kHz; }}
+        }}
+        run pure like software {{ rates {{ record = 1 kHz; }} }}
+        sweep beds of ideal {{ vary links.beam.mass = {masses()}; }}
+        sweep pures of pure {{ vary links.beam.mass = {masses()}; }}
+    """
+    mixed, pure = (engine.run(experiment(tmp_path, more, name)) for name in ("beds", "pures"))
+    shaft = mixed.signals["swing.bed.shaft_rate"].reshape(len(LIGHT_TO_HEAVY), -1) / RATIO
+    off = 100.0 * np.sqrt(np.mean((shaft - pure.signals["qd"][:, :, 0]) ** 2, axis=1)) / SLOW
+    assert row == " / ".join(f"{each:#.2g}".rstrip(".") for each in off)
+
+
+def masses() -> str:
+    return "[" + ", ".join(f"{r} * rotor / 1 m^2" for r in LIGHT_TO_HEAVY) + "]"

@@ -1,0 +1,123 @@
+"""What a deck says and would have no effect is told: gains of zero, wrenches that never act, commands that jump."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from met import plan_file
+from met.diagnostic import Problem
+from tests.ic.small_decks import ARM, RUN, changed, check, codes, told
+
+# ruff: noqa: E501 - messages are as wide as they are
+
+IDEAL = "servo drive { model = ideal; bandwidth = 2 1/s; command = position(0 rad); }\n"
+PUSHED = changed(RUN, ("duration", "environment { push = wrench { link = bar; force = [1, 0, 0] N; }; }\n    duration"))
+
+
+def shown(folder: Path, *parts: str) -> str:
+    """What is said of a deck, without the counting line."""
+    return told(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
+
+
+def test_a_bandwidth_of_zero_never_moves_the_joint(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, changed(IDEAL, ("2 1/s", "0 1/s")), RUN) == """\
+error[D077]: `bandwidth` of servo `drive` must be above 0 1/s under a position command
+ --> deck.ic:5:42
+  |
+5 | servo drive { model = ideal; bandwidth = 0 1/s; command = position(0 rad); }
+  |                                          ^^^^^ this is 0 1/s
+  = help: write a number above 0 1/s (how fast an error dies away, used under a rate or position command)
+"""
+
+
+def test_a_bandwidth_of_zero_in_a_sweep_names_the_case(tmp_path: Path) -> None:
+    sweep = "sweep widths of hold { vary drive.bandwidth = [1, 0] 1/s; }\n"
+    assert shown(tmp_path, ARM, changed(IDEAL, ("position(0 rad)", "rate(1 rad/s)")), RUN, sweep) == """\
+error[D077]: `bandwidth` of servo `drive` must be above 0 1/s under a rate command; case #1 breaks it
+  --> deck.ic:13:29
+   |
+13 | sweep widths of hold { vary drive.bandwidth = [1, 0] 1/s; }
+   |                             ^^^^^^^^^^^^^^^ this is 0 1/s
+   = help: case #1: drive.bandwidth = 0 1/s
+   = help: write a number above 0 1/s (how fast an error dies away, used under a rate or position command)
+"""
+
+
+def test_under_an_acceleration_command_a_bandwidth_of_zero_is_as_good_as_any(tmp_path: Path) -> None:
+    servo = changed(IDEAL, ("2 1/s", "0 1/s"), ("position(0 rad)", "acceleration(1 rad/s^2)"))
+    assert codes(tmp_path, ARM, servo, RUN) == []
+
+
+def test_a_plan_file_with_a_bandwidth_of_zero_is_refused(tmp_path: Path) -> None:
+    plan = check(tmp_path, ARM, IDEAL, RUN).plan
+    assert plan is not None
+    before, head, after = plan_file.dumps(plan).partition('"hinge.servo.bandwidth":')
+    (tmp_path / "p.json").write_text(before + head + after.replace("2.0", "0.0", 1), encoding="utf-8")
+    with pytest.raises(Problem) as caught:
+        plan_file.read(tmp_path / "p.json")
+    assert "it should be above 0" in caught.value.diagnostics[0].message
+
+
+@pytest.mark.parametrize(("written", "line"), [
+    ("force = [1, 0, 0] N; from = 2 s; until = 1 s", "it would begin at 2 s and end at 1 s"),
+    ("force = [1, 0, 0] N; from = 1 s", "it would begin at 1 s, and the run ends at 1 s"),
+    ("moment = [0, 0, 0] N*m", "it has neither force nor moment"),
+    ("force = [1, 0, 0] N; from = -1 s; until = 0 s", "it would end at 0 s, and the run begins at 0 s"),
+])  # fmt: skip
+def test_a_wrench_that_can_never_act_is_told(tmp_path: Path, written: str, line: str) -> None:
+    (told,) = check(tmp_path, ARM, IDEAL, changed(PUSHED, ("force = [1, 0, 0] N", written))).diagnostics
+    assert (told.code, told.severity, told.message) == ("D168", "warning", f"environment `push` never acts: {line}")
+
+
+def test_the_place_of_a_wrench_that_never_acts_is_what_says_so(tmp_path: Path) -> None:
+    assert shown(tmp_path, ARM, IDEAL, changed(PUSHED, ("force = [1, 0, 0] N", "force = [1, 0, 0] N; from = 5 s"))) == """\
+warning[D168]: environment `push` never acts: it would begin at 5 s, and the run ends at 1 s
+  --> deck.ic:10:75
+   |
+10 |     environment { push = wrench { link = bar; force = [1, 0, 0] N; from = 5 s; }; }
+   |                                                                           ^^^
+   = help: change that, or leave it out
+"""
+
+
+def test_a_wrench_that_acts_or_that_a_sweep_varies_is_none(tmp_path: Path) -> None:
+    assert codes(tmp_path, ARM, IDEAL, PUSHED) == []
+    late = changed(PUSHED, ("force = [1, 0, 0] N", "force = [1, 0, 0] N; from = 5 s"))
+    sweep = "sweep times of hold { vary environment.push.from = [0.5, 5] s; }\n"
+    assert codes(tmp_path, ARM, IDEAL, late, sweep, select=["times"]) == []
+
+
+def test_a_position_command_that_begins_elsewhere_than_its_joint(tmp_path: Path) -> None:
+    run = changed(RUN, ("duration", "initial { hinge.q = 10 deg; }\n    duration"))
+    assert shown(tmp_path, ARM, changed(IDEAL, ("0 rad", "0.5 rad")), run) == """\
+warning[D169]: the command of joint `hinge` begins at 0.5 rad, and the joint at 0.174533 rad: it jumps
+ --> deck.ic:5:68
+  |
+5 | servo drive { model = ideal; bandwidth = 2 1/s; command = position(0.5 rad); }
+  |                                                                    ^^^^^^^
+ ::: deck.ic:10:25  the joint begins here
+  = help: write `hinge.q = 0.5 rad;` in `initial`, or begin the command elsewhere
+"""
+
+
+@pytest.mark.parametrize(("course", "jumps"), [
+    ("trapezoid(start = 1 rad, to = 2 rad, max_rate = 1 rad/s, max_acceleration = 1 rad/s^2)", True),
+    ("chirp(amplitude = 1 rad, f0 = 1 Hz, f1 = 2 Hz, over = 1 s, phase = 90 deg)", True),
+    ("table(times = [0, 1] s, values = [1, 2] rad)", True),
+    ("trapezoid(to = 2 rad, max_rate = 1 rad/s, max_acceleration = 1 rad/s^2)", False),
+    ("chirp(amplitude = 1 rad, f0 = 1 Hz, f1 = 2 Hz, over = 1 s)", False),
+    ("step(to = 1 rad, at = 0.5 s)", False),
+    ("5e-10 rad", False),
+])  # fmt: skip
+def test_a_course_jumps_where_its_value_at_the_start_is_not_the_joints(tmp_path: Path, course: str, jumps: bool) -> None:
+    assert codes(tmp_path, ARM, changed(IDEAL, ("0 rad", course)), RUN) == ["D169"] * jumps
+
+
+def test_of_what_a_sweep_varies_and_of_a_real_servo_nothing_is_said(tmp_path: Path) -> None:
+    sweep = "sweep starts of hold { vary initial.hinge.q = [0.1, 0.2] rad; }\n"
+    assert codes(tmp_path, ARM, IDEAL, RUN, sweep, select=["starts"]) == []
+    gearbox = ("servo drive { model = rigid_gearbox; ratio = 100; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm;"
+               " kt = 0.05 N*m/A; tau_max = 1 N*m; j_m = 1e-4 kg*m^2; k_position = 5 1/s; command = position(1 rad); }\n")
+    assert codes(tmp_path, ARM, gearbox, RUN) == []
