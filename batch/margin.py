@@ -16,15 +16,16 @@ def told(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> Iterator[
     cases = f", {count(len(found), 'case')}" if len(found) > 1 else ""
     yield f"{experiment.name}: {count(len(found[0]), 'joint')} on a bed{cases}"
     yield ""
-    rows = [["joint", "law", "servo", "delay", "r", "stable to r", "margin"]]
+    several = len(found[0]) > 1
+    rows = [["joint", "law", "servo", "delay", "r", *["together"] * several, "stable to r", "margin"]]
     joints = list(zip(*found, strict=True))
     for each in joints:
         worst = min(each, key=_room)
         rows.append([
             worst.joint, worst.law, f"{worst.rate_hz:g} Hz", f"{worst.delay:g}", f"{worst.r:.3g}",
-            _limit(worst), _verdict(worst),
+            *[f"{worst.together:.3g}"] * several, _limit(worst), _verdict(worst),
         ])  # fmt: skip
-    yield from columns(rows, right=(2, 3, 4, 5))
+    yield from columns(rows, right=(2, 3, 4, 5, 6) if several else (2, 3, 4, 5))
     yield ""
     for each in joints:
         bad = [one for one in each if not one.stable]
@@ -32,6 +33,8 @@ def told(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> Iterator[
             named = ", ".join(f"#{one.case}" for one in bad[:5]) + (" ..." if len(bad) > 5 else "")
             yield f"  {each[0].joint}: not stable in {len(bad)} of {len(found)} cases: {named}"
     yield "  r = J_eff/(N^2 J_m) at the start of the run, each joint by itself; delay in ticks of the servo"
+    if several:
+        yield "  together: the largest of any motion of all of them, which the limit is held against"
 
 
 def as_data(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> dict[str, Any]:
@@ -46,12 +49,12 @@ def _limit(one: Margin) -> str:
 
 def _room(one: Margin) -> float:
     """How many times heavier the arm might be at least; nothing is tighter than an arm whose r is no number."""
-    room = one.factor if one.factor is not None else one.searched / one.r
+    room = one.factor if one.factor is not None else one.searched / one.together
     return room if room == room else 0.0
 
 
 def _verdict(one: Margin) -> str:
-    if not one.stable and one.r != one.r:
+    if not one.stable and one.together != one.together:
         return "NONE: r is no number"
     if one.factor is None:
         return "no limit found"

@@ -39,8 +39,9 @@ _ANGLES = ("angle",)
 class Margin:
     """One substituted joint of a case.
 
-    r       of the arm at the start of the run
-    limit   smallest r at which the loop is unstable; None: none found up to `searched`; below r, if so light already
+    r         of the arm at the start of the run
+    together  the largest r of any motion of all substituted joints, an eigenvalue of Lambda/(N^2 J_m); of one joint: r
+    limit     smallest r at which the loop is unstable; None: none found up to `searched`; below r, if so light already
     """
 
     case: int
@@ -50,24 +51,28 @@ class Margin:
     rate_hz: float
     delay: float
     r: float
+    together: float
     limit: float | None
     searched: float
 
     @property
     def factor(self) -> float | None:
         """How many times heavier the arm might be; None where no limit was found."""
-        return None if self.limit is None else self.limit / self.r
+        return None if self.limit is None else self.limit / self.together
 
     @property
     def stable(self) -> bool:
         """Of an arm whose r is no number nothing is known: False."""
-        return self.r < (self.searched if self.limit is None else self.limit)
+        return self.together < (self.searched if self.limit is None else self.limit)
 
 
 def margins(
     experiment: Experiment, cases: Sequence[int] | None = None, progress: Callable[[int], None] | None = None
 ) -> tuple[tuple[Margin, ...], ...]:
-    """Every substituted joint of an experiment, each by itself: one tuple a case (all by default).
+    """Every substituted joint of an experiment: one tuple a case (all by default).
+
+    The loop is taken round for each joint by itself, and held against the heaviest that the arm is in any motion of all
+    of them together: their loops are one through the arm.
 
     progress  called with the number of cases done so far. A limit is looked for once for all cases that share the
               parameters of servo, bed and law
@@ -86,22 +91,25 @@ def _margins(experiment: Experiment, case: int, known: dict[tuple[Any, ...], flo
     builder, tape = _begun(experiment, case)
     beds = builder.step.beds
     # All of them first: a loop is taken round over the same cells, with loads of its own.
-    felt = [float(tape.read(f"{each.joint}:Lambda.{each.joint}")) for each in beds.mounted]
-    for each, load in zip(beds.mounted, felt, strict=True):
-        loop = _Loop(builder, tape, each)
-        r = load / loop.rotor
+    names = [each.joint for each in beds.mounted]
+    Lambda = np.array([[float(tape.read(f"{a}:Lambda.{b}")) for b in names] for a in names])
+    loops = [_Loop(builder, tape, each) for each in beds.mounted]
+    ratios = Lambda / np.array([loop.rotor for loop in loops])[:, None]
+    # of a matrix that is similar to a symmetric one: real but for rounding
+    together = float(np.linalg.eigvals(ratios).real.max()) if np.isfinite(ratios).all() else np.nan
+    for each, loop, r in zip(beds.mounted, loops, ratios.diagonal().tolist(), strict=True):
         heads = (f"{each.joint}.servo.", f"{each.joint}.bed.", f"{each.joint}.law.")
         own = [path for path in experiment.parameters if path.startswith(heads) and ".command." not in path]
         # Its own r is always among those searched. Where a loop grows, or not, beyond them is not known.
         lightest, heaviest = LIGHTEST, HEAVIEST
-        if 0.0 < r < np.inf:
-            lightest, heaviest = min(lightest, 0.5 * r), max(heaviest, 2.0 * r)
+        if r > 0.0 and together < np.inf:
+            lightest, heaviest = min(lightest, 0.5 * r), max(heaviest, 2.0 * together)
         key = (each.joint, lightest, heaviest, *(builder.machine.value(path, tape.read) for path in own))
         if key not in known:
             known[key] = loop.limit(lightest, heaviest)
         delay = float(builder.machine.value(f"{each.joint}.bed.delay", tape.read))
         rate_hz = builder.schedule.base_hz / beds.divisor
-        yield Margin(case, each.joint, each.law.name, each.bed.name, rate_hz, delay, r, known[key], heaviest)
+        yield Margin(case, each.joint, each.law.name, each.bed.name, rate_hz, delay, r, together, known[key], heaviest)
 
 
 def _faultless(experiment: Experiment) -> Experiment:

@@ -55,9 +55,11 @@ FLOPS = {"add": 1, "sub": 1, "mul": 1, "div": 1, "sqrt": 1, "fma": 2}
 """Operations that count as arithmetic, and for how much; comparing, choosing and moving count for none."""
 
 WORK = {
-    "servos_": "servo computers", "modes": "friction modes", "decide": "friction decisions", "derive": "first stage",
-    "judge": "failures", "left_open": "friction decisions", "advance": "integrator", "carry": "integrator",
-    "slope": "further stages", "split": "friction splits", "metrics_": "metrics", "record": "recorder",
+    "bed": "emulated beds", "read": "observers", "follow": "observers", "servos_": "servo computers",
+    "modes": "friction modes", "decide": "friction decisions", "arm": "arm on a bed", "law": "laws", "given": "laws",
+    "derive": "first stage", "judge": "failures", "left_open": "friction decisions", "advance": "integrator",
+    "carry": "integrator", "slope": "further stages", "split": "friction splits", "metrics_": "metrics",
+    "record": "recorder",
 }  # fmt: skip
 """What a phase's work is called, by the beginning of its name; in the order of an instant and the step after it."""
 

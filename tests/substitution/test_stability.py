@@ -136,6 +136,10 @@ def test_joints_by_measured_acceleration_together_grow_by_the_largest_r_of_all_t
         assert first > 0 and found[first:].all()
         worst.see(abs(wanted[first] / 5.4 - 1.0), f"{joint}, r = {wanted[first]:.3g}")
     worst.below(0.1)
+    told = margins(compiled(text, "bench"), [0, len(heavier) - 1])
+    assert [one.stable for case in told for one in case] == [True, True, False, False]
+    # each joint by itself would not grow: the elbow is far from its limit
+    assert all(one.limit is not None and case[1].r < 0.3 * one.limit for case in told for one in case)
 
 
 def test_the_margin_tells_the_r_of_the_arm_at_the_start() -> None:
