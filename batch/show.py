@@ -143,6 +143,9 @@ def verdict(summary: Summary, width: int) -> list[str]:
         out += textwrap.wrap(failure.cause, max(width, 40), initial_indent=head, subsequent_indent=" " * len(head))
     if summary.failed > len(summary.failures):
         out.append(f"  and {summary.failed - len(summary.failures):,} more; `cause` in the archive has them all")
+    if summary.limited:
+        of = "" if summary.cases == 1 else f" in {summary.limited:,} of {summary.cases:,} cases"
+        out.append(f"  note: the load motor of a bed was at its limit{of}: the run is not what the joint would do")
     if summary.metrics:
         out += _metric_table(summary)
     wide = max((len(r.text) for r in summary.requirements), default=0)

@@ -56,7 +56,11 @@ class RequirementSummary:
 
 @frozen
 class Summary:
-    """One experiment's outcome. failures: a few of them, unlike ones first."""
+    """One experiment's outcome.
+
+    failures  a few of them, unlike ones first
+    limited   cases in which the load motor of a bed was at its limit at some tick
+    """
 
     name: str
     cases: int
@@ -65,6 +69,7 @@ class Summary:
     failures: tuple[Failure, ...]
     metrics: tuple[MetricSummary, ...]
     requirements: tuple[RequirementSummary, ...]
+    limited: int = 0
 
     @property
     def ok(self) -> bool:
@@ -109,6 +114,7 @@ def summary_of(group: Group, position: int | None = None) -> Summary:
         failures=failures,
         metrics=tuple(_metric(v, group.values(v.name)[here]) for v in group.role("metric")),
         requirements=requirements,
+        limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
     )
 
 

@@ -13,6 +13,7 @@ from met.frozen import frozen
 from met.plan import Experiment
 from met.program.build import COORDINATE, METRIC, OUTPUTS, build
 from met.program.step import EVENTS, NOT_FINITE, SINGULAR
+from met.program.substituted import LIMITED
 from met.trace.program import Program
 
 DONE, FAILED = 0, 1
@@ -32,6 +33,7 @@ class Run:
     met          requirements by their text: True where met; False for a failed case
     coordinates  the varied parameters as the engine used them, by path, SI
     events       friction events by name: splits, clamped, undecided (docs/physics.md, section 6)
+    limited      ticks at which the load motor of a bed was at its limit
     """
 
     case: np.ndarray
@@ -44,6 +46,7 @@ class Run:
     met: dict[str, np.ndarray]
     coordinates: dict[str, np.ndarray]
     events: dict[str, np.ndarray]
+    limited: np.ndarray
 
 
 @frozen
@@ -133,6 +136,7 @@ def _results(
         met={r.text: _met(metrics[r.metric], r.comparison, r.limit) for r in experiment.requirements},
         coordinates={c.path: out[COORDINATE + c.path] for c in experiment.cases.coordinates},
         events={name.split(".")[1]: out[name].astype(np.int64) for name in EVENTS},
+        limited=out[LIMITED].astype(np.int64),
     )
 
 

@@ -60,9 +60,11 @@ EVENTS = {
 }
 """Counts of friction's events in a case (`met.run.Run.events`): variables `friction_...`."""
 
+LIMITED = "ticks at which the load motor of a bed was at its limit"
+
 RESERVED = frozenset({
     "case", "recorded_case", "time", "joint", "requirement", "case_id", "case_key", "repeat", "seed", "status",
-    "cause", "n_valid", "met", "provenance", *(f"friction_{name}" for name in EVENTS),
+    "cause", "n_valid", "met", "provenance", "bed_limited", *(f"friction_{name}" for name in EVENTS),
 })  # fmt: skip
 """What a group holds under names of our own. A deck's name that is taken here, or by a signal, gets a word before it:
 `coordinates.seed`, `metrics.time`, and for an experiment's group `experiments.provenance`."""
@@ -200,6 +202,7 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         variable("cause", "str", "why the case failed; empty where it did not"),
         variable("n_valid", "int64", "recorded rows before the case failed; after them, not-a-number"),
         *(variable(f"friction_{name}", "int64", words) for name, words in EVENTS.items()),
+        *([variable("bed_limited", "int64", LIMITED)] if experiment.structure.substitutions else []),
     ]
     taken |= set(names.values())
     metrics = [use.name for use in experiment.structure.metrics]

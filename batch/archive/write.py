@@ -66,6 +66,8 @@ class Writer:
             "status": run.status, "cause": run.cause, "n_valid": run.n_valid,
             **{f"friction_{name}": count for name, count in run.events.items()},
         }  # fmt: skip
+        if target.experiment.structure.substitutions:
+            given["bed_limited"] = run.limited
         for variable in target.layout.role("coordinate"):
             given[variable.name] = run.coordinates[variable.key]
         for variable in target.layout.role("metric"):

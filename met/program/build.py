@@ -15,6 +15,7 @@ from met.plan import Experiment
 from met.program.machine import PARAMETER, Actuator, Machine
 from met.program.observe import derived
 from met.program.step import EVENTS, Step
+from met.program.substituted import LIMITED
 from met.program.values import Values, answer, parameters, returned
 from met.servos.servo import Asked, Seen
 from met.trace import Real, both, floor, where
@@ -22,7 +23,7 @@ from met.trace.program import Call, Control, Every, Phase, Program, Record, Run,
 
 Body = Callable[[Tape], None]
 
-OUTPUTS = ("failure", "failure.joint", "failure.tick", *EVENTS)
+OUTPUTS = ("failure", "failure.joint", "failure.tick", *EVENTS, LIMITED)
 
 COORDINATE, METRIC = "coordinate:", "metric:"
 """Prefixes of the outputs, and cells, that are named by a deck: no name of a deck's is one of the engine's."""

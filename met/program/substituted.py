@@ -16,6 +16,7 @@ from typing import Any
 
 from met.frozen import frozen
 from met.parameter import Parameter
+from met.program import cells
 from met.program.machine import Actuator, Machine
 from met.program.values import Values, answer, parameters, returned
 from met.servos.motor import Motor, torque
@@ -29,6 +30,9 @@ from met.trace.program import Control, Every, Phase, Run, Tape, Unless0, WhileAn
 
 QUEUE = 3
 """Ticks of delay that there is room for (parameter `delay` of a bed)."""
+
+LIMITED = "bed.limited"
+"""Counts a case: ticks at which a bed's load motor was at its limit."""
 
 SETTLING = 0.25
 """Time in which the observer's covariance settles, s: some thirty of its slowest time constants."""
@@ -291,7 +295,8 @@ class Substituted:
         name = each.joint
         p = self._bed_values(tape, each)
         asked = Wire(self._voltage(tape, each), given.torque / p.kt_load)
-        asked = answer(self._owner(each), each.bed.taken, p, asked)
+        asked, limited = answer(self._owner(each), each.bed.taken, p, asked)
+        cells.count(tape, limited, LIMITED)
         delay = self._delay(tape, each)
         late = self._queued(tape, each, delay)
         at_once = delay == 0.0

@@ -13,7 +13,7 @@ from typing import Any
 
 from met.frozen import frozen
 from met.parameter import Memory, Parameter
-from met.trace import Real
+from met.trace import Real, Truth
 
 
 @frozen
@@ -35,7 +35,7 @@ class Bed:
     memory    its state, recorded under its names; `shaft_rate` (rad/s) is among them
     advance   (p, held, wire, time, draw) -> the memory after `time` s, by name
     read      (p, held) -> the filtered rate as the computer reads it, rad/s
-    taken     (p, wire) -> what the amplifiers make of a command: converters and limits
+    taken     (p, wire) -> what the amplifiers make of a command, converters and limits; whether a limit held it back
     presets   by the word `faults`: what parameters are that a deck does not write
     """
 
@@ -45,5 +45,5 @@ class Bed:
     memory: tuple[Memory, ...]
     advance: Callable[[Any, Any, Wire, float, Draw], Mapping[str, Real]]
     read: Callable[[Any, Any], Real]
-    taken: Callable[[Any, Wire], Wire]
+    taken: Callable[[Any, Wire], tuple[Wire, Truth]]
     presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)

@@ -21,7 +21,7 @@ from met.parameter import Memory, Parameter
 from met.servos.motor import torque
 from met.substitution import butterworth, shaft
 from met.substitution.bed import Bed, Draw, Wire
-from met.trace import Real, absolute, clip, rint, sin, where
+from met.trace import Real, Truth, absolute, clip, rint, sin, where
 
 SUBSTEP = 250e-6
 """Longest substep, s. Against one of 50 us a run moves by 0.005 % of its rate, all faults on."""
@@ -56,9 +56,10 @@ def read(p: Any, held: Any) -> Real:
     return converted(held.filtered, p.converter_in)
 
 
-def taken(p: Any, wire: Wire) -> Wire:
-    current = clip(converted(wire.current, p.converter_current), -p.i_max, p.i_max)
-    return Wire(converted(wire.voltage, p.converter_voltage), current)
+def taken(p: Any, wire: Wire) -> tuple[Wire, Truth]:
+    current = converted(wire.current, p.converter_current)
+    held = Wire(converted(wire.voltage, p.converter_voltage), clip(current, -p.i_max, p.i_max))
+    return held, absolute(current) > p.i_max
 
 
 def converted(x: Real, resolution: Real) -> Real:

@@ -187,4 +187,5 @@ def answer(
         met={r.text: COMPARE[r.comparison](metrics[r.metric], r.limit) for r in experiment.requirements},
         coordinates=values,
         events={name: np.zeros(len(rows), dtype=np.int64) for name in ("splits", "clamped", "undecided")},
+        limited=np.zeros(len(rows), dtype=np.int64),
     )
