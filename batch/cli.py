@@ -157,7 +157,8 @@ def margin(
     plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, quiet=form == "json")
     asked = [each for each in experiments_named(plan, names or None) if each.structure.substitutions]
     if not asked:
-        raise Problem(error("E333", "no joint is on a bed here", help="a run says so: `substitute JOINT { }`"))
+        helps = ("a run says so: `substitute JOINT { }`", "name the run or sweep that does, if it is another one")
+        raise Problem(error("E333", "no joint is on a bed here", help=helps))
     found = [(each, margins(each)) for each in asked]
     if form == "json":
         click.echo(json.dumps([as_data(*each) for each in found], indent=1))

@@ -32,6 +32,8 @@ def told(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> Iterator[
         if bad and len(found) > 1:
             named = ", ".join(f"#{one.case}" for one in bad[:5]) + (" ..." if len(bad) > 5 else "")
             yield f"  {each[0].joint}: not stable in {len(bad)} of {len(found)} cases: {named}"
+    if len(found) > 1:
+        yield "  each row is the tightest of all cases"
     yield "  r = J_eff/(N^2 J_m) at the start of the run, each joint by itself; delay in ticks of the servo"
     if several:
         yield "  together: the largest of any motion of all of them, which the limit is held against"
@@ -44,7 +46,9 @@ def as_data(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> dict[s
 
 
 def _limit(one: Margin) -> str:
-    return f"more than {one.searched:.4g}" if one.limit is None else f"{one.limit:.3g}"
+    if one.limit is None:
+        return f"more than {one.searched:.4g}"
+    return f"{one.limit:.3g}" if one.limit > 0.0 else "nothing"
 
 
 def _room(one: Margin) -> float:

@@ -41,7 +41,7 @@ class Margin:
 
     r         of the arm at the start of the run
     together  the largest r of any motion of all substituted joints, an eigenvalue of Lambda/(N^2 J_m); of one joint: r
-    limit     smallest r at which the loop is unstable; None: none found up to `searched`; below r, if so light already
+    limit     smallest r at which the loop is unstable; None: none found up to `searched`; 0: at any
     """
 
     case: int
@@ -210,7 +210,10 @@ class _Loop:
         return float("inf") if not np.isfinite(matrix).all() else float(np.abs(np.linalg.eigvals(matrix)).max())
 
     def limit(self, lightest: float, heaviest: float) -> float | None:
-        """Smallest r of this range at which the loop grows, to a hundredth; None where there is none."""
+        """Smallest r of this range at which the loop grows, to a hundredth; None where there is none, 0 where it grows
+        at the lightest already."""
+        if self.radius(lightest) > GROWS:
+            return 0.0
         low = lightest
         for r in np.geomspace(lightest, heaviest, STEPS):
             if self.radius(float(r)) > GROWS:
