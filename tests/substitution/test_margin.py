@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from batch.margin import told
+from met.cli import main
 from met.margin import HEAVIEST, LIGHTEST, Margin, margins
 from tests.substitution.hybrid import compiled, deck
 
@@ -56,3 +57,13 @@ def test_an_arm_heavier_than_all_that_is_searched_is_searched_too() -> None:
 def test_an_arm_whose_r_is_no_number_is_not_called_stable() -> None:
     one = Margin(0, "a", "velocity_tracking", "emulated", 1000.0, 0.0, float("nan"), float("nan"), None, HEAVIEST)
     assert not one.stable
+
+
+def test_a_run_without_a_bed_has_no_margin(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["margin", "panda.ic"]) == 2
+    assert capsys.readouterr().err.endswith(
+        "error[E333]: no joint is on a bed here\n"
+        " = help: a run says so: `substitute JOINT { }`\n"
+        " = help: name the run or sweep that does, if it is another one\n"
+        "\n1 error\n"
+    )
