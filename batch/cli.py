@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
+
+if TYPE_CHECKING:
+    from met.plan import Experiment
 
 
 @click.command(short_help="Run the cases of a deck or a plan into an archive.")
@@ -114,21 +118,12 @@ def profile(
     Operations, flops and time of each part of a step, the share of what the core can do, what is folded into the code
     and what is an input, and how the kernel was made. Nothing is written but the cache.
     """
-    import json
-
-    from batch.campaign import experiments_named
     from batch.profile import told
-    from batch.running import read_plan
     from met.profile import as_data
     from met.profile import profile as measured
 
-    check_options(source, names, defines=defines, include_dirs=include_dirs)
-    plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, quiet=form == "json")
-    found = [(measured(each), each) for each in experiments_named(plan, names or None)]
-    if form == "json":
-        click.echo(json.dumps([as_data(each) for each, _ in found], indent=1))
-        return YES
-    click.echo("\n\n".join("\n".join(told(*each)) for each in found))
+    found = [(measured(each), each) for each in _asked_for(source, names, defines, include_dirs, form)]
+    _say(form, [as_data(each) for each, _ in found], [told(*each) for each in found])
     return YES
 
 
@@ -145,23 +140,34 @@ def margin(
     The loop of bed, servo and law is taken round once by the functions that run it, and its eigenvalues are looked at.
     Exit status: 0 all joints are stable in all cases; 1 one is not; 2 the input is wrong, or no joint is on a bed.
     """
-    import json
-
-    from batch.campaign import experiments_named
     from batch.margin import as_data, told
-    from batch.running import read_plan
     from met.diagnostic import Problem, error
     from met.margin import margins
 
-    check_options(source, names, defines=defines, include_dirs=include_dirs)
-    plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, quiet=form == "json")
-    asked = [each for each in experiments_named(plan, names or None) if each.structure.substitutions]
+    asked = [each for each in _asked_for(source, names, defines, include_dirs, form) if each.structure.substitutions]
     if not asked:
         helps = ("a run says so: `substitute JOINT { }`", "name the run or sweep that does, if it is another one")
         raise Problem(error("E333", "no joint is on a bed here", help=helps))
     found = [(each, margins(each)) for each in asked]
-    if form == "json":
-        click.echo(json.dumps([as_data(*each) for each in found], indent=1))
-    else:
-        click.echo("\n\n".join("\n".join(told(*each)) for each in found))
+    _say(form, [as_data(*each) for each in found], [told(*each) for each in found])
     return YES if all(one.stable for _, cases in found for case in cases for one in case) else NO
+
+
+def _asked_for(
+    source: str, names: tuple[str, ...], defines: tuple[str, ...], include_dirs: tuple[str, ...], form: str
+) -> Sequence[Experiment]:
+    """The runs and sweeps of a deck or plan that a command is asked about; what the compiler says goes to people."""
+    from batch.campaign import experiments_named
+    from batch.running import read_plan
+
+    check_options(source, names, defines=defines, include_dirs=include_dirs)
+    plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, quiet=form == "json")
+    return experiments_named(plan, names or None)
+
+
+def _say(form: str, data: Sequence[Any], texts: Sequence[Iterable[str]]) -> None:
+    """Prints data for programs, or texts for people with a line between each two."""
+    import json
+
+    said = json.dumps(data, indent=1) if form == "json" else "\n\n".join("\n".join(lines) for lines in texts)
+    click.echo(said)

@@ -19,9 +19,8 @@ from met.plan import Experiment
 from met.program.build import Builder
 from met.program.machine import Machine
 from met.program.substituted import Mounted
-from met.program.values import Values, answer
 from met.run import inputs
-from met.servos.servo import Asked, Seen
+from met.servos.servo import Asked
 from met.trace.reference import PlainTape, follow
 
 GROWS = 1.0 + 1e-6
@@ -30,8 +29,7 @@ GROWS = 1.0 + 1e-6
 LIGHTEST, HEAVIEST, STEPS = 0.05, 2000.0, 40
 """Range of r that is searched, wider for an arm that lies outside it; and how many values, a constant share apart."""
 
-# cells that hold a rate of the shaft; and angles, which only add up and come back to nothing
-_RATES = ("shaft_rate", "bed.filtered", ":read", ":before", ":w", ":w_ref", "observer.w", "observer.y")
+# ends of the names of angles, which only add up and come back to nothing
 _ANGLES = ("angle",)
 
 
@@ -153,7 +151,7 @@ class _Loop:
     """The loop of one joint at a tick, over the cells of a tape."""
 
     def __init__(self, builder: Builder, tape: PlainTape, each: Mounted) -> None:
-        self.machine, self.tape, self.each = builder.machine, tape, each
+        self.builder, self.tape, self.each = builder, tape, each
         self.beds = builder.step.beds.alone(each)
         self.motor = self.beds.motor(tape, each)
         self.rotor = float(self.motor.ratio * self.motor.ratio * self.motor.inertia)
@@ -169,7 +167,11 @@ class _Loop:
         written = tape.cells.written
         self.names = [name for name in cells if name in written and (name == back or not name.endswith(_ANGLES))]
         # The shaft turns on at one rate, and nothing else is under way.
-        self.start = cells | {name: self.rate if name.endswith(_RATES) else 0.0 for name in self.names}
+        tape.cells.update(dict.fromkeys(self.names, np.float64(0.0)))
+        tape.write(f"{each.joint}.qd", self.rate / self.motor.ratio)
+        tape.write(f"{each.joint}.q", 0.0)
+        self.beds.start(tape)
+        self.start = {name: float(tape.cells[name]) for name in cells}
 
     def _around(self, cells: Mapping[str, float], load: float) -> dict[str, float]:
         """The cells a tick later, with an arm of this inertia on the joint (kg m^2; kg)."""
@@ -178,14 +180,7 @@ class _Loop:
         tape.cells.update({f"{joint}:Lambda.{joint}": np.float64(load), f"{joint}:b_0": np.float64(0.0)})
         self.beds.advance(tape)
         self.beds.read(tape)
-        asked = self._asked()
-        q, qd = self.beds.seen(tape, actuator) or (0.0, 0.0)
-        held = Values(actuator.owner, {m.name: tape.read(f"{actuator.path}.{m.name}") for m in actuator.servo.memory})
-        seen = Seen(q, qd, asked, self.beds.period, tape.time)
-        assert actuator.servo.tick is not None
-        new = answer(actuator.owner, actuator.servo.tick, self.machine.servo_values(actuator, tape.read), held, seen)
-        for name, value in new.items():
-            tape.write(f"{actuator.path}.{name}", value)
+        self.builder.compute(tape, actuator, *(self.beds.seen(tape, actuator) or (0.0, 0.0)), self._asked())
         self.beds.act(tape)
         return {name: float(tape.cells[name]) for name in cells}
 
@@ -212,9 +207,7 @@ class _Loop:
     def limit(self, lightest: float, heaviest: float) -> float | None:
         """Smallest r of this range at which the loop grows, to a hundredth; None where there is none, 0 where it grows
         at the lightest already."""
-        if self.radius(lightest) > GROWS:
-            return 0.0
-        low = lightest
+        low = 0.0
         for r in np.geomspace(lightest, heaviest, STEPS):
             if self.radius(float(r)) > GROWS:
                 high = float(r)
@@ -222,6 +215,8 @@ class _Loop:
             low = float(r)
         else:
             return None
+        if low == 0.0:
+            return 0.0
         while high > 1.005 * low:
             middle = (low * high) ** 0.5
             low, high = (low, middle) if self.radius(middle) > GROWS else (middle, high)

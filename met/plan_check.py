@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 from typing import Any
 
@@ -147,10 +147,7 @@ def _check_uses(structure: Structure, where: str) -> None:
     driven: set[str] = set()
     for index, use in enumerate(structure.servos):
         path = f"{where}.servos[{index}]"
-        if use.joint not in kinds:
-            raise Damaged(f"{path}.joint", f"there is no joint `{use.joint}`")
-        if kinds[use.joint] == "fixed":
-            raise Damaged(f"{path}.joint", f"joint `{use.joint}` is fixed")
+        _moves(kinds, use.joint, path)
         if use.joint in driven:
             raise Damaged(f"{path}.joint", f"joint `{use.joint}` has a servo already")
         driven.add(use.joint)
@@ -176,6 +173,14 @@ def _check_uses(structure: Structure, where: str) -> None:
     _check_substitutions(structure, where)
 
 
+def _moves(kinds: Mapping[str, str], joint: str, path: str) -> None:
+    """The joint that something is on is there, and no fixed one."""
+    if joint not in kinds:
+        raise Damaged(f"{path}.joint", f"there is no joint `{joint}`")
+    if kinds[joint] == "fixed":
+        raise Damaged(f"{path}.joint", f"joint `{joint}` is fixed")
+
+
 def _check_substitutions(structure: Structure, where: str) -> None:
     """Motors on beds are there, once each; one law for all, and servos that tick together."""
     kinds = {joint.name: joint.kind for joint in structure.joints}
@@ -183,10 +188,7 @@ def _check_substitutions(structure: Structure, where: str) -> None:
     on_beds: set[str] = set()
     for index, use in enumerate(structure.substitutions):
         path = f"{where}.substitutions[{index}]"
-        if use.joint not in kinds:
-            raise Damaged(f"{path}.joint", f"there is no joint `{use.joint}`")
-        if kinds[use.joint] == "fixed":
-            raise Damaged(f"{path}.joint", f"joint `{use.joint}` is fixed")
+        _moves(kinds, use.joint, path)
         if use.joint not in servos:
             raise Damaged(f"{path}.joint", f"joint `{use.joint}` has no servo")
         if use.joint in on_beds:

@@ -62,11 +62,6 @@ class Complaints:
         except Problem as problem:
             self.add(*problem.diagnostics)
 
-    def raise_errors(self) -> None:
-        """Raises `Problem` with everything found, warnings too, where there is an error."""
-        if self.errors:
-            raise Problem(self.all)
-
 
 def belongs(word: str) -> list[str]:
     """Where a word of the language stands that stands elsewhere only."""

@@ -143,6 +143,12 @@ class Builder:
             q, qd = on_bed
         else:
             q, qd = self._carried(tape, actuator) if actuator in self.machine.between else self._state_of(tape, joint)
+        self.compute(tape, actuator, q, qd, asked)
+
+    def compute(self, tape: Tape, actuator: Actuator, q: Real, qd: Real, asked: Asked) -> None:
+        """What the servo's computer does with what it sees and is asked: new memory."""
+        servo = actuator.servo
+        assert servo.tick is not None
         held = Values(actuator.owner, {m.name: tape.read(f"{actuator.path}.{m.name}") for m in servo.memory})
         seen = Seen(q, qd, asked, actuator.use.divisor / self.schedule.base_hz, tape.time)
         new = answer(actuator.owner, servo.tick, self.machine.servo_values(actuator, tape.read), held, seen)

@@ -62,11 +62,8 @@ class Step:
         """What happens at an instant once the servos have ticked: modes, then the step's first stage."""
         decide = self._decide if self.machine.sticking else ()
         judge = WhileAny("suspect", 1, (Run(Phase("judge", self.judge)),))
-        modes: tuple[Control, ...] = (Run(Phase("modes", self.modes)), *decide)
-        if not self.beds.mounted:
-            return (Every(self.schedule.dynamics, (*modes, self._derive, judge)),)
-        due = self.schedule.dynamics
-        return (Every(due, modes), *self.beds.after_modes(), Every(due, (self._derive, judge)))
+        modes, due = Run(Phase("modes", self.modes)), self.schedule.dynamics
+        return (Every(due, (modes, *decide)), *self.beds.after_modes(), Every(due, (self._derive, judge)))
 
     def finish(self) -> tuple[Control, ...]:
         """The rest of the step, at its end."""

@@ -132,12 +132,15 @@ class Substituted:
     # The run's start.
 
     def start(self, tape: Tape) -> None:
+        """Each shaft turns with its joint, and has done so; the observer knows that, and nothing else."""
         tape.write("always", 1.0)
         for each in self.mounted:
             motor = self.motor(tape, each)
             w = motor.ratio * tape.read(f"{each.joint}.qd")
-            for memory in each.bed.memory:
-                tape.write(f"{each.joint}.bed.{memory.name}", w if memory.unit == "rad/s" else memory.start)
+            begun = answer(self._owner(each), each.bed.begin, self._bed_values(tape, each), w)
+            returned(self._owner(each), "begin", begun, (memory.name for memory in each.bed.memory))
+            for name, value in begun.items():
+                tape.write(f"{each.joint}.bed.{name}", value)
             for name in ("read", "before", "w", "w_ref", "observer.w", "observer.y"):
                 tape.write(f"{each.joint}:{name}", w)
             tape.write(f"{each.joint}:angle", motor.ratio * tape.read(f"{each.joint}.q"))

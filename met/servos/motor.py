@@ -27,8 +27,13 @@ class Motor:
 
     @property
     def damping(self) -> Real:
-        """What brakes the shaft for each unit of its rate: back-EMF and viscous friction, N m s/rad."""
-        return self.kt * self.kt / self.resistance + self.f_v
+        """What brakes the shaft for each unit of its rate, N m s/rad."""
+        return damping(self.kt, self.resistance, self.f_v)
+
+
+def damping(kt: Real, resistance: Real, f_v: Real) -> Real:
+    """Back-EMF and viscous friction, for each unit of the shaft's rate, N m s/rad."""
+    return kt * kt / resistance + f_v
 
 
 def torque(kt: Real, resistance: Real, tau_max: Real, voltage: Real, w: Real) -> Real:

@@ -33,6 +33,7 @@ class Bed:
     """The declaration of an emulated bed; one a file.
 
     memory    its state, recorded under its names; `shaft_rate` (rad/s) is among them
+    begin     (p, w) -> the memory of a shaft that has turned at w rad/s for long
     advance   (p, held, wire, time, draw) -> the memory after `time` s, by name
     read      (p, held) -> the filtered rate as the computer reads it, rad/s
     taken     (p, wire) -> what the amplifiers make of a command, converters and limits; whether a limit held it back
@@ -43,6 +44,7 @@ class Bed:
     doc: str
     parameters: tuple[Parameter, ...] = ()
     memory: tuple[Memory, ...]
+    begin: Callable[[Any, Real], Mapping[str, Real]]
     advance: Callable[[Any, Any, Wire, float, Draw], Mapping[str, Real]]
     read: Callable[[Any, Any], Real]
     taken: Callable[[Any, Wire], tuple[Wire, Truth]]

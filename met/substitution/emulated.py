@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from met.parameter import Memory, Parameter
-from met.servos.motor import torque
+from met.servos.motor import damping, torque
 from met.substitution import butterworth, shaft
 from met.substitution.bed import Bed, Draw, Wire
 from met.trace import Real, Truth, absolute, clip, rint, sin, where
@@ -30,10 +30,14 @@ SUBSTEP = 250e-6
 _ONCE_AT, _TWICE_AT = 0.3, 1.1
 
 
+def begin(p: Any, w: Real) -> Mapping[str, Real]:
+    return {"shaft_rate": w, "shaft_angle": 0.0, "filtered": w, "filtered_slope": 0.0}
+
+
 def advance(p: Any, held: Any, wire: Wire, time: float, draw: Draw) -> Mapping[str, Real]:
     count = math.ceil(time / SUBSTEP - 1e-9)
     h = time / count
-    decay = (p.kt * p.kt / p.resistance + p.f_v) / p.inertia
+    decay = damping(p.kt, p.resistance, p.f_v) / p.inertia
     of = butterworth.over(p.f_cut, h)
     load = p.kt_load * wire.current
     noise = p.tachometer * draw("tachometer")
@@ -112,6 +116,7 @@ BED = Bed(
         Memory(name="filtered", unit="rad/s", doc="rate behind the filter"),
         Memory(name="filtered_slope", unit="rad/s^2", doc="its slope"),
     ),
+    begin=begin,
     advance=advance,
     read=read,
     taken=taken,

@@ -8,7 +8,7 @@ and what acceleration the arm is told.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 from met.frozen import frozen
 from met.parameter import Memory, Parameter
@@ -65,7 +65,7 @@ class Law:
     doc: str
     parameters: tuple[Parameter, ...] = ()
     observer: bool = False
-    balance: str = "full"
+    balance: Literal["full", "bare", "none"] = "full"
     memory: tuple[Memory, ...] = ()
     give: Callable[
         [Sequence[Any], Sequence[Any], Sequence[Told], Callable[[Sequence[Real]], Sequence[Real]]],

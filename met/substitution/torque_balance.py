@@ -15,18 +15,19 @@ from met.substitution.law import BAND, Given, Law, Told
 from met.trace import Real
 
 
-def load_torque(told: Told) -> Real:
-    """Torque of the load motor that gives the shaft its part in the balance, N m."""
+def balanced(told: Told) -> Given:
+    """The load torque that gives the shaft its part in the balance, and the joint's part."""
     found = told.balance
     assert found is not None
-    return (told.inertia + told.extra) * (told.motor.ratio * found.qdd) - (found.net - found.friction)
+    torque = (told.inertia + told.extra) * (told.motor.ratio * found.qdd) - (found.net - found.friction)
+    return Given(torque, found.qdd)
 
 
 def give(
     p: Sequence[Any], held: Sequence[Any], told: Sequence[Told], load: Callable[[Sequence[Real]], Sequence[Real]]
 ) -> Sequence[tuple[Given, Mapping[str, Real]]]:
     return [
-        (Given(load_torque(joint), (joint.rate - joint.before) / (joint.period * joint.motor.ratio)), {})
+        (Given(balanced(joint).torque, (joint.rate - joint.before) / (joint.period * joint.motor.ratio)), {})
         for joint in told
     ]
 

@@ -12,14 +12,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from met.substitution.law import BAND, OBSERVER, Given, Law, Told
-from met.substitution.torque_balance import load_torque
+from met.substitution.torque_balance import balanced
 from met.trace import Real
 
 
 def give(
     p: Sequence[Any], held: Sequence[Any], told: Sequence[Told], load: Callable[[Sequence[Real]], Sequence[Real]]
 ) -> Sequence[tuple[Given, Mapping[str, Real]]]:
-    return [(Given(load_torque(joint), joint.balance.qdd if joint.balance else 0.0), {}) for joint in told]
+    return [(balanced(joint), {}) for joint in told]
 
 
 LAW = Law(name="torque_balance_observer", doc=__doc__, parameters=(BAND, *OBSERVER), observer=True, give=give)

@@ -15,7 +15,7 @@ from typing import Any
 
 from met.parameter import Parameter
 from met.substitution.law import BAND, OBSERVER, Given, Law, Told
-from met.substitution.torque_balance import load_torque
+from met.substitution.torque_balance import balanced
 from met.trace import Real
 
 
@@ -25,7 +25,8 @@ def give(
     given: list[tuple[Given, Mapping[str, Real]]] = []
     for own, joint in zip(p, told, strict=True):
         pull = own.gain * joint.inertia / joint.period * (joint.w_ref - joint.w)
-        given.append((Given(load_torque(joint) + pull, joint.balance.qdd if joint.balance else 0.0), {}))
+        shared = balanced(joint)
+        given.append((Given(shared.torque + pull, shared.qdd), {}))
     return given
 
 
