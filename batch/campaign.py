@@ -104,7 +104,7 @@ def prepare(
 
     output       None: `default_output`, in the current folder
     experiments  names; None: all of the plan's
-    cases        rows of the case table, `"#7"` or the beginning of a case_id; None: all
+    cases        positions in the case table, `7` or `"#7"`, or the beginning of a case_id; None: all
     histories    "default": all while the archive stays below 1 GiB, else none, and a note says so
     """
     chosen = experiments_named(plan, experiments)
@@ -135,7 +135,7 @@ def default_output(
     So a case that is run again does not take its sweep's place. A deck of the standard library is called `<name>`.
     """
     names = [Path(plan.deck.strip("<>")).stem, *(experiments or plan.selected)]
-    chosen = [int(row) for _, rows in selected for row in rows]
+    chosen = [int(position) for experiment, rows in selected for position in experiment.cases.table[rows]]
     if len(chosen) < sum(experiment.cases.count for experiment, _ in selected):
         names.append("case" + "-".join(map(str, chosen)) if len(chosen) <= 4 else "cases")
     return Path(".".join([*names, "h5"]))
@@ -245,7 +245,10 @@ def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experime
     """The plan's experiments of these names; all of them for None. Raises Problem E310."""
     if names is None:
         return plan.experiments
-    by_name = {experiment.name: experiment for experiment in plan.experiments}
+    by_name: dict[str, list[Experiment]] = {}
+    for experiment in plan.experiments:
+        for name in {experiment.name, experiment.asked}:
+            by_name.setdefault(name, []).append(experiment)
     problems = []
     for name in names:
         if name not in by_name:
@@ -255,7 +258,8 @@ def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experime
             problems.append(error("E310", f"no run or sweep `{name}` in {plan.deck}", help=helps))
     if problems:
         raise Problem(problems)
-    return tuple(by_name[name] for name in dict.fromkeys(names))
+    found = {experiment.name: experiment for name in names for experiment in by_name[name]}
+    return tuple(found.values())
 
 
 def _selected(
@@ -268,11 +272,13 @@ def _selected(
     for case in cases:
         matches = [(e, row) for e in experiments for row in _rows(e, case)]
         if not matches:
-            last = [(e.name, e.cases.count - 1) for e in experiments]
-            counts = ", ".join(f"`{name}` has #0 {f'to #{row}' if row else 'alone'}" for name, row in last)
+            last: dict[str, int] = {}
+            for e in experiments:
+                last[e.asked] = max(last.get(e.asked, 0), int(e.cases.table[-1]))
+            counts = ", ".join(f"`{name}` has #0 {f'to #{row}' if row else 'alone'}" for name, row in last.items())
             raise Problem(error("E311", f"no case `{_case_text(case)}`", help=[counts, "`met cases DECK` lists them"]))
         if len(matches) > 1 and not _is_row(case):
-            some = ", ".join(f"#{row} of `{e.name}`" for e, row in matches[:4])
+            some = ", ".join(f"#{e.cases.table[row]} of `{e.asked}`" for e, row in matches[:4])
             message = f"case `{case}` may be any of {len(matches)}: {some}"
             raise Problem(error("E312", message, help="give more of its id, or its position: `--case '#0'`"))
         for experiment, row in matches:
@@ -290,8 +296,8 @@ def _case_text(case: int | str) -> str:
 
 def _rows(experiment: Experiment, case: int | str) -> list[int]:
     if _is_row(case):
-        row = row_of(case) if isinstance(case, str) else int(case)
-        return [row] if row is not None and 0 <= row < experiment.cases.count else []
+        position = row_of(case) if isinstance(case, str) else int(case)
+        return np.flatnonzero(experiment.cases.table == position).tolist()
     return [row for row, case_id in enumerate(keys.case_ids(experiment)) if case and case_id.startswith(str(case))]
 
 

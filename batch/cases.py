@@ -44,6 +44,9 @@ def table(group: Group, most: int | None = SHOWN_CASES, *, hint: bool = True) ->
     cells = [["", *(f"#{row}" for row in group.at("case", positions))]]
     cells.append(["id", *(case_id[:8] for case_id in group.at("case_id", positions))])
     marks, units = _marks(group, outcomes), ["", ""]
+    if "repeat" in group.variables and group.values("repeat").any():
+        cells.append(["repeat", *map(str, group.at("repeat", positions))])
+        units.append("")
     for variable in (*group.role("coordinate"), *group.role("metric")):
         scale, unit = deck_unit(variable)
         texts = [number_text(value / scale) for value in group.at(variable.name, positions)]
@@ -79,6 +82,7 @@ def rows_json(
     where not finite), and whether it meets each requirement (null where that is not known)."""
     positions = worst_first(group)[:most] if positions is None else np.asarray(positions)
     numbers = [variable.name for variable in (*group.role("coordinate"), *group.role("metric"))]
+    repeats = {"repeat": group.at("repeat", positions)} if "repeat" in group.variables else {}
     values = {name: group.at(name, positions) for name in ("case", "case_id", "status", "cause", *numbers)}
     texts = [str(text) for text in group.values("requirement")] if "requirement" in group.variables else []
     outcomes = _outcomes(group, positions)
@@ -86,6 +90,7 @@ def rows_json(
         {
             "row": int(values["case"][i]),
             "case_id": str(values["case_id"][i]),
+            **{each: int(found[i]) for each, found in repeats.items()},
             "status": "failed" if values["status"][i] else "done",
             "cause": str(values["cause"][i]),
             "coordinates": {v.path: finite(float(values[v.name][i])) for v in group.role("coordinate")},

@@ -19,6 +19,9 @@ from met.plan import Plan
 WORST = 3
 """Cases of a sweep that the verdict names."""
 
+MOST_GROUPS = 4
+"""Structures of a sweep that are told of in full; of more, a line each."""
+
 
 def run_and_tell(
     source: str,
@@ -127,7 +130,7 @@ def _part_lines(part: Part, verbose: bool) -> list[str]:
     count, whole = len(part.rows), experiment.cases.count
     cases = f"{count:,} case{'s' if count != 1 else ''}" + (f" of {whole:,}" if count < whole else "")
     if count == 1 and whole > 1:
-        cases = f"case #{part.rows[0]} of {whole:,}"
+        cases = f"case #{experiment.cases.table[part.rows[0]]} of {whole:,}"
     steps = schedule.ticks // schedule.dynamics
     out = [
         f"{experiment.name}: {cases}, {schedule.duration:g} s in {steps:,} steps of {1e3 * schedule.step:g} ms, "
@@ -177,11 +180,17 @@ def told(
 ) -> list[str]:  # fmt: skip
     """The verdict, and where everything is."""
     out: list[str] = []
+    many = {s.sweep for s in summaries if sum(s.sweep == other.sweep for other in summaries) > MOST_GROUPS} - {""}
     for summary, cases, timing in zip(summaries, worst, timings, strict=True):
         lines = verdict(summary, 100)
+        if summary.sweep in many:
+            said = "; ".join([lines[0], *(f"{r.text} met by {r.met:,}" for r in summary.requirements)])
+            out.append(f"{summary.name}: {said}")
+            continue
         name = f"{summary.name}: " if len(summaries) > 1 else ""
         out += ["", f"{name}{lines[0]}, in {duration(timing['seconds'])}", *lines[1:]]
         out += ["", *cases.lines] if cases.lines else []
+    out += yields(summaries)
     path = campaign.output
     out += ["", f"archive  {path}  ({size_text(path.stat().st_size)})"]
     if picture is not None:
@@ -190,13 +199,28 @@ def told(
         out.append(f"picture  none: {excuse}")
     out.append(f"next     met show {quoted(path)}")
     for summary, cases in zip(summaries, worst, strict=True):
-        if cases.rows:
+        if cases.rows and summary.sweep not in many:
             only = f" --run {quoted(summary.name)}" if len(summaries) > 1 else ""
             out.append(f"         met show {quoted(path)}{only} --case '{cases.first}'")
     if not any(summary.recorded for summary in summaries) and campaign.parts[0].experiment.structure.record:
         out.append(f"         met run {quoted(source)} {summaries[0].name} --case '#0'")
     if not ok:
         out.append(f"exit 1: {_why_not(summaries)}")
+    return out
+
+
+def yields(summaries: tuple[Summary, ...]) -> list[str]:
+    """Of each sweep of several structures, how many of all its cases meet each requirement."""
+    out = []
+    for sweep in dict.fromkeys(summary.sweep for summary in summaries if summary.sweep):
+        groups = [summary for summary in summaries if summary.sweep == sweep]
+        if len(groups) > 1:
+            cases, failed = sum(group.cases for group in groups), sum(group.failed for group in groups)
+            out += ["", f"{sweep}: {cases - failed:,} of {cases:,} cases reached their end"]
+            for text in dict.fromkeys(r.text for group in groups for r in group.requirements):
+                found = [(group, r) for group in groups for r in group.requirements if r.text == text]
+                met, of = sum(r.met for _, r in found), sum(group.cases for group, _ in found)
+                out.append(f"  require {text}  met by {met:,} of {of:,} ({100 * met / of:.3g} %)")
     return out
 
 

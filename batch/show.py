@@ -88,12 +88,13 @@ def as_json(
 
 def chosen(archive: ArchiveFile, names: Sequence[str]) -> tuple[Group, ...]:
     """The experiments of these names, all where none is given."""
-    groups = {group.name: group for group in archive.groups}
+    known = [*dict.fromkeys(group.sweep or group.name for group in archive.groups)]
     for name in names:
-        if name not in groups:
-            helps = f"in it: {', '.join(groups)}"
+        if all(name not in (group.name, group.sweep) for group in archive.groups):
+            helps = f"in it: {', '.join(known)}"
             raise Problem(error("E325", f"no run or sweep `{name}` in {archive.path}", help=helps))
-    return tuple(groups[name] for name in names) if names else archive.groups
+    found = [group for name in names for group in archive.groups if name in (group.name, group.sweep)]
+    return tuple(dict.fromkeys(found)) if names else archive.groups
 
 
 def picked(archive: ArchiveFile, names: Sequence[str], case: str | None) -> list[tuple[Group, int | None]]:
@@ -125,6 +126,8 @@ def heading(group: Group, width: int) -> list[str]:
     )
     lines = textwrap.wrap(text, width - len(group.name) - 2)
     out = [f"{group.name}  {lines[0]}", *(" " * (len(group.name) + 2) + line for line in lines[1:])]
+    for variable in group.role("choice"):
+        out.append(f"  {variable.path} = {group.at(variable.name, [0])[0]}")
     for variable in group.role("coordinate"):
         scale = float(variable.attributes.get("deck_scale", 1.0))
         unit = pretty_unit(str(variable.attributes.get("deck_unit", variable.unit)))

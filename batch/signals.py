@@ -174,4 +174,11 @@ def case_text(group: Group, position: int, *, varied: bool = True) -> str:
         f"{path} = {number_text(value)} {pretty_unit(unit)}".removesuffix(" 1")
         for path, (value, unit) in (group.coordinates_of(position).items() if varied else ())
     ]
-    return " · ".join([f"case #{row} {case_id[:8]}", *words])
+    chosen = [f"{v.path} = {group.at(v.name, [position])[0]}" for v in (group.role("choice") if varied else ())]
+    return " · ".join([f"case #{row} {case_id[:8]}", *chosen, *words, *repeat_text(group, position)])
+
+
+def repeat_text(group: Group, position: int) -> list[str]:
+    """Which repeat a case is, where cases are repeated."""
+    repeats = group.values("repeat") if "repeat" in group.variables else np.zeros(0)
+    return [f"repeat {int(repeats[position])}"] if repeats.any() else []

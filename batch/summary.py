@@ -59,6 +59,7 @@ class Summary:
     """One experiment's outcome.
 
     failures  a few of them, unlike ones first
+    sweep     of which this is a group; "" where it is the whole of its run or sweep
     limited   cases in which the load motor of a bed was at its limit at some tick
     """
 
@@ -70,6 +71,7 @@ class Summary:
     metrics: tuple[MetricSummary, ...]
     requirements: tuple[RequirementSummary, ...]
     limited: int = 0
+    sweep: str = ""
 
     @property
     def ok(self) -> bool:
@@ -114,6 +116,7 @@ def summary_of(group: Group, position: int | None = None) -> Summary:
         failures=failures,
         metrics=tuple(_metric(v, group.values(v.name)[here]) for v in group.role("metric")),
         requirements=requirements,
+        sweep=str(group.attributes.get("sweep", "")),
         limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
     )
 

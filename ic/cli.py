@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Literal
+from functools import partial
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
 from met.cli import BAD_INPUT, YES, check_options, complain, deck_options, format_option, loudness_options
-from met.diagnostic import Label, Problem, did_you_mean
+from met.diagnostic import Problem, did_you_mean
 
 if TYPE_CHECKING:
     from ic.meaning.lower import Compiled
@@ -131,14 +133,15 @@ def cases(
 
     check_options(deck, defines=defines, include_dirs=include_dirs)
     made = _plan(deck, include_dirs, defines, names, not names, True)
-    shown = [e for e in made.experiments if names or e.cases.coordinates] or list(made.experiments)
+    sweeps = [e for e in made.experiments if names or e.varies] or list(made.experiments)
+    shown = [list(groups) for _, groups in groupby(sweeps, lambda experiment: experiment.asked)]
     if form == "json":
-        _print_json([cases_json(experiment) for experiment in shown])
+        _print_json([cases_json(groups) for groups in shown])
         return
-    for position, experiment in enumerate(shown):
+    for position, groups in enumerate(shown):
         if position:
             click.echo()
-        _print(print_cases(experiment, everything=everything))
+        _print(print_cases(groups, everything=everything))
 
 
 @click.command()
@@ -163,41 +166,51 @@ def explain(
     PATH is a parameter (elbow.servo.kt), the beginning of several (elbow.servo), one of a definition (gearbox.kp), or a
     setting of the run (rates.dynamics).
     """
-    from ic.meaning.explain import explained, in_full
-    from ic.printing.explain import explain_json, print_explain, with_settings
+    from ic.printing.explaining import Sources, explained_json, print_explained
 
     check_options(deck, defines=defines, include_dirs=include_dirs)
     names = (name,) if name else ()
-    compiled = None if deck.endswith(".json") else _compiled(deck, include_dirs, defines, names or None)
-    made = _plan_in_file(deck, names) if compiled is None else compiled.plan
-    assert made is not None
-
-    def names_of(path: str) -> tuple[Label, ...]:
-        return () if compiled is None else next((found.names for found in explained(compiled, path)), ())
-
-    experiment = with_settings(made.experiments[0] if compiled is None else in_full(compiled))
-    also = {} if compiled is None else compiled.scopes[0].known
+    if deck.endswith(".json"):
+        sources: Sources = [lambda: (_plan_in_file(deck, names), None)]
+    else:  # what only another run of the deck knows is told of that one
+        selections: list[Any] = [names] if names else [None, "all"]
+        sources = [partial(_source, deck, include_dirs, defines, selection) for selection in selections]
     if form == "json":
-        _print_json(explain_json(experiment, path, also))
-        return
-    _print(print_explain(experiment, path, {source.name: source.text for source in made.sources}, names_of, also))
+        _print_json(explained_json(sources, path))
+    else:
+        _print(print_explained(sources, path))
 
 
 @click.command()
 @click.argument("words", nargs=-1, metavar="[KIND] [MODEL]")
+@click.option("--markdown", is_flag=True, help="All of MET's own models as one page, docs/reference.md.")
 @format_option
-def doc(words: tuple[str, ...], form: str) -> None:
+def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
     """Show the models there are and what each declares.
 
-    KIND is servo, command, environment, metric, integrator, bed or law; MODEL one of them by name. `met doc channels`
-    lists what can be recorded, `met doc dh` says what Denavit-Hartenberg numbers are.
+    KIND is servo, command, environment, metric, integrator, bed or law; MODEL one of them by name. Also:
+    `met doc channels`, what can be recorded; `dh`, Denavit-Hartenberg numbers; `shapes`, of links; `substitute`, motors
+    on beds; `units`; and the code of a message, as in `met doc D060`.
     """
     from ic.printing import models as print_models
+    from ic.printing.codes import is_code, print_code
     from ic.printing.subjects import SUBJECTS
     from met import models
 
     if len(words) > 2:
         raise click.UsageError("at most a kind and a model")
+    if markdown:
+        from ic.printing.reference import page
+
+        if words or form == "json":
+            raise click.UsageError("--markdown is the whole page: it takes neither words nor --format")
+        _print(page())
+        return
+    if len(words) == 1 and is_code(words[0]):
+        if form == "json":
+            raise click.UsageError("what a code means is text: it has no --format")
+        _print(print_code(words[0]))
+        return
     if len(words) == 1 and words[0] in SUBJECTS:
         text, data = SUBJECTS[words[0]]
         if form == "json":
@@ -264,6 +277,12 @@ def _compiled(
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)
     return compiled
+
+
+def _source(deck: str, include_dirs: tuple[str, ...], defines: tuple[str, ...], select: Any) -> tuple[Plan, Compiled]:
+    compiled = _compiled(deck, include_dirs, defines, select)
+    assert compiled.plan is not None
+    return compiled.plan, compiled
 
 
 def _plan_in_file(path: str, names: tuple[str, ...]) -> Plan:

@@ -18,7 +18,7 @@ def find(name: str, include_dirs: Sequence[str | Path] = ()) -> Path:
     found = Files(include_dirs).deck(name)
     if Path(found.path).exists():
         return Path(found.path)
-    here = sorted(path.name for path in Path(name).parent.glob("*.ic"))
+    here = sorted(path.name for path in Path(name).parent.glob("*.ic") if path.exists() and path.name.isprintable())
     standard = standard_decks()
     folder = "" if str(Path(name).parent) == "." else f"{Path(name).parent}/"
     known = [f"{folder}{each}" for each in here] + standard

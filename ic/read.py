@@ -40,7 +40,17 @@ def read(
     found = in_order(findings.all, seen.sources)
     if findings.errors or not seen.whole:
         raise Problem(found, {source.name: source.text for source in seen.sources})
-    return Deck(seen.sources[0].name, entries, seen.sources, found, tuple(os.fspath(each) for each in include_dirs))
+    return Deck(
+        seen.sources[0].name, entries, seen.sources, found, tuple(os.fspath(each) for each in include_dirs),
+        os.fspath(path), tuple(defines),
+    )  # fmt: skip
+
+
+def read_again(deck: Deck, defines: Sequence[str], *, library: Path = LIBRARY) -> Deck:
+    """A deck as it is with further macros, `NAME=VALUE`, in place of those of their names on the command line."""
+    names = {each.partition("=")[0] for each in defines}
+    kept = [each for each in deck.defines if each.partition("=")[0] not in names]
+    return read(deck.path, deck.include_dirs, (*kept, *defines), library=library)
 
 
 def in_order(diagnostics: Iterable[Diagnostic], sources: Sequence[SourceText]) -> tuple[Diagnostic, ...]:

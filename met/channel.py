@@ -28,7 +28,7 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from met import models
+from met import models, units
 from met.frozen import frozen
 from met.plan import Joint, Recorded, Structure
 
@@ -136,6 +136,13 @@ def joint_unit(unit: str, joint: Joint, command: str | None = None) -> str:
         out += _factor(replacements.get(word, word), out) + character
         word = ""
     return REPEATED.sub(_per_time, out.strip())
+
+
+def watched_unit(declared: str, of: str) -> str:
+    """A metric's declared unit with `of`, the unit of what it watches, put in: of `rad/s`, `of*s` is `rad`."""
+    if declared == "of" or "of" not in re.findall(r"[A-Za-z_]+", declared):
+        return of if declared == "of" else declared
+    return units.text(units.parse_unit(declared, {"of": units.parse_unit(of)}).dimension)
 
 
 def _per_time(repeated: re.Match[str]) -> str:

@@ -26,8 +26,8 @@ DEFECT = 70  # EX_SOFTWARE of sysexits.h
 
 # How `met --help` lists the commands: in the order of work. A command that is not named here comes after them.
 ORDER = (
-    "new", "fmt", "check", "explain", "plan", "cases", "run", "submit", "status", "show", "plot", "report", "diff",
-    "export", "import", "profile", "margin", "bed", "doc", "dump",
+    "new", "import", "fmt", "check", "explain", "plan", "cases", "run", "submit", "status", "show", "plot", "report",
+    "diff", "export", "profile", "margin", "bed", "doc", "dump",
 )  # fmt: skip
 
 Face = TypeVar("Face", bound=Callable[..., Any])
@@ -218,7 +218,7 @@ def _confess(defect: Exception, arguments: Sequence[str], verbose: bool) -> None
         where = "The traceback is above."
     else:
         handle, path = tempfile.mkstemp(prefix="met-defect-", suffix=".txt")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
+        with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
             file.write(f"{command}\nmet {VERSION}, Python {platform.python_version()}, {platform.platform()}\n\n")
             traceback.print_exception(defect, file=file)
         where = f"The traceback is in {path}; with -v it is printed."

@@ -40,19 +40,23 @@ def inputs(experiment: Experiment) -> tuple[str, ...]:
     """What each case of an experiment brings: its coordinates, and the parameters that follow from them by formulas."""
     coordinates = [coordinate.path for coordinate in experiment.cases.coordinates]
     followers = sorted(path for path, q in experiment.parameters.items() if isinstance(q.value, Formula))
-    return (*coordinates, *followers)
+    return (*coordinates, *followers, *experiment.cases.noise)
 
 
 def case_keys(experiment: Experiment, rows: Sequence[int] | np.ndarray | None = None) -> list[str]:
     """case_key of every case, or of some rows of the case table, in their order."""
     coordinates = sorted(experiment.cases.coordinates, key=lambda coordinate: coordinate.path)
-    count = experiment.cases.count if rows is None else len(rows)
-    table = np.zeros((count, len(coordinates) + 1), dtype="<f8")  # the last column is the repeat: there is none yet
+    cases = experiment.cases
+    count = cases.count if rows is None else len(rows)
+    table = np.zeros((count, len(coordinates) + 1), dtype="<f8")  # the last column is the repeat
     for column, coordinate in enumerate(coordinates):
         table[:, column] = coordinate.values if rows is None else coordinate.values[np.asarray(rows)]
+    if cases.repeats is not None:
+        table[:, -1] = cases.repeats if rows is None else cases.repeats[np.asarray(rows)]
     table += 0.0  # -0 and 0 are one value
     table[np.isnan(table)] = np.nan  # and so are all that are not numbers
-    head = _bytes(["case_key", [coordinate.path for coordinate in coordinates]])
+    chosen = [[[choice.path, choice.value] for choice in sorted(cases.choices, key=lambda choice: choice.path)]]
+    head = _bytes(["case_key", [coordinate.path for coordinate in coordinates], *(chosen if chosen[0] else [])])
     return _row_digests(head, table.view(np.uint8).reshape(count, -1))
 
 
@@ -60,10 +64,23 @@ def case_ids(experiment: Experiment, rows: Sequence[int] | np.ndarray | None = N
     """case_id of every case, or of some rows of the case table, in their order."""
     parameters = {path: _value(quantity.value) for path, quantity in experiment.parameters.items()}
     formulas = experiment.formulas
-    head = _bytes(["case_id", parameters, experiment.cases.seed, formulas.inputs, formulas.nodes, formulas.outputs])
+    own = [experiment.cases.seeds] if experiment.cases.seeds != "common" else []
+    head = _bytes(
+        ["case_id", parameters, experiment.cases.seed, formulas.inputs, formulas.nodes, formulas.outputs, *own]
+    )
     keys = case_keys(experiment, rows)
     packed = np.frombuffer("".join(keys).encode("ascii"), dtype=np.uint8).reshape(len(keys), 2 * DIGEST_BYTES)
     return _row_digests(head, packed)
+
+
+def case_seeds(experiment: Experiment, rows: Sequence[int] | np.ndarray | None = None) -> np.ndarray:
+    """Seed of the noise of every case, or of some rows of the case table: whole numbers below 2^53."""
+    count = experiment.cases.count if rows is None else len(rows)
+    seed = experiment.cases.seed
+    if experiment.cases.seeds == "common":
+        return np.full(count, seed, dtype=np.int64)
+    mixed = (_digest(["seed", seed, case_key]) for case_key in case_keys(experiment, rows))
+    return np.array([int(digest, 16) % 2**53 for digest in mixed], dtype=np.int64)
 
 
 def _row_digests(head: bytes, rows: np.ndarray) -> list[str]:

@@ -38,6 +38,9 @@ from met.trace.graph import Formulas
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
 
+REPEAT, SEED = "noise:repeat", "noise:seed"
+"""Inputs of a program besides coordinates: no path of a deck's has a colon."""
+
 
 @frozen
 class Origin:
@@ -245,19 +248,54 @@ class Coordinate:
 
 
 @frozen
+class Choice:
+    """A coordinate of a sweep that decides the structure, so that it is one for all cases of an experiment.
+
+    path   as the deck wrote it: `integrator`, `shoulder.servo`, `rates.dynamics`, `macro PAYLOAD`
+    value  as the deck wrote it: `rk4`, `500 Hz`
+    """
+
+    path: str
+    value: str
+    place: Place | None = None
+
+
+@frozen
 class Cases:
-    """The case table: `count` rows of coordinates, in the order that `met cases` prints."""
+    """The case table: `count` rows of coordinates, in the order that `met cases` prints.
+
+    seed         of the noise. "common": cases that differ in coordinates alone feel the same noise; "independent": each
+                 has noise of its own, by its case_key
+    choices      what all these cases share, and other groups of the same sweep have otherwise
+    repeats      number of each case's repeat, which has a stream of noise of its own; None where nothing is repeated
+    positions    of each case in the table of its sweep, rising; None where they are 0 to count - 1
+    """
 
     count: int
     coordinates: tuple[Coordinate, ...] = ()
     seed: int = 0
+    seeds: Literal["common", "independent"] = "common"
+    choices: tuple[Choice, ...] = ()
+    repeats: np.ndarray | None = None
+    positions: np.ndarray | None = None
+
+    @property
+    def noise(self) -> tuple[str, ...]:
+        """What of a case's noise is its own: inputs of the program, after the coordinates."""
+        return (*([REPEAT] if self.repeats is not None else []), *([SEED] if self.seeds == "independent" else []))
+
+    @property
+    def table(self) -> np.ndarray:
+        """Position of each case in the table of its sweep."""
+        return np.arange(self.count) if self.positions is None else self.positions.astype(np.int64)
 
 
 @frozen
 class Experiment:
-    """A run or sweep: structure, parameters, cases.
+    """A run or sweep, or of a sweep of several structures one group: structure, parameters, cases.
 
     formulas   from the coordinates (inputs, by path) to every parameter that varies (`Formula.output`)
+    sweep      what a group is of; "" where the experiment is the whole of its run or sweep
     """
 
     name: str
@@ -268,6 +306,17 @@ class Experiment:
     requirements: tuple[Requirement, ...] = ()
     place: Place | None = None
     notes: tuple[str, ...] = ()
+    sweep: str = ""
+
+    @property
+    def asked(self) -> str:
+        """The name by which a user asks for it: that of the run or sweep."""
+        return self.sweep or self.name
+
+    @property
+    def varies(self) -> bool:
+        """Whether it is a sweep, or a group of one."""
+        return bool(self.sweep or self.cases.coordinates or self.cases.choices or self.cases.repeats is not None)
 
 
 @frozen

@@ -25,6 +25,7 @@ from met.plan_defaults import INERTIA, declared, heads_of_models
 from met.trace.graph import TRUTHS, Formulas
 
 NAME = re.compile(r"[^\W\d]\w*")
+GROUP = re.compile(r"[\w+-]+(\.[\w+-]+)*")
 """What a deck can name: a name is part of paths, of messages, of files' names."""
 
 MOST_TICKS = 10**12
@@ -47,7 +48,7 @@ def check(experiments: Iterable[Experiment]) -> None:
     names: list[str] = []
     for index, experiment in enumerate(experiments):
         where = f"experiments[{index}]"
-        _name(experiment.name, f"{where}.name", names)
+        _group_name(experiment, f"{where}.name", names)
         names.append(experiment.name)
         _check_arm(experiment.structure, f"{where}.structure")
         _check_schedule(experiment.structure, f"{where}.structure")
@@ -83,6 +84,16 @@ def _name(name: str, where: str, before: Collection[str] = ()) -> None:
         raise Damaged(where, f"{name!r} is no name: letters, digits and _")
     if name in before:
         raise Damaged(where, f"`{name}` is there twice")
+
+
+def _group_name(experiment: Experiment, where: str, before: Collection[str]) -> None:
+    """A run's or sweep's name; behind it, for a group of a sweep, what tells it from the others."""
+    head, _, rest = experiment.name.partition(".")
+    _name(head, where)
+    if experiment.name in before:
+        raise Damaged(where, f"`{experiment.name}` is there twice")
+    if (rest or experiment.sweep) and not (GROUP.fullmatch(rest) and experiment.sweep == head):
+        raise Damaged(where, f"{experiment.name!r} is no name of a group of the sweep `{experiment.sweep}`")
 
 
 def _whole(number: int | None, low: int, high: int, where: str) -> None:
@@ -250,8 +261,12 @@ def _check_requirements(experiment: Experiment, where: str) -> None:
 
 def _check_cases(experiment: Experiment, where: str) -> None:
     cases = experiment.cases
-    _whole(cases.count, 1, 2**63 - 1 if cases.coordinates else 1, f"{where}.count")
+    many = cases.coordinates or cases.repeats is not None
+    _whole(cases.count, 1, 2**63 - 1 if many else 1, f"{where}.count")
     _whole(cases.seed, 0, MOST_SEED, f"{where}.seed")
+    for name, column in (("repeats", cases.repeats), ("positions", cases.positions)):
+        if column is not None:
+            _check_numbering(column, cases.count, name == "positions", f"{where}.{name}")
     paths: set[str] = set()
     for index, coordinate in enumerate(cases.coordinates):
         path = f"{where}.coordinates[{index}]"
@@ -261,6 +276,15 @@ def _check_cases(experiment: Experiment, where: str) -> None:
             raise Damaged(f"{path}.path", f"`{coordinate.path}` is there twice")
         paths.add(coordinate.path)
         _check_coordinate(experiment, coordinate, path)
+
+
+def _check_numbering(numbers: np.ndarray, count: int, rising: bool, where: str) -> None:
+    if numbers.shape != (count,):
+        raise Damaged(where, f"there are {numbers.size} for {count} cases")
+    if not (np.isfinite(numbers).all() and (numbers == np.rint(numbers)).all()):
+        raise Damaged(where, "they should be whole numbers")
+    if not ((numbers >= 0) & (numbers < 2**32)).all() or (rising and not (np.diff(numbers) > 0).all()):
+        raise Damaged(where, "they should be at least 0" + (", and rise" if rising else " and below 2^32"))
 
 
 def _check_coordinate(experiment: Experiment, coordinate: Coordinate, where: str) -> None:
@@ -407,12 +431,12 @@ def _check_table(experiment: Experiment, prefix: str, fewest: int, where: str) -
 
 
 def _check_bodies(experiment: Experiment, where: str) -> None:
-    """Masses are above zero, inertias are possible, axes have length 1: as written, or in every case."""
+    """Masses are not below zero, inertias are possible, axes have length 1: as written, or in every case."""
     structure = experiment.structure
     tests: list[tuple[str, list[str], Callable[[np.ndarray], np.ndarray], str]] = []
     for link in structure.links:
         head = f"links.{link.name}"
-        tests.append((f"{head}.mass", [f"{head}.mass"], _is_mass, "it should be above 0"))
+        tests.append((f"{head}.mass", [f"{head}.mass"], _is_mass, "it should be at least 0"))
         inertia = [f"{head}.inertia.{entry}" for entry in INERTIA]
         tests.append((f"{head}.inertia", inertia, _is_inertia, "a principal moment is below 0: no body has that"))
     for joint in structure.moving:
@@ -456,7 +480,7 @@ def _check_varied(
 
 
 def _is_mass(values: np.ndarray) -> np.ndarray:
-    return (values[:, 0] > 0.0) & np.isfinite(values[:, 0])
+    return (values[:, 0] >= 0.0) & np.isfinite(values[:, 0])
 
 
 def _is_axis(values: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from met import models
-from met.channel import channels, joint_unit
+from met.channel import channels, joint_unit, watched_unit
 from met.diagnostic import nearest
 from met.parameter import Parameter, under
 from met.plan import Experiment, Origin, Quantity, Structure
@@ -93,7 +93,7 @@ def declared(structure: Structure) -> Iterator[Declared]:
     for metric in structure.metrics:
         of = watched[metric.of].unit if metric.of in watched else "1"
         for parameter in models.find("metric", metric.model, metric.place).parameters:
-            yield from _numbers(f"metrics.{metric.name}", parameter, of if parameter.unit == "of" else parameter.unit)
+            yield from _numbers(f"metrics.{metric.name}", parameter, watched_unit(parameter.unit, of))
 
 
 def _numbers(prefix: str, parameter: Parameter, unit: str) -> Iterator[Declared]:

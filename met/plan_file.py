@@ -95,8 +95,11 @@ def dumps(plan: Plan, refer: Refer | None = None) -> str:
     body = encode(Plan, replace(plan, experiments=tuple(bare)))
     for experiment, written, elsewhere in zip(plan.experiments, body["experiments"], kept_elsewhere, strict=True):
         if refer is not None and elsewhere:
-            for index, coordinate in enumerate(written["cases"].get("coordinates", ())):
-                coordinate["values"] = refer(experiment, index)
+            cases = written["cases"]
+            columns = [(coordinate, "values") for coordinate in cases.get("coordinates", ())]
+            columns += [(cases, name) for name in ("repeats", "positions") if name in cases]
+            for index, (holder, name) in enumerate(columns):
+                holder[name] = refer(experiment, index)
     document = {"schema": SCHEMA, "version": VERSION, **body}
     return json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -169,16 +172,18 @@ def table_bytes(experiment: Experiment) -> bytes:
 
 
 def table(experiment: Experiment) -> np.ndarray:
-    """The values of all coordinates: (coordinate, case), SI."""
-    out = np.empty((len(experiment.cases.coordinates), experiment.cases.count), dtype="<f8")
-    for row, coordinate in enumerate(experiment.cases.coordinates):
-        out[row] = coordinate.values
-    return out
+    """The values of all coordinates, SI, then repeats and positions where there are any: (column, case)."""
+    cases = experiment.cases
+    columns = [coordinate.values for coordinate in cases.coordinates]
+    columns += [column for column in (cases.repeats, cases.positions) if column is not None]
+    return np.array(columns, dtype="<f8").reshape(len(columns), cases.count)
 
 
 def _without_values(experiment: Experiment) -> Experiment:
-    coordinates = tuple(replace(c, values=np.empty(0)) for c in experiment.cases.coordinates)
-    return replace(experiment, cases=replace(experiment.cases, coordinates=coordinates))
+    cases = experiment.cases
+    coordinates = tuple(replace(c, values=np.empty(0)) for c in cases.coordinates)
+    repeats, positions = (None if column is None else np.empty(0) for column in (cases.repeats, cases.positions))
+    return replace(experiment, cases=replace(cases, coordinates=coordinates, repeats=repeats, positions=positions))
 
 
 def _read_table(plan: Path, name: str) -> tuple[np.ndarray, str]:

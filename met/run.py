@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 
+from met import keys
 from met.frozen import frozen
-from met.plan import Experiment
+from met.plan import REPEAT, Experiment
 from met.program.build import COORDINATE, METRIC, OUTPUTS, build
 from met.program.step import EVENTS, NOT_FINITE, SINGULAR
 from met.program.substituted import LIMITED
@@ -100,10 +101,16 @@ def run(
 
 def inputs(experiment: Experiment, rows: np.ndarray) -> np.ndarray:
     """What the kernel takes of these rows of the case table, [case, input]."""
-    coordinates = experiment.cases.coordinates
-    values = np.empty((len(rows), len(coordinates)))
-    for column, coordinate in enumerate(coordinates):
+    cases = experiment.cases
+    values = np.empty((len(rows), len(cases.coordinates) + len(cases.noise)))
+    for column, coordinate in enumerate(cases.coordinates):
         values[:, column] = coordinate.values[rows]
+    for column, name in enumerate(cases.noise, start=len(cases.coordinates)):
+        if name == REPEAT:
+            assert cases.repeats is not None
+            values[:, column] = cases.repeats[rows]
+        else:
+            values[:, column] = keys.case_seeds(experiment, rows)
     return values
 
 
@@ -114,6 +121,9 @@ def _results(
     out = {name: outputs[:, column] for column, name in enumerate(program.outputs)}
     failed = out["failure"] != 0.0
     n_valid = np.where(failed, np.ceil(out["failure.tick"] / schedule.record), schedule.rows).astype(np.int64)
+    causes = [_cause(experiment, *row) for row in outputs[:, :3].tolist()]
+    for row, cause in _misapplied(experiment, rows, out).items():
+        failed[row], n_valid[row], causes[row] = True, 0, cause
     signals: dict[str, np.ndarray] = {}
     if history is not None:
         for case in np.flatnonzero(failed):
@@ -128,7 +138,7 @@ def _results(
     return Run(
         case=rows,
         status=np.where(failed, FAILED, DONE).astype(np.int8),
-        cause=[_cause(experiment, *row) for row in outputs[:, :3].tolist()],
+        cause=causes,
         n_valid=n_valid,
         time=np.arange(schedule.rows) * schedule.record / schedule.base_hz,
         signals=signals,
@@ -138,6 +148,19 @@ def _results(
         events={name.split(".")[1]: out[name].astype(np.int64) for name in EVENTS},
         limited=out[LIMITED].astype(np.int64),
     )
+
+
+def _misapplied(experiment: Experiment, rows: np.ndarray, out: Mapping[str, np.ndarray]) -> dict[int, str]:
+    """Cases that were run with another value than the case table has for them, which would be a defect: in words."""
+    found: dict[int, str] = {}
+    for coordinate in experiment.cases.coordinates:
+        used, wanted = out[COORDINATE + coordinate.path], coordinate.values[rows]
+        for case in np.flatnonzero((used != wanted) & ~(np.isnan(used) & np.isnan(wanted))).tolist():
+            found[case] = (
+                f"a defect of MET: the engine used {used[case]!r} for {coordinate.path}, and the case table has "
+                f"{wanted[case]!r}. Please report it"
+            )
+    return found
 
 
 def _met(metric: np.ndarray, comparison: str, limit: float) -> np.ndarray:

@@ -119,12 +119,12 @@ error[D086]: these joints make a loop, which hangs on no base: bar -> tip -> bar
         "mass = 2 kg",
         "mass = -2 kg",
         """\
-error[D077]: `mass` of link `bar` must be above 0 kg
+error[D077]: `mass` of link `bar` must be at least 0 kg
  --> deck.ic:3:23
   |
 3 |     link bar { mass = -2 kg; shape = rod(length = 1 m, along = x); }
   |                       ^^^^^ this is -2 kg
-  = help: write a number above 0 kg (mass of the link)
+  = help: write a number at least 0 kg (mass of the link)
 
 1 error
 """,

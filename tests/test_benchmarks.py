@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from benchmarks import arms, evaluation, peer, report, stepping
+from benchmarks import arms, evaluation, long_deck, peer, report, stepping
 from benchmarks import machine as measured_on
 from benchmarks.__main__ import SUBJECTS, main
 from benchmarks.benchmark import Benchmark, Derived, Target, Untaken, ratio, take, with_sources
 
+import ic
 from met import kernel
 
 HERE = {
@@ -51,6 +52,20 @@ def test_the_list_names_every_figure_once_ratios_first(capsys: pytest.CaptureFix
     assert len(set(names)) == len(names)
     assert [line.split()[0] for line in lines if line.startswith("    ")][: len(names)] == names
     assert {"version", "check", "run", "hot.7R", "compile.100R", "static.30R-general"} <= set(names)
+
+
+def test_a_quick_look_leaves_out_what_is_slow_and_what_follows_from_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--quick", "--repeats", "1", "check.growth"]) == 0
+    assert capsys.readouterr().out.endswith("targets: 0, none missed\n")
+
+
+@pytest.mark.parametrize("lines", [20, 100])
+def test_the_long_deck_has_its_lines_and_is_sound(tmp_path: Path, lines: int) -> None:
+    text = long_deck.text(lines)
+    used = [line for line in text.splitlines() if line.count("(") >= 2 and line.startswith(("let", "LINK"))]
+    assert len(used) == lines
+    (tmp_path / "deck.ic").write_text(text)
+    assert ic.check(tmp_path / "deck.ic").diagnostics == ()
 
 
 def test_what_a_figure_follows_from_is_taken_with_it() -> None:

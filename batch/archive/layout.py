@@ -2,13 +2,13 @@
 
     /                       attributes: schema, deck, and for a single experiment those of its group
       <variables>           a single experiment lies in the root
-    /<experiment>           several: one group each
+    /<experiment>           several: one group each; of a sweep of several structures, one for each structure
     /provenance             source (files of the deck, whole), plan (JSON); versions and git commit as attributes
       cases.<experiment>    coordinate by case: the whole case table, where it is too large for the plan's JSON
 
 Dimensions, each with its coordinate variable:
 
-    case            row of the case table (position that `met cases` prints)
+    case            position in the sweep's case table, which `met cases` prints
     recorded_case   the cases whose histories were kept
     time            s, of the recorded rows
     joint           names of the moving joints; a signal of some joints only has a dimension of its own, `joint_of_...`
@@ -16,10 +16,10 @@ Dimensions, each with its coordinate variable:
     quaternion      w, x, y, z: of an orientation
     requirement     texts of the requirements
 
-A variable says what it is by its attribute `role`: dimension, case, coordinate, metric, requirement, recorded or
-signal. In a sweep, `recorded.case_id` and `recorded.<path>` repeat names and varied parameters along recorded_case, for
-a variable has one set of dimensions only: so a signal that is taken out by itself still says what its cases are
-(`q.where(q["recorded.gearbox.kp"] > 0.02, drop=True)`).
+A variable says what it is by its attribute `role`: dimension, case, coordinate, choice (what decides the structure, in
+words), metric, requirement, recorded or signal. In a sweep, `recorded.case_id` and `recorded.<path>` repeat names and
+varied parameters along recorded_case, for a variable has one set of dimensions only: so a signal that is taken out by
+itself still says what its cases are (`q.where(q["recorded.gearbox.kp"] > 0.02, drop=True)`).
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from typing import Any, Literal
 import numpy as np
 
 from batch.archive import limits
-from met.channel import DIMENSIONS, channels
+from met.channel import DIMENSIONS, channels, watched_unit
 from met.frozen import frozen
 from met.plan import Coordinate, Experiment, MetricUse, Plan, Recorded
 
 SCHEMA = "met.archive"
 VERSION = 1
 
-Role = Literal["dimension", "case", "coordinate", "metric", "requirement", "recorded", "signal"]
+Role = Literal["dimension", "case", "coordinate", "choice", "metric", "requirement", "recorded", "signal"]
 Kind = Literal["float64", "int64", "int8", "str"]
 
 CHUNK_BYTES = 4 << 20
@@ -174,10 +174,7 @@ def metric_unit(experiment: Experiment, use: MetricUse) -> str:
     from met import models
 
     declared = models.find("metric", use.model, use.place).unit
-    if "of" not in re.findall(r"\w+", declared):
-        return str(declared)
-    unit = channels(experiment.structure)[use.of].unit
-    return unit if declared == "of" else re.sub(r"\bof\b", f"({unit})", declared)
+    return watched_unit(str(declared), channels(experiment.structure)[use.of].unit)
 
 
 def _case_variables(experiment: Experiment) -> list[Variable]:
@@ -188,12 +185,17 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         variable("case_id", "str", "digest of all parameters of the case"),
         variable("case_key", "str", "digest of the coordinates of the case"),
         variable("repeat", "int64", "number of the repeat"),
-        variable("seed", "int64", "seed of the run's noise"),
+        variable("seed", "int64", "seed of the case's noise"),
     ]
     taken = RESERVED | {recorded.name for recorded in experiment.structure.record}
     taken |= {*joint_dimensions(experiment).values(), *component_dimensions(experiment).values()}
     paths = [coordinate.path for coordinate in experiment.cases.coordinates]
+    paths += [choice.path for choice in experiment.cases.choices]
     names = {path: _apart(path, "coordinates", taken, paths) for path in paths}
+    out += [
+        Variable(names[c.path], "str", ("case",), "choice", f"chosen: {c.path}", attributes={"path": c.path})
+        for c in experiment.cases.choices
+    ]
     out += [_coordinate(experiment, c, names[c.path]) for c in experiment.cases.coordinates]
     out += [
         variable(
@@ -306,9 +308,13 @@ def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, 
     from met import keys
 
     structure, schedule = experiment.structure, experiment.structure.schedule
-    coordinates = ["case_id", "case_key", *(v.name for v in variables if v.role in ("coordinate", "recorded"))]
+    named = ("coordinate", "choice", "recorded")
+    coordinates = ["case_id", "case_key", *(v.name for v in variables if v.role in named)]
+    if experiment.cases.repeats is not None:
+        coordinates.append("repeat")
     return {
         "experiment": experiment.name,
+        **({"sweep": experiment.sweep} if experiment.sweep else {}),
         "arm": structure.arm,
         "integrator": structure.integrator,
         "velocity_products": "on" if structure.velocity_products else "off",

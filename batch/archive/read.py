@@ -74,6 +74,7 @@ class Group:
             self.attributes: dict[str, Any] = {name: _plain(value) for name, value in node.attrs.items()}
             self._check()
         self.name: str = self.attributes["experiment"]
+        self.sweep: str = str(self.attributes.get("sweep", ""))
 
     def _check(self) -> None:
         """That the variables are those of an experiment, and that their sizes are those of their dimensions."""
@@ -91,7 +92,7 @@ class Group:
             if shapes[name] != tuple(shapes[dim][0] for dim in variable.dims):
                 raise Unlike(f"variable `{name}` is not of the size of its dimensions")
             numbers = variable.role in ("coordinate", "metric", "signal") or name in ("time", "met", "recorded_case")
-            words = name == "requirement"
+            words = name == "requirement" or variable.role == "choice"
             if self._node[name].dtype.kind not in (NUMBERS if numbers else WORDS if words else NUMBERS + WORDS):
                 raise Unlike(f"variable `{name}` is of another type")
             if variable.role == "signal" and variable.dims[:2] != ("recorded_case", "time"):
@@ -173,10 +174,8 @@ class Group:
             return int(found[0])
         if len(found) == 0:
             raise Problem(error("E321", f"no case `{wanted}` in `{self.name}`", help=_cases_here(self.values("case"))))
-        some = ", ".join(self.values("case_id")[found[:4]])
-        raise Problem(
-            error("E322", f"case `{wanted}` may be any of {len(found)}: {some} ...", help="give more of its id")
-        )
+        some = ", ".join(self.values("case_id")[found[:4]]) + (" ..." if len(found) > 4 else "")
+        raise Problem(error("E322", f"case `{wanted}` may be any of {len(found)}: {some}", help="give more of its id"))
 
 
 def _of_joints(variable: Stored) -> bool:

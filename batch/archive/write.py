@@ -134,13 +134,17 @@ class Writer:
         schedule = experiment.structure.schedule
         values["case_id"][:] = keys.case_ids(experiment, section.rows)
         values["case_key"][:] = keys.case_keys(experiment, section.rows)
-        values["seed"][:] = experiment.cases.seed
-        values["case"] = section.rows
+        values["seed"][:] = keys.case_seeds(experiment, section.rows)
+        if experiment.cases.repeats is not None:
+            values["repeat"][:] = experiment.cases.repeats[section.rows]
+        for choice, variable in zip(experiment.cases.choices, section.layout.role("choice"), strict=True):
+            values[variable.name][:] = choice.value
+        values["case"] = experiment.cases.table[section.rows]
         values["requirement"] = np.array([r.text for r in experiment.requirements], dtype=object)
         for variable in section.layout.role("recorded"):
             values[variable.name] = values[variable.source]
         if section.recorded:
-            values["recorded_case"] = section.rows
+            values["recorded_case"] = values["case"]
             values["time"] = np.arange(schedule.rows) * schedule.record / schedule.base_hz
             for along in (archive_layout.joint_dimensions(experiment), archive_layout.component_dimensions(experiment)):
                 for names, dim in along.items():

@@ -1,7 +1,7 @@
 """Tokens to the tree of `ic.grammar.syntax`, by recursive descent.
 
-The parser knows no word of the language but `let`, `like`, `of`, `and`, `or`, `not` and `when`, and those only where
-they stand: what a run of names means is decided by what comes behind it, so a joint may be called `at`, `let` or
+The parser knows no word of the language but `let`, `like`, `of`, `from`, `and`, `or`, `not` and `when`, and those only
+where they stand: what a run of names means is decided by what comes behind it, so a joint may be called `at`, `let` or
 `sample`.
 
     names =  or  +=      a setting; all names but the last are words
@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 
-from ic.grammar.cursor import OPENING, Ended, Unreadable, found, span
+from ic.grammar.cursor import OPENING, SHOWN, Ended, Unreadable, found, span
 from ic.grammar.expressions import Expressions
 from ic.grammar.syntax import Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, Token
@@ -118,6 +118,11 @@ class _Parser(Expressions):
             return self.setting(names, tail)
         if text == "{" or (text == ";" and _base_at(names) is not None):
             return self.group(names, tail)
+        if text == "(" and _made_from(names, tail):
+            return self.group_from(names)
+        if self.token.kind == STRING and names[0].text == "arm" and names[-1].text == "from":
+            self.fail("D020", "a file is named by what it is", self.token,
+                      help=f"write `from urdf({self.token.text[:SHOWN]})`")  # fmt: skip
         if text == "," and _base_at(names) is not None:
             self.fail("D032", "there is one base only", self.token, help="a definition takes after one other")
         if text in ("-=", "*=", "/="):
@@ -191,9 +196,7 @@ class _Parser(Expressions):
             self.fail("D023", "`=` sets a value", operator, help="to compare, write `==`")
         value = self.value()
         self.semicolon(value)
-        named = _words(path)
-        place = named[0].place if len(named) == 1 else span(path[0], path[-1])
-        return Setting(_words(words), named, operator.text, value, place)
+        return Setting(_words(words), _words(path), operator.text, value, span(names[0], path[-1]))
 
     def group(self, names: list[Token], tail: list[Token]) -> Group:
         base = _base_at(names)
@@ -221,6 +224,30 @@ class _Parser(Expressions):
             body = self.block()
         return Group(_words(words), like, of, body, span(words[0], words[-1]))
 
+    def group_from(self, names: list[Token]) -> Group:
+        """`arm NAME from urdf("FILE") { ... }`: the block that follows is the group's, not the call's."""
+        words, called = names[:-2], names[-1]
+        if _base_at(words) is not None:
+            self.fail("D032", f"`{words[-2].text}` and `from` both name a base", names[-2],
+                      help="there is one base only")  # fmt: skip
+        closing, depth = self.at + 1, 1
+        while depth and self.tokens[closing].kind != END:
+            depth += {"(": 1, ")": -1}.get(self.tokens[closing].text, 0)
+            closing += 1
+        behind = self.tokens[closing]
+        if behind.text in ("like", "of"):
+            self.fail("D032", f"`from` and `{behind.text}` both name a base", behind, help="there is one base only")
+        call = self.call(Name((_word(called),), called.place), called)
+        if not isinstance(call, Call):
+            self.fail("D020", "a file has no unit", self.previous, help="leave the unit out")
+        body = call.body
+        if body is None:
+            if self.token.text != ";":
+                self.unexpected("`{` or `;`", help="a block holds what differs from the file; `;` stands for none")
+            self.advance()
+        made_from = Call(call.name, call.positional, call.named, None, call.place)
+        return Group(_words(words), None, None, body or (), span(words[0], words[-1]), made_from)
+
     def statement(self, start: int, names: list[Token], tail: list[Token]) -> Statement:
         """`require settle < 10 s;`: which of the names belong to the value is seen from what follows them."""
         token = self.token
@@ -230,6 +257,8 @@ class _Parser(Expressions):
         self.at = start + count
         words = names[:count]
         value = self.value()
+        if words[0].text == "sample" and self.token.text == "{":
+            self.unexpected("`;`", help="a sample names its design: `sample lhs(200) { ... }`")
         self.semicolon(value)
         return Statement(_words(words), value, span(words[0], words[-1]))
 
@@ -255,7 +284,8 @@ class _Parser(Expressions):
         if token.text == "}" or token.kind == END or self.on_new_line(self.at):
             self.tell("D021", "expected `;`", self.behind(self.previous), help=_SEMICOLON)
             return
-        if token.text == "," and (self.on_new_line(self.at + 1) or self.following.text == "}"):
+        another = self.following.kind == NAME and self.tokens[self.at + 2].text in ("=", "+=")
+        if token.text == "," and (another or self.on_new_line(self.at + 1) or self.following.text == "}"):
             self.tell("D024", "`,` at the end of an entry", token, help="write `;`")
             self.advance()
             return
@@ -266,7 +296,7 @@ class _Parser(Expressions):
             return
         helps = {
             "=": "to compare, write `==`; to set two things, write two entries",
-            "..": "ranges are not in the language yet: write `linspace(first, last, count)`",
+            "..": "a range is written `first .. last by step`",
             ",": "a list stands in brackets: `[a, b]`",
             "?": "there is no `?:` in a deck; `#if` chooses between builds",
         }
@@ -287,6 +317,11 @@ def _base_at(names: Sequence[Token]) -> int | None:
     """Where `like X` or `of X` stands at the end of a definition's names; kind and name come first."""
     at = len(names) - 2
     return at if at >= 2 and names[at].text in ("like", "of") else None
+
+
+def _made_from(names: Sequence[Token], tail: Sequence[Token]) -> bool:
+    """Whether the names of a definition end in `from MODEL`, before the arguments of the model."""
+    return len(names) >= 4 and names[-2].text == "from" and not tail
 
 
 def _words_before_value(names: Sequence[Token], dotted: bool, following: Token) -> int:

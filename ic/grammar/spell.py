@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ic.grammar.syntax import Binary, Call, Expression, List, Name, Number, String, Unary, WithUnit
+from ic.grammar.syntax import Binary, Call, Expression, List, Name, Number, Range, String, Unary, WithUnit
 
 LOOSE = {"or": 1, "and": 2, "<": 3, "<=": 3, ">": 3, ">=": 3, "==": 3, "!=": 3, "+": 4, "-": 4, "*": 5, "/": 5, "^": 7}
 
@@ -28,6 +28,8 @@ def spell(expression: Expression, within: int = 0) -> str:
         case Call():
             named = (f"{word.text} = {spell(value)}" for word, value in expression.named)
             return f"{expression.name.text}({', '.join([*(spell(value) for value in expression.positional), *named])})"
+        case Range():
+            return f"{spell(expression.first)} .. {spell(expression.last)} by {spell(expression.step)}"
         case Unary():
             gap = " " if expression.operator == "not" else ""
             return f"{expression.operator}{gap}{spell(expression.operand, 6)}"

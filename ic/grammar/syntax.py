@@ -7,10 +7,14 @@ what may stand where is decided when the tree is resolved. So a joint may be cal
     servo gearbox like rigid_gearbox { ... }                Group, words ("servo", "gearbox"), like ("rigid_gearbox",)
     default run nominal { ... }                             Group, words ("default", "run", "nominal")
     sweep gains of nominal { ... }                          Group, words ("sweep", "gains"), of ("nominal",)
+    arm panda from urdf("panda.urdf") { ... }               Group, words ("arm", "panda"), made_from a Call
     joint elbow revolute { ... }                            Group, words ("joint", "elbow", "revolute")
     shoulder = gearbox;      record += [q];                 Setting, words (), path, operator, value
     metric settle = settling_time { ... };                  Setting, words ("metric",), path ("settle",)
     vary gearbox.kp = linspace(0.01, 0.04, 7) V*s/rad;      Setting, words ("vary",), path ("gearbox", "kp")
+    vary macro PAYLOAD = [0, 5];                            Setting, words ("vary", "macro"), path ("PAYLOAD",)
+    sweep both = gains + spread;                            Setting, words ("sweep",), path ("both",)
+    sample lhs(200) { ... }                                 Statement, words ("sample",), value a Call with a body
     require settle < 10 s;                                  Statement, words ("require",), value
     exclude when kp > 3 V*s/rad and m > 5 kg;               Statement, words ("exclude", "when"), value
     remove settle;                                          Statement, words ("remove",), value a Name
@@ -94,6 +98,16 @@ class WithUnit:
 
 
 @frozen
+class Range:
+    """`first .. last by step`: both ends included where the steps meet the last."""
+
+    first: Expression
+    last: Expression
+    step: Expression
+    place: Place  # of the `..`
+
+
+@frozen
 class Unary:
     operator: str  # "-" "+" "not"
     operand: Expression
@@ -110,7 +124,7 @@ class Binary:
     place: Place  # of the operator
 
 
-Expression = Number | String | Name | List | Call | WithUnit | Unary | Binary
+Expression = Number | String | Name | List | Call | WithUnit | Range | Unary | Binary
 
 
 def children(expression: Expression) -> tuple[Expression, ...]:
@@ -120,6 +134,8 @@ def children(expression: Expression) -> tuple[Expression, ...]:
             return items
         case WithUnit(inner=inner):
             return (inner,)
+        case Range(first=first, last=last, step=step):
+            return (first, last, step)
         case Unary(operand=operand):
             return (operand,)
         case Binary(left=left, right=right):
@@ -142,7 +158,7 @@ class Setting:
     path: tuple[Word, ...]
     operator: str  # "=" or "+="
     value: Expression
-    place: Place  # of the path
+    place: Place  # of the words and the path
 
 
 @frozen
@@ -154,13 +170,14 @@ class Statement:
 
 @frozen
 class Group:
-    """`words { body }`, or with `like`/`of` a base. At the top level a definition, inside one a block."""
+    """`words { body }`, or with `like`/`of`/`from` a base. At the top level a definition, inside one a block."""
 
     words: tuple[Word, ...]
     like: Name | None
     of: Name | None
     body: tuple[Entry, ...]
     place: Place  # of the words
+    made_from: Call | None = None
 
 
 Entry = Let | Setting | Statement | Group
@@ -180,6 +197,7 @@ class Deck:
     """A whole deck after the preprocessor: its entries in order, the files they came from, and warnings so far.
 
     include_dirs: further directories in which files that the deck names are looked for.
+    path, defines: what it was read from and with, to read it again.
     """
 
     file: str
@@ -187,3 +205,5 @@ class Deck:
     sources: tuple[SourceText, ...]
     warnings: tuple[Diagnostic, ...] = ()
     include_dirs: tuple[str, ...] = ()
+    path: str = ""
+    defines: tuple[str, ...] = ()

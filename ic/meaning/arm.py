@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from ic.grammar.syntax import Call, Expression, Name, Unary
+from ic.meaning.bodies import check_body, check_moved
 from ic.meaning.complaints import belongs, known_words
 from ic.meaning.dh import use_dh
+from ic.meaning.foreign import refused
+from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, refuse_values, word_of
-from ic.meaning.resolve import RESERVED, Block, Definition, Item
+from ic.meaning.resolve import RESERVED, Definition
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.shapes import SHAPES, Solid
+from ic.meaning.values import place_of
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
@@ -24,7 +29,7 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 JOINT_KINDS = ("revolute", "prismatic", "fixed")
 
-MASS = Parameter(name="mass", unit="kg", above=0.0, doc="mass of the link")
+MASS = Parameter(name="mass", unit="kg", at_least=0.0, doc="mass of the link")
 COM = Parameter(name="com", unit="m", shape="vector", doc="centre of mass, link frame")
 INERTIA = Parameter(name="inertia", unit="kg*m^2", shape="list", doc="inertia about the centre of mass, link axes")
 AT = Parameter(name="at", unit="m", shape="vector", doc="origin of the joint frame, parent link's frame")
@@ -65,12 +70,15 @@ def resolve_arm(scope: Scope, definition: Definition) -> Arm | None:
         scope.complaints.error("D080", "an arm holds links and joints; this is neither", statement.place,
                                help="move it to the run")
     links = [link for item in block.of_kind("link") if (link := _link(scope, item, homes)) is not None]
-    made = [_joint(scope, item, homes, block) for item in block.of_kind("joint")]
+    ends = {item.name: None for item in block.of_kind("link")}
+    made = [_joint(scope, item, homes, ends) for item in block.of_kind("joint")]
     joints = [joint for joint in made if joint is not None]
     if not any(True for _ in block.of_kind("link")):
         scope.complaints.error("D081", f"arm `{definition.name}` has no links", definition.place,
                                help="write `link NAME { ... }` and a joint to hold it")
     check_tree(scope, definition.name, links, joints, complete=len(joints) == len(made))
+    if not scope.complaints.errors:
+        check_moved(scope, links, joints)
     written = {item.name for kind in ("link", "joint") for item in block.of_kind(kind)}
     lost = frozenset(written - {link.name for link in links} - {joint.name for joint in joints})
     return Arm(definition.name, tuple(links), tuple(joints), lost)
@@ -101,7 +109,7 @@ def _link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
     if item.detail:
         scope.complaints.error("D085", f"`{item.detail[0].text}` after the name of a link", item.detail[0].place,
                                help=f"write `link {item.name} {{ ... }}`")
-    if item.body is None:
+    if item.body is None or item.value is not None:
         scope.complaints.error("D085", f"link `{item.name}` needs a block", item.place,
                                help=f"write `link {item.name} {{ mass = ...; shape = ...; }}`")
         return None
@@ -112,20 +120,7 @@ def _link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
     _com(scope, owner, body.get("com"), solid)
     inertia = _inertia(scope, owner, body.get("inertia"), solid, mass)
     if inertia is not None:
-        strict = body.get("inertia") is not None
-        place = body.items["inertia"].place if strict else item.place
-        scope.checks.hold(
-            inertia,
-            lambda moments: _not_a_body(moments, strict),
-            code="D087",
-            needs=(f"{owner.path}.mass",),
-            message=f"the inertia of link `{item.name}` is no body's",
-            place=place,
-            help=(
-                "inertia is about the centre of mass, in link axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2",
-                "products have the sign of -sum(m x y)",
-            ),
-        )
+        check_body(scope, owner, item.name, body.get("inertia"), inertia, mass)
     shape = None
     if solid is not None:
         shape = (solid.kind, tuple((name, scope.checks.first(value)) for name, value in solid.numbers))
@@ -138,7 +133,8 @@ def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
     name = word_of(item.value)
     if name is None or name not in SHAPES:
         helps = did_you_mean(name, SHAPES) if name else ()
-        scope.complaints.error("D088", f"no shape `{name}`" if name else "a shape is needed here", item.place,
+        scope.complaints.error("D088", f"no shape `{name}`" if name else "a shape is needed here",
+                               _value_at(item),
                                help=[*helps, "shapes: rod(length, along), box(size, along), cylinder(radius, length, "
                                      "along), sphere(radius)"])
         scope.checks.fail(f"{owner.path}.shape")
@@ -184,6 +180,8 @@ def _inertia(scope: Scope, owner: Owner, item: Item | None, solid: Solid | None,
     if item is not None:
         return scope.vector(owner, INERTIA, item, names=MOMENTS, short=3)
     if solid is None:
+        if isinstance(mass, float) and mass == 0.0:
+            return tuple(scope.derived(owner, f"inertia.{name}", 0.0, "kg*m^2", "without mass") for name in MOMENTS)
         if not scope.checks.failed(f"{owner.path}.shape"):
             scope.complaints.error(
                 "D089", f"{owner.label} has no inertia", owner.place,
@@ -198,37 +196,18 @@ def _inertia(scope: Scope, owner: Owner, item: Item | None, solid: Solid | None,
                  for name, value in zip(MOMENTS, solid.inertia(mass), strict=True))
 
 
-def _not_a_body(moments: np.ndarray, strict: bool) -> tuple[np.ndarray, list[str]]:
-    """Which rows [n, 6] are no rigid body's inertia, and why, in words.
-
-    The tolerance, 1e-9 of the largest moment, is for rounding alone: published tables have ten digits at most.
-    """
-    xx, yy, zz, xy, xz, yz = moments.T
-    matrices = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=-1).reshape(-1, 3, 3)
-    finite = np.isfinite(matrices).all(axis=(1, 2))
-    least, middle, most = np.linalg.eigvalsh(np.where(finite[:, None, None], matrices, np.eye(3))).T
-    slack = 1e-9 * np.abs(most)
-    negative = least <= slack * 1e-3 if strict else least < -slack
-    triangle = least + middle < most - slack
-    bad = ~finite | negative | triangle
-    causes = []
-    for row in np.flatnonzero(bad)[:1]:
-        shown = f"principal moments {least[row]:.6g}, {middle[row]:.6g} and {most[row]:.6g} kg*m^2"
-        if not finite[row]:
-            causes.append("it is not finite")
-        elif negative[row]:
-            causes.append(f"{shown}; none may be {'zero or negative' if strict else 'negative'}")
-        else:
-            causes.append(f"{shown}; no body has one above the sum of the others")
-    return bad, causes
-
-
 # Joints
 
 
-def _joint(scope: Scope, item: Item, homes: tuple[str, ...], arm: Block) -> Joint | None:
+def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str, None]) -> Joint | None:
     owner = Owner(f"joint `{item.name}`", item.place, item.name, homes=homes)
+    if refused(scope, item):
+        return None
     kind = item.detail[0].text if item.detail else None
+    if item.body is None or item.value is not None:
+        scope.complaints.error("D091", f"joint `{item.name}` needs a block", item.place,
+                               help=f"write `joint {item.name} revolute {{ parent = base; child = ...; axis = z; }}`")
+        return None
     if kind not in JOINT_KINDS:
         place = item.detail[0].place if item.detail else item.place
         message = f"no kind of joint `{kind}`" if kind else f"joint `{item.name}` has no kind"
@@ -240,14 +219,9 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], arm: Block) -> Join
         scope.complaints.error("D166", f"`{item.name}` begins paths of its own, so no joint may be called so",
                                item.place, help="give the joint another name")
         return None
-    if item.body is None:
-        scope.complaints.error("D091", f"joint `{item.name}` needs a block", item.place,
-                               help=f"write `joint {item.name} {kind} {{ parent = base; child = ...; axis = z; }}`")
-        return None
     body = item.body
     check_keys(scope, body, JOINT_KEYS, owner)
-    links = [link.name for link in arm.of_kind("link")]
-    parent = _end(scope, owner, "parent", body.get("parent"), ["base", *links])
+    parent = _end(scope, owner, "parent", body.get("parent"), {"base": None, **links})
     child = _end(scope, owner, "child", body.get("child"), links)
     if body.get("dh") is not None:
         use_dh(scope, owner, kind, body.items["dh"], body)
@@ -266,7 +240,7 @@ def _frame(scope: Scope, owner: Owner, kind: str, body: Block) -> None:
     _axis(scope, owner, kind, body.get("axis"))
 
 
-def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: list[str]) -> str | None:
+def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping[str, None]) -> str | None:
     if item is None:
         scope.complaints.error("D092", f"{owner.label} has no {key}", owner.place, help=f"write `{key} = LINK;`")
         return None
@@ -274,16 +248,21 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: list[st
     if name in known:
         return name
     if name == "base":
-        scope.complaints.error("D093", "the base cannot be a child", item.place,
+        scope.complaints.error("D093", "the base cannot be a child", _value_at(item),
                                help="turn the joint round: `parent = base;`")
     elif name is None:
-        scope.complaints.error(
-            "D094", f"a link's name is needed for {key}", item.place, help=known_words("links", known)
-        )
+        scope.complaints.error("D094", f"a link's name is needed for {key}", _value_at(item),
+                               help=known_words("links", known))
     else:
-        scope.complaints.error("D094", f"no link `{name}` in this arm", item.place,
-                               help=[*did_you_mean(name, known), known_words("links", known)])
+        ground = name in scope.definitions.robot_files.roots
+        near = (f"`{name}` is the root of its robot: write `base`",) if ground else did_you_mean(name, known)
+        scope.complaints.error("D094", f"no link `{name}` in this arm", _value_at(item),
+                               help=[*near, known_words("links", known)])
     return None
+
+
+def _value_at(item: Item) -> Place:
+    return place_of(item.value) if item.value is not None else item.place
 
 
 def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
@@ -306,7 +285,7 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
     if written is None:
         return
     scope.checks.hold(written, _no_direction, code="D097", message=f"the axis of {owner.label} has no direction",
-                      place=item.place, needs=(owner.join("axis"),), help="one of its numbers must not be zero")
+                      place=_value_at(item), needs=(owner.join("axis"),), help="one of its numbers must not be zero")
     x, y, z = written
     length = sqrt(x * x + y * y + z * z)
     if isinstance(length, Scalar) or 0.0 < length < math.inf:

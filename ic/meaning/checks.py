@@ -28,6 +28,9 @@ class Varied:
     unit: Unit | None
     scale: float
 
+    def __len__(self) -> int:
+        return len(self.values)
+
 
 @frozen
 class Check:

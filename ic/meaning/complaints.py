@@ -9,6 +9,8 @@ from met.diagnostic import Diagnostic, Label, Place, Problem, error
 
 MOST = 200  # a deck with more mistakes than this is told the first ones: the rest seldom say more
 
+OF_A_VALUE = ("D060", "D061", "D077", "D087")  # a bare number, a wrong unit, out of range, no body's inertia
+
 
 class Complaints:
     """Diagnostics in the order found, each once."""
@@ -31,8 +33,15 @@ class Complaints:
 
     def add(self, *diagnostics: Diagnostic) -> None:
         for diagnostic in diagnostics:
-            if len(self._found) < MOST:
+            if len(self._found) < MOST and not self._told_of_another_user(diagnostic):
                 self._found.setdefault(diagnostic)
+
+    def _told_of_another_user(self, diagnostic: Diagnostic) -> bool:
+        """Whether this value's mistake is known: what a base or a `let` writes is found wrong at each of its users."""
+        return diagnostic.code in OF_A_VALUE and any(
+            each.code == diagnostic.code and each.at is not None and diagnostic.at is not None
+            and each.at.place == diagnostic.at.place for each in self._found
+        )
 
     def error(self, code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
               help: Iterable[str] | str = ()) -> None:
@@ -53,6 +62,15 @@ class Complaints:
         """Makes warnings of the remarks."""
         self.add(*self._remarks)
         self._remarks = {}
+
+    def mark(self, since: int, *labels: Label) -> None:
+        """Adds places, and what they say, to the errors found after the first `since` diagnostics."""
+        found = list(self._found)
+        for n, each in enumerate(found):
+            if n >= since and each.severity == "error":
+                more = (label for label in labels if each.at is None or label.place != each.at.place)
+                found[n] = Diagnostic(each.code, each.message, each.at, (*each.also, *more), each.help, each.severity)
+        self._found = dict.fromkeys(found)
 
     @contextmanager
     def gather(self) -> Iterator[None]:

@@ -15,7 +15,7 @@ import itertools
 import math
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from ic.grammar.syntax import Deck, SourceText, String
 from ic.meaning.complaints import known_words
@@ -31,6 +31,7 @@ from met.units import PURE, Dimension, Measure
 LONGEST_NAME = 40  # characters of a column's name that a message shows
 
 _HEADER = re.compile(r"(?P<name>[^\[\]]*)(?:\[(?P<unit>[^\[\]]*)\])?")  # spaces are cut off later, not tried here
+_WORD = re.compile(r"[^\W\d]\w*")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 
@@ -60,7 +61,23 @@ class Table:
 
         Raises Problem D193 for its unit, D194 for a cell that is no number.
         """
-        measure = _measure(column, text, dimension, label)
+        return self._numbers(column, _measure(column, text, dimension, label))
+
+    def quantities(self, column: Column) -> tuple[tuple[float, ...], Measure]:
+        """The column in SI, and what its own unit means. Raises Problem D193, D194."""
+        measure = units.ONE if column.unit is None else _meaning(column, "", ())
+        return self._numbers(column, measure), measure
+
+    def words(self, column: Column) -> list[tuple[str, Place]] | None:
+        """The column's cells and their places, where all of them are words and it has no unit; else None."""
+        if column.unit is not None:
+            return None
+        cells = [(_stripped(row.split(",")[column.number])[0], line, row) for line, row in self.rows]
+        if not cells or not all(_WORD.fullmatch(cell) for cell, _, _ in cells):
+            return None
+        return [(cell, self._cell(line, row, column.number)) for cell, line, row in cells]
+
+    def _numbers(self, column: Column, measure: Measure) -> tuple[float, ...]:
         made = []
         for line, row in self.rows:
             cell = _stripped(row.split(",")[column.number])[0]
@@ -199,21 +216,25 @@ def _measure(column: Column, text: str, dimension: Dimension, label: Label) -> M
             return units.ONE
         raise Problem(error("D193", f"column `{column.name}` has no unit", column.place, also=[label],
                             help=f"write {shown}"))
-    try:
-        measure = units.parse_unit(column.unit)
-    except (ValueError, OverflowError, ZeroDivisionError):
-        near = units.suggest(column.unit)
-        if near is None or not units.same(units.parse_unit(near).dimension, dimension):
-            remedy = f"write {shown}"
-        else:
-            remedy = f"did you mean `{column.name} [{near}]`?"
-        raise Problem(error("D193", f"`{column.unit}` is not a unit", column.place, also=[label],
-                            help=remedy)) from None
+    measure = _meaning(column, f"write {shown}", [label], dimension)
     if not units.same(measure.dimension, dimension):
         found = "a pure number" if measure.dimension == PURE else f"in {units.text(measure.dimension)}"
         raise Problem(error("D193", f"column `{column.name}` is {found}, and {text} is needed", column.place,
                             also=[label], help=f"write {shown}, with numbers in that unit"))
     return measure
+
+
+def _meaning(column: Column, remedy: str, also: Iterable[Label], dimension: Dimension | None = None) -> Measure:
+    """What the column's unit means. remedy: where no unit like it is known; dimension: the one that is needed."""
+    assert column.unit is not None
+    try:
+        return units.parse_unit(column.unit)
+    except (ValueError, OverflowError, ZeroDivisionError):
+        near = units.suggest(column.unit)
+        if near is not None and (dimension is None or units.same(units.parse_unit(near).dimension, dimension)):
+            remedy = f"did you mean `{column.name} [{near}]`?"
+        known = remedy or f"the units: {', '.join(units.UNITS)}"
+        raise Problem(error("D193", f"`{column.unit}` is not a unit", column.place, also=also, help=known)) from None
 
 
 def _short(name: str) -> str:

@@ -16,8 +16,8 @@ import math
 from collections.abc import Callable
 
 from ic.grammar.syntax import Call
+from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, word_of
-from ic.meaning.resolve import Block, Item
 from ic.meaning.scope import XYZ, Owner, Scope
 from ic.meaning.values import place_of
 from met.diagnostic import Label, did_you_mean

@@ -71,10 +71,10 @@ def explain(path: str | PathLike[str], target: str, *, include_dirs: Sequence[st
     return found
 
 
-def in_full(compiled: Compiled) -> Experiment:
-    """The first experiment of a deck, with settings and what parameters are made of as if these were parameters."""
+def in_full(compiled: Compiled, number: int = 0) -> Experiment:
+    """An experiment of a deck, with settings and what parameters are made of as if these were parameters."""
     assert compiled.plan is not None
-    experiment, scope = compiled.plan.experiments[0], compiled.scopes[0]
+    experiment, scope = compiled.plan.experiments[number], compiled.scopes[number]
     parameters, outputs = scope.quantities(beside=True)
     for name in scope.definitions.lets:
         let = _let(scope, name)

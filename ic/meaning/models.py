@@ -7,7 +7,7 @@ from typing import Any
 
 from ic.grammar.syntax import Call, Expression, Name
 from ic.meaning.complaints import an, belongs, known_words
-from ic.meaning.resolve import Block, Item
+from ic.meaning.merge import Block, Item
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.values import place_of
 from met import models

@@ -112,6 +112,8 @@ class Names:
             helps = [f"`{name.text}` is a function: write `{name.text}(...)`"]
         elif not rest and units.is_unit(first):
             helps = [f"`{first}` is a unit: it follows a number, or closing brackets"]
+        elif not helps and rest:
+            helps = ["a value names a `let`, or what a servo's definition writes, such as `SERVO.kp`"]
         elif not helps:
             helps = [f"define it: `let {first} = ...;`"]
         raise Problem(error("D065", f"no value `{name.text}`", name.place, help=helps))

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any, Literal
+from typing import Literal
 
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Binary, Expression, List, Name, Statement
 from ic.meaning.complaints import known_words
+from ic.meaning.merge import Block, Item
 from ic.meaning.models import find_model, refuse_values, use_model, word_of
-from ic.meaning.resolve import Block, Item
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.values import place_of
 from met import models
-from met.channel import FAMILIES, Channel, carries, channels, recordable
+from met.channel import FAMILIES, Channel, carries, channels, recordable, watched_unit
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
@@ -31,7 +31,7 @@ FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
 def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Structure) -> tuple[Recorded, ...]:
     """The variables that are recorded, in the deck's order."""
-    scope.whole["record"] = "decides the program, which is one for the whole sweep in this version"
+    scope.whole["record"] = "is one for the whole sweep: record all that any case needs"
     if item is None:
         scope.complaints.error("D124", f"{run.label} records nothing", run.place,
                                help="write `record = [q, qd, tau];`, or `record = [];` where metrics are all you want")
@@ -164,13 +164,13 @@ def _not_one(name: Name, structure: Structure) -> tuple[str, list[str]]:
     if name.text not in known:
         return f"no channel `{name.text}`", _nearest(name, known, structure)
     numbers = [f"`{path}`" for variable in known[name.text] for path in variable.channels]
-    return f"`{name.text}` is {len(numbers)} channels", [known_words("a metric watches one of them", numbers)]
+    count = f"{len(numbers)} channel{'s' * (len(numbers) != 1)}"
+    return f"`{name.text}` is {count}", [known_words("a metric watches one of them", numbers)]
 
 
 def metric_unit(use: MetricUse, known: dict[str, Channel]) -> str:
     """Unit of a metric's result."""
-    metric: Any = models.find("metric", use.model)
-    return known[use.of].unit if metric.unit == "of" else str(metric.unit)
+    return watched_unit(str(models.find("metric", use.model).unit), known[use.of].unit)
 
 
 # Requirements
@@ -205,11 +205,14 @@ def read_requirements(scope: Scope, block: Block) -> list[Comparison]:
             operator, metric, limit = FLIPPED[operator], limit, metric
         if not _is_metric(metric, written | removed):
             name = spell(metric)
+            watch = []
+            if isinstance(metric, Name) and len(metric.path) > 1:
+                watch = [f"a metric of a channel is `metric NAME = max {{ of = {name}; }}`, and `require NAME < ...;`"]
             scope.complaints.error(
                 "D132",
                 f"no metric `{name}`",
                 place_of(metric),
-                help=[*did_you_mean(name, written), known_words("metrics of this run", sorted(written))],
+                help=[*did_you_mean(name, written), known_words("metrics of this run", sorted(written)), *watch],
             )
         elif spell(metric) in removed:
             scope.notes.append(

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from ic.grammar.syntax import Expression, List, Number, WithUnit
-from ic.meaning.resolve import Item
+from ic.meaning.merge import Item
 from ic.meaning.unit_words import in_deck, in_degrees, units_of
 from ic.meaning.values import Value
 from met.trace import Scalar

@@ -1,19 +1,20 @@
-"""From entries as written to definitions as meant: `like`, overrides, `+=`, `remove`, each entry with its history.
+"""From entries as written to definitions as meant: each under its kind and name, found when it is needed.
 
-A definition refers to its base and is merged with it when asked for, block by block and key by key. An entry with a
-kind (`metric settle = ...`, `link upper { ... }`) adds; one without overrides what the base has under that name.
+A definition refers to its base, or to the file that it is made from, and is merged with it when asked for (`merge`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import field, replace
+from collections.abc import Mapping
+from copy import copy
 
-from ic.grammar.syntax import Call, Deck, Entry, Expression, Group, Let, Name, Setting, Statement, Word
+from ic.grammar.syntax import Binary, Call, Deck, Entry, Group, Let, Name, Setting, Word
 from ic.meaning.complaints import Complaints, an, belongs, known_words
 from ic.meaning.csv_files import CsvFiles
+from ic.meaning.merge import Block, merge, twice
+from ic.robots.files import RobotFiles
 from ic.text.files import library_defines
-from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 
 KINDS = ("arm", "servo", "run", "sweep")
@@ -21,57 +22,17 @@ RESERVED = ("links", "initial", "environment", "metrics", "rates")  # what paths
 
 
 @frozen
-class Item:
-    """One entry of a merged block.
-
-    kind       the word that added it ("link", "metric"); "" for a plain key
-    detail     words after the name (`revolute`)
-    value      what stands after `=`; None for a block. A call's named arguments and body are in `body`
-    overrides  places of what it replaced, latest first
-    homes      definitions under whose names this entry is reached: the one that wrote it and those that took it over
-    """
-
-    kind: str
-    name: str
-    detail: tuple[Word, ...]
-    value: Expression | None
-    body: Block | None
-    place: Place
-    overrides: tuple[Place, ...] = ()
-    appended: tuple[Expression, ...] = ()
-    homes: tuple[str, ...] = ()
-
-    @property
-    def key(self) -> str:
-        return f"{self.kind} {self.name}" if self.kind else self.name
-
-
-@frozen
-class Block:
-    """Merged entries by key ("kind name", or the name of a plain key), in order, and statements such as `require`.
-
-    removed  keys of what was removed, each with the number of statements that stood before its `remove`
-    """
-
-    items: Mapping[str, Item] = field(default_factory=dict)
-    statements: tuple[Statement, ...] = ()
-    removed: tuple[tuple[str, int], ...] = ()
-
-    def of_kind(self, kind: str) -> Iterator[Item]:
-        return (item for item in self.items.values() if item.kind == kind)
-
-    def get(self, key: str) -> Item | None:
-        return self.items.get(key)
-
-
-@frozen
 class Definition:
-    """A definition as written: `default run nominal like base { ... }`."""
+    """A definition as written: `default run nominal like base { ... }`.
+
+    parts: of a sweep made of others, `sweep both = gains + spread;`, which are runs and sweeps
+    """
 
     kind: str
     name: str
     group: Group
     default: bool = False
+    parts: tuple[Name, ...] = ()
 
     @property
     def place(self) -> Place:
@@ -79,11 +40,12 @@ class Definition:
 
 
 class Definitions:
-    """All definitions and lets of a deck, by kind and name; and the CSV files that it names."""
+    """All definitions and lets of a deck, by kind and name; and the CSV and URDF files that it names."""
 
     def __init__(self, deck: Deck, complaints: Complaints) -> None:
         self.lets: dict[str, Let] = {}
         self.csv_files = CsvFiles(deck)
+        self.robot_files = RobotFiles(deck)
         self._by_kind: dict[str, dict[str, Definition]] = {kind: {} for kind in KINDS}
         self._merged: dict[tuple[str, str], Block] = {}
         self._failed: set[tuple[str, str]] = set()
@@ -93,6 +55,17 @@ class Definitions:
             with complaints.gather():
                 self._enter(entry)
         self._check_defaults()
+
+    def instead(self, *changed: Definition) -> Definitions:
+        """The same definitions but for these, which take the places of those of their names."""
+        if not changed:
+            return self
+        other = copy(self)
+        other._by_kind = {kind: dict(known) for kind, known in self._by_kind.items()}
+        other._merged, other._failed = {}, set()
+        for each in changed:
+            other._by_kind[each.kind][each.name] = each
+        return other
 
     def of_kind(self, kind: str) -> Mapping[str, Definition]:
         return self._by_kind[kind]
@@ -143,10 +116,25 @@ class Definitions:
         above = at
         for each in reversed(chain):
             base_name = f"{each.kind} `{above.name}`" if above is not None else None
+            if each.group.made_from is not None:
+                base_name = f"`{each.name}`"
+                block = self._made_from(each, each.group.made_from)
+                if block is None:
+                    self._failed.update((d.kind, d.name) for d in chain)
+                    return None
             block = merge(block, each.group.body, home=each.name, base_name=base_name, complaints=self._complaints)
             self._merged[(each.kind, each.name)] = block
             above = each
         return block
+
+    def _made_from(self, definition: Definition, call: Call) -> Block | None:
+        """What a definition's file says, as its base; None where that failed (and was told)."""
+        with self._complaints.gather():
+            body = self.robot_files.body(call)
+            for each in self.robot_files.remarks(call):
+                self._complaints.remark(each.code, each.message, each.at, also=each.also, help=each.help)
+            return merge(None, body.entries, home=definition.name, base_name=None, complaints=self._complaints)
+        return None
 
     def homes(self, definition: Definition) -> tuple[str, ...]:
         """Names of the definition and its bases, outermost base first."""
@@ -164,13 +152,12 @@ class Definitions:
         if isinstance(entry, Let):
             earlier = self.lets.get(entry.name.text)
             if earlier is not None:
-                raise Problem(_twice("let", entry.name.text, entry.name.place, earlier.name.place))
+                raise Problem(twice("let", entry.name.text, entry.name.place, earlier.name.place))
             self.lets[entry.name.text] = entry
         elif isinstance(entry, Group):
             self._define(entry)
-        elif isinstance(entry, Setting) and [word.text for word in entry.words] == ["sweep"]:
-            raise Problem(error("D120", "sweeps made of others are not in this version", entry.place,
-                                help="write one sweep, with a `vary` line for each parameter"))
+        elif isinstance(entry, Setting) and [word.text for word in entry.words] in (["sweep"], ["default", "sweep"]):
+            self._define_sum(entry)
         else:
             name = entry.path[0].text if isinstance(entry, Setting) and entry.path else "..."
             raise Problem(error(
@@ -197,6 +184,9 @@ class Definitions:
             raise Problem(error("D046", f"this {kind.text} has no name", kind.place,
                                 help=f"write `{kind.text} NAME {{ ... }}`"))
         if len(words) > 2:
+            if words[2].text in ("like", "of"):
+                raise Problem(error("D047", f"the block of {kind.text} `{words[1].text}` is missing", words[2].place,
+                                    help="write `{ ... }` behind its base, or `;` where nothing differs"))
             raise Problem(error("D047", f"`{words[2].text}` after the name of {an(kind.text)}", words[2].place,
                                 help=f"write `{kind.text} {words[1].text} {{ ... }}`, `like BASE` before the brace"))
         if default and kind.text not in ("run", "sweep"):
@@ -206,15 +196,39 @@ class Definitions:
             usage = f"sweep {words[1].text} of RUN {{ ... }}" if kind.text == "sweep" else f"{kind.text} NAME like BASE"
             raise Problem(error("D049", "a sweep is `of` a run, other definitions are `like` another", kind.place,
                                 help=f"write `{usage}`"))
+        if group.made_from is not None and kind.text != "arm":
+            raise Problem(error("D214", f"{an(kind.text)} is not made from a file", group.made_from.name.place,
+                                help="`from urdf(...)` makes an arm"))
         name = words[1]
         if name.text in RESERVED and kind.text in ("arm", "servo"):  # whose names begin paths of parameters
             raise Problem(error("D166", f"`{name.text}` begins paths of its own, so no {kind.text} may be called so",
                                 name.place, help=f"give the {kind.text} another name"))
-        spaces = ("run", "sweep") if kind.text in ("run", "sweep") else (kind.text,)
-        for space in spaces:
+        self._add(Definition(kind.text, name.text, group, default))
+
+    def _define_sum(self, entry: Setting) -> None:
+        """`sweep both = gains + spread;`"""
+        if len(entry.path) > 1 or entry.operator != "=":
+            raise Problem(error("D120", "a sweep made of others is `sweep NAME = ONE + OTHER;`", entry.place,
+                                help="its name is one word, and `=` follows"))
+        parts: list[Name] = []
+        at = entry.value
+        while isinstance(at, Binary) and at.operator == "+" and isinstance(at.right, Name):
+            parts.append(at.right)
+            at = at.left
+        if not isinstance(at, Name) or any(len(part.path) > 1 for part in (*parts, at)):
+            place = at.place if not isinstance(at, Binary) else at.right.place
+            raise Problem(error("D120", "a sweep is made of runs and sweeps, with `+` between them", place,
+                                help=f"write `sweep {entry.path[0].text} = ONE + OTHER;`"))
+        group = Group((*entry.words, entry.path[0]), None, None, (), entry.place)
+        self._add(Definition("sweep", entry.path[0].text, group, len(entry.words) > 1, (at, *reversed(parts))))
+
+    def _add(self, definition: Definition) -> None:
+        """Enters a definition under its name, which nothing else of its kind may bear; runs and sweeps share theirs."""
+        kind, name = definition.kind, definition.group.words[-1]
+        for space in ("run", "sweep") if kind in ("run", "sweep") else (kind,):
             if name.text in self._by_kind[space]:
-                raise Problem(_twice(space, name.text, name.place, self._by_kind[space][name.text].place))
-        self._by_kind[kind.text][name.text] = Definition(kind.text, name.text, group, default)
+                raise Problem(twice(space, name.text, name.place, self._by_kind[space][name.text].place))
+        self._by_kind[kind][name.text] = definition
 
     def _check_defaults(self) -> None:
         first: dict[str, Definition] = {}  # of each file: decks that can be included together have one each
@@ -234,179 +248,8 @@ class Definitions:
         return own[0] if own else found[0] if len({each.place.file for each in found}) == 1 else None
 
 
-def merge(base: Block | None, body: tuple[Entry, ...], *, home: str | None, base_name: str | None,
-          complaints: Complaints) -> Block:
-    """The base's entries with `body` upon them.
-
-    home       name of the definition that writes `body`; None for a use, whose entries no definition's path reaches
-    base_name  what to call the base in messages; None where there is none
-    """
-    merger = _Merger(base or Block(), home, base_name, complaints)
-    for entry in body:
-        with complaints.gather():
-            merger.enter(entry)
-    return Block(merger.items, tuple(merger.statements), tuple(merger.removed))
-
-
-class _Merger:
-    def __init__(self, base: Block, home: str | None, base_name: str | None, complaints: Complaints) -> None:
-        homes = (home,) if home else ()
-        self.home, self.base_name, self.complaints = homes, base_name, complaints
-        self.items = {key: _taken_over(item, homes) for key, item in base.items.items()}
-        self.statements = list(base.statements)
-        self.removed = list(base.removed)
-        self.names: dict[str, list[str]] = {}
-        for key, item in self.items.items():
-            self.names.setdefault(item.name, []).append(key)
-        self.written: dict[str, Place] = {}
-
-    def enter(self, entry: Entry) -> None:
-        if isinstance(entry, Let):
-            raise Problem(error("D051", "`let` stands inside a definition", entry.place,
-                                help="move it out: a `let` belongs to the whole deck"))
-        if isinstance(entry, Statement):
-            if [word.text for word in entry.words] == ["remove"]:
-                self._remove(entry)
-            else:
-                self.statements.append(entry)
-            return
-        if isinstance(entry, Setting):
-            words, name = entry.words, ".".join(word.text for word in entry.path)
-        else:
-            if entry.like is not None or entry.of is not None:
-                raise Problem(
-                    error(
-                        "D052",
-                        "`like` and `of` belong to definitions, not to the blocks inside",
-                        entry.place,
-                        help="write the block without it; what is not written is taken from the base",
-                    )
-                )
-            words, name = entry.words[:-1][:1], entry.words[min(1, len(entry.words) - 1)].text
-        detail = entry.words[2:] if isinstance(entry, Group) else ()
-        kind = words[0].text if words else ""
-        if isinstance(entry, Setting) and entry.operator == "+=":
-            self._append(entry, name)
-            return
-        earlier = self._earlier(kind, name, entry.place)
-        key = earlier.key if earlier else (f"{kind} {name}" if kind else name)
-        if key in self.written:
-            raise Problem(_twice(kind, name, entry.place, self.written[key]))
-        if kind and earlier:
-            raise Problem(
-                error(
-                    "D053",
-                    f"{kind} `{name}` is in {self.base_name or 'the base'} already",
-                    entry.place,
-                    also=[Label(earlier.place, "here")],
-                    help=[
-                        f"leave out the word `{kind}` to change it",
-                        f"`remove {name};` first, to put another in its place",
-                    ],
-                )
-            )
-        self.written[key] = entry.place
-        self.names.setdefault(name, []).append(key) if earlier is None else None
-        self.items[key] = self._made(entry, kind, name, detail, earlier)
-
-    def _made(
-        self, entry: Setting | Group, kind: str, name: str, detail: tuple[Word, ...], earlier: Item | None
-    ) -> Item:
-        if isinstance(entry, Setting):
-            value, body = open_call(entry.value, self.home[0] if self.home else None, self.complaints)
-            if earlier is None:
-                return Item(kind, name, detail, value, body, entry.place, homes=self.home)
-            return Item(earlier.kind, name, earlier.detail, value, body, entry.place,
-                        (earlier.place, *earlier.overrides), homes=self.home)
-        if earlier is not None and earlier.body is None and not isinstance(earlier.value, (Call, Name)):
-            raise Problem(error("D054", f"`{name}` is a value, not a block", entry.place,
-                                also=[Label(earlier.place, "written here")], help=f"write `{name} = ...;`"))
-        body = merge(earlier.body if earlier else None, entry.body, home=self.home[0] if self.home else None,
-                     base_name=f"`{name}`" if earlier else None, complaints=self.complaints)
-        if earlier is None:
-            return Item(kind, name, detail, None, body, entry.place, homes=self.home)
-        return replace(earlier, body=body, detail=detail or earlier.detail)
-
-    def _earlier(self, kind: str, name: str, place: Place) -> Item | None:
-        if kind:
-            return self.items.get(f"{kind} {name}")
-        if name in self.items:
-            return self.items[name]
-        keys = self.names.get(name, [])
-        if len(keys) > 1:
-            both = [self.items[key] for key in keys]
-            raise Problem(error(
-                "D055", f"`{name}` may be " + " or ".join(f"the {item.kind} `{name}`" for item in both), place,
-                also=[Label(item.place, item.kind) for item in both], help="give them different names in the base"))
-        return self.items[keys[0]] if keys else None
-
-    def _append(self, entry: Setting, name: str) -> None:
-        earlier = self._earlier("", name, entry.place)
-        if earlier is None or earlier.value is None:
-            raise Problem(error("D056", f"nothing is in `{name}` yet to append to", entry.place,
-                                help=f"write `{name} = ...;`"))
-        self.items[earlier.key] = replace(earlier, appended=(*earlier.appended, entry.value))
-
-    def _remove(self, entry: Statement) -> None:
-        if not isinstance(entry.value, Name):
-            raise Problem(error("D057", "`remove` takes a name", entry.place, help="write `remove NAME;`"))
-        name = entry.value.text
-        earlier = self._earlier("", name, entry.value.place)
-        if earlier is None:
-            known = [item.name for item in self.items.values()]
-            raise Problem(error("D058", f"nothing named `{name}` to remove", entry.value.place,
-                                help=[*did_you_mean(name, known), known_words("there is", known)]))
-        del self.items[earlier.key]
-        self.names[name].remove(earlier.key)
-        self.written.pop(earlier.key, None)
-        self.removed.append((earlier.key, len(self.statements)))
-
-
-def overlay(base: Block, over: Block) -> Block:
-    """The base's entries with those of a use upon them, which no definition's path reaches."""
-    items = dict(base.items)
-    for key, item in over.items.items():
-        earlier = items.get(key)
-        if earlier is None:
-            items[key] = replace(item, homes=())
-        elif item.value is None and item.body is not None:
-            body = overlay(earlier.body or Block(), item.body)
-            items[key] = replace(earlier, body=body)
-        else:
-            items[key] = replace(item, homes=(), overrides=(*item.overrides, earlier.place, *earlier.overrides))
-    removed = ((key, len(base.statements) + before) for key, before in over.removed)
-    return Block(items, (*base.statements, *over.statements), (*base.removed, *removed))
-
-
-def open_call(value: Expression, home: str | None, complaints: Complaints) -> tuple[Expression, Block | None]:
-    """A call's named arguments and body as a block, so that they can be overridden one by one."""
-    if not isinstance(value, Call) or (value.body is None and not value.named):
-        return value, None
-    named = tuple(Setting((), (word,), "=", inner, word.place) for word, inner in value.named)
-    block = merge(None, (*named, *(value.body or ())), home=home, base_name=None, complaints=complaints)
-    return Call(value.name, value.positional, (), None, value.place), block
-
-
-def _taken_over(item: Item, homes: tuple[str, ...]) -> Item:
-    """The item of a base, now reached under the name of the definition that took it over too."""
-    if not homes:
-        return item
-    body = item.body
-    if body is not None:
-        body = replace(body, items={key: _taken_over(inner, homes) for key, inner in body.items.items()})
-    return replace(item, body=body, homes=(*(h for h in item.homes if h not in homes), *homes))
-
-
 def _single(name: Name) -> Word:
     if len(name.path) > 1:
         raise Problem(error("D059", f"`{name.text}` is a path; the name of a definition is needed", name.place,
                             help=f"write `{name.path[0].text}`"))
     return name.path[0]
-
-
-def _twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnostic:
-    what = f"{kind} `{name}`" if kind else f"`{name}`"
-    helps = ["remove one of the two"]
-    if (place.file, place.line, place.column) == (earlier.file, earlier.line, earlier.column):
-        helps = ["its file is included twice: begin that file with `#pragma once`"]
-    return error("D040", f"{what} is written twice", Label(place, "again"), also=[Label(earlier, "first")], help=helps)

@@ -10,9 +10,10 @@ from typing import Any
 from ic.grammar.syntax import Call, Name, Word
 from ic.meaning.arm import Arm, resolve_arm
 from ic.meaning.complaints import belongs, known_words
+from ic.meaning.merge import Block, Item
 from ic.meaning.models import find_bare_model, find_model, refuse_values, use_model, word_of
 from ic.meaning.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
-from ic.meaning.resolve import Block, Definition, Item
+from ic.meaning.resolve import Definition
 from ic.meaning.schedule import Rate, base_rate, check_stability, divisor, make_schedule
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.servos import RATE, Use, check_rest, check_start, fixed_rate, resolve_servos
@@ -27,6 +28,7 @@ from met.trace import Real, Scalar
 from met.units import PURE
 
 KEYS = ("arm", "servos", "initial", "environment", "rates", "integrator", "duration", "record", "seed")
+BLOCKS = ("servos", "initial", "environment", "rates")
 RATES = ("dynamics", "servos", "record", "base")
 DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
 SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")
@@ -62,9 +64,8 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     rates = _rates(scope, run, block.get("rates"))
     duration = scope.constant(run, DURATION, block.items["duration"]) if "duration" in block.items else None
     if "duration" not in block.items:
-        scope.complaints.error(
-            "D107", f"{run.label} has no duration", definition.place, help="write `duration = 10 s;`"
-        )
+        told = f"{run.label} has no duration"
+        scope.complaints.error("D107", told, definition.place, help="write `duration = 10 s;`")
     if arm is None:
         return None
     scope.gone = arm.lost
@@ -85,8 +86,9 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     for use in uses:
         if use.parameters is not None and use.joint not in on_beds:  # there the motor is no part of the step
             x = check_stability(
-                scope, f"servo `{use.definition}`", use.servo, use.parameters, schedule, integrator, rates["dynamics"]
-            )
+                scope, f"servo `{use.definition}`", use.servo, use.parameters, schedule, integrator, rates["dynamics"],
+                f"{use.joint}.servo",
+            )  # fmt: skip
             if x is not None:
                 stability.append((use.joint, x))
     servos = tuple(ServoUse(use.joint, use.definition, use.servo.name, use.command, divisors[use.joint], use.place)
@@ -123,7 +125,10 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
     for item in block.items.values():
         if item.kind in ("metric", "substitute") or (not item.kind and item.name in KEYS):
             continue
-        if item.kind:
+        if item.kind in KEYS:
+            scope.complaints.error("D108", f"`{item.name}` after `{item.kind}`, which takes no name", item.place,
+                                   help=f"write `{item.kind} {'= ...;' if item.body is None else '{ ... }'}`")
+        elif item.kind:
             scope.complaints.error("D108", f"no `{item.kind}` in a run", item.place,
                                    help=[*did_you_mean(item.kind, ("metric", "substitute", *KEYS)),
                                          known_words("a run has", (*KEYS, "metric NAME", "substitute JOINT", "require"))
@@ -136,8 +141,10 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
                 "D109", f"nothing named `{item.name}` in run `{definition.name}` to change", item.place,
                 help=belongs(item.name) or [*did_you_mean(item.name, (*metrics, *KEYS)), adds])
         else:
+            block_name, _, rest = item.name.partition(".")
+            helps = [*did_you_mean(item.name, (*KEYS, *metrics)), known_words("a run has", KEYS)]
             scope.complaints.error("D109", f"a run has no `{item.name}`", item.place,
-                                   help=[*did_you_mean(item.name, (*KEYS, *metrics)), known_words("a run has", KEYS)])
+                                   help=f"write `{block_name} {{ {rest} = ...; }}`" if block_name in BLOCKS else helps)
     for statement in block.statements:
         words = " ".join(word.text for word in statement.words)
         if words != "require":
@@ -147,6 +154,8 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
                 statement.place,
                 help=["`exclude when` stands in a sweep"]
                 if words == "exclude when"
+                else ["write `metric NAME = MODEL { of = CHANNEL; }`"]
+                if words == "metric"
                 else belongs(words)
                 or [*did_you_mean(words, ("require", "remove")), "statements of a run: require, remove"],
             )
@@ -155,7 +164,7 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
 def _body(scope: Scope, item: Item | None) -> Block:
     if item is None:
         return Block()
-    if item.body is None:
+    if item.body is None or item.value is not None:
         scope.complaints.error("D111", f"`{item.name}` is a block, not a value", item.place,
                                help=f"write `{item.name} {{ ... }}`")
         return Block()
@@ -164,16 +173,13 @@ def _body(scope: Scope, item: Item | None) -> Block:
 
 def _arm(scope: Scope, run: Owner, item: Item | None) -> Arm | None:
     if item is None:
-        scope.complaints.error(
-            "D112",
-            f"{run.label} has no arm",
-            run.place,
-            help=["write `arm = ARM;`", known_words("arms of this deck", scope.definitions.of_kind("arm"))],
-        )
+        known = known_words("arms of this deck", scope.definitions.of_kind("arm"))
+        scope.complaints.error("D112", f"{run.label} has no arm", run.place, help=["write `arm = ARM;`", known])
         return None
     name = word_of(item.value)
     if name is None or not isinstance(item.value, Name):
-        scope.complaints.error("D112", "the name of an arm is needed here", item.place, help="write `arm = ARM;`")
+        at = place_of(item.value) if item.value is not None else item.place
+        scope.complaints.error("D112", "the name of an arm is needed here", at, help="write `arm = ARM;`")
         return None
     with scope.complaints.gather():
         return resolve_arm(scope, scope.definitions.find("arm", Word(name, item.value.place)))
@@ -181,18 +187,19 @@ def _arm(scope: Scope, run: Owner, item: Item | None) -> Arm | None:
 
 
 def _integrator(scope: Scope, item: Item | None):  # type: ignore[no-untyped-def]  # any package's declaration
-    scope.whole["integrator"] = "decides the program, which is one for the whole sweep in this version"
     if item is None:
         return models.find_own("integrator")["modified_euler"]
     return find_bare_model(scope, "integrator", item, "write `integrator = {};`: an integrator has no parameters")
 
 
 def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
+    number = scope.constant(run, SEED, item) if item is not None else 0.0
+    scope.whole["seed"] = "is one for the whole sweep: `repeat 5;` runs each case with other noise"
     if item is None:
         return 0
-    number = scope.constant(run, SEED, item)
     if number is not None and not number.is_integer():
-        scope.complaints.error("D113", "a seed is a whole number", place_of(item.value) if item.value else item.place)
+        scope.complaints.error("D113", "a seed is a whole number from 0 to 2^53",
+                               place_of(item.value) if item.value else item.place)
         return 0
     return int(number or 0)
 
@@ -207,9 +214,9 @@ def _environment(
     products = True
     for item in body.items.values():
         if item.kind:
-            scope.complaints.error(
-                "D157", f"no `{item.kind}` in an environment", item.place, help="write `NAME = MODEL { ... }`"
-            )
+            meant = f"{item.name} = {item.kind}" if item.kind in models.available("environment") else "NAME = MODEL"
+            scope.complaints.error("D157", f"no `{item.kind}` in an environment", item.place,
+                                   help=f"write `{meant} {{ ... }}`")
         elif item.name == "velocity_products":
             owner = Owner("the environment", item.place, "environment")
             products = scope.word(owner, ON_OFF, item) != "off"
@@ -255,7 +262,7 @@ def _environment_use(scope: Scope, item: Item, arm: Arm, duration: float | None)
             known = names.get(wanted.name)
             if wanted.shape == "word" and known is not None and values[wanted.name] not in (*known, *arm.lost):
                 given = (item.body or Block()).get(wanted.name)
-                place = given.place if given is not None else item.place
+                place = place_of(given.value) if given is not None and given.value is not None else item.place
                 scope.complaints.error("D159", f"no {wanted.name} `{values[wanted.name]}` in arm `{arm.name}`", place,
                                        help=[*did_you_mean(values[wanted.name], known),
                                              known_words(f"{wanted.name}s", known)])
@@ -298,13 +305,11 @@ def _initial(scope: Scope, body: Block, arm: Arm) -> None:
             if listed is not None and arm.lost:
                 continue
             if listed is not None and len(listed.items) != len(arm.moving):
-                scope.complaints.error(
-                    "D071",
-                    f"{len(listed.items)} numbers for {len(arm.moving)} joints",
-                    listed.place,
-                    help="one for each moving joint, in the arm's order, or one for all: "
-                    + ", ".join(joint.name for joint in arm.moving),
-                )
+                given, moving = len(listed.items), len(arm.moving)
+                told = f"{given} number{'s' * (given != 1)} for {moving} joint{'s' * (moving != 1)}"
+                names = ", ".join(joint.name for joint in arm.moving)
+                helps = f"one for each moving joint, in the arm's order, or one for all: {names}"
+                scope.complaints.error("D071", told, listed.place, help=helps)
                 continue
         for n, joint in enumerate(arm.moving):
             own = body.get(f"{joint.name}.{name}")
@@ -364,12 +369,12 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
               duration: float | None) -> tuple[Schedule | None, dict[str, int]]:
     dynamics = rates.get("dynamics")
     rates_item = block.get("rates")
+    body = rates_item.body if rates_item is not None else None
     for use in uses:
-        if use.rate is None and use.servo.tick is not None and "servos" not in rates and rates_item is not None:
-            body = rates_item.body or Block()
-            if "servos" not in body.items:
-                scope.complaints.error("D118", "no rate of the servos", rates_item.place,
-                                       help="write `servos = 1 kHz;`, or a `rate` in each servo's definition")
+        if use.rate is None and use.servo.tick is not None and body is not None and "servos" not in body.items:
+            assert rates_item is not None
+            scope.complaints.error("D118", "no rate of the servos", rates_item.place,
+                                   help="write `servos = 1 kHz;`, or a `rate` in each servo's definition")
     if dynamics is None or duration is None:
         return None, {}
     shared = rates.get("servos")

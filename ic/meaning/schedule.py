@@ -21,7 +21,7 @@ from met.trace import Real
 if TYPE_CHECKING:
     from fractions import Fraction
 
-MOST_TICKS = 2**53  # a tick's number is a double
+MOST_TICKS = 10**12  # what a plan may have (met/plan_check): thirty years at a kilohertz
 WARN_ABOVE = 0.5  # of h lambda: above it, a step sees less than the decay it should follow
 
 
@@ -98,6 +98,11 @@ def make_schedule(complaints: Complaints, dynamics: Rate, record: Rate, base: Ra
     all_rates = [dynamics, record, *others]
     step = divisor(complaints, dynamics, base, all_rates, written=base_written)
     row = step if record == dynamics else divisor(complaints, record, base, all_rates, written=base_written)
+    if duration * base.hz > MOST_TICKS:
+        ticks_in_words = f"{min(duration * base.hz, 1e308):.3g}"
+        complaints.error("D103", f"a run of {ticks_in_words} ticks of the base rate", duration_place,
+                         also=[Label(base.place, "the base rate")], help="at most 1e12 are possible: shorten the run")
+        return Schedule(base.hz, step, row, 1)
     in_whole = duration.is_integer() and base.hz.is_integer()
     ticks = int(duration) * int(base.hz) if in_whole else exact(duration) * exact(base.hz)
     whole = round(ticks)
@@ -122,20 +127,17 @@ def make_schedule(complaints: Complaints, dynamics: Rate, record: Rate, base: Ra
             also=[Label(duration_place, "the end")],
             help="a duration that is a whole number of rows records both ends",
         )
-    if whole >= MOST_TICKS:
-        complaints.error("D103", f"a run of {float(ticks):.3g} ticks of the base rate", duration_place,
-                         also=[Label(base.place, "the base rate")], help="at most 9e15 are possible: shorten the run")
-        whole = 1
     return Schedule(base.hz, step, row, whole)
 
 
 def check_stability(scope: Scope, label: str, servo: Any, parameters: Mapping[str, Any], schedule: Schedule,
-                    integrator: Any, dynamics: Rate) -> Real | None:
+                    integrator: Any, dynamics: Rate, path: str) -> Real | None:
     """h lambda of a joint under its servo (`Servo.fastest`): given back, and warned of or told as an error.
 
     label  the servo in words; joints with the same servo and the same figure are told of once
+    path   of the servo: where a parameter of it is out of its range, that is told, and nothing is computed of it
     """
-    if servo.fastest is None:
+    if servo.fastest is None or scope.checks.failed(path):
         return None
     from types import SimpleNamespace
 
@@ -155,12 +157,12 @@ def check_stability(scope: Scope, label: str, servo: Any, parameters: Mapping[st
         def warn(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
             x = h * values[:, 0]
             if WARN_ABOVE < float(np.max(x)) < limit:
-                better = _hz(float(f"{float(np.max(values[:, 0])) / WARN_ABOVE:.2g}"))
+                better = _slowest_that_fits(schedule, WARN_ABOVE * (1.0 + 1e-9))(float(np.max(values[:, 0])))
                 scope.complaints.remark(
                     "D105", f"{label} is fast for the dynamics' step: h * lambda = "
                     f"{float(np.max(x)):.3g}", Label(dynamics.place, f"h = {h:g} s"),
-                    help=f"stable below {limit:g} with {integrator.name}, true to the motion below {WARN_ABOVE:g}: at "
-                         f"some {better} Hz and more")
+                    help=f"stable below {limit:g} with {integrator.name}, true to the motion below {WARN_ABOVE:g}: the "
+                         f"slowest rate that fits is {better}")
             return np.zeros(len(values), bool), []
 
         scope.checks.hold(
@@ -170,8 +172,9 @@ def check_stability(scope: Scope, label: str, servo: Any, parameters: Mapping[st
             place=dynamics.place,
             message=f"{label} is unstable with {integrator.name} at this rate of the dynamics",
             help=f"h * lambda must stay below {limit:g}; lambda is the servo's fastest rate constant, on any arm",
+            needs=(path,),
         )
-        scope.checks.hold((fastest,), warn, code="D105", place=dynamics.place, message="")
+        scope.checks.hold((fastest,), warn, code="D105", place=dynamics.place, message="", needs=(path,))
         return fastest * h
     return None
 

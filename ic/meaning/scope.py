@@ -17,9 +17,10 @@ import numpy as np
 from ic.grammar.syntax import Call, Expression, Name, String
 from ic.meaning.checks import Checks, Varied
 from ic.meaning.complaints import Complaints
+from ic.meaning.merge import Item
 from ic.meaning.names import Names
 from ic.meaning.remedies import components, mended
-from ic.meaning.resolve import Definitions, Item
+from ic.meaning.resolve import Definitions
 from ic.meaning.unit_words import either, in_deck, in_degrees, unit_here
 from ic.meaning.values import Value, Values, place_of
 from met import units
@@ -134,7 +135,7 @@ class Scope:
                                         found.place, help="leave the brackets out"))
                 written = found
         default = wanted.default if isinstance(wanted.default, (int, float)) else None
-        return self._settle(owner, wanted, wanted.name, item, written, default, record)
+        return self._settle(owner, wanted, wanted.name, item, written, default, record, expression)
 
     def vector(self, owner: Owner, wanted: Parameter, item: Item | None, *, names: Sequence[str] = XYZ, short: int = 0,
                given: Sequence[Real] | None = None, record: bool = True) -> tuple[Real, ...] | None:
@@ -195,11 +196,10 @@ class Scope:
         return numbers
 
     def constant(self, owner: Owner, wanted: Parameter, item: Item) -> float | None:
-        """A number that decides the program, so that no sweep can vary it."""
+        """A number that decides the program: no input of it, but what makes another structure where it is another."""
         path = owner.join(wanted.name)
-        reason = "decides the program, which is one for the whole sweep in this version"
         for known in owner.paths(wanted.name, item.homes):
-            self.whole[known] = reason
+            self.whole[known] = "decides the program"
         number = None
         with self.complaints.gather():
             found = self.written(item)
@@ -209,7 +209,7 @@ class Scope:
             self.check_dimension(owner, wanted, found)
             if isinstance(found.number, Scalar):
                 raise Problem(error("D122", f"`{wanted.name}` of {owner.label} varies with the sweep", found.place,
-                                    help=f"it {reason}"))
+                                    help=f"it decides the program: vary `{path}` itself"))
             before = len(self.complaints.all)
             self._check_range(owner, wanted, found.number, found.place)
             number = float(found.number) if len(self.complaints.all) == before else None
@@ -223,7 +223,7 @@ class Scope:
     def numbers(self, owner: Owner, wanted: Parameter, item: Item | None) -> tuple[float, ...] | None:
         """A list of any length, the same in all cases."""
         path = owner.join(wanted.name)
-        self.whole[path] = "is a list, which cannot vary in this version"
+        self.whole[path] = "is a list, which does not vary: write a run for each, and `sweep NAME = ONE + OTHER;`"
         if item is None:
             self._missing(owner, wanted)
             return None
@@ -239,8 +239,9 @@ class Scope:
                     raise Problem(error("D071", "a list inside a list", value.place))
                 self.check_dimension(owner, wanted, value)
                 if isinstance(value.number, Scalar):
+                    remedy = "a list does not vary: write a run for each, and `sweep NAME = ONE + OTHER;`"
                     raise Problem(error("D122", f"`{wanted.name}` of {owner.label} varies with the sweep", value.place,
-                                        help="a list cannot vary in this version"))
+                                        help=remedy))
                 self._check_range(owner, wanted, value.number, value.place)
                 made.append(float(value.number))
             numbers = tuple(made)
@@ -253,7 +254,7 @@ class Scope:
     def word(self, owner: Owner, wanted: Parameter, item: Item | None, *, record: bool = False) -> str | None:
         """A word, one of `wanted.words` where it has any."""
         path = owner.join(wanted.name)
-        self.whole[path] = "is a word, which cannot vary in this version"
+        self.whole[path] = "is a word: vary it over words"
         if item is None:
             if not isinstance(wanted.default, str):
                 self._missing(owner, wanted)
@@ -444,6 +445,8 @@ class Scope:
             shown = f"a number in {text}"
             if not isinstance(value.number, Scalar):
                 shown = either(f"{value.number:g} {in_deck(each)}" for each in in_degrees(text))
+            if value.bare and any(source.name == value.place.file for source in self.definitions.csv_files.sources):
+                shown = f"the unit in square brackets behind the column's name: `[{in_deck(text)}]`"
             raise Problem(error(
                 "D060", f"{what} is in {text}, and this is a {'bare' if value.bare else 'pure'} number", value.place,
                 also=also, help=f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}"))
@@ -471,7 +474,8 @@ class Scope:
         remedy = f"write a number {limits}{unit}" if bounds else "write a finite number"
         if wanted.whole:
             limits, remedy = f"whole and {limits}", remedy.replace("a number", "a whole number")
-        self.checks.hold((value,), test, code="D077", message=f"{owner.what(wanted)} must be {limits}{unit}",
+        limits += unit if bounds else ""
+        self.checks.hold((value,), test, code="D077", message=f"{owner.what(wanted)} must be {limits}",
                          place=place, path=path, needs=needs, help=remedy + (f" ({wanted.doc})" if wanted.doc else ""))
 
     def quantities(self, *, beside: bool = False) -> tuple[dict[str, Any], list[Scalar]]:

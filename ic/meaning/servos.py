@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from ic.grammar.syntax import Call, Expression, Name, String, Word
+from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, Word
 from ic.meaning.arm import Arm
-from ic.meaning.complaints import an, known_words
+from ic.meaning.complaints import known_words
+from ic.meaning.merge import Block, Item, open_call, overlay
 from ic.meaning.models import check_keys, find_bare_model, find_model, refuse_values, use_model, word_of
-from ic.meaning.resolve import Block, Item, open_call, overlay
 from ic.meaning.schedule import Rate
-from ic.meaning.scope import Owner, Scope
+from ic.meaning.scope import Owner, Scope, Settled
 from ic.meaning.trajectories import use_file, with_file_named
 from ic.meaning.unit_words import in_deck
-from ic.meaning.values import place_of
+from ic.meaning.values import measure_of, place_of
 from ic.text.files import library_defines
-from met import models
+from met import models, units
 from met.channel import COMMAND_UNIT
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
@@ -109,11 +110,11 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
         _check_needed(scope, owner, servo, command, block, place)
     rate = None
     if servo.tick is None and block.get("rate") is not None:
-        scope.complaints.error("D150", f"{an(servo.name)} has no computer that ticks, so no rate",
+        scope.complaints.error("D150", f"the model `{servo.name}` has no computer that ticks, so no rate",
                                block.items["rate"].place, help="leave `rate` out")
     elif block.get("rate") is not None:
         rate = fixed_rate(scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`")
-    scope.whole[f"{item.name}.servo.model"] = "decides the program, which is one for the whole sweep in this version"
+    scope.whole[f"{item.name}.servo.model"] = f"decides the program: vary `{item.name}.servo` over definitions"
     return Use(item.name, name, servo, command, rate, parameters, item.place)
 
 
@@ -127,7 +128,8 @@ def moving_kind(scope: Scope, item: Item, arm: Arm, so: str) -> str | None:
     if kind == "fixed":
         scope.complaints.error("D145", f"joint `{item.name}` is fixed, {so}", item.place,
                                also=[Label(place, "fixed here") for j in arm.joints if j.name == item.name
-                                     and (place := j.place)], help="make the joint revolute or prismatic")
+                                     and (place := j.place)],
+                               help="leave it out, or make the joint revolute or prismatic")
         return None
     return kind
 
@@ -202,16 +204,27 @@ def check_start(scope: Scope, use: Use) -> None:
     values = [each.value for each in asked.values()]
     if begins is None or profile is None or {p.name for p in profile.parameters} - set(asked):
         return
-    if isinstance(begins.value, Scalar) or any(isinstance(value, Scalar) for value in values):
+    if not isinstance(begins.value, (int, float)) or any(isinstance(value, Scalar) for value in values):
         return  # a sweep varies one of them
+    unit, scale = _unit_written([*asked.values(), begins], begins.unit)
     value, _ = profile.course(SimpleNamespace(**{name: each.value for name, each in asked.items()}), 0.0)
     if abs(value - begins.value) > APART:
         places = [each.origin.place for each in asked.values() if each.origin.place is not None]
         also = [] if begins.origin.place is None else [Label(begins.origin.place, "the joint begins here")]
         scope.complaints.remark(
-            "D169", f"the command of joint `{use.joint}` begins at {value:g} {begins.unit}, and the joint at "
-            f"{begins.value:g} {begins.unit}: it jumps", places[0] if places else use.place, also=also,
-            help=f"write `{use.joint}.q = {value:.12g} {begins.unit};` in `initial`, or begin the command elsewhere")
+            "D169", f"the command of joint `{use.joint}` begins at {value / scale:g} {unit}, and the joint at "
+            f"{begins.value / scale:g} {unit}: it jumps", places[0] if places else use.place, also=also,
+            help=f"write `{use.joint}.q = {value / scale:.12g} {unit};` in `initial`, or begin the command elsewhere")
+
+
+def _unit_written(found: Iterable[Settled], wanted: str) -> tuple[str, float]:
+    """The unit that the deck wrote first of the dimension of `wanted`, and its size; `wanted`, in SI, where none is."""
+    dimension = units.parse_unit(wanted).dimension
+    for each in found:
+        written = each.expression.unit if isinstance(each.expression, (Number, WithUnit)) else None
+        if written is not None and measure_of(written).dimension == dimension:
+            return written.text, measure_of(written).scale
+    return wanted, 1.0
 
 
 def fixed_rate(scope: Scope, owner: Owner, item: Item, label: str, name: str = "rate") -> Rate | None:
@@ -247,7 +260,7 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     call = item.value
     place = place_of(call) if call is not None else item.place
     if not servo.commands:
-        scope.complaints.error("D150", f"{an(servo.name)} takes no command", place, help="leave `command` out")
+        scope.complaints.error("D150", f"the model `{servo.name}` takes no command", place, help="leave `command` out")
         return None
     word = word_of(call)
     if word is not None and word not in COMMAND_UNIT and word in models.available("command"):
@@ -262,7 +275,7 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
         return None
     kind = call.name.text
     if kind not in servo.commands:
-        scope.complaints.error("D152", f"{an(servo.name)} takes no command `{kind}`", call.name.place,
+        scope.complaints.error("D152", f"the model `{servo.name}` takes no command `{kind}`", call.name.place,
                                help=[*did_you_mean(kind, servo.commands), f"it takes {known}"])
         return None
     inner = _asked(scope, call)

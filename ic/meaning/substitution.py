@@ -9,8 +9,8 @@ from typing import Any
 from ic.grammar.syntax import Call, Expression
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
+from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, find_model, refuse_values, use_model, word_of
-from ic.meaning.resolve import Block, Item
 from ic.meaning.scope import Owner, Scope
 from ic.meaning.servos import Use, moving_kind
 from ic.meaning.values import place_of
@@ -96,7 +96,7 @@ def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use])
         part = block.get(each)
         owner = Owner(f"{each} `{model.name}` of joint `{item.name}`", (part or item).place, f"{item.name}.{each}",
                       homes=(part or item).homes, joint=kind)  # type: ignore[arg-type]
-        scope.whole[f"{owner.path}.model"] = "decides the program, which is one for the whole sweep in this version"
+        scope.whole[f"{owner.path}.model"] = f"decides the program: vary `{owner.path}` over models"
         body = (part.body if part is not None else None) or Block()
         if each == "bed":
             _use_bed(scope, owner, model, body, use)

@@ -8,8 +8,8 @@ from typing import Any
 
 from ic.grammar.syntax import Call, Name, String, Word
 from ic.meaning.csv_files import missing_column
+from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, use_model
-from ic.meaning.resolve import Block, Item
 from ic.meaning.scope import Owner, Scope, Settled
 from ic.meaning.values import place_of
 from met.commands.profile import COLUMN, FILE, Profile
@@ -69,6 +69,8 @@ def _columns(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: s
         assert declared is not None  # by the declaration of `from_file`
         if column is None:
             why = "the times of the rows stand in a column `time [s]`" if column_name == TIME else ""
+            if at is named.place and not why:
+                why = "that of the joint's name is taken, unless `column = \"NAME\"` names another"
             raise missing_column(table, column_name, at, why)
         text, dimension = scope.unit(owner, declared)
         label = here if column_name == TIME else Label(named.place, f"read here for joint `{joint}`")

@@ -10,8 +10,24 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import cast
 
-from ic.grammar.syntax import Binary, Call, Expression, List, Name, Number, String, Unary, Unit, WithUnit, children
+from ic.grammar.spell import spell
+from ic.grammar.syntax import (
+    Binary,
+    Call,
+    Expression,
+    List,
+    Name,
+    Number,
+    Range,
+    String,
+    Unary,
+    Unit,
+    WithUnit,
+    children,
+)
+from ic.meaning import series
 from ic.meaning.complaints import known_words
+from ic.meaning.unit_words import in_deck
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
@@ -78,7 +94,9 @@ def _leaf(expression: Expression, lookup: Lookup) -> Value | Values:
                 return Value(CONSTANTS[expression.text], PURE, expression.place)
             return replace(lookup(expression), place=expression.place)
         case List():
-            return Values(tuple(evaluate(item, lookup) for item in expression.items), expression.place)
+            return Values(tuple(_items(expression, lookup)), expression.place)
+        case Range():
+            return _range(expression, lookup)
         case WithUnit():
             return _with_unit(expression, lookup)
         case Unary():
@@ -167,10 +185,12 @@ def _binary(node: Binary, left: Value | Values, lookup: Lookup) -> Value:
     bare = left.bare and right.bare
     if operator in ("+", "-"):
         if not units.same(left.dimension, right.dimension):
+            other, bare_one = (right, left) if left.bare else (left, right)
             raise Problem(error(
                 "D063", f"`{operator}` of {_named(left)} and {_named(right)}", node.place,
                 also=[Label(left.place, _named(left)), Label(right.place, _named(right))],
-                help="both must be of one dimension"))
+                help=f"write `{bare_one.number:g} {in_deck(units.text(other.dimension))}`"
+                if bare_one.bare and not isinstance(bare_one.number, Scalar) else "both must be of one dimension"))
         number = left.number + right.number if operator == "+" else left.number - right.number
         return Value(_sound(number, place), left.dimension, place, bare, left.unit)
     if operator == "*":
@@ -215,6 +235,66 @@ def _power(node: Binary, base: Value, exponent: Value) -> Value:
     return Value(_sound(result, node.place), dimension, base.place)
 
 
+def _items(written: List, lookup: Lookup) -> Iterable[Value | Values]:
+    """A list's items; a range or a linspace among them stands for its values."""
+    for item in written.items:
+        value = evaluate(item, lookup)
+        inner = item.inner if isinstance(item, WithUnit) else item
+        if isinstance(value, Values) and isinstance(inner, Range | Call):
+            yield from value.items
+        else:
+            yield value
+
+
+def _range(expression: Range, lookup: Lookup) -> Values:
+    """`first .. last by step`: steps from the first, as far as the last."""
+    first, last, step = (evaluate_number(each, lookup) for each in
+                         (expression.first, expression.last, expression.step))
+    place = place_of(expression)
+    for other in (last, step):
+        if not units.same(first.dimension, other.dimension):
+            remedy = "all three must be of one dimension"
+            if first.bare and last.bare and isinstance(expression.step, Number) and expression.step.unit is not None:
+                inside = f"{spell(expression.first)} .. {spell(expression.last)} by {expression.step.text}"
+                remedy = f"a unit behind the brackets is for all: `({inside}) {expression.step.unit.text}`"
+            raise Problem(error(
+                "D063", f"a range from {_named(first)} to {_named(last)} by {_named(step)}", expression.place,
+                also=[Label(each.place, _named(each)) for each in (first, last, step)],
+                help=remedy))
+    if any(isinstance(value.number, Scalar) for value in (first, last, step)):
+        raise Problem(error("D121", "the values of a sweep depend on what the sweep varies", place,
+                            help="write numbers that stand still"))
+    a, b, by = (float(value.number) for value in (first, last, step))
+    points = _steps(a, b, by, expression, first)
+    bare = first.bare and last.bare and step.bare
+    made = (Value(x, first.dimension, place, bare, first.unit) for x in points)
+    return Values(tuple(made), place, first.unit)
+
+
+def _steps(a: float, b: float, step: float, expression: Range, first: Value) -> Iterable[float]:
+    def shown(number: float) -> str:
+        """In the unit of the first value, where it has one of its own."""
+        if first.unit is None or measure_of(first.unit).dimension != first.dimension:
+            return f"{number:g}"
+        return f"{number / measure_of(first.unit).scale:g} {first.unit.text}"
+
+    if step == 0.0:
+        raise Problem(error("D072", "a range by steps of zero has no end", place_of(expression.step)))
+    if (b - a) * step < 0.0:
+        raise Problem(error("D072", f"steps of {shown(step)} do not lead from {shown(a)} to {shown(b)}",
+                            place_of(expression.step),
+                            help="give the step the other sign, or change the ends about"))
+    found = series.Steps.between(a, b, step)
+    if found.count > MOST_POINTS:
+        raise Problem(error("D072", f"a range of {min(found.count, 10**300):.3g} values", place_of(expression),
+                            help=f"up to {MOST_POINTS} are possible"))
+    if not found.meet:
+        raise Problem(error("D220", f"the steps do not meet the end: they reach {shown(found.last)}, and {shown(b)} "
+                            "is not a whole number of steps from the first", place_of(expression.last),
+                            help="end where the steps do, or `linspace(from, to, count)`, whose ends are met"))
+    return found.points
+
+
 # Functions
 
 
@@ -222,12 +302,13 @@ def _call(call: Call, lookup: Lookup) -> Value | Values:
     name = call.name.text
     if name not in FUNCTIONS:
         raise Problem(error("D069", f"no function `{name}`", call.name.place,
-                            help=[*did_you_mean(name, FUNCTIONS), known_words("functions", (*FUNCTIONS, "pi"))]))
+                            help=[*did_you_mean(name, FUNCTIONS), known_words("functions", FUNCTIONS)]))
     if call.named or call.body is not None:
         raise Problem(error("D070", f"`{name}` takes its arguments in order, without names", call.name.place,
                             help=f"write `{name}({', '.join(_USAGE[name])})`"))
     if len(call.positional) != len(_USAGE[name]) and not (name in ("min", "max") and call.positional):
-        raise Problem(error("D070", f"`{name}` takes {len(_USAGE[name])} arguments, not {len(call.positional)}",
+        count = f"{len(_USAGE[name])} argument{'s' * (len(_USAGE[name]) != 1)}"
+        raise Problem(error("D070", f"`{name}` takes {count}, not {len(call.positional)}",
                             call.name.place, help=f"write `{name}({', '.join(_USAGE[name])})`"))
     arguments = [evaluate_number(argument, lookup) for argument in call.positional]
     if name in ("linspace", "logspace"):
@@ -282,34 +363,9 @@ def _spaced(call: Call, arguments: list[Value]) -> Values:
     if name == "logspace" and not a * b > 0.0:
         raise Problem(error("D072", "the ends of a logspace are both above or both below zero", call.place,
                             help="linspace(...) has no such limit"))
-    points = _even(a, b, n) if name == "linspace" else _by_ratio(a, b, n)
+    points = series.even(a, b, n) if name == "linspace" else series.by_ratio(a, b, n)
     made = (Value(x, start.dimension, call.place, start.bare and end.bare, start.unit) for x in points)
     return Values(tuple(made), call.place, start.unit)
-
-
-def _even(a: float, b: float, n: int) -> Iterable[float]:
-    """Each point is the double nearest to what the ends' shortest decimals give: 0.01 to 0.04 in 7 has 0.015 in it."""
-    (first, under_first), (last, under_last) = _shortest(a), _shortest(b)
-    below = under_first * under_last
-    p, q = first * under_last, last * under_first
-    try:
-        return [(p * (n - 1 - i) + q * i) / (below * (n - 1)) for i in range(n)]
-    except OverflowError:
-        return [a + (b - a) * (i / (n - 1)) for i in range(n)]
-
-
-def _shortest(x: float) -> tuple[int, int]:
-    """The shortest decimal that reads back as x, as a fraction. (Not a `Fraction`: importing them takes 2 ms.)"""
-    digits, _, power = repr(x).partition("e")
-    whole, _, rest = digits.partition(".")
-    exponent = int(power or 0) - len(rest)
-    return int(whole + rest) * 10 ** max(exponent, 0), 10 ** max(-exponent, 0)
-
-
-def _by_ratio(a: float, b: float, n: int) -> Iterable[float]:
-    low, high = math.log(abs(a)), math.log(abs(b))
-    inner = (math.copysign(math.exp(low + (high - low) * i / (n - 1)), a) for i in range(1, n - 1))
-    return [a, *inner, b]
 
 
 # Places and numbers
@@ -329,6 +385,8 @@ def place_of(expression: Expression) -> Place:
             return spanned(place_of(left), place_of(expression.right))
         case WithUnit():
             return spanned(place_of(expression.inner), expression.unit.place)
+        case Range():
+            return spanned(place_of(expression.first), place_of(expression.step))
     return expression.place
 
 

@@ -2,53 +2,130 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
-from ic.printing.columns import columns, count, number
+import numpy as np
+
+from ic.printing.columns import columns, count, number, size
+from ic.printing.plan import history_bytes
 from met import keys
-from met.plan import Experiment
+from met.plan import Coordinate, Experiment
 
 HEAD, TAIL = 30, 10
 SHORTEST = 4
+REPEAT = "repeat"
+SAMPLED = "sample"
 
 
-def print_cases(experiment: Experiment, *, everything: bool = False) -> Iterator[str]:
-    """Line by line; of a long table the head and the tail, unless `everything` is asked for."""
-    cases = experiment.cases
-    names = prefixes(keys.case_ids(experiment))
-    yield f"{experiment.name}: {count(cases.count, 'case')}"
-    positions = list(range(cases.count))
-    cut = not everything and cases.count > HEAD + TAIL
+def print_cases(groups: Sequence[Experiment], *, everything: bool = False) -> Iterator[str]:
+    """Line by line the table of one sweep, of which these are the groups; of a long one the head and the tail."""
+    rows = _Rows(groups)
+    total = len(rows.groups)
+    title = f"{groups[0].asked}: {count(total, 'case')}"
+    if len(groups) > 1:
+        yield f"{title}, {len(groups)} structures"
+        yield from _structures(groups)
+        yield ""
+    else:
+        each = history_bytes(groups[0])
+        yield title + (f", {size(each)} of histories each" if each and total > 1 else "")
+    for note in dict.fromkeys(note for group in groups for note in group.notes if note.startswith(SAMPLED)):
+        yield f"  {note}"
+    positions = list(range(total))
+    cut = not everything and total > HEAD + TAIL
     if cut:
         positions = [*positions[:HEAD], *positions[-TAIL:]]
-    units = ["" if coordinate.unit == "1" else coordinate.unit for coordinate in cases.coordinates]
-    rows = [["", "id", *(coordinate.path for coordinate in cases.coordinates)], ["", "", *units]]
-    for position in positions:
-        shown = [number(float(c.values[position]) / c.scale) for c in cases.coordinates]
-        rows.append([f"#{position}", names[position], *shown])
-    if not any(units):
-        del rows[1]
-    lines = columns(rows, right=(0, *range(2, 2 + len(units))))
+    short = prefixes(rows.ids)
+    heads = ["", "id", *rows.choices, *(path for path, _ in rows.coordinates), *([REPEAT] if rows.repeated else [])]
+    units = ["", "", *("" for _ in rows.choices), *(unit for _, unit in rows.coordinates), *([""] * rows.repeated)]
+    table = [heads, units] if any(units) else [heads]
+    table += [[f"#{position}", short[position], *rows.shown(position)] for position in positions]
+    first = 2 + len(rows.choices)
+    lines = columns(table, right=(0, *range(first, len(heads))))
     if cut:
-        lines.insert(len(lines) - TAIL, f"  ... {cases.count - HEAD - TAIL} more; --all prints them")
+        lines.insert(len(lines) - TAIL, f"  ... {total - HEAD - TAIL} more; --all prints them")
     yield from lines
 
 
-def cases_json(experiment: Experiment) -> dict[str, Any]:
-    """The same for programs, in SI, whole."""
-    coordinates = experiment.cases.coordinates
-    names = keys.case_ids(experiment)
-    columns_ = [coordinate.values.tolist() for coordinate in coordinates]
+def _structures(groups: Sequence[Experiment]) -> Iterator[str]:
+    """What each group of a sweep is, how many cases it has, and how much one of them records."""
+    paths = list(dict.fromkeys(choice.path for group in groups for choice in group.cases.choices))
+    rows = [["group", *paths, "cases", "a case"]]
+    for group in groups:
+        chosen = {choice.path: choice.value for choice in group.cases.choices}
+        values = [chosen.get(path, "") for path in paths]
+        rows.append([group.name, *values, str(group.cases.count), size(history_bytes(group))])
+    yield from columns(rows, right=(len(paths) + 1, len(paths) + 2))
+
+
+class _Rows:
+    """The rows of all groups of a sweep, by position in its table."""
+
+    def __init__(self, groups: Sequence[Experiment]) -> None:
+        everything = np.concatenate([group.cases.table for group in groups])
+        order = np.argsort(everything, kind="stable")
+        self.experiments = groups
+        self.groups = np.concatenate([np.full(g.cases.count, n) for n, g in enumerate(groups)])[order]
+        self.rows = np.concatenate([np.arange(group.cases.count) for group in groups])[order]
+        ids = [case_id for group in groups for case_id in keys.case_ids(group)]
+        self.ids = [ids[n] for n in order]
+        self.choices = list(dict.fromkeys(choice.path for group in groups for choice in group.cases.choices))
+        named = (coordinate for group in groups for coordinate in group.cases.coordinates)
+        self.coordinates = list(dict.fromkeys((c.path, "" if c.unit == "1" else c.unit) for c in named))
+        self.repeated = any(group.cases.repeats is not None for group in groups)
+        self._chosen = [{choice.path: choice.value for choice in group.cases.choices} for group in groups]
+        self._columns: list[dict[str, Coordinate]] = [{c.path: c for c in g.cases.coordinates} for g in groups]
+
+    def chosen(self, position: int) -> dict[str, str]:
+        return self._chosen[self.groups[position]]
+
+    def value(self, position: int, path: str) -> tuple[float, float] | None:
+        """A coordinate in SI, and the deck's unit in SI; None where this case has no such coordinate."""
+        coordinate = self._columns[self.groups[position]].get(path)
+        return None if coordinate is None else (float(coordinate.values[self.rows[position]]), coordinate.scale)
+
+    def repeat(self, position: int) -> int:
+        repeats = self.experiments[self.groups[position]].cases.repeats
+        return 0 if repeats is None else int(repeats[self.rows[position]])
+
+    def shown(self, position: int) -> list[str]:
+        """Cells of the row behind its id."""
+        made = [self.chosen(position).get(path, "") for path in self.choices]
+        found = [self.value(position, path) for path, _ in self.coordinates]
+        made += ["" if value is None else number(value[0] / value[1]) for value in found]
+        return [*made, *([str(self.repeat(position))] if self.repeated else [])]
+
+
+def cases_json(groups: Sequence[Experiment]) -> dict[str, Any]:
+    """The same for programs, in SI, whole; a value is null where a case of this group has no such coordinate."""
+    rows = _Rows(groups)
+    first = {c.path: c for group in reversed(groups) for c in group.cases.coordinates}
+    paths = list(first)
+    made = []
+    for position, case_id in enumerate(rows.ids):
+        found = [rows.value(position, path) for path in paths]
+        case: dict[str, Any] = {"position": position, "id": case_id, "values": [x and x[0] for x in found]}
+        if len(groups) > 1:
+            case["group"] = groups[rows.groups[position]].name
+        if rows.repeated:
+            case["repeat"] = rows.repeat(position)
+        made.append(case)
     return {
-        "experiment": experiment.name,
-        "count": experiment.cases.count,
-        "coordinates": [{"path": c.path, "deck_unit": c.unit, "scale": c.scale} for c in coordinates],
-        "cases": [
-            {"position": position, "id": names[position], "values": [column[position] for column in columns_]}
-            for position in range(experiment.cases.count)
+        "experiment": groups[0].asked,
+        "count": len(rows.ids),
+        "groups": [
+            {
+                "name": group.name,
+                "count": group.cases.count,
+                "choices": {choice.path: choice.value for choice in group.cases.choices},
+                "history_bytes": history_bytes(group),
+            }
+            for group in groups
         ],
+        "coordinates": [{"path": c.path, "deck_unit": c.unit, "scale": c.scale} for c in first.values()],
+        "cases": made,
     }
 
 

@@ -15,7 +15,7 @@ from met.frozen import frozen
 
 if TYPE_CHECKING:
     from ic.grammar.syntax import Entry
-    from ic.meaning.resolve import Block, Item
+    from ic.meaning.merge import Block, Item
     from met.plan import Plan
 
 GROUP = "met.stages"
@@ -144,7 +144,8 @@ def _entry(entry: Entry, indent: str) -> Iterator[str]:
             words = " ".join(word.text for word in entry.words)
             like = f" like {entry.like.text}" if entry.like is not None else ""
             of = f" of {entry.of.text}" if entry.of is not None else ""
-            yield f"{indent}Group {words}{like}{of}{_written(entry.place)}"
+            made = f" from {spell(entry.made_from)}" if entry.made_from is not None else ""
+            yield f"{indent}Group {words}{like}{of}{made}{_written(entry.place)}"
             yield from _entries(entry.body, indent)
 
 

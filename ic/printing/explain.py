@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ic.meaning.complaints import known_words
 from ic.printing.columns import columns, number, quantity, vector
 from ic.printing.settings import settings
 from met import models, render
@@ -86,6 +87,10 @@ def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[st
     if same:
         more = f" and {len(same) - MOST_NEAR} more" if len(same) > MOST_NEAR else ""
         helps.append(f"parameters called `{last}`: {', '.join(same[:MOST_NEAR])}{more}")
+    head = path.rpartition(".")[0]
+    beside = [name for name in known if head and name.startswith(f"{head}.")]
+    if beside:
+        helps.append(known_words(f"`{head}` has", [name.removeprefix(f"{head}.") for name in beside]))
     if not helps:
         heads = dict.fromkeys(name.partition(".")[0] for name in known)
         helps.append(f"paths begin with {', '.join(heads)}")
@@ -204,11 +209,12 @@ def _one(
 def _written_at(place: Place, sources: Mapping[str, str]) -> str:
     """The entry, or the value, that begins at a place: up to its semicolon, or the end of its line.
 
-    Not past a bracket or comma of what holds it, as in `classic(a = l2, d = 0 m)`.
+    Not past a bracket or comma of what holds it, as in `classic(a = l2, d = 0 m)`; in a URDF file, the place itself.
     """
     lines = sources.get(place.file, "").split("\n")
     rest = lines[place.line - 1][place.column - 1 :] if place.line <= len(lines) else ""
-    text = rest[: place.length + _end(rest[place.length :])]
+    more = 0 if lines[0].startswith("<") else _end(rest[place.length :])
+    text = rest[: place.length + more]
     text = " ".join(text.split())
     return f"`{text}`" if text else "this"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, get_args
 
 from ic.printing.columns import columns, number, vector
@@ -24,8 +24,11 @@ HOW = {
     "law": "substitute JOINT { law = MODEL(...); ... }, in a run",
 }
 
-OTHERS = ("channels", "dh")
+OTHERS = ("channels", "dh", "shapes", "substitute", "units")
 """What else `met doc` has a page on (ic/printing/subjects.py)."""
+
+FIELDS = ("name", "unit", "doc", "default", "above", "at_least", "below", "at_most", "shape", "words", "source")
+"""What a program is told of a parameter."""
 
 WORDS = {
     "joint": "rad, or m on a prismatic joint",
@@ -56,12 +59,13 @@ def chosen(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
 def print_list(found: list[tuple[models.Kind, Any]]) -> Iterator[str]:
     """One line a model, kind by kind."""
     for kind in KINDS:
-        rows = [(model.name, summary(model)) for k, model in found if k == kind]
-        if rows:
+        listed = [(model.name, summary(model)) for k, model in found if k == kind]
+        if listed:
             yield f"{kind}: {HOW[kind]}"
-            yield from columns(rows)
+            yield from columns(listed)
             yield ""
     yield "`met doc MODEL` says all that one declares; `met doc channels` what can be recorded."
+    yield f"Also: {', '.join(OTHERS[1:])}; and the code of a message, as in `met doc D060`."
 
 
 def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
@@ -69,7 +73,61 @@ def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
     yield f"{kind} {model.name}"
     yield from (f"  {line}".rstrip() for line in textwrap.dedent(model.doc).strip().splitlines())
     yield ""
-    yield f"In a deck: {HOW[kind]}"
+    yield f"In a deck: {how(kind, model)}"
+    yield from facts(kind, model)
+    parameters = models.written(model)
+    if parameters:
+        yield ""
+        yield "Parameters"
+        yield from columns(rows(parameters))
+    yield from (f"  {word}: {text}" for word, text in words_in(parameters))
+    for text, parts in shown_of(kind, model):
+        yield ""
+        yield text
+        yield from columns(parts)
+
+
+def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
+    """All that a model declares, for programs."""
+    told: dict[str, Any] = {"kind": kind, "name": model.name, "doc": textwrap.dedent(model.doc).strip()}
+    told["parameters"] = [{field: getattr(p, field) for field in FIELDS} for p in models.written(model)]
+    for words in ("commands", "unit", "order", "real_limit"):
+        if hasattr(model, words):
+            told[words] = getattr(model, words)
+    for words in ("memory", "states", "signals"):
+        told[words] = [{"name": p.name, "unit": p.unit, "doc": p.doc} for p in getattr(model, words, ())]
+    return told
+
+
+def rows(parameters: Iterable[Parameter]) -> list[tuple[str, str, str, str, str]]:
+    """A table of parameters, its head first."""
+    told = [(p.name, unit_in_words(p.unit), default(p), range_(p), meaning(p)) for p in parameters]
+    return [("name", "unit", "default", "range", "meaning"), *told]
+
+
+def how(kind: models.Kind, model: Any) -> str:
+    """Where a deck writes this model."""
+    return HOW[kind].replace("MODEL", model.name)
+
+
+def shown_of(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
+    """What there is of a servo, bed or law to be recorded: in words, then name, unit and meaning of each."""
+    for words, text in (
+        ("memory", "Held by its computer from tick to tick"),
+        ("states", "Integrated with the motion"),
+        ("signals", "Shown at every instant"),
+    ):
+        parts = getattr(model, words, ())
+        if parts and kind == "servo":
+            yield f"{text}; recorded as JOINT.servo.NAME", [(p.name, unit_in_words(p.unit), p.doc) for p in parts]
+    shown = list(of_bed(model) if kind == "bed" else of_law(model) if kind == "law" else ())
+    if shown:
+        told = [(name, unit_in_words(unit), doc) for name, unit, doc in shown]
+        yield f"Held from tick to tick; recorded as JOINT.{kind}.NAME", told
+
+
+def facts(kind: models.Kind, model: Any) -> Iterator[str]:
+    """What else a model declares, in a line each."""
     for words, text in (
         ("commands", "Commands it takes"),
         ("order", "Order"),
@@ -80,43 +138,12 @@ def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
             yield f"{text}: {', '.join(value) if isinstance(value, tuple) else number(value)}"
     if kind == "metric":
         yield f"Unit of the result: {WORDS.get(model.unit, unit_in_words(model.unit))}"
-    parameters = models.written(model)
-    if parameters:
-        yield ""
-        yield "Parameters"
-        rows = [("name", "unit", "default", "range", "meaning")]
-        rows += [(p.name, unit_in_words(p.unit), default(p), range_(p), meaning(p)) for p in parameters]
-        yield from columns(rows)
-    words_used = {word for p in parameters for word in WORDS if word in p.unit.replace("*", "/").split("/")}
-    yield from (f"  {word}: {WORDS[word]}" for word in WORDS if word in words_used)
-    for words, text in (
-        ("memory", "Held by its computer from tick to tick"),
-        ("states", "Integrated with the motion"),
-        ("signals", "Shown at every instant"),
-    ):
-        parts = getattr(model, words, ())
-        if parts and kind == "servo":
-            yield ""
-            yield f"{text}; recorded as JOINT.servo.NAME"
-            yield from columns([(part.name, unit_in_words(part.unit), part.doc) for part in parts])
-    shown = list(of_bed(model) if kind == "bed" else of_law(model) if kind == "law" else ())
-    if shown:
-        yield ""
-        yield f"Held from tick to tick; recorded as JOINT.{kind}.NAME"
-        yield from columns([(name, unit_in_words(unit), doc) for name, unit, doc in shown])
 
 
-def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
-    """All that a model declares, for programs."""
-    fields = ("name", "unit", "doc", "default", "above", "at_least", "below", "at_most", "shape", "words", "source")
-    told: dict[str, Any] = {"kind": kind, "name": model.name, "doc": textwrap.dedent(model.doc).strip()}
-    told["parameters"] = [{field: getattr(p, field) for field in fields} for p in models.written(model)]
-    for words in ("commands", "unit", "order", "real_limit"):
-        if hasattr(model, words):
-            told[words] = getattr(model, words)
-    for words in ("memory", "states", "signals"):
-        told[words] = [{"name": p.name, "unit": p.unit, "doc": p.doc} for p in getattr(model, words, ())]
-    return told
+def words_in(parameters: tuple[Parameter, ...]) -> Iterator[tuple[str, str]]:
+    """The words in units that the use decides, and what they stand for."""
+    used = {word for p in parameters for word in WORDS if word in re.split(r"\W+", p.unit)}
+    return ((word, text) for word, text in WORDS.items() if word in used)
 
 
 def summary(model: Any) -> str:

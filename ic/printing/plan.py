@@ -265,13 +265,18 @@ def _metrics(experiment: Experiment) -> Iterator[str]:
     yield from columns(rows)
 
 
+def history_bytes(experiment: Experiment) -> int:
+    """Size of one case's histories."""
+    columns = sum(len(recorded.channels) for recorded in experiment.structure.record)
+    return NUMBER_BYTES * columns * experiment.structure.schedule.rows
+
+
 def _cases(experiment: Experiment) -> Iterator[str]:
-    cases, structure = experiment.cases, experiment.structure
-    width = sum(len(recorded.channels) for recorded in structure.record)
-    total = cases.count * width * structure.schedule.rows * NUMBER_BYTES
-    written = f"{size(total)} of histories" if width else "metrics alone are written"
+    cases = experiment.cases
+    each = history_bytes(experiment)
+    written = f"{size(cases.count * each)} of histories" if each else "metrics alone are written"
     yield f"Cases: {cases.count}, {written}"
-    rows = []
+    rows = [(choice.path, choice.value) for choice in cases.choices]
     for coordinate in cases.coordinates:
         shown = np.unique(coordinate.values) / coordinate.scale
         if shown.size == 0:
@@ -281,4 +286,8 @@ def _cases(experiment: Experiment) -> Iterator[str]:
         else:
             several = f"{shown.size} values from {number(float(shown[0]))} to {number(float(shown[-1]))}"
         rows.append((coordinate.path, f"{several} {coordinate.unit}" if coordinate.unit != "1" else several))
+    if cases.repeats is not None:
+        rows.append(("repeat", f"{len(np.unique(cases.repeats))} times each"))
+    if cases.seeds == "independent":
+        rows.append(("seeds", "each case has noise of its own"))
     yield from columns(rows)

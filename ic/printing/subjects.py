@@ -1,4 +1,4 @@
-"""What `met doc` says besides models: what can be recorded, and what Denavit-Hartenberg numbers are."""
+"""What `met doc` says besides models: channels, Denavit-Hartenberg numbers, shapes, motors on beds, units."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from ic.meaning import dh
-from ic.printing.columns import columns
-from ic.printing.models import WORDS, default, unit_in_words
-from met import channel
+from ic.meaning import dh, shapes
+from ic.meaning.substitution import DEFAULTS
+from ic.printing.columns import columns, number
+from ic.printing.models import FIELDS, WORDS, default, rows, summary, unit_in_words
+from met import channel, models, units
 
 OF_ANY = (
     ("JOINT.servo.NAME", "what a servo holds, integrates and shows: `met doc` and the name of its model"),
@@ -52,8 +53,13 @@ def print_channels() -> Iterator[str]:
     yield from columns(list(OF_ANY))
     yield ""
     yield "Without `JOINT.` it is that of all joints that have it; with `.x`, one component of a vector."
+    yield from (f"  {word}: {text}" for word, text in words_of(found))
+
+
+def words_of(found: list[dict[str, str]]) -> list[tuple[str, str]]:
+    """The words in the units of channels that the joint decides, and what they stand for."""
     used = {word for each in found for word in each["unit"].replace("*", "/").split("/")}
-    yield from (f"  {word}: {text}" for word, text in {**WORDS, **MORE_WORDS}.items() if word in used)
+    return [(word, text) for word, text in {**WORDS, **MORE_WORDS}.items() if word in used]
 
 
 def print_dh() -> Iterator[str]:
@@ -72,10 +78,74 @@ def dh_json() -> list[dict[str, Any]]:
     return [{field: getattr(each, field) for field in fields} for each in dh.NUMBERS]
 
 
+def print_shapes() -> Iterator[str]:
+    yield "shapes: uniform solids, which give a link its inertia and its centre of mass"
+    yield from (f"  {line}".rstrip() for line in BEGIN.splitlines())
+    yield ""
+    yield "In a deck: link NAME { mass = 2 kg;  shape = rod(length = 1 m, along = x); }"
+    for name, shape in shapes.SHAPES.items():
+        yield ""
+        yield name
+        yield from columns(rows(shape.parameters))
+
+
+BEGIN = (shapes.__doc__ or "").strip().split("\n\n", 1)[1]
+"""Where a shape lies, as the module says it."""
+
+
+def shapes_json() -> list[dict[str, Any]]:
+    return [{"name": name, "parameters": [{field: getattr(p, field) for field in FIELDS} for p in shape.parameters]}
+            for name, shape in shapes.SHAPES.items()]  # fmt: skip
+
+
+def print_substitute() -> Iterator[str]:
+    yield "substitute: the motor of a joint, put on a motor bed"
+    yield "  The servo stays what it is. What its motor does is the bed's; how the bed's second motor loads it is the"
+    yield "  law's, one for all substituted joints of a run."
+    yield ""
+    yield "In a deck: substitute JOINT { bed = MODEL(...);  law = MODEL(...); }, in a run"
+    for kind, usual in DEFAULTS.items():
+        yield ""
+        yield f"{kind}s; {usual} unless written"
+        yield from columns([(name, summary(model)) for name, model in models.available(kind).items()])
+    yield ""
+    yield "Parameters of a bed that are the servo's unless they are written"
+    yield from columns([(name, p.name, f"the servo's {p.of_servo}", p.doc)
+                        for name, model in models.available("bed").items() for p in model.parameters if p.of_servo])
+    yield ""
+    yield "`met doc emulated`, and so for every bed and law, says what it takes and what of it can be recorded."
+
+
+def substitute_json() -> list[dict[str, Any]]:
+    return [{"key": kind, "default": usual, "models": list(models.available(kind))} for kind, usual in DEFAULTS.items()]
+
+
+def unit_table() -> list[dict[str, Any]]:
+    """Every unit: its name, its word, and what one of it is in SI."""
+    return [{"name": name, "word": unit.word, "scale": unit.measure.scale, "si": units.text(unit.measure.dimension)}
+            for name, unit in units.UNITS.items()]  # fmt: skip
+
+
+def print_units() -> Iterator[str]:
+    yield "units: those that a deck may write, behind a number, joined by * / ^ and brackets"
+    yield ""
+    yield from columns([("name", "word", "is"), *((each["name"], each["word"], in_si(each)) for each in unit_table())])
+    yield ""
+    yield "A rate of turning is no frequency: 60 rpm is 2 pi rad/s, and 1 Hz is 1/s. There are no further prefixes."
+
+
+def in_si(unit: Mapping[str, Any]) -> str:
+    """`0.001 m`; of a share `0.01`."""
+    return f"{number(unit['scale'])} {unit['si']}" if unit["si"] != "1" else number(unit["scale"])
+
+
 Subject = tuple[Callable[[], Iterator[str]], Callable[[], list[Any]]]
 
 SUBJECTS: Mapping[str, Subject] = MappingProxyType({
     "channels": (print_channels, channels),
     "dh": (print_dh, dh_json),
+    "shapes": (print_shapes, shapes_json),
+    "substitute": (print_substitute, substitute_json),
+    "units": (print_units, unit_table),
 })
 """By the word that `met doc` takes: what it prints, and the same for programs."""

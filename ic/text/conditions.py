@@ -1,107 +1,319 @@
-"""The conditions of `#if` and `#elif`: whole numbers, as in C. pcpp evaluates them; here is what it would get wrong.
+"""The conditions of `#if` and `#elif`: C's whole numbers of 64 bits, with and without a sign, and C's operators.
 
-pcpp cuts `0.5` in two, takes `08` for 0, compares strings by accident and computes `1 << 9999999999`.
+A result that does not fit wraps round, as gcc and clang do it. What C leaves open is an error here: a shift by less
+than 0 or more than 63, a character constant of several characters. What `&&`, `||` and `?:` leave out is read, but not
+computed: `0 && 1 / 0` is 0.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from operator import add as plus
+from operator import and_, eq, ge, gt, le, lt, mul, ne, or_, sub, xor
+from types import MappingProxyType
+from typing import NamedTuple, NoReturn
 
-from ic.text.lexer import BAD, DECIMAL, JOINED, NAME, SPACE, STRING, WHOLE, Token
-from ic.text.limits import LONGEST_NUMBER, Findings
+from ic.text.lexer import BAD, CHARACTER, DECIMAL, NAME, SPACE, STRING, WHOLE, Token
+from ic.text.limits import CONDITION_NESTING, LONGEST_NUMBER, MOST_TERMS, Findings
 from ic.text.strays import complain_of_stray
+from met.diagnostic import Place
 
-_C_NUMBER = re.compile(r"0[xX][0-9a-fA-F]+|0[0-7]*[lL]?|[1-9][0-9]*|1L")
-_C_WORDS = {"and": "&&", "or": "||", "not": "!"}
-MOST_TERMS = 2_000
+_NUMBER = re.compile(r"(?:0[xX](?P<hex>[0-9a-fA-F]+)|0(?P<octal>[0-7]*)|(?P<decimal>[1-9][0-9]*))")
+_SUFFIX = re.compile(r"[uU](?:l|L|ll|LL)?|(?:l|L|ll|LL)[uU]?")
+_WORDS = MappingProxyType({"and": "&&", "or": "||", "not": "!"})
+_ESCAPE = re.compile(r"\\(?:x(?P<hex>[0-9a-fA-F]{1,2})|(?P<octal>[0-7]{1,3})|(?P<plain>[abfnrtv\\'\"?]))")
+_ESCAPED = MappingProxyType(dict(zip("abfnrtv\\'\"?", b"\a\b\f\n\r\t\v\\'\"?", strict=True)))
+_USUAL = "a condition is of whole numbers, macros, `defined(NAME)` and C's operators"
+
+_LEVEL: Mapping[str, int] = MappingProxyType({
+    "||": 1, "&&": 2, "|": 3, "^": 4, "&": 5, "==": 6, "!=": 6, "<": 7, "<=": 7, ">": 7, ">=": 7, "<<": 8, ">>": 8,
+    "+": 9, "-": 9, "*": 10, "/": 10, "%": 10,
+})  # fmt: skip
+_COMPARED: Mapping[str, Callable[[int, int], bool]] = MappingProxyType(
+    {"==": eq, "!=": ne, "<": lt, "<=": le, ">": gt, ">=": ge}
+)
+_COMPUTED: Mapping[str, Callable[[int, int], int]] = MappingProxyType(
+    {"|": or_, "^": xor, "&": and_, "+": plus, "-": sub, "*": mul}
+)
 
 
 class Refused(Exception):
     """The condition has no meaning, and that has been said."""
 
 
-def well_formed(directive: Token, args: list[Token], findings: Findings) -> bool:
+class _Value(NamedTuple):
+    """A number of 64 bits; `plain` where it has no sign."""
+
+    number: int
+    plain: bool = False
+
+
+def well_formed(directive: Token, args: Sequence[Token], findings: Findings) -> bool:
     """Whether there is a condition, and each `defined` in it is followed by a name."""
-    written = [token for token in args if token.kind not in (SPACE, JOINED)]
+    written = [token for token in args if token.kind != SPACE]
     if not written:
-        findings.error("D009", f"`#{directive.text}` needs a condition", directive.place)
+        findings.error("D009", f"`#{directive.text}` needs a condition", directive.place,
+                       help=f"write `#{directive.text} NAME == 1`, or another condition")  # fmt: skip
         return False
     if len(written) > MOST_TERMS:
         findings.error("D018", f"a condition has at most {MOST_TERMS} tokens", directive.place)
         return False
+    return _each_defined(written, findings) is not None
+
+
+def with_defined(tokens: Sequence[Token], is_macro: Callable[[str], bool], findings: Findings) -> list[Token]:
+    """The condition with a number in place of each `defined NAME`; raises Refused where no name follows."""
+    written = [token for token in tokens if token.kind != SPACE]
+    stretches = _each_defined(written, findings)
+    if stretches is None:
+        raise Refused
+    made, at = [], 0
+    for first, name, end in stretches:
+        made += written[at:first]
+        truth = written[first].__copy__()
+        truth.kind, truth.text = WHOLE, "1" if is_macro(written[name].text) else "0"
+        made.append(truth)
+        at = end
+    return [*made, *written[at:]]
+
+
+def _each_defined(written: Sequence[Token], findings: Findings) -> list[tuple[int, int, int]] | None:
+    """Where each `defined` stands, its name, and what comes behind; None, and a message, where it has no name."""
+    stretches: list[tuple[int, int, int]] = []
     texts = [token.text for token in written] + ["", "", ""]
     for i, token in enumerate(written):
-        if token.text != "defined" or token.kind != NAME:
+        if token.text != "defined" or token.kind != NAME or (stretches and i < stretches[-1][2]):
             continue
-        name = i + 2 if texts[i + 1] == "(" else i + 1
+        bracketed = texts[i + 1] == "("
+        name = i + 1 + bracketed
         named = name < len(written) and written[name].kind == NAME
-        if not named or (name == i + 2 and texts[i + 3] != ")"):
+        if not named or (bracketed and texts[name + 1] != ")"):
             findings.error("D009", "`defined` needs a macro's name", token.place, help="write `defined(NAME)`")
-            return False
-    return True
+            return None
+        stretches.append((i, name, name + 1 + bracketed))
+    return stretches
 
 
-def evaluate(tokens: list[Token], findings: Findings, compute: Callable[[], Any]) -> Any:
-    """The value of an expanded condition, by `compute`; raises Refused, with a message noted, where it has none."""
-    written = [token for token in tokens if token.kind not in (SPACE, JOINED)]
-    after = [*written[1:], None]
-    for token, following in zip(written, after, strict=True):
-        _check(token, following, findings)
-    try:
-        value = compute()
-        value.value()
+def evaluate(tokens: Sequence[Token], findings: Findings) -> bool:
+    """Whether an expanded condition holds; raises Refused, with a message noted, where it has no meaning."""
+    return _Condition([token for token in tokens if token.kind != SPACE], findings).truth()
+
+
+class _Condition:
+    """Where reading stands in the tokens of a condition. `live`: whether what is read counts."""
+
+    def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
+        self.tokens = tokens
+        self.findings = findings
+        self.at = 0
+        self.depth = 0
+
+    def truth(self) -> bool:
+        value = self.whole(live=True)
+        if self.at < len(self.tokens):
+            self.cannot_follow()
+        return value.number != 0
+
+    # complaints
+
+    def refuse(self, message: str, at: Token | Place, help: str = "", code: str = "D009") -> NoReturn:
+        self.findings.error(code, message, at.place if isinstance(at, Token) else at, help=help or ())
+        raise Refused
+
+    def not_understood(self, why: str, at: Token, help: str = "") -> NoReturn:
+        used = next((token.text for token in self.tokens if token.text in _WORDS), "")
+        words = f"the preprocessor writes `{_WORDS[used]}` for `{used}`" if used else ""
+        self.refuse(f"this condition cannot be understood: {why}", at, help or words or _USUAL)
+
+    def cannot_follow(self) -> NoReturn:
+        token, before = self.tokens[self.at], self.tokens[self.at - 1]
+        self.no_stray(token)
+        if token.text == "=":
+            self.refuse("`=` does not compare", token, "write `==`")
+        if token.text == "(" and before.kind == NAME:
+            self.not_understood(f"`{before.text[:LONGEST_NUMBER]}` is not a macro with arguments", before)
+        if token.text == ":":
+            self.not_understood("`:` without its `?`", token)
+        if token.text == ")":
+            self.not_understood("this `)` closes nothing", token)
+        self.not_understood(f"expected an operator, found `{token.text[:LONGEST_NUMBER]}`", token)
+
+    def no_stray(self, token: Token) -> None:
+        if token.kind == BAD:
+            if token.text:  # else what it stands for has been told
+                complain_of_stray(token, self.findings)
+            raise Refused
+
+    def no_double(self, token: Token) -> None:
+        """`--` and `++`, which C reads as one token."""
+        if token.text in ("-", "+") and self.text() == token.text:
+            after = self.tokens[self.at]
+            if after.source is token.source and after.offset == token.end:
+                both = token.source.place(token.offset, 2, token.expansions)
+                self.refuse(f"`{token.text * 2}` has no meaning in a condition", both,
+                            f"write `{token.text} {token.text}`")  # fmt: skip
+
+    # reading
+
+    def text(self) -> str:
+        return self.tokens[self.at].text if self.at < len(self.tokens) else ""
+
+    def take(self, text: str, opening: Token) -> None:
+        if self.text() != text:
+            if self.at < len(self.tokens):
+                if self.text() not in (")", ":"):
+                    self.cannot_follow()
+                self.not_understood(f"expected `{text}`, found `{self.text()}`", self.tokens[self.at])
+            self.not_understood(f"this `{opening.text}` lacks its `{text}`", opening)
+        self.at += 1
+
+    def deeper(self, token: Token) -> None:
+        self.depth += 1
+        if self.depth > CONDITION_NESTING:
+            self.refuse(f"a condition goes deeper than {CONDITION_NESTING}", token, code="D018")
+
+    def whole(self, live: bool) -> _Value:
+        """With commas, of which the last value counts."""
+        value = self.choice(live)
+        while self.text() == ",":
+            self.at += 1
+            value = self.choice(live)
         return value
-    except ZeroDivisionError:
-        findings.error("D009", "this condition divides by zero", _whole(written))
-    except Exception as reason:  # whatever pcpp's parser makes of nonsense
-        said = str(reason)
-        why = said if said.endswith("is not a macro with arguments") else _expected(said)
-        usual = "a condition is of whole numbers, macros, `defined(NAME)` and C's operators"
-        help = _words_for_symbols(written) or usual
-        findings.error("D009", f"this condition cannot be understood: {why}", _whole(written), help=help)
-    raise Refused
+
+    def choice(self, live: bool) -> _Value:
+        condition = self.binary(1, live)
+        if self.text() != "?":
+            return condition
+        question = self.tokens[self.at]
+        self.deeper(question)
+        self.at += 1
+        holds = condition.number != 0
+        yes = self.whole(live and holds)
+        self.take(":", question)
+        no = self.choice(live and not holds)
+        self.depth -= 1
+        return _wrapped((yes if holds else no).number, yes.plain or no.plain)
+
+    def binary(self, least: int, live: bool) -> _Value:
+        left = self.unary(live)
+        while True:
+            operator = self.text()
+            level = _LEVEL.get(operator, 0)
+            if level < least:
+                return left
+            token = self.tokens[self.at]
+            self.at += 1
+            self.no_double(token)
+            if operator in ("&&", "||"):
+                decides = (left.number != 0) == (operator == "||")
+                right = self.binary(level + 1, live and not decides)
+                left = _Value(int((left.number != 0) if decides else (right.number != 0)))
+            else:
+                left = self.computed(token, left, self.binary(level + 1, live), live)
+
+    def computed(self, operator: Token, left: _Value, right: _Value, live: bool) -> _Value:
+        text, plain = operator.text, left.plain or right.plain
+        if text in ("<<", ">>"):
+            if not live:
+                return left
+            if not 0 <= right.number <= 63:
+                self.refuse(f"`{text}` shifts by a number from 0 to 63 here, and this is {right.number}", operator,
+                            "C does not say what another number means")  # fmt: skip
+            return _wrapped(left.number << right.number if text == "<<" else left.number >> right.number, left.plain)
+        a, b = _wrapped(left.number, plain).number, _wrapped(right.number, plain).number
+        if text in _COMPARED:
+            return _Value(int(_COMPARED[text](a, b)))
+        if text in _COMPUTED:
+            return _wrapped(_COMPUTED[text](a, b), plain)
+        if not live:
+            return _Value(0, plain)
+        if b == 0:
+            self.refuse("this condition divides by zero", operator, "ask before: `NAME != 0 && 10 / NAME > 2`")
+        quotient = abs(a) // abs(b) if (a < 0) == (b < 0) else -(abs(a) // abs(b))  # towards zero, as in C
+        return _wrapped(quotient if text == "/" else a - b * quotient, plain)
+
+    def unary(self, live: bool) -> _Value:
+        """A value, with the operators in front of it."""
+        if self.at == len(self.tokens):
+            self.not_understood("it ends too early", self.tokens[-1])
+        token = self.tokens[self.at]
+        text = token.text
+        if text not in ("-", "+", "~", "!", "("):
+            return self.operand(token)
+        self.deeper(token)
+        self.at += 1
+        if text == "(":
+            value = self.whole(live)
+            self.take(")", token)
+        else:
+            self.no_double(token)
+            inner = self.unary(live)
+            if text == "!":
+                value = _Value(int(inner.number == 0))
+            else:
+                changed = {"-": -inner.number, "~": ~inner.number, "+": inner.number}[text]
+                value = _wrapped(changed, inner.plain)
+        self.depth -= 1
+        return value
+
+    def operand(self, token: Token) -> _Value:
+        self.no_stray(token)
+        if token.kind == WHOLE:
+            return self.number(token)
+        if token.kind == NAME:  # what is no macro is 0, as in C
+            self.at += 1
+            return _Value(0)
+        if token.kind == CHARACTER:
+            return self.character(token)
+        if token.kind == DECIMAL:
+            self.refuse(
+                f"`#if` compares whole numbers only, as in C, and `{token.text[:LONGEST_NUMBER]}` is not whole", token,
+                "give the switch whole values, or choose by `#ifdef`",
+            )  # fmt: skip
+        if token.kind == STRING:
+            self.refuse("`#if` compares whole numbers only, as in C: a string has no value here", token,
+                        "define each choice as a number, `#define RIGID 1`, and compare with its name")  # fmt: skip
+        self.not_understood(f"expected a value, found `{token.text[:LONGEST_NUMBER]}`", token)
+
+    def number(self, token: Token) -> _Value:
+        self.at += 1
+        text = token.text
+        found = _NUMBER.fullmatch(text)
+        if len(text) > LONGEST_NUMBER or found is None:
+            self.refuse(f"`{text[:LONGEST_NUMBER]}` is not a whole number that C knows", token,
+                        "a number that begins with 0 is octal" if text.startswith("0") else "")  # fmt: skip
+        base = 16 if found["hex"] else 10 if found["decimal"] else 8
+        value = int(found["hex"] or found["decimal"] or found["octal"] or "0", base)
+        if value >= 1 << 64:
+            self.refuse(f"`{text}` does not fit into 64 bits", token, f"the largest number is {2**64 - 1}")
+        plain = value >= 1 << 63
+        after = self.tokens[self.at] if self.at < len(self.tokens) else None
+        if after is not None and after.kind == NAME and after.source is token.source and after.offset == token.end:
+            if not _SUFFIX.fullmatch(after.text):
+                written = f"{text}{after.text}"[:LONGEST_NUMBER]
+                self.refuse(f"`{written}` is not a whole number that C knows", token,
+                            "write it in decimal, or in hexadecimal as in `0x1F`")  # fmt: skip
+            plain = plain or "u" in after.text.lower()
+            self.at += 1
+        return _Value(value, plain)
+
+    def character(self, token: Token) -> _Value:
+        self.at += 1
+        inner = token.text[1:-1]
+        escape = _ESCAPE.fullmatch(inner)
+        if escape is not None:
+            written = escape["hex"] or escape["octal"]
+            code = int(written, 16 if escape["hex"] else 8) if written else _ESCAPED[escape["plain"]]
+        elif len(inner) == 1 and inner.isascii():
+            code = ord(inner)
+        else:
+            self.refuse(f"`{token.text[:LONGEST_NUMBER]}` has no value here", token,
+                        "between the quotes stands one character, of ASCII, or one escape such as `\\n`")  # fmt: skip
+        return _Value(code - 256 if 127 < code < 256 else code)
 
 
-def _check(token: Token, following: Token | None, findings: Findings) -> None:
-    def refuse(message: str, help: str = "") -> None:
-        findings.error("D009", message, token.place, help=help or ())
-        raise Refused
-
-    if token.kind == BAD:
-        complain_of_stray(token, findings)
-        raise Refused
-    if token.kind == DECIMAL:
-        refuse(f"`#if` compares whole numbers only, as in C, and `{token.text[:LONGEST_NUMBER]}` is not whole",
-               "give the switch whole values, or choose by `#ifdef`")  # fmt: skip
-    if token.kind == STRING:
-        refuse("`#if` compares whole numbers only, as in C: a string has no value here",
-               "define each choice as a number, `#define RIGID 1`, and compare with its name")  # fmt: skip
-    if token.text == "=":
-        refuse("`=` does not compare", "write `==`")
-    if token.kind == WHOLE and (len(token.text) > LONGEST_NUMBER or not _C_NUMBER.fullmatch(token.text)):
-        refuse(f"`{token.text[:LONGEST_NUMBER]}` is not a whole number that C knows",
-               "a number that begins with 0 is octal" if token.text.startswith("0") else "")  # fmt: skip
-    if token.text in ("<<", ">>"):
-        whole = following is not None and following.text.isdigit() and len(following.text) <= 2
-        if not whole or int(following.text if following else 0) > 63:
-            refuse(f"`{token.text}` shifts by a number from 0 to 63 here")
-
-
-def _expected(said: str) -> str:
-    match = re.match(r"around token '(.*)' type", said, re.DOTALL)
-    if match:
-        return f"`{match.group(1)[:LONGEST_NUMBER]}` is not expected where it stands"
-    return "it ends too early" if said == "at EOF" else "it is not an expression"
-
-
-def _words_for_symbols(written: list[Token]) -> str:
-    used = [token.text for token in written if token.text in _C_WORDS]
-    return f"the preprocessor writes `{_C_WORDS[used[0]]}` for `{used[0]}`" if used else ""
-
-
-def _whole(written: list[Token]) -> Any:
-    first, last = written[0], written[-1]
-    together = first.source is last.source and first.expansions == last.expansions and first.line == last.line
-    return first.source.place(first.offset, (last.end if together else first.end) - first.offset, first.expansions)
+def _wrapped(number: int, plain: bool) -> _Value:
+    """The number brought into 64 bits."""
+    number &= (1 << 64) - 1
+    return _Value(number if plain or number < 1 << 63 else number - (1 << 64), plain)

@@ -12,7 +12,7 @@ import os
 import posixpath
 import re
 import stat
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ic.grammar.syntax import SourceText
@@ -21,7 +21,8 @@ from met.diagnostic import Diagnostic, Place, Problem, error
 from met.frozen import frozen
 
 LIBRARY = Path(__file__).parents[1] / "decks"
-MOST_LISTED = 2_000  # files looked at for a "did you mean"
+MOST_LISTED = 2_000  # names that a "did you mean" compares with
+MOST_SEEN = 20_000  # files and folders looked at for them
 MOST_NAMED = 8  # files named in a message
 
 _NOT_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
@@ -39,11 +40,13 @@ class Directory:
             return FoundFile(
                 os.path.join(self.path, file), f"<{posixpath.normpath(posixpath.join(self.name[1:-1], file))}>"
             )
-        return FoundFile(os.path.join(self.path, file), os.path.normpath(os.path.join(self.name, file)))
+        return found_at(os.path.join(self.path, file))
 
     @property
     def said(self) -> str:
-        return "the standard library" if self.name == "<>" else f"`{self.name or '.'}`"
+        if self.name == "<>":
+            return "the standard library"
+        return f"`{self.name or '.'}`" + ("" if os.path.isdir(self.path or ".") else " (there is no such folder)")
 
 
 @frozen
@@ -64,6 +67,17 @@ class FoundFile:
         return os.path.realpath(self.path)
 
 
+def found_at(path: str) -> FoundFile:
+    """A file that is not the library's, by a name that no other file has.
+
+    `a/../b.ic` is `b.ic`, unless `a` is a link to elsewhere.
+    """
+    name = os.path.normpath(path)
+    if ".." in path.split(os.sep) and os.path.realpath(name) != os.path.realpath(path):
+        name = path
+    return FoundFile(path, os.path.join(os.curdir, name) if name.startswith("<") else name)
+
+
 class Files:
     """The places to look in, and every file that was read, in order."""
 
@@ -72,11 +86,12 @@ class Files:
         named += [d for d in os.environ.get("MET_DECK_PATH", "").split(os.pathsep) if d]
         self.path = [Directory(d, d) for d in named] + [Directory(os.fspath(library), "<>")]
         self.read_so_far: dict[str, SourceText] = {}
+        self._refused: dict[str, Problem] = {}
 
     def deck(self, path: str | Path) -> FoundFile:
         """The deck of that name: a file, or else one of the library's."""
         name = os.fspath(path)
-        given = FoundFile(name, os.path.normpath(name))
+        given = found_at(name)
         if os.path.exists(name) or os.path.isabs(name):
             return given
         return next((found for d in self.path if os.path.isfile((found := d.join(name)).path)), given)
@@ -86,22 +101,30 @@ class Files:
         return self.path if angled else [includer.directory, *self.path]
 
     def find(self, header: str, directories: Sequence[Directory]) -> FoundFile | None:
-        if os.path.isabs(header):
-            return FoundFile(header, os.path.normpath(header)) if os.path.exists(header) else None
-        return next((found for d in directories if os.path.exists((found := d.join(header)).path)), None)
+        """The first that there is; a folder of that name only where there is no file."""
+        asked = [found_at(header)] if os.path.isabs(header) else [d.join(header) for d in directories]
+        there = [file for file in asked if os.path.exists(file.path)]
+        return next((file for file in there if not os.path.isdir(file.path)), there[0] if there else None)
+
+    def dangling(self, header: str, directories: Sequence[Directory]) -> str | None:
+        """The name of a link that leads nowhere, where that is what an include has found."""
+        files = (d.join(header) for d in directories)
+        return next((file.name for file in files if os.path.islink(file.path)), None)
 
     def listed(self, directories: Sequence[Directory], ending: str = ".ic") -> list[str]:
         """Names that a file of this ending could have, for a "did you mean"."""
         names: list[str] = []
+        seen = 0
         for directory in directories:
             for at, folders, files in os.walk(directory.path or "."):
+                seen += len(folders) + len(files)
                 folders[:] = sorted(f for f in folders if not f.startswith("."))
                 if at.count(os.sep) - directory.path.count(os.sep) >= 2:
                     folders.clear()
                 beside = os.path.relpath(at, directory.path or ".")
-                names += [os.path.normpath(os.path.join(beside, f)) for f in sorted(files)
-                          if f.endswith(ending) and os.path.exists(os.path.join(at, f))]  # not a link to nowhere
-                if len(names) > MOST_LISTED:
+                names += [os.path.normpath(os.path.join(beside, f)) for f in _shown(files, ending)
+                          if os.path.exists(os.path.join(at, f))]  # not a link to nowhere
+                if len(names) > MOST_LISTED or seen > MOST_SEEN:
                     return names[:MOST_LISTED]
         return names
 
@@ -110,12 +133,15 @@ class Files:
 
         kind: what it should be, for messages; most: bytes that it may have.
         """
+        if file.name in self._refused:
+            raise self._refused[file.name]
         if file.name not in self.read_so_far:
             data = _read_bytes(file, kind, most)
-            text, complaint = _decode(data, file.name, kind)
+            text, complaint = decode(data, file.name, kind)
             self.read_so_far[file.name] = SourceText(file.name, text, hashlib.sha256(data).hexdigest())
             if complaint is not None:
-                raise Problem(complaint)
+                self._refused[file.name] = Problem(complaint)
+                raise self._refused[file.name]
         return self.read_so_far[file.name].text
 
 
@@ -128,30 +154,46 @@ def library_defines(kind: str, name: str, library: Path = LIBRARY) -> str | None
     return None
 
 
+def _shown(names: Iterable[str], ending: str) -> list[str]:
+    """Names that a message can show and a deck can write, in order."""
+    return sorted(name for name in names if name.endswith(ending) and name.isprintable())
+
+
 def _read_bytes(file: FoundFile, kind: str, most: int) -> bytes:
+    try:
+        file.name.encode()
+    except UnicodeEncodeError:
+        help = "give it, or the folder it lies in, another name: plans and archives hold it as text"
+        raise Problem(error("D001", f"cannot read `{file.name}`: its name is not UTF-8", help=help)) from None
     try:
         about = os.stat(file.path)
         if stat.S_ISDIR(about.st_mode):
             ending = ".ic" if kind == "deck" else ".csv"
-            inside = sorted(f for f in os.listdir(file.path) if f.endswith(ending))[:MOST_NAMED]
+            inside = _shown(os.listdir(file.path), ending)[:MOST_NAMED]
             help = f"{kind}s in it: {', '.join(inside)}" if inside else f"there is no {kind} in it"
             raise Problem(error("D001", f"`{file.name}` is a directory, not a {kind}", help=help))
         if not stat.S_ISREG(about.st_mode):
             raise Problem(error("D001", f"`{file.name}` is not a regular file", help="copy what it gives to a file"))
         if about.st_size > most:
-            whose = "deck's file" if kind == "deck" else kind
-            size = f"{about.st_size / 2**20:.1f} MiB; a {whose} has at most {most >> 20}"
-            help = "numbers in bulk belong in a CSV file, not in a deck" if kind == "deck" else "split it"
-            raise Problem(error("D018", f"`{file.name}` has {size}", help=help))
+            raise Problem(_too_large(file, kind, f"{about.st_size / 2**20:.1f} MiB", most))
         with open(file.path, "rb") as stream:
-            return stream.read(most)
+            data = stream.read(most + 1)
+        if len(data) > most:  # a file that does not say its size, or grows
+            raise Problem(_too_large(file, kind, "no end", most))
+        return data
     except (OSError, ValueError) as reason:
         why = getattr(reason, "strerror", None) or str(reason)
         help = "look at the name, and at who may read the file"
         raise Problem(error("D001", f"cannot read `{file.name}`: {why}", help=help)) from None
 
 
-def _decode(data: bytes, name: str, kind: str) -> tuple[str, Diagnostic | None]:
+def _too_large(file: FoundFile, kind: str, size: str, most: int) -> Diagnostic:
+    whose = "deck's file" if kind == "deck" else kind
+    help = "numbers in bulk belong in a CSV file, not in a deck" if kind == "deck" else "split it"
+    return error("D018", f"`{file.name}` has {size}; a {whose} has at most {most >> 20}", help=help)
+
+
+def decode(data: bytes, name: str, kind: str) -> tuple[str, Diagnostic | None]:
     """The text, and what is wrong with it; where something is, the text is good enough to show the line."""
     complaint = None
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):

@@ -3,7 +3,8 @@
 One regular expression cuts a whole file. Numbers are decimal with an optional exponent and never swallow a unit or a
 range: `0.061`, `1e-3`, `.5`, `10mm` (a number and a name), `1..50` (a number, `..`, a number). What cannot be a token
 becomes a token of kind BAD, and is complained about only where it reaches the deck: text that `#if` leaves out may be
-anything.
+anything. A backslash at a line's end joins it to the next, before anything else and in the middle of a word or comment
+too, as in C.
 
 The kinds have the names that pcpp asks for, and a token answers to pcpp's names for its fields as well (`type`,
 `value`, `lexpos`, `lineno`): the same objects go through the preprocessor and on to the parser.
@@ -25,14 +26,14 @@ DECIMAL = "CPP_FLOAT"
 STRING = "CPP_STRING"
 CHARACTER = "CPP_CHAR"
 SPACE = "CPP_WS"
-JOINED = "CPP_LINECONT"
 BAD = "BAD"  # no token; with an empty text where that has been said
 END = "END"
 PASTE = "CPP_DPOUND"
+NOTHING = "NOTHING"  # stands for an empty argument while `##` joins, and where a directive was
+HASHES = "HASHES"  # a `##` that joins nothing: in an argument, or one that was joined itself
 COMMAND_LINE = "<command line>"  # the name of the text that holds the macros given with -D
 
 NUMBERS = (WHOLE, DECIMAL)
-MOST_JOINED = 200_000
 
 _SYMBOLS = {
     "#": "CPP_POUND", "##": PASTE, "+": "CPP_PLUS", "-": "CPP_MINUS", "*": "CPP_STAR", "/": "CPP_FSLASH",
@@ -46,6 +47,8 @@ _SYMBOLS = {
 }  # fmt: skip
 
 # the order of the alternatives matters; a hexadecimal number is for #if only
+_SPLICE = re.compile(r"\\[ \t\f\v]*(?:\n|\Z)")
+_REST = re.compile(r"(?:\\[ \t\f\v]*\n|[^\n])*+")
 _TOKEN = re.compile(
     r"""
       (?P<space>[ \t\f\v]+)
@@ -56,7 +59,6 @@ _TOKEN = re.compile(
     | (?P<unclosed>/\*)
     | (?P<string>"(?:[^"\\\n]|\\.)*+")
     | (?P<character>'(?:[^'\\\n]|\\.)*+')
-    | (?P<joined>\\[ \t]*\n)
     | (?P<symbol>\#\#|\.\.\.|\.\.|<<|>>|[<>=!+*/-]=|\|\||&&|[][(){}<>=!+*/%^;:,.\#&|~?-])
     | (?P<bad>"[^\n]*|'[^\n]*|[^\x00-\x7f]+|.)
     """,
@@ -81,6 +83,27 @@ class Text:
         starts.extend(match.end() for match in re.finditer("\n", self.text))
         return starts
 
+    @cached_property
+    def joined(self) -> str:
+        """The text without the line ends that a backslash takes away."""
+        return _SPLICE.sub("", self.text) if "\\" in self.text else self.text
+
+    @cached_property
+    def _joints(self) -> tuple[list[int], list[int]]:
+        """Where in the joined text something was taken away, and how much up to there and with it."""
+        at, taken, total = [], [], 0
+        for match in _SPLICE.finditer(self.text):
+            at.append(match.start() - total)
+            total += match.end() - match.start()
+            taken.append(total)
+        return at, taken
+
+    def written_at(self, offset: int) -> int:
+        """Where the character at `offset` of the joined text stands in the text."""
+        at, taken = self._joints
+        before = bisect_right(at, offset)
+        return offset + taken[before - 1] if before else offset
+
     def line(self, offset: int) -> int:
         """The number of the line, from 1, that holds the character at `offset`."""
         return bisect_right(self._starts, offset)
@@ -89,7 +112,8 @@ class Text:
         """The place of `length` characters from `offset`, cut at the end of the line."""
         line = bisect_right(self._starts, offset)
         start = self._starts[line - 1]
-        return Place(self.name, line, offset - start + 1, length or 1, expansions, self.included)
+        end = self._starts[line] - 1 if line < len(self._starts) else len(self.text)
+        return Place(self.name, line, offset - start + 1, min(length, end - offset) or 1, expansions, self.included)
 
     def indent(self, offset: int) -> int:
         """The column, from 1, of the first thing on the line that holds `offset`."""
@@ -100,9 +124,8 @@ class Text:
         return at - start + 1
 
     def rest_of_line(self, offset: int) -> str:
-        """The text from `offset` to the end of its line."""
-        end = self.text.find("\n", offset)
-        return self.text[offset : len(self.text) if end < 0 else end]
+        """The text from `offset` to the end of its line and of those that a backslash joins to it."""
+        return _SPLICE.sub("", _REST.match(self.text, offset)[0])  # type: ignore[index]  # it matches nothing at least
 
 
 class Token:
@@ -162,9 +185,25 @@ _slots.type, _slots.value, _slots.lexpos = Token.__dict__["kind"], Token.__dict_
 def logical_lines(source: Text) -> Iterator[list[Token]]:
     """The tokens of each line, the last of them its newline. Comments are spaces; a backslash at a line's end joins
     it to the next. The last line gets its newline too."""
+    lines = _lines_of(source, source.joined)
+    if len(source.joined) < len(source.text):
+        lines = (_where_written(line, source) for line in lines)
+    return lines
+
+
+def _where_written(line: list[Token], source: Text) -> list[Token]:
+    """The tokens of the joined text, moved to where they stand in the text."""
+    for token in line:
+        last = source.written_at(max(token.offset, token.offset + token.length - 1))
+        token.offset = source.written_at(token.offset)
+        token.length = last - token.offset + 1 if token.length else 0
+    return line
+
+
+def _lines_of(source: Text, text: str) -> Iterator[list[Token]]:
     line: list[Token] = []
     add = line.append
-    for match in _TOKEN.finditer(source.text):
+    for match in _TOKEN.finditer(text):
         group = match.lastgroup
         piece = match.group()
         at = match.start()
@@ -183,12 +222,6 @@ def logical_lines(source: Text) -> Iterator[list[Token]]:
             add(Token(_number_kind(piece), piece, source, at, len(piece)))
         elif group == "comment":
             add(Token(SPACE, " ", source, at, len(piece)))
-        elif group == "joined":
-            add(Token(JOINED, " ", source, at, 1))
-            if len(line) > MOST_JOINED:  # to hold no more than this; no directive may be so long, and text may be cut
-                yield line
-                line = []
-                add = line.append
         elif group == "string":
             add(Token(STRING, piece, source, at, len(piece)))
         elif group == "character":
@@ -199,7 +232,7 @@ def logical_lines(source: Text) -> Iterator[list[Token]]:
         else:
             add(Token(BAD, piece, source, at, len(piece.rstrip())))
     if line:
-        add(Token(SPACE, "\n", source, len(source.text), 1))
+        add(Token(SPACE, "\n", source, len(text), 1))
         yield line
 
 
@@ -223,8 +256,10 @@ class Lexer:
     def input(self, text: str) -> None:
         lines = list(logical_lines(Text("", text)))
         self._left = [token for line in lines for token in line if token.text != "\n"][::-1]
+        for token in self._left:
+            token.kind = HASHES if token.kind == PASTE else token.kind
         if not self._left:  # two empty arguments pasted
-            self._left = [Token(SPACE, " ", Text("", text), 0, 1)]
+            self._left = [Token(NOTHING, "", Text("", text), 0, 0)]
         self.made.append((text, len(self._left)))
 
     def token(self) -> Token | None:

@@ -12,7 +12,9 @@ from typing import Any
 
 from pcpp import Preprocessor as Pcpp
 
-from ic.text.lexer import BAD, CHARACTER, JOINED, NAME, NUMBERS, PASTE, SPACE, STRING, WHOLE, Lexer, Token
+from ic.text import definitions
+from ic.text.definitions import CLOCK, PASTED_COMMA, PREDEFINED
+from ic.text.lexer import BAD, CHARACTER, HASHES, NAME, NOTHING, PASTE, SPACE, STRING, WHOLE, Lexer, Token
 from ic.text.limits import (
     LONGEST_NAME,
     LONGEST_STRING,
@@ -20,22 +22,18 @@ from ic.text.limits import (
     MOST_ARGUMENTS,
     MOST_EXPANDED,
     MOST_FROM_ONE_USE,
-    MOST_MACRO_BODY,
     Findings,
     GiveUp,
 )
-from ic.text.strays import complain_of_stray
 from met import units
 from met.diagnostic import Expansion, Label, Place
-
-CLOCK = ("__DATE__", "__TIME__", "__TIMESTAMP__")
-PREDEFINED = ("__FILE__", "__LINE__", "defined", "__VA_ARGS__", *CLOCK)
 
 
 class _Argument(list[Token]):
     """A macro's argument as written, with what it expands to; pcpp asks for one or the other."""
 
     expanded: list[Token]
+    omitted = spaced = False
 
     def __copy__(self) -> _Argument:
         other = _Argument(self)
@@ -51,6 +49,7 @@ class Macros(Pcpp):
         self._expanded = 0
         self._expanded_here = 0
         self._depth = 0
+        self.in_condition = False
         super().__init__(Lexer())
         self.macros: dict[str, Any] = {}
         self.refused: dict[str, bool] = {}  # macros that were refused, which was told; whether with parameters
@@ -62,15 +61,15 @@ class Macros(Pcpp):
         self.t_ID, self.t_INTEGER, self.t_INTEGER_TYPE = NAME, WHOLE, str
         self.t_STRING, self.t_CHAR, self.t_DPOUND = STRING, CHARACTER, PASTE
         self.t_SPACE = self.t_NEWLINE = SPACE
-        self.t_LINECONT = JOINED
-        self.t_WS = (SPACE, JOINED)
+        self.t_LINECONT = "none: lines are joined before"
+        self.t_WS = (SPACE,)
         self.t_COMMENT1 = self.t_COMMENT2 = "none: comments are spaces"
         self.t_COMMENT = (self.t_COMMENT1,)
 
     def define(self, tokens: Any) -> None:
         if isinstance(tokens, str):  # pcpp's own macros, and the clock: a deck must mean the same tomorrow
             return
-        body = self._checked_definition(tokens)
+        body = definitions.checked(tokens, self.findings)
         name = tokens[0]
         if body is None:
             takes = len(tokens) > 1 and tokens[1].text == "("
@@ -79,107 +78,40 @@ class Macros(Pcpp):
             return
         self.refused.pop(name.text, None)
         old = self.macros.get(name.text)
-        super().define([*tokens[: len(tokens) - len(body)], *_without_space_at_paste(body)])
-        macro = self.macros[name.text]
-        macro.name_token = name
-        macro.pastes = any(token.kind == PASTE for token in macro.value)
-        if macro.arglist is None and macro.pastes:
-            macro.patch, macro.str_patch, macro.var_comma_patch = [], [], []
-        if old is not None and _spelling(old) != _spelling(macro):
+        head, body = tokens[: len(tokens) - len(body)], definitions.without_space_at_paste(body)
+        forms = definitions.forms_at_comma(body) if any(token.text == "..." for token in head) else None
+        macro = self._defined(head, body if forms is None else forms[0])
+        if forms is not None:
+            macro.without_rest = self._defined(head, forms[1])
+            self.macros[name.text] = macro
+        if old is not None and definitions.spelling(old) != definitions.spelling(macro):
             self.findings.error(
                 "D010", f"macro `{name.text}` is defined again, differently", name.place,
                 also=(Label(old.name_token.place, "first defined here"),),
                 help=(f"`#undef {name.text}` first, or put the default between `#ifndef {name.text}` and `#endif`",),
             )  # fmt: skip
         elif old is None and macro.arglist is None:
-            self._warn_of_quantity(name, macro.value)
+            definitions.warn_of_quantity(name, macro.value, self.findings)
 
-    def _checked_definition(self, tokens: list[Token]) -> list[Token] | None:
-        """The body of a sound definition; None, and a message, for another."""
-        name, tell = tokens[0], self.findings.error
-        if name.kind != NAME:
-            tell("D007", f"a macro's name cannot be `{name.text[:LONGEST_NAME]}`", name.place,
-                 help="a name is letters, digits and `_`, and begins with no digit")  # fmt: skip
-            return None
-        if name.text in PREDEFINED:
-            tell("D007", f"`{name.text}` cannot be a macro of yours", name.place, help="choose another name")
-            return None
-        if units.is_unit(name.text):
-            word = units.UNITS[name.text].word
-            help = f"it would replace the unit in every quantity after it: `2 {name.text}` would lose its unit"
-            tell("D011", f"a macro cannot be called `{name.text}`: that is the unit {word}", name.place, help=help)
-            return None
-        body = tokens[1:]
-        if body and body[0].text == "(":
-            close = next((i for i, token in enumerate(body) if token.text == ")"), None)
-            if close is None:
-                tell("D007", f"the parameters of macro `{name.text}` have no `)`", body[0].place,
-                     help=f"write `#define {name.text[:LONGEST_NAME]}(A, B) ...` on one line")  # fmt: skip
-                return None
-            if not self._checked_parameters(name, [t for t in body[1:close] if t.kind not in (SPACE, JOINED)]):
-                return None
-            body = body[close + 1 :]
-        elif body and body[0].kind not in (SPACE, JOINED):
-            tell(
-                "D007", f"a space is needed between the macro's name and `{body[0].text[:LONGEST_NAME]}`",
-                body[0].place, help=f"write `#define {name.text[:LONGEST_NAME]} {body[0].text[:LONGEST_NAME]}`",
-            )  # fmt: skip
-            return None
-        if len(body) > MOST_MACRO_BODY:
-            tell("D018", f"the body of macro `{name.text}` has more than {MOST_MACRO_BODY} tokens", name.place)
-            return None
-        written = [token for token in body if token.kind not in (SPACE, JOINED)]
-        for token in written:
-            if token.kind == BAD:
-                complain_of_stray(token, self.findings)
-        for token in (*written[:1], *written[-1:]):
-            if token.kind == PASTE:
-                tell("D019", "`##` joins two tokens, so it cannot stand at an end", token.place)
-                return None
-        return body
-
-    def _checked_parameters(self, name: Token, written: list[Token]) -> bool:
-        seen: set[str] = set()
-        for i, token in enumerate(written):
-            last = i == len(written) - 1
-            if i % 2:
-                if token.text != "," or last:
-                    self.findings.error(
-                        "D007", f"expected `,` and a parameter, or `)`, not `{token.text}`", token.place
-                    )
-                    return False
-            elif units.is_unit(token.text):
-                word = units.UNITS[token.text].word
-                message = f"a macro's parameter cannot be called `{token.text}`: that is the unit {word}"
-                help = f"in the body of `{name.text}` it would replace the unit: `0.5 {token.text}` would lose it"
-                self.findings.error("D011", message, token.place, help=help)
-                return False
-            elif token.text == "..." and last:
-                pass
-            elif token.kind != NAME or token.text in PREDEFINED or token.text in seen:
-                why = "is there twice" if token.text in seen else "cannot be a parameter"
-                self.findings.error("D007", f"`{token.text}` {why}", token.place)
-                return False
-            seen.add(token.text)
-        return True
-
-    def _warn_of_quantity(self, name: Token, body: list[Token]) -> None:
-        """`#define LENGTH 2.0 m`: the value of `LENGTH^2` would surprise."""
-        written = [token for token in body if token.kind not in (SPACE, JOINED)]
-        if written and written[0].text in ("-", "+"):
-            del written[0]
-        if len(written) < 2 or written[0].kind not in NUMBERS or not units.is_unit(written[1].text):
-            return
-        if any(token.kind == NAME and not units.is_unit(token.text) for token in written[1:]):
-            return
-        quantity = "".join(token.text for token in body).strip()
-        why = f"a macro is put in as text, so `{name.text}^2` would be `{quantity}^2`"
-        help = f"write `let {name.text} = {quantity};`: {why}"
-        self.findings.warn("D017", f"macro `{name.text}` is a quantity", name.place, help=help)
+    def _defined(self, head: list[Token], body: list[Token]) -> Any:
+        """The macro as pcpp makes it, with what we want to know besides."""
+        super().define([*head, *body])
+        macro = self.macros[head[0].text]
+        macro.name_token = head[0]
+        macro.written = body
+        macro.without_rest = None
+        for token in macro.value:
+            if token.kind == SPACE and token.text == PASTED_COMMA:
+                token.kind = NOTHING
+        macro.pastes = any(token.kind in (PASTE, NOTHING) for token in macro.value)
+        if macro.arglist is None and macro.pastes:
+            macro.patch, macro.str_patch = [], []
+        macro.var_comma_patch = []
+        return macro
 
     def undef(self, tokens: list[Token]) -> None:
         if tokens[0].kind != NAME:
-            self.findings.error("D007", "`#undef` needs a name", tokens[0].place)
+            self.findings.error("D007", "`#undef` needs a name", tokens[0].place, help="write `#undef NAME`")
             return
         self._nothing_after(tokens[1:], f"#undef {tokens[0].text}")
         self.macros.pop(tokens[0].text, None)
@@ -199,7 +131,7 @@ class Macros(Pcpp):
             if kind == NAME:
                 text = token.text
                 macro = macros.get(text)
-                if macro is not None and text not in token.hidden:
+                if macro is not None and text not in token.hidden and not _is_varied(out, pending):
                     self._use(token, macro, pending, out)
                     continue
                 if macro is None and text in self.refused:
@@ -207,10 +139,21 @@ class Macros(Pcpp):
                     continue
                 if text[:2] == "__":
                     token = self._predefined(token)
-            elif not keep_space and kind in (SPACE, JOINED):
+                elif text == "defined" and self.in_condition:
+                    self._keep_defined(pending, out, token)
+                    continue
+            elif kind == NOTHING or (kind == SPACE and not keep_space):
                 continue
             out.append(token)
         return out
+
+    def _keep_defined(self, pending: list[Token], out: list[Token], token: Token) -> None:
+        """`defined NAME` that a macro made: the name is asked for, not expanded."""
+        out.append(token)
+        while pending and (pending[-1].kind == SPACE or pending[-1].text == "("):
+            out.append(pending.pop())
+        if pending and pending[-1].kind == NAME:
+            out.append(pending.pop())
 
     def _predefined(self, token: Token) -> Token:
         outermost = token.expansions[-1].use if token.expansions else token.place
@@ -221,8 +164,9 @@ class Macros(Pcpp):
             made.kind, made.text = STRING, f'"{outermost.file}"'
         elif token.text in CLOCK:
             self.findings.error(
-                "D016", f"`{token.text}` is not available: a deck must mean the same whenever it is read", token.place
-            )
+                "D016", f"`{token.text}` is not available: a deck must mean the same whenever it is read", token.place,
+                help="leave it out: beside an archive, `.run.json` says when it was made",
+            )  # fmt: skip
             made.kind, made.text = BAD, ""
         return made
 
@@ -230,7 +174,7 @@ class Macros(Pcpp):
         """Of a macro that was refused nothing is known but that it was meant: no more is said of what it makes."""
         if self.refused[token.text]:
             at = len(pending) - 1
-            while at >= 0 and pending[at].kind in (SPACE, JOINED):
+            while at >= 0 and pending[at].kind == SPACE:
                 at -= 1
             if at < 0 or pending[at].text != "(":
                 out.append(token)
@@ -257,7 +201,7 @@ class Macros(Pcpp):
             made = self.macro_expand_args(macro, []) if macro.pastes else macro.value
         else:
             at = len(pending) - 1
-            while at >= 0 and (pending[at].kind == SPACE or pending[at].kind == JOINED):
+            while at >= 0 and pending[at].kind == SPACE:
                 at -= 1
             if at < 0 or pending[at].text != "(":
                 out.append(token)
@@ -287,6 +231,8 @@ class Macros(Pcpp):
                     "D018", f"a call of macro `{token.text}` has more than {MOST_ARGUMENTS} tokens", token.place
                 )
             text = piece.text
+            if piece.kind == NOTHING:
+                continue
             if text == "(":
                 depth += 1
             elif text == ")":
@@ -296,6 +242,9 @@ class Macros(Pcpp):
             elif text == "," and depth == 0 and not (macro.variadic and len(arguments) == len(names)):
                 arguments.append(_Argument())
                 continue
+            if piece.kind == PASTE:  # as an argument it joins nothing
+                piece = piece.__copy__()
+                piece.kind = HASHES
             arguments[-1].append(piece)
         else:
             self._give_up(
@@ -303,9 +252,14 @@ class Macros(Pcpp):
                 also=(self._defined_at(macro),), help="its `)` is missing, or a directive stands in between",
             )  # fmt: skip
         for argument in arguments:
+            first = argument[0] if argument else None
             self.tokenstrip(argument)
+            argument.spaced = argument != [] and argument[0] is not first
         if macro.variadic and len(arguments) == len(names) - 1:
             arguments.append(_Argument())
+            arguments[-1].omitted = True
+        elif macro.variadic and arguments == [[]]:
+            arguments[-1].omitted = True
         if names == [] and arguments == [[]]:
             arguments = []
         if len(arguments) != len(names):
@@ -336,6 +290,8 @@ class Macros(Pcpp):
 
     def _substitute(self, token: Token, macro: Any, arguments: list[_Argument]) -> list[Token]:
         """The macro's body with the arguments in it, by pcpp; sizes are checked before."""
+        if macro.without_rest is not None and arguments[-1].omitted:
+            macro = macro.without_rest
         expanded = {number for kind, number, _ in macro.patch if kind == "e"}
         self._depth += 1
         if self._depth > MACRO_DEPTH:
@@ -352,15 +308,22 @@ class Macros(Pcpp):
             if number not in expanded:
                 argument.expanded = argument
             if not argument and macro.pastes:  # pcpp would paste what stands on either side of an empty argument
-                argument.append(Token(SPACE, "", token.source, token.offset, token.length))
+                argument.append(Token(NOTHING, "", token.source, token.offset, token.length))
         self.lexer.made.clear()
         made: list[Token] = self.macro_expand_args(macro, arguments)
         for text, count in self.lexer.made:
             if count != 1:
                 message = f"`##` makes `{text[:LONGEST_NAME]}`, which is not one token"
-                self.findings.error("D019", message, token.place, also=(self._defined_at(macro),))
+                self.findings.error("D019", message, token.place, also=(self._defined_at(macro),),
+                                    help="what it joins must be one name, one number or one sign")  # fmt: skip
                 return [Token(BAD, "", token.source, token.offset, token.length)]
-        return made
+        return definitions.without_nothing(made, macro.variadic and arguments[-1].spaced) if macro.pastes else made
+
+    def is_macro(self, name: str) -> bool:
+        return name in self.macros or name in ("__FILE__", "__LINE__")
+
+    def on_unknown_macro_in_defined_expr(self, token: Token) -> bool:
+        return self.is_macro(token.text)
 
     def _check_made(self, token: Token, made: list[Token]) -> None:
         self._expanded += len(made) + 1
@@ -381,7 +344,7 @@ class Macros(Pcpp):
                       help="do these macros use each other without end?")  # fmt: skip
 
     def _nothing_after(self, rest: Iterable[Token], what: str) -> None:
-        extra = next((token for token in rest if token.kind not in (SPACE, JOINED)), None)
+        extra = next((token for token in rest if token.kind != SPACE), None)
         if extra is not None:
             self.findings.error(
                 "D007", f"nothing may follow `{what}`", extra.place, help="is it a comment? Write `//` before it"
@@ -392,21 +355,16 @@ class Macros(Pcpp):
         raise GiveUp
 
 
-def _spelling(macro: Any) -> tuple[object, ...]:
-    """What makes two definitions the same: parameters and body, any white space being as good as another."""
-    body = tuple(" " if token.kind in (SPACE, JOINED) else token.text for token in macro.value)
-    return (tuple(macro.arglist) if macro.arglist is not None else None, macro.variadic, body)
+def _is_varied(before: Sequence[Token], pending: Sequence[Token]) -> bool:
+    """Whether a macro's name stands in `vary macro NAME = [...]`, where it is the macro that is meant, not its body.
 
-
-def _without_space_at_paste(body: list[Token]) -> list[Token]:
-    kept: list[Token] = []
-    for token in body:
-        if token.kind in (SPACE, JOINED) and kept and kept[-1].kind == PASTE:
-            continue
-        while token.kind == PASTE and kept and kept[-1].kind in (SPACE, JOINED) and len(kept) > 1:
-            kept.pop()
-        kept.append(token)
-    return kept
+    pending: what follows, the next token last
+    """
+    last = next((token for token in reversed(before) if token.kind != SPACE), None)
+    if last is None or last.text != "macro":
+        return False
+    following = next((token for token in reversed(pending) if token.kind != SPACE), None)
+    return following is not None and following.text == "="
 
 
 def _come_through(token: Token, made: list[Token], hidden: frozenset[str]) -> list[Token]:

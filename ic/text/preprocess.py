@@ -1,14 +1,15 @@
 """The preprocessor: pcpp reads the directives; tokens go in and come out, never text.
 
-pcpp keeps the conditionals, parses and stores the macros, puts arguments into bodies (with `#` and `##`) and evaluates
-`#if`. Ours are the tokens, the scan that finds what to expand (linear, with C's hide sets, each token keeping the
-places it came through), the search for included files, every check, and every message.
+pcpp keeps the conditionals, parses and stores the macros, and puts arguments into bodies (with `#` and `##`). Ours are
+the tokens, the scan that finds what to expand (linear, with C's hide sets, each token keeping the places it came
+through), the values of conditions, the search for included files, every check, and every message.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,21 +17,9 @@ from pcpp import Action, OutputDirective
 
 from ic.grammar.syntax import SourceText
 from ic.meaning.complaints import Complaints
-from ic.text.conditions import Refused, evaluate, well_formed
+from ic.text.conditions import Refused, evaluate, well_formed, with_defined
 from ic.text.files import LIBRARY, Files, FoundFile
-from ic.text.lexer import (
-    BAD,
-    CHARACTER,
-    COMMAND_LINE,
-    END,
-    NAME,
-    SPACE,
-    STRING,
-    WHOLE,
-    Text,
-    Token,
-    logical_lines,
-)
+from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, NAME, NOTHING, SPACE, STRING, Text, Token, logical_lines
 from ic.text.limits import (
     CONDITION_DEPTH,
     INCLUDE_DEPTH,
@@ -51,6 +40,7 @@ from met.frozen import frozen
 CONDITIONALS = ("if", "ifdef", "ifndef", "elif", "else", "endif")
 DIRECTIVES = (*CONDITIONALS, "define", "undef", "include", "pragma", "error", "warning")
 _LONG_LINE = re.compile(rf"[^\n]{{{LONGEST_LINE + 1}}}")
+_INCLUDES = 'write `#include "beside.ic"` or `#include <servos/rigid_gearbox.ic>`'
 TRUTH = "TRUTH"  # the kind of a condition's value
 
 
@@ -123,11 +113,8 @@ class _Preprocessor(Macros):
         self._included = 0
         self._tokens = 0
         self._directive: Token | None = None
-        self._evaluated = False
         self._conditions = 0
         super().__init__(findings)
-        self._pcpp_evaluator: Any = self.evaluator
-        self.evaluator: Any = self._evaluate
 
     # reading
 
@@ -170,15 +157,19 @@ class _Preprocessor(Macros):
     def group_lines(self, _text: str, source: Text) -> Iterable[list[Token]]:
         """The lines that pcpp works on. Those that `#if` leaves out are lexed, since a comment may begin there."""
         ifs = self._ifs[-1]
-        long = _LONG_LINE.search(source.text)
+        long = _LONG_LINE.search(source.joined)
         if long is not None:
-            self._give_up("D018", f"a line has at most {LONGEST_LINE} characters", source.place(long.start(), 1))
+            at = source.place(source.written_at(long.start()), 1)
+            self._give_up("D018", f"a line has at most {LONGEST_LINE} characters", at)
+        joined = len(source.joined) < len(source.text)
         for line in logical_lines(source):
             self._tokens += len(line)
             if self._tokens > MOST_TOKENS:
                 self._give_up("D018", f"more than {MOST_TOKENS} tokens", line[0].place)
             if len(line) > 1 and line[-2].kind == BAD and line[-2].text == "/*":
                 complain_of_stray(line.pop(-2), self.findings)
+            if joined and not (ifs and not ifs[-1].active):
+                self._warn_of_joined_comments(line)
             first = next((token for token in line if token.kind != SPACE), line[-1])
             if first.text != "#":
                 if ifs and not ifs[-1].active:
@@ -187,7 +178,19 @@ class _Preprocessor(Macros):
                     if token.kind == BAD:
                         complain_of_stray(token, self.findings)
                         token.text = ""
+            elif not ifs or ifs[-1].active:
+                # a macro's name and the parenthesis of its call stand on one side of a directive
+                yield [Token(NOTHING, "", source, first.offset, 0)]
             yield line
+
+    def _warn_of_joined_comments(self, line: list[Token]) -> None:
+        for token in line:
+            written = token.source.text[token.offset : token.end]
+            if token.kind == SPACE and written.startswith("//") and "\n" in written:
+                self.findings.warn(
+                    "D003", "this comment goes on in the next line", token.place,
+                    help="its line ends with `\\`, which joins the next to it; write `/* ... */` for several lines",
+                )  # fmt: skip
 
     def include(self, tokens: list[Token], _line: object) -> Iterable[Token]:
         """Reads an included file. Its tokens go straight to the output: pcpp has handed over all before them."""
@@ -202,7 +205,11 @@ class _Preprocessor(Macros):
         file = self.files.find(name, directories)
         if file is None:
             quoted = f"<{name}>" if angled else f'"{name}"'
-            near = did_you_mean(name, self.files.listed(directories))
+            link = self.files.dangling(name, directories)
+            near = (
+                did_you_mean(name, self.files.listed(directories)) if link is None
+                else (f"`{link}` is a link to a file that is not there",)
+            )  # fmt: skip
             looked = f"looked in {', '.join(dict.fromkeys(d.said for d in directories))}"
             self.findings.error("D005", f"cannot find {quoted}", at, help=(*near, looked))
             return ()
@@ -213,14 +220,13 @@ class _Preprocessor(Macros):
             self._too_deep(at)
         if self._included > MOST_INCLUDES:
             self._give_up("D018", f"more than {MOST_INCLUDES} files are included", at)
+        included = ((source.name, directive.line), *source.included)
         try:
             text = self.files.text(file)
         except Problem as problem:
-            self.findings.add(
-                *(d if d.at else Diagnostic(d.code, d.message, Label(at), d.also, d.help) for d in problem.diagnostics)
-            )
+            self.findings.add(*(_reached_by(d, at, included) for d in problem.diagnostics))
             return ()
-        self._read(file, Text(file.name, text, ((source.name, directive.line), *source.included)), at)
+        self._read(file, Text(file.name, text, included), at)
         return ()
 
     def _header(self, tokens: list[Token], directive: Token) -> tuple[str, bool, Place] | None:
@@ -235,18 +241,18 @@ class _Preprocessor(Macros):
             )
             end = written.find(">")
             if end < 0:
-                self.findings.error("D005", "`#include <` without its `>`", first.place)
+                self.findings.error("D005", "`#include <` without its `>`", first.place, help=_INCLUDES)
                 return None
             name, angled, at = written[1:end], True, first.source.place(first.offset, end + 1, first.expansions)
             rest = tokens[close + 1 :] if close is not None else []
         else:
             self.findings.error(
                 "D005", "`#include` needs a file", tokens[0].place if tokens else directive.place,
-                help='write `#include "beside.ic"` or `#include <servos/rigid_gearbox.ic>`',
+                help=_INCLUDES,
             )  # fmt: skip
             return None
         if not name.strip():
-            self.findings.error("D005", "`#include` needs a file, and this name is empty", at)
+            self.findings.error("D005", "`#include` needs a file, and this name is empty", at, help=_INCLUDES)
             return None
         self._nothing_after(rest, "#include")
         return name, angled, at
@@ -272,7 +278,7 @@ class _Preprocessor(Macros):
         if name in CONDITIONALS:
             self._conditional(name, directive, args, ifs)
             return True
-        if ifs and not ifs[-1].active:
+        if ifs and not ifs[-1].active and not name.startswith(("el", "end")):  # `#elseif` was meant for us
             raise _REMOVE
         if name in ("define", "undef", "include"):
             if not args and name != "include":
@@ -292,14 +298,16 @@ class _Preprocessor(Macros):
                 help="leave it out",
             )  # fmt: skip
         else:
+            meant = "elif" if name in ("elseif", "elsif") else name
             self.findings.error(
                 "D007", f"`#{name}` is not a directive", directive.place,
-                help=(*did_you_mean(name, DIRECTIVES), "a comment begins with `//`"),
+                help=did_you_mean(meant, CONDITIONALS if name.startswith(("if", "el", "end")) else DIRECTIVES)
+                or "a comment begins with `//`",
             )  # fmt: skip
         raise _REMOVE
 
     def _announce(self, name: str, directive: Token, args: list[Token]) -> None:
-        said = directive.source.rest_of_line(args[0].offset).strip() if args else f"`#{name}`"
+        said = " ".join(directive.source.rest_of_line(args[0].offset).split()) if args else f"`#{name}`"
         tell = self.findings.error if name == "error" else self.findings.warn
         tell("D014" if name == "error" else "D015", said[:LONGEST_NAME], directive.place)
 
@@ -347,7 +355,7 @@ class _Preprocessor(Macros):
             args[:] = [Token(NAME, "__nothing__", directive.source, directive.offset, directive.length)]
             return False
         self._nothing_after(args[1:], f"#{name} {args[0].text}")
-        return args[0].text in self.macros
+        return self.is_macro(args[0].text)
 
     def _condition(self, directive: Token, args: list[Token]) -> bool:
         """Whether the condition of an `#if` or `#elif` holds; False, and a message, where it has no meaning."""
@@ -356,34 +364,35 @@ class _Preprocessor(Macros):
         self._conditions += 1
         if self._conditions > MOST_CONDITIONS:
             self._give_up("D018", f"more than {MOST_CONDITIONS} conditions", directive.place)
-        self._evaluated = False
-        result = bool(self.evalexpr([token.__copy__() for token in args])[0])
-        if not self._evaluated:
-            self.findings.error("D009", f"the condition of this `#{directive.text}` expands to nothing", args[0].place)
-        return result
+        try:
+            before = with_defined(args, self.is_macro, self.findings)
+            self.in_condition = True
+            expanded = with_defined(self.expand_macros(before), self.is_macro, self.findings)
+            if expanded:
+                return evaluate(expanded, self.findings)
+        except Refused:
+            return False
+        finally:
+            self.in_condition = False
+        help = "`#ifdef NAME` asks whether a macro is defined; a value is one of `#define NAME 1`"
+        message = f"the condition of this `#{directive.text}` expands to nothing"
+        self.findings.error("D009", message, args[0].place, help=help)
+        return False
 
     def evalexpr(self, tokens: list[Token]) -> tuple[Any, Any]:
-        """pcpp's, but for what has been evaluated already."""
-        if len(tokens) == 1 and tokens[0].kind == TRUTH:
-            return (tokens[0].text == "1", None)
-        result: tuple[Any, Any] = super().evalexpr(tokens)
-        return result
-
-    def _evaluate(self, tokens: list[Token], functions: Any, identifiers: Any) -> Any:
-        """pcpp's evaluator between our checks."""
-        self._evaluated = True
-        try:
-            return evaluate(tokens, self.findings, lambda: self._pcpp_evaluator(tokens, functions, identifiers))
-        except Refused:
-            return self._pcpp_evaluator([Token(WHOLE, "0", tokens[0].source, tokens[0].offset, 1)])
-
-    def on_unknown_macro_function_in_expr(self, name: str) -> Any:
-        raise SyntaxError(f"`{name}` is not a macro with arguments")
+        """What pcpp asks for, which `_condition` has found."""
+        return (tokens[0].text == "1", None)
 
     def on_error(self, _file: object, _line: object, message: str) -> None:
         """pcpp's own complaints: those that ours have not forestalled."""
         if not message.startswith("Unterminated") and self._directive is not None:
             self.findings.error("D007", f"the preprocessor cannot read this: {message}", self._directive.place)
+
+
+def _reached_by(complaint: Diagnostic, at: Place, included: tuple[tuple[str, int], ...]) -> Diagnostic:
+    """What is wrong with an included file, at the include where it has no place of its own."""
+    place = at if complaint.at is None else replace(complaint.at.place, included=included)
+    return replace(complaint, at=Label(place))
 
 
 def _constant(truth: bool, at: Token) -> Token:

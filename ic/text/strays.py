@@ -45,5 +45,5 @@ def complain_of_stray(token: Token, findings: Findings) -> None:
         if not text.isascii():
             said += f" ({known})"
         remedy = f"write {plain}" if plain in ("a space", "nothing") else f"write `{plain}`"
-        helps = (remedy,) if plain else () if text.isascii() else ("names and units are written in plain ASCII",)
-        tell("D004", f"{said} does not belong in a deck", token.place, help=helps)
+        usual = "leave it out" if text.isascii() else "names and units are written in plain ASCII"
+        tell("D004", f"{said} does not belong in a deck", token.place, help=remedy if plain else usual)

@@ -30,7 +30,8 @@ COORDINATE, METRIC = "coordinate:", "metric:"
 
 
 def build(experiment: Experiment, *, wire: bool = False) -> Program:
-    """The program of an experiment: inputs are its coordinates, columns its recorded channels.
+    """The program of an experiment: inputs are its coordinates and what noise is a case's own, columns its recorded
+    channels.
 
     wire  for real beds: no bed is in the program. The filtered rate that each has read is an input of every tick,
           `wire:<joint>.rate` (rad/s); what its amplifiers are told are outputs, `wire:<joint>.voltage` (V) and
@@ -70,7 +71,7 @@ class Builder:
             start=(Run(Phase("start", self.start)), *self.step.beds.begin_run()),
             tick=tuple(tick),
             end=(Run(Phase("end", self.end)),),
-            inputs=(*coordinates, *self.step.beds.wire_inputs),
+            inputs=(*coordinates, *self.machine.experiment.cases.noise, *self.step.beds.wire_inputs),
             columns=len(columns),
             outputs=(
                 *OUTPUTS,

@@ -16,6 +16,7 @@ from typing import Any
 
 from met.frozen import frozen
 from met.parameter import Parameter
+from met.plan import REPEAT, SEED
 from met.program import cells
 from met.program.machine import Actuator, Machine
 from met.program.values import Values, answer, parameters, returned
@@ -167,13 +168,15 @@ class Substituted:
     def advance(self, tape: Tape) -> None:
         """The emulated beds, from the last tick to this one."""
         tick = tape.tick / float(self.divisor) - 1.0
+        cases = self.machine.experiment.cases
+        seed = tape.input(SEED) if SEED in cases.noise else float(cases.seed)
+        repeat = tape.input(REPEAT) if REPEAT in cases.noise else 0.0
         for each in self.mounted:
             p = self._bed_values(tape, each)
             wire = Wire(tape.read(f"{each.joint}.bed.drive_voltage"), tape.read(f"{each.joint}.bed.load_current"))
 
             def draw(name: str, each: Mounted = each) -> Real:
-                seed = float(self.machine.experiment.cases.seed)
-                return normal(Stream(seed, 0.0, f"{each.joint}.bed.{name}"), tick)
+                return normal(Stream(seed, repeat, f"{each.joint}.bed.{name}"), tick)
 
             new = answer(self._owner(each), each.bed.advance, p, self._bed(tape, each), wire, self.period, draw)
             returned(self._owner(each), "advance", new, (memory.name for memory in each.bed.memory))

@@ -33,7 +33,8 @@ def main(words: Sequence[str] | None = None) -> int:
         return 0
     then = report.read(asked.against) if asked.against is not None else None
     names = with_sources(asked.names or list(known), known)
-    chosen = [known[name] for name in names if not (asked.quick and getattr(known[name], "slow", False))]
+    slow = {name for name, one in known.items() if getattr(one, "slow", False)} if asked.quick else set()
+    chosen = [known[name] for name in names if not slow & {name, *getattr(known[name], "of", ())}]
     turns = asked.repeats or (QUICK if asked.quick else TURNS)
 
     here = machine()

@@ -1,4 +1,4 @@
-"""What a user waits for: whole commands, from the shell's start of the process to its end."""
+"""What a user waits for: whole commands, from the shell's start of the process to its end; and what they need."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.benchmark import Benchmark, Target
+from benchmarks import long_deck
+from benchmarks.benchmark import Benchmark, Derived, Target, ratio
 
-TITLE = "whole commands, s"
+TITLE = "whole commands"
 
 MET = Path(__file__).parents[1] / "met"
 
@@ -19,26 +20,68 @@ MET = Path(__file__).parents[1] / "met"
 ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
 
 
-def _seconds(*words: str) -> float:
-    """Wall time of `scripts/met` with these words, in an empty directory."""
+def _run(*words: str, deck: str = "") -> tuple[float, float]:
+    """Wall time (s) and memory (MiB) of `scripts/met` with these words, where `deck.ic` is this text and nothing else.
+
+    Memory: the largest that the process had in use at any time.
+    """
     with tempfile.TemporaryDirectory() as directory:
-        begun = time.perf_counter()
-        done = subprocess.run([MET, *words], cwd=directory, env=ENVIRONMENT, capture_output=True, text=True)
-        seconds = time.perf_counter() - begun
+        if deck:
+            Path(directory, "deck.ic").write_text(deck, encoding="utf-8")
+        with tempfile.TemporaryFile() as said:
+            begun = time.perf_counter()
+            done = subprocess.Popen([MET, *words], cwd=directory, env=ENVIRONMENT, stdout=said, stderr=said)
+            _, status, used = os.wait4(done.pid, 0)
+            seconds = time.perf_counter() - begun
+            done.returncode = os.waitstatus_to_exitcode(status)
+            said.seek(0)
+            text = said.read().decode()
     if done.returncode not in (0, 1):  # 1: a requirement was missed, which is an answer
-        raise SystemExit(f"`met {' '.join(words)}` ended with {done.returncode}:\n{done.stderr}")
-    return seconds
+        raise SystemExit(f"`met {' '.join(words)}` ended with {done.returncode}:\n{text}")
+    return seconds, used.ru_maxrss / 1024
 
 
 def _prepared(*words: str) -> Callable[[], Callable[[], float]]:
-    return lambda: lambda: _seconds(*words)
+    return lambda: lambda: _run(*words)[0]
 
 
-BENCHMARKS = (
+def _long(lines: int, which: int) -> Callable[[], Callable[[], float]]:
+    """`met check` of a long deck: its seconds (0) or its MiB (1)."""
+
+    def prepare() -> Callable[[], float]:
+        deck = long_deck.text(lines)
+        return lambda: _run("check", "deck.ic", deck=deck)[which]
+
+    return prepare
+
+
+def _growing(lines: int) -> tuple[Benchmark, Benchmark]:
+    doc = f"met check of {lines} lines with two macros each"
+    return (
+        Benchmark(f"check.{lines}", doc, "s", _long(lines, 0), Target(10.0) if lines == LONGEST else None, 2, True),
+        Benchmark(f"memory.{lines}", f"{doc}: memory in use", "MiB", _long(lines, 1),
+                  Target(512.0) if lines == LONGEST else None, 1, True),
+    )  # fmt: skip
+
+
+SHORTEST, LONGEST = 2_500, 10_000
+LINEAR = 5.0
+"""Times that four times the lines may take: 4 where the cost is in proportion, 16 where it grows with the square."""
+
+
+BENCHMARKS: tuple[Benchmark | Derived, ...] = (
     Benchmark("version", "met --version: Python and the command's frame", "s", _prepared("--version")),
-    Benchmark("check", "met check two_link.ic", "s", _prepared("check", "two_link.ic"), Target(0.25)),
+    Benchmark(
+        "check", "met check two_link.ic, 70 lines with what it includes", "s", _prepared("check", "two_link.ic"),
+        Target(0.25),
+    ),
     Benchmark(
         "run", "met run two_link.ic --case '#0' --no-picture", "s",
         _prepared("run", "two_link.ic", "--case", "#0", "--no-picture"), Target(1.0),
     ),
+    *_growing(SHORTEST), *_growing(5_000), *_growing(LONGEST),
+    ratio("check.growth", "times that four times the lines take", over=f"check.{LONGEST}", under=f"check.{SHORTEST}",
+          target=Target(LINEAR)),
+    ratio("memory.growth", "times that four times the lines need", over=f"memory.{LONGEST}",
+          under=f"memory.{SHORTEST}", target=Target(LINEAR)),
 )  # fmt: skip

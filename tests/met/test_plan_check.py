@@ -54,8 +54,7 @@ def coordinate(**new: Any) -> Change:
     [
         (value("links.upper.mass", {"word": "heavy"}), "parameters.links.upper.mass.value: it should be a number"),
         (value("links.upper.mass", [40.0]), "parameters.links.upper.mass.value: it should be a number"),
-        (value("links.upper.mass", -40.0), "parameters.links.upper.mass: it should be above 0"),
-        (value("links.upper.mass", 0.0), "parameters.links.upper.mass: it should be above 0"),
+        (value("links.upper.mass", -40.0), "parameters.links.upper.mass: it should be at least 0"),
         (value("links.upper.mass", "inf"), "parameters.links.upper.mass.value: it is not finite"),
         (value("links.upper.inertia.xx", -1.0),
          "parameters.links.upper.inertia: a principal moment is below 0: no body has that"),
@@ -135,7 +134,7 @@ def coordinate(**new: Any) -> Change:
         (lambda e: e["requirements"][1].update(text="settle < 10 s"),
          "requirements[1].text: another requirement has the same text"),
         (lambda e: e["cases"]["coordinates"][1].update(values=[20.0, -0.1, 20.0]),
-         "parameters.links.lower.mass: it should be above 0; in case #1"),
+         "parameters.links.lower.mass: it should be at least 0; in case #1"),
         (lambda e: e.update(name="a/b"), "name: 'a/b' is no name: letters, digits and _"),
         (lambda e: e["structure"].update(arm="a\0b"), "structure.arm: a null character is in it"),
         (lambda e: e["requirements"][0].update(text="\ud800"), "requirements[0].text: half of a character is in it"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import pint
 import pytest
 
 from met import units
@@ -16,7 +17,6 @@ PINT_NAMES = {"%": "percent", "cycle": "turn", "t": "metric_ton", "um": "microme
 
 @pytest.fixture(scope="module")
 def pint_registry():
-    pint = pytest.importorskip("pint", reason="the oracle of this test")
     return pint.UnitRegistry()
 
 

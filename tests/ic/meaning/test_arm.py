@@ -95,12 +95,13 @@ def test_angles_of_a_frame_are_radians_in_the_plan(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("link", "code"), [
     ("shape = rod(length = 1 m, along = x);", "D075"),                          # no mass
-    ("mass = 0 kg; shape = rod(length = 1 m, along = x);", "D077"),
+    ("mass = 0 kg; shape = rod(length = 1 m, along = x);", "D217"),             # and its joint moves nothing else
+    ("mass = 0 kg; inertia = [1, 1, 1] kg*m^2;", "D087"),
     ("mass = -1 kg; shape = rod(length = 1 m, along = x);", "D077"),
     ("mass = 1 kg; shape = rod(length = 0 m, along = x);", "D077"),
     ("mass = 1 kg;", "D089"),
     ("mass = 1 kg; inertia = [1, 1, 3] kg*m^2;", "D087"),                       # 1 + 1 < 3
-    ("mass = 1 kg; inertia = [1, 1, 0] kg*m^2;", "D087"),                       # not positive
+    ("mass = 1 kg; inertia = [1, 1, 0] kg*m^2;", "D087"),                       # not positive; all zeros are a point's
     ("mass = 1 kg; inertia = [1, 1, 1, 2, 0, 0] kg*m^2;", "D087"),              # a negative principal moment
     ("mass = 1 kg; inertia = [1, 1] kg*m^2;", "D071"),
     ("mass = 1 kg; inertia = [1, 1, 1];", "D060"),

@@ -110,6 +110,7 @@ error[D192]: `moves.csv` has no column `hinge`
  ::: moves.csv:1:1  its first line
   = help: did you mean `hinges`?
   = help: columns: time, hinges, other
+  = help: that of the joint's name is taken, unless `column = "NAME"` names another
 """)
 mistake("no column of the name that is written", MOVES, """\
 error[D192]: `moves.csv` has no column `elbow`
@@ -175,6 +176,7 @@ error[D192]: `moves.csv` has no column `hinge`
  ::: moves.csv:1:1  its first line
   = help: a unit stands in square brackets: write `hinge [deg]`
   = help: columns: time, hinge (deg), other
+  = help: that of the joint's name is taken, unless `column = "NAME"` names another
 """)
 mistake("no line that names the columns", "0, 0\n1, 1\n", """\
 error[D191]: the first line names no columns: it holds numbers

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from met import plan_file
+import pytest
+
+from met import models, plan_file
 from met.channel import recordable
 from met.plan import Plan, Recorded
 from tests.ic.small_decks import RUN, SERVO, changed, check, experiment, told
@@ -136,3 +140,22 @@ error[D125]: `links.hook.position` is 3 channels
 """
     assert "= help: a metric watches one of them: `hinge.q`, `rail.q`\n" in of("q")
     assert "= help: did you mean `energy.kinetic`?\n" in of("energy.kinetik")
+
+
+@pytest.mark.parametrize(
+    ("declared", "unit"), [("of", "rad/s"), ("of*s", "rad"), ("of/s", "rad/s^2"), ("1", "1"), ("s", "s")]
+)
+def test_a_metrics_unit_may_be_made_of_that_of_its_channel(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, declared: str, unit: str
+) -> None:
+    """A metric of somebody's own: an integral, in the channel's unit times seconds."""
+    found = models.find
+
+    def find(kind: models.Kind, name: str, *place: Any) -> Any:
+        model = found(kind, name, *place)
+        return replace(model, unit=declared) if name == "final" else model
+
+    monkeypatch.setattr(models, "find", find)
+    wanted = "" if unit == "1" else unit
+    metric = f"metric area = final {{ of = hinge.qd; }}  require area < 3 {wanted};"
+    experiment(tmp_path, ARM, SERVO, changed(RUN, ("duration", f"{metric}\n    duration")))

@@ -12,7 +12,7 @@ BESIDE = changed(  # a run that names the joint and the link in every way there 
     RUN, ("record = [q];", "record = [q, hinge.qd, hinge.servo.voltage]; initial { hinge.q = 3 deg; }\n"
           "    metric top = max { of = hinge.qd; } require top < 3 rad/s;"))  # fmt: skip
 SWEEP = (
-    "sweep it of hold { vary links.bar.mass = [1, 2] kg; vary hinge.at.x = [0, 1] m; "
+    "sweep it of hold { vary links.bar.mass = [1, 2] kg; vary links.bar.com.x = [0, 1] m; "
     "vary drive.kp = [0.1, 0.2] V*s/rad; }\n"
 )
 RAIL = changed(

@@ -84,7 +84,10 @@ def test_an_end_that_is_not_recorded_is_warned_of(tmp_path: Path) -> None:
     assert compiled.plan is not None
 
 
-@pytest.mark.parametrize(("duration", "code"), [("1e300 s", "D103"), ("0 s", "D077"), ("-1 s", "D077"), ("3", "D060")])
+@pytest.mark.parametrize(
+    ("duration", "code"),
+    [("1e300 s", "D103"), ("1e308 s", "D103"), ("0 s", "D077"), ("-1 s", "D077"), ("3", "D060")],
+)
 def test_a_duration_that_cannot_be_is_told(tmp_path: Path, duration: str, code: str) -> None:
     assert code in codes(tmp_path, *with_rates(RATES, duration))
 
@@ -135,3 +138,20 @@ def test_stability_of_a_sweep_is_that_of_its_worst_case(tmp_path: Path) -> None:
     (diagnostic,) = check(tmp_path, ARM, SERVO, RUN, sweep, select=["rotors"]).diagnostics
     assert diagnostic.code == "D104"
     assert "case #2" in diagnostic.message
+
+
+@pytest.mark.parametrize(("change", "more"), [
+    (("resistance = 1 ohm", "resistance = 0 ohm"), ""),
+    (("j_m = 1e-4 kg*m^2", "j_m = 0 kg*m^2"), ""),
+    (("", ""), "sweep it of hold { vary drive.resistance = [0, 1] ohm; }"),
+])
+def test_nothing_is_computed_of_a_servo_whose_parameter_is_out_of_range(
+    tmp_path: Path, change: tuple[str, str], more: str
+) -> None:
+    assert codes(tmp_path, ARM, changed(SERVO, change), RUN, more, select="all") == ["D077"]
+
+
+def test_a_value_of_a_base_that_is_wrong_is_told_once_for_all_its_users(tmp_path: Path) -> None:
+    both = "servo left like drive { kp = 0.2 V*s/rad; }\nservo right like drive { kp = 0.3 V*s/rad; }\n"
+    runs = "run a like hold { servos { hinge = left; } }\nrun b like hold { servos { hinge = right; } }\n"
+    assert codes(tmp_path, ARM, changed(SERVO, ("ki = 1 V/rad", "ki = 1")), both, RUN, runs, select="all") == ["D060"]

@@ -246,7 +246,7 @@ error[D145]: joint `mount` is fixed, so it has no motor
 1 | run it like base_run { substitute mount {} }
   |                        ^^^^^^^^^^^^^^^^
  ::: deck.ic:12:5  fixed here
-  = help: make the joint revolute or prismatic
+  = help: leave it out, or make the joint revolute or prismatic
 """
 
 
@@ -481,14 +481,14 @@ error[D122]: `one.bed.faults` cannot vary
   |
 3 |     vary one.bed.faults = [1, 2];
   |          ^^^^^^^^^^^^^^
-  = help: it is a word, which cannot vary in this version
+  = help: it is a word: vary it over words
 
 error[D122]: `one.law.model` cannot vary
  --> deck.ic:4:10
   |
 4 |     vary one.law.model = [1, 2];
   |          ^^^^^^^^^^^^^
-  = help: it decides the program, which is one for the whole sweep in this version
+  = help: it decides the program: vary `one.law` over models
 
 error[D128]: no parameter `one.bed.ktt` in this run
  --> deck.ic:5:10
@@ -521,7 +521,7 @@ BELONGS = "  = help: `substitute JOINT { ... }`, in a run, puts a joint's motor 
     ("servo c like drive { substitute one {} }", "error[D141]: no `substitute` in servo `c`",
      "it has: ratio, kp, ki, v_max, resistance, kt, tau_max, j_m, f_c, f_v, k_position, model, command, rate"),
     ("sweep s of base_run { substitute one {} }", "error[D136]: no `substitute one` in a sweep",
-     "a sweep has: vary, zip, exclude when"),
+     "a sweep has: vary, zip, from, sample, repeat, exclude when, seed, seeds"),
 ])
 def test_outside_of_a_run(more: str, first: str, last: str, tmp_path: Path) -> None:
     at = more.index("substitute")

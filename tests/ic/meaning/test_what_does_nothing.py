@@ -84,7 +84,7 @@ warning[D168]: environment `push` never acts: it would begin at 5 s, and the run
 
 def test_a_wrench_that_acts_or_that_a_sweep_varies_is_none(tmp_path: Path) -> None:
     assert codes(tmp_path, ARM, IDEAL, PUSHED) == []
-    late = changed(PUSHED, ("force = [1, 0, 0] N", "force = [1, 0, 0] N; from = 5 s"))
+    late = changed(PUSHED, ("force = [1, 0, 0] N", "moment = [0, 0, 1] N*m; from = 5 s"), ("[q]", "[q, tau]"))
     sweep = "sweep times of hold { vary environment.push.from = [0.5, 5] s; }\n"
     assert codes(tmp_path, ARM, IDEAL, late, sweep, select=["times"]) == []
 

@@ -151,7 +151,7 @@ metric settling_time
 
   Infinite where it is outside at the end. The band is `band` of the target's size, plus `within`.
 
-In a deck: metric NAME = MODEL { of = CHANNEL; ... }, in a run
+In a deck: metric NAME = settling_time { of = CHANNEL; ... }, in a run
 Unit of the result: s
 
 Parameters
@@ -255,7 +255,7 @@ def test_cases_lists_position_id_and_coordinates_in_the_units_of_the_deck(capsys
     width = len(near[0])
     lines = printed(capsys, "cases", "swing.ic").splitlines()
     assert lines[:5] == [
-        "load: 60 cases",
+        "load: 60 cases, 11.0 KiB of histories each",
         f"       {'id':{width}}  links.slider.mass  motor.kp",
         f"       {'':{width}}                 kg  mV*s/rad",
         f"   #0  {near[0]}                  1        50",
@@ -300,6 +300,8 @@ def test_explain_of_an_unknown_path_says_what_was_meant(capsys: pytest.CaptureFi
     assert complained(capsys, "explain", "swing.ic", "knee.servo.kq") == (
         "error[D170]: no parameter `knee.servo.kq` in `free`\n"
         " = help: did you mean `knee.servo.kt`, `knee.servo.kp`, `knee.servo.ki`?\n"
+        " = help: `knee.servo` has: ratio, kp, ki, v_max, resistance, kt, tau_max, j_m, f_c, f_v, k_position, "
+        "command.value, rate, model\n"
         "\n"
         "1 error\n"
     )

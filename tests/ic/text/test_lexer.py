@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ic.text.lexer import BAD, DECIMAL, JOINED, SPACE, WHOLE, Text, Token, logical_lines
+from ic.text.lexer import BAD, DECIMAL, SPACE, WHOLE, Text, Token, logical_lines
 
 
 def tokens(text: str) -> list[Token]:
-    return [token for line in logical_lines(Text("a.ic", text)) for token in line if token.kind not in (SPACE, JOINED)]
+    return [token for line in logical_lines(Text("a.ic", text)) for token in line if token.kind != SPACE]
 
 
 def texts(text: str) -> list[str]:
@@ -42,7 +44,10 @@ def texts(text: str) -> list[str]:
         ('"a // b" c', ['"a // b"', "c"]),
         (r'"a\"b" c', [r'"a\"b"', "c"]),
         ("x_1.q", ["x_1", ".", "q"]),
-        ("a\\\nb", ["a", "b"]),
+        ("a\\\nb", ["ab"]),
+        ("a \\  \nb\\", ["a", "b"]),
+        ("1\\\n2.\\\n5 <\\\n= \\\n\\\nc", ["12.5", "<=", "c"]),
+        ('"a\\\nb" /\\\n* c */ d /\\\n/ e \\\n f\ng', ['"ab"', "d", "g"]),
     ],
 )
 def test_text_is_cut_where_a_reader_would_cut_it(text, pieces):
@@ -56,6 +61,13 @@ def test_a_number_is_whole_or_decimal():
 @pytest.mark.parametrize("text", ['"abc', "'abc", "$", "\u00b5", "/* abc", "\\ x"])
 def test_what_is_no_token_is_a_token_of_kind_bad_so_that_skipped_text_may_hold_it(text):
     assert tokens(text)[0].kind == BAD
+
+
+def test_a_joined_line_counts_where_it_stands() -> None:
+    token, other = tokens("  re\\\n\\ \n  ach = ro\\\nd")[0], tokens("a \\\n = ro\\\nd")[2]
+    assert (token.text, token.place.line, token.place.column, token.place.length) == ("re", 1, 3, 2)
+    assert (other.text, other.place.line, other.place.column, other.place.length) == ("rod", 2, 4, 3)
+    assert other.source.text[other.offset : other.end] == "ro\\\nd"
 
 
 def test_lines_and_columns_count_characters_from_one_through_tabs_comments_and_joined_lines():
@@ -75,7 +87,7 @@ def test_every_token_stands_where_it_says(text):
     for token in tokens(text):
         place = token.place
         written = "\n".join(lines[place.line - 1 :])[place.column - 1 :]
-        assert written.startswith(token.text)
+        assert re.sub(r"\\[ \t]*(\n|\Z)", "", written).startswith(token.text)
 
 
 @given(st.text(max_size=200))

@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import os
-import random
-import shutil
-import subprocess
-import time
 from pathlib import Path
 
 import pytest
 
-from ic.text.lexer import Text, logical_lines
 from tests.ic.decktext import Desk
 
 # numbers, units and macros
@@ -91,52 +86,6 @@ def test_a_token_of_an_included_file_knows_the_includes_that_led_there(desk: Des
     token = desk.tokens('\n#include "sub/b.ic"\n').tokens[0]
     assert str(token.place) == "sub/c.ic:2:1"
     assert token.place.included == (("sub/b.ic", 1), ("a.ic", 2))
-
-
-# gcc's preprocessor, where there is one, is the oracle for macros: random definitions, random uses
-
-
-def _random_macros(rng: random.Random, count: int, recursive: bool) -> str:
-    """Macros that use each other (in any way, or only those before them), and a line that uses them."""
-    takes = {f"M{i}": rng.randint(0, 2) for i in range(count)}
-
-    def piece(words: list[str], callable_: list[str], depth: int) -> str:
-        if rng.random() < 0.5 or depth > 1 or not callable_:
-            return rng.choice(words)
-        name = rng.choice(callable_)
-        arguments = [piece(words, callable_, depth + 1) if rng.random() < 0.9 else "" for _ in range(takes[name])]
-        return f"{name}{rng.choice(['', ' '])}({', '.join(arguments)})"
-
-    lines = []
-    for i, (name, parameters) in enumerate((name, ["p", "q"][:n]) for name, n in takes.items()):
-        known = list(takes) if recursive else list(takes)[:i]
-        body = " ".join(piece([*known, *parameters, *parameters, "x"], known, 0) for _ in range(rng.randint(0, 3)))
-        lines.append(f"#define {name}{'(' + ', '.join(parameters) + ')' if parameters else ''} {body}")
-    lines.append(" ".join(piece([*takes, "z"], list(takes), 0) for _ in range(3)) + ";")
-    return "\n".join(lines) + "\n"
-
-
-@pytest.mark.parametrize("recursive", [True, False])
-@pytest.mark.parametrize("seed", range(20))
-def test_random_macros_expand_as_gcc_expands_them(desk: Desk, seed: int, recursive: bool):
-    cpp = shutil.which("cpp")
-    if cpp is None:
-        pytest.skip("gcc's preprocessor is the oracle of this test")
-    rng = random.Random(seed)
-    compared = 0
-    for _ in range(10):
-        # of more macros that use each other in circles C does not say all, and some uses outgrow our limits
-        text = _random_macros(rng, rng.randint(1, 3) if recursive else 6, recursive)
-        theirs = subprocess.run([cpp, "-P", "-"], input=text, capture_output=True, text=True, check=False)
-        mine = desk.tokens(text)
-        # a function-like name may meet parentheses with a wrong number of arguments: wrong for both
-        assert bool(mine.diagnostics) == bool(theirs.returncode), text
-        if mine.diagnostics:
-            continue
-        compared += 1
-        expected = [t.text for line in logical_lines(Text("", theirs.stdout)) for t in line if t.text.strip()]
-        assert [t.text for t in mine.tokens[:-1]] == expected, text
-    assert compared >= 3
 
 
 # files
@@ -227,7 +176,7 @@ error[D005]: cannot find <servos/rigid_gearbx.ic>
 2 | #include <servos/rigid_gearbx.ic>  // table 1
   |          ^^^^^^^^^^^^^^^^^^^^^^^^
   = help: did you mean `servos/rigid_gearbox.ic`?
-  = help: looked in `extra`, the standard library
+  = help: looked in `extra` (there is no such folder), the standard library
   = note: included from a.ic:1
 
 1 error
@@ -434,6 +383,9 @@ warning[D015]: careful
         ("x = 1; # stray", ["D004:1"]),
         ("x = __DATE__;", ["D016:1"]),
         ("x = __TIME__;", ["D016:1"]),
+        ("#if __DATE__\n#endif", ["D016:1"]),
+        ("#if 0\n#elseif 1\nx = 3;\n#endif", ["D007:2"]),
+        ("#if 0\n#mast\n#endif", []),
         ("/* open", ["D003:1"]),
         ("#if 0\n/* open\n#endif", ["D008:1", "D003:2"]),
         ('x = "open;\ny = 1;', ["D003:1"]),
@@ -475,63 +427,6 @@ def test_a_deck_that_cannot_be_read_is_an_error_without_a_traceback(desk: Desk):
 
 def test_the_clock_is_refused_with_a_reason(desk: Desk):
     assert "a deck must mean the same whenever it is read" in desk.told("x = __DATE__;")
-
-
-# hostile decks: a diagnostic within seconds, in bounded memory
-
-
-DOUBLING = "#define A0 x x\n" + "".join(f"#define A{i} A{i - 1} A{i - 1}\n" for i in range(1, 50)) + "A49"
-
-
-def _nested(name: str, count: int) -> str:
-    return f"{name}(" * count + "1" + ")" * count
-
-
-@pytest.mark.parametrize(
-    ("text", "code"),
-    [
-        pytest.param(DOUBLING, "D013", id="doubling names"),
-        pytest.param("#define D(x) x x\n" + _nested("D", 50), "D013", id="doubling arguments"),
-        pytest.param("#define P(x) x##x\n#define Q(x) P(x)\n" + _nested("Q", 50), "D013", id="doubling by pasting"),
-        pytest.param("#define S(x) #x\n#define Q(x) S(x)\n" + _nested("Q", 50), "D013", id="doubling by quoting"),
-        pytest.param("#define D(x) x\n" + _nested("D", 5000), "D013", id="deep arguments"),
-        pytest.param("".join(f"#define A{i} A{i + 1}\n" for i in range(200)) + "A0", "D013", id="a long chain"),
-        pytest.param("#define B(x) " + "x " * 2000 + "\nB(" + "1 " * 9000 + ")", "D013", id="a long body"),
-        pytest.param("#define B(x) x\nB(" + "1 " * 30000 + ")", "D018", id="long arguments"),
-        pytest.param("#define B " + "x " * 5000, "D018", id="a very long body"),
-        pytest.param("#if 1\n" * 5000, "D018", id="deep conditions"),
-        pytest.param("#if " + "1+" * 5000 + "1\n#endif", "D018", id="a long condition"),
-        pytest.param("#if 1\n#endif\n" * 12000, "D018", id="many conditions"),
-        pytest.param("x" * 300_000, "D018", id="a long line"),
-        pytest.param("{" * 1_000_000, "D018", id="a million braces"),
-        pytest.param("{\n" * 1_000_000, "D018", id="a million braces on a million lines"),
-        pytest.param("a \\\n" * 400_000, "D018", id="half a million joined lines"),
-        pytest.param("a\n" * 3_000_000, "D018", id="a large file"),
-        pytest.param('#include "a.ic"\n#include "a.ic"\n', "D006", id="a file that includes itself twice"),
-        pytest.param("$\n" * 100_000, "D018", id="nothing but mistakes"),
-    ],
-)  # fmt: skip
-def test_a_hostile_deck_ends_in_a_diagnostic_soon(desk: Desk, text: str, code: str):
-    desk.write(text)
-    start = time.process_time()
-    made = desk.tokens(text)
-    assert code in [d.code for d in made.diagnostics]
-    # seconds, where without limits it would be hours; about 0.5 s on an idle machine
-    assert time.process_time() - start < 5
-
-
-def test_macros_in_ten_thousand_lines_cost_time_in_proportion(desk: Desk):
-    head = "#define REACH 2.0 m\n#define ROD(NAME, MASS) link NAME { mass = MASS; at = REACH; }\n"
-
-    def seconds(lines: int) -> float:
-        text = head + "".join(f"ROD(l{i}, 40 kg) x{i} = REACH;\n" for i in range(lines))
-        start = time.process_time()
-        assert len(desk.tokens(text).tokens) == 19 * lines + 1
-        return time.process_time() - start
-
-    few, many = seconds(1000), seconds(10_000)
-    # tenfold work: a quadratic step would make it a hundredfold
-    assert many < 30 * few
 
 
 def test_nothing_is_written_beside_the_deck_or_the_library(desk: Desk):

@@ -124,6 +124,12 @@ def test_it_acts_always_unless_told_otherwise(tmp_path: Path) -> None:
     assert (engine.run(experiment(tmp_path, text)).signals["qdd"] == 3.0).all()
 
 
+def test_numbers_of_it_that_a_slider_does_not_feel_do_not_vary(tmp_path: Path) -> None:
+    turning = "vary environment.push.point.y = [0, 1, 2] m; vary environment.push.moment.z = [0, 1] N*m;"
+    sweep = f"sweep some of it {{ {turning} }}"
+    assert [d.code for d in check(tmp_path, SLIDER, sweep, select=["some"]).diagnostics] == ["D137", "D137"]
+
+
 def test_every_number_of_it_varies_with_the_case(tmp_path: Path) -> None:
     sweep = """\
 sweep some of it {
@@ -131,8 +137,6 @@ sweep some of it {
         environment.push.force.x = [6, 6, 12] N;
         environment.push.from    = [0.2, 0.4, 0.2] s;
         environment.push.until   = [0.5, 0.5, 0.3] s;
-        environment.push.point.y = [0, 1, 2] m;
-        environment.push.moment.z = [0, 1, 2] N*m;
     }
 }
 """
@@ -143,10 +147,10 @@ sweep some of it {
 def test_a_link_that_is_not_there_is_told(tmp_path: Path) -> None:
     assert told(check(tmp_path, changed(SLIDER, ("link = block", "link = bloc")))) == """\
 error[D159]: no link `bloc` in arm `rail`
- --> deck.ic:7:35
+ --> deck.ic:7:42
   |
 7 |     environment { push = wrench { link = bloc; force = [6, 0, 0] N; from = 0.2 s; until = 0.5 s; } }
-  |                                   ^^^^
+  |                                          ^^^^
   = help: did you mean `block`?
   = help: links: block
 

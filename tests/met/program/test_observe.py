@@ -60,7 +60,7 @@ default run pick {
     record      = [q, qd, qdd, tau];
     metric furthest = max { of = swing.q; }
 }
-sweep masses of pick { vary links.boom.mass = [5, 7] kg;  vary swing.at.x = [0.15, 0.2] m; }
+sweep masses of pick { vary links.boom.mass = [5, 7] kg;  vary links.boom.com.x = [0.4, 0.45] m; }
 """
 
 JOINTS = ("tau_load", "J_eff", "b", "mode", "reaction")

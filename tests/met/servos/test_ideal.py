@@ -139,7 +139,7 @@ error[D160]: servo `follow` needs `bandwidth` under a {place.partition("(")[0]} 
 def test_a_servo_that_takes_no_acceleration_says_so(tmp_path: Path) -> None:
     gearbox = changed(SERVO, ("rate(0.1 rad/s)", "acceleration(1 rad/s^2)"))
     assert told(check(tmp_path, ARM, gearbox, small_decks.RUN)) == """\
-error[D152]: a rigid_gearbox takes no command `acceleration`
+error[D152]: the model `rigid_gearbox` takes no command `acceleration`
  --> deck.ic:9:15
   |
 9 |     command = acceleration(1 rad/s^2);

@@ -134,7 +134,7 @@ def test_a_plan_by_hand_is_held_to_it_too(tmp_path: Path, sweep: str, said: str)
 def test_a_rate_has_no_meaning_for_a_servo_without_a_computer(tmp_path: Path) -> None:
     text = changed(RUN, ("model = locked;", "model = locked; rate = 1 kHz;"))
     assert told(check(tmp_path, TREE, text)) == """\
-error[D150]: a locked has no computer that ticks, so no rate
+error[D150]: the model `locked` has no computer that ticks, so no rate
   --> deck.ic:13:30
    |
 13 | servo lock { model = locked; rate = 1 kHz; }

@@ -1,0 +1,74 @@
+"""The files that `met new` writes: their names, their texts, and what stands in the way of writing them."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import re
+from collections.abc import Mapping, Sequence
+from string import Template
+from typing import get_args
+
+from ic.beginnings.deck import DECK
+from ic.beginnings.models import MODELS, PROJECT, TRIAL, Beginning
+from met import models, units
+from met.diagnostic import Problem, error
+
+PARTS = [each.name for each in dataclasses.fields(Beginning)]
+
+
+def deck(name: str, path: str | None) -> dict[str, str]:
+    """A deck, by its path. Raises Problem E343 where nothing may be called so."""
+    check_name("an arm", name)
+    return {path or f"{name}.ic": Template(DECK).substitute(name=name)}
+
+
+def model(kind: str, name: str, folder: str | None) -> dict[str, str]:
+    """A package of one model with a deck to try it in, by their paths.
+
+    Raises Problem E343 where no model may be called so, or one is.
+    """
+    check_name("a model", name)
+    of_models = next(each for each in get_args(models.Kind) if each == kind)
+    if name in models.available(of_models):
+        help = f"choose another name; `met doc {kind} {name}` says what that one is"
+        raise Problem(error("E343", f"there is a {kind} model `{name}` already", help=help))
+    begun = MODELS[kind]
+    module = f"{name}_for_met"
+    parts = {field: Template(getattr(begun, field)).substitute(name=name) for field in PARTS}
+    told = {**parts, "name": name, "kind": kind, "distribution": module.replace("_", "-")}
+    folder = folder or name
+    return {
+        os.path.join(folder, f"{module}.py"): parts["module"],
+        os.path.join(folder, f"{name}.ic"): Template(TRIAL).substitute(told),
+        os.path.join(folder, "pyproject.toml"): Template(PROJECT).substitute({**told, "module": module}),
+    }
+
+
+def check_name(what: str, name: str) -> None:
+    """Raises Problem E343 where no arm and no model may have this name."""
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        near = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lstrip("0123456789_")
+        helps = [f"`{near}` would do"] if near else []
+        helps.append("a name is letters, digits and `_`, and begins with a letter")
+        raise Problem(error("E343", f"{what} cannot be called `{name}`", help=helps))
+    if units.is_unit(name):
+        message = f"{what} cannot be called `{name}`: that is the unit {units.UNITS[name].word}"
+        raise Problem(error("E343", message, help="choose another name"))
+
+
+def write(texts: Mapping[str, str], *, force: bool) -> None:
+    """Writes the files, by path. Raises Problem E344, and writes none, where one is there and `force` is not given."""
+    there = [path for path in texts if os.path.lexists(path)]
+    if there and not force:
+        raise Problem(error("E344", _there(there), help="--force writes over it; -o writes to another place"))
+    for path, text in texts.items():
+        if folder := os.path.dirname(path):
+            os.makedirs(folder, exist_ok=True)
+        with open(path, "w", encoding="utf-8", newline="\n") as stream:
+            stream.write(text)
+
+
+def _there(paths: Sequence[str]) -> str:
+    named = ", ".join(f"`{path}`" for path in paths)
+    return f"{named} is there already" if len(paths) == 1 else f"{named} are there already"

@@ -1,0 +1,51 @@
+"""The command fmt: a face over `ic.formatting`."""
+
+from __future__ import annotations
+
+import click
+
+from met.cli import BAD_INPUT, NO, YES, complain, loudness_options
+from met.diagnostic import Problem
+
+
+@click.command()
+@click.argument("paths", nargs=-1, required=True, metavar="PATH...")
+@click.option("--check", is_flag=True, help="Write nothing; exit with 1 where a deck would change.")
+@click.option("--diff", is_flag=True, help="Write nothing; print what would change.")
+@loudness_options
+def fmt(paths: tuple[str, ...], check: bool, diff: bool, quiet: bool, verbose: bool) -> int:
+    """Lay out decks: indentation, blanks, alignment.
+
+    PATH is a deck, a folder (all `.ic` files in it and in its folders), or `-`: from standard input to standard output.
+    Where lines break and what is aligned is yours; tokens, comments and preprocessor lines stay as they are. A deck
+    that is broken is left alone. Exit status: 0 done, or nothing to do; 1 with --check: some would change; 2 a deck
+    cannot be formatted.
+    """
+    from ic.formatting.files import STDIN, decks, lay_out, write
+
+    found = decks(paths)
+    if STDIN in found and len(found) > 1:
+        raise click.UsageError("`-` stands alone: what is formatted goes to standard output")
+    changed = 0
+    broken = False
+    for path in found:
+        try:
+            deck = lay_out(path)
+        except Problem as problem:
+            complain(problem.diagnostics, problem.sources)
+            broken = True
+            continue
+        changed += deck.changes
+        if diff:
+            click.echo("".join(deck.diff()), nl=False)
+        if path == STDIN and not (check or diff):
+            click.echo(deck.after, nl=False)
+        elif deck.changes and not (check or diff):
+            write(path, deck.after)
+        if path != STDIN and not quiet and (verbose or deck.changes) and (check or not diff):
+            told = "as it should be" if not deck.changes else "would be formatted" if check else "formatted"
+            ends = "; its lines end with a newline alone" if deck.changes and deck.ends else ""
+            click.echo(f"{deck.name}: {told}{ends}", err=diff)
+    if broken:
+        return BAD_INPUT
+    return NO if check and changed else YES

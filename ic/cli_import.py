@@ -1,0 +1,41 @@
+"""The command import: a face over `ic.robots.importing`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import click
+
+from met.cli import loudness_options
+from met.diagnostic import Problem, error
+
+
+@click.command("import", short_help="Make a deck of a robot's URDF file.")
+@click.argument("file")
+@click.option("-o", "output", metavar="DECK", help="Write the deck to this file; printed where left out.")
+@click.option("--force", is_flag=True, help="Write over a file that is there.")
+@click.option(
+    "--mimic", type=click.Choice(["free", "fixed"]), help="What joints that follow others do here: move, or stay at 0."
+)
+@loudness_options
+def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet: bool, verbose: bool) -> None:
+    """Make a deck from a URDF file: the arm, with limits and friction as comments, and runs to begin with.
+
+    `met import panda.urdf -o panda.ic`, then `met run panda.ic`. A deck can also take the file as it is:
+    `arm panda from urdf("panda.urdf") { ... }`.
+    """
+    from ic.robots.importing import imported
+
+    if force and output is None:
+        raise click.UsageError("--force is for -o: nothing is written without it")
+    text = imported(file, mimic)  # type: ignore[arg-type]  # click has seen to it
+    if output is None:
+        click.echo(text, nl=False)
+        return
+    target = Path(output)
+    if os.path.lexists(target) and not force:
+        raise Problem(error("D216", f"`{output}` is there already", help="--force writes over it, -o names another"))
+    target.write_text(text, encoding="utf-8")
+    if not quiet:
+        click.echo(f"wrote {output}")

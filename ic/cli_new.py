@@ -1,0 +1,49 @@
+"""The command new: a face over `ic.beginnings`."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+
+import click
+
+from met.cli import loudness_options
+
+
+@click.command()
+@click.argument("kind", type=click.Choice(["deck", "servo", "environment", "command", "metric", "integrator"]))
+@click.argument("name")
+@click.option("-o", "output", metavar="PATH", help="The deck's file, or the model's folder; else it is named NAME.")
+@click.option("--force", is_flag=True, help="Write over what is there.")
+@loudness_options
+def new(kind: str, name: str, output: str | None, force: bool, quiet: bool, verbose: bool) -> None:
+    """Write a deck or a model to begin from.
+
+    It runs as it is: change what you need. `deck` is an arm of two links with servos, a run and a sweep. All others
+    are models: a folder with the Python file, a deck to try it in, and what makes it an installable package.
+    """
+    from ic.beginnings import files
+    from ic.printing.columns import columns
+
+    name = name.removesuffix(".ic")
+    texts = files.deck(name, output) if kind == "deck" else files.model(kind, name, output)
+    files.write(texts, force=force)
+    if quiet:
+        return
+    for path in texts:
+        click.echo(f"wrote {path}")
+    click.echo()
+    for line in columns(_next(kind, name, list(texts))):
+        click.echo(line)
+
+
+def _next(kind: str, name: str, paths: list[str]) -> list[tuple[str, str]]:
+    """What to type next, and what it does."""
+    deck = shlex.quote(next(path for path in paths if kind == "deck" or path.endswith(".ic")))
+    run = (f"met run {deck}", "simulates it and shows what came of it")
+    if kind == "deck":
+        return [(f"met check {deck}", "says what is wrong with it, if anything is"), run]
+    folder = os.path.join(".", os.path.dirname(paths[0])) if not os.path.isabs(paths[0]) else os.path.dirname(paths[0])
+    install = f"{shlex.quote(sys.executable)} -m pip install -e {shlex.quote(folder)}"
+    return [(install, "makes MET know it, once"), (f"met doc {kind} {name}", "what it declares"), run]

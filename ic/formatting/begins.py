@@ -1,0 +1,35 @@
+"""How a row begins: anew, going on with an entry, or below what follows a bracket."""
+
+from __future__ import annotations
+
+from ic.formatting.rows import Row
+from ic.text.lexer import NUMBERS, STRING
+
+_JOINING = frozenset(("+", "-", "*", "/", "^", "=", "+=", "<", "<=", ">", ">=", "==", "!=", "..", "and", "or", "by"))
+_LEFT_OPEN = _JOINING | {"not", "when", "like", "of"}
+
+
+def stands_below(row: Row) -> bool:
+    """Whether a row was written below what follows the bracket that it stands in."""
+    if row.parent is None or row.closes is not None:
+        return False
+    outer, opener = row.parent
+    following = outer.pieces[opener + 1 : opener + 2]
+    if outer.exact or not following or outer.pieces[opener].text == "{" or following[0].kind == "comment":
+        return False
+    return row.column(row.whole[0].offset) == following[0].column
+
+
+def goes_on(row: Row) -> bool:
+    """Whether a row goes on with what the row before has begun, where no bracket says so."""
+    behind = row.behind
+    if row.closes is not None or stands_below(row):
+        return False
+    if behind is None or behind.text in (";", ",", "}"):
+        return bool(row.pieces) and behind is not None and behind.text == "}" and row.pieces[0].text in _JOINING
+    if behind.text in _LEFT_OPEN:
+        return True
+    if not row.pieces:
+        return False
+    first = row.pieces[0]
+    return first.text in _JOINING or first.text in ("(", "[") or first.tokens[0].kind in (STRING, *NUMBERS)

@@ -1,0 +1,109 @@
+"""Decks on a disk, for `met fmt`: which there are, what each would be, and how that is written in its place."""
+
+from __future__ import annotations
+
+import difflib
+import io
+import os
+import stat
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+
+from ic.formatting.formatter import formatted
+from ic.formatting.strings import making_strings
+from ic.text.files import Files, FoundFile, decode
+from ic.text.limits import MOST_BYTES
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+
+STDIN = "-"
+
+
+@frozen
+class LaidOut:
+    """A deck as it is and as it is to be.
+
+    name     for messages
+    before   its text, its lines ended by newlines whatever they were
+    after    that text laid out
+    changes  whether the file's bytes differ from what is to be written
+    ends     whether its lines did not end as they are to
+    """
+
+    name: str
+    before: str
+    after: str
+    changes: bool
+    ends: bool
+
+    def diff(self) -> Iterator[str]:
+        """What is to change, as `diff -u` says it."""
+        old, new = (list(io.StringIO(text)) for text in (self.before, self.after))
+        for line in difflib.unified_diff(old, new, self.name, f"{self.name} (formatted)"):
+            yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
+
+
+def decks(paths: Sequence[str]) -> list[str]:
+    """The files that these paths stand for: those of a folder and of its folders are all its `.ic` files.
+
+    Raises Problem E341 where a folder has none.
+    """
+    found: list[str] = []
+    for path in paths:
+        if path != STDIN and os.path.isdir(path):
+            inside = sorted(_inside(path))
+            if not inside:
+                help = "a deck's name ends in `.ic`; a file of another name is formatted where it is named"
+                raise Problem(error("E341", f"there is no deck in the folder `{path}`", help=help))
+            found += inside
+        else:
+            found.append(path)
+    return list(dict.fromkeys(found))
+
+
+def _inside(folder: str) -> Iterator[str]:
+    for at, folders, files in os.walk(folder):
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        yield from (os.path.normpath(os.path.join(at, name)) for name in files if name.endswith(".ic"))
+
+
+def lay_out(path: str) -> LaidOut:
+    """One deck. Raises Problem where it cannot be read, is broken, or is no deck."""
+    if path == STDIN:
+        return _laid_out(FoundFile("<stdin>", "<stdin>"), sys.stdin.buffer.read(MOST_BYTES + 1))
+    if path.endswith(".json"):
+        help = "`met fmt` is for decks"
+        raise Problem(error("E342", f"`{path}` is a plan, and plans are written by `met plan`", help=help))
+    file = FoundFile(path, os.path.normpath(path))
+    Files().text(file)  # complains as every reader of decks does
+    with open(path, "rb") as stream:
+        return _laid_out(file, stream.read(MOST_BYTES + 1))
+
+
+def _laid_out(file: FoundFile, data: bytes) -> LaidOut:
+    if len(data) > MOST_BYTES:
+        raise Problem(error("D018", f"`{file.name}` has more than the {MOST_BYTES >> 20} MiB that a deck may have"))
+    text, complaint = decode(data, file.name, "deck")
+    if complaint is not None:
+        raise Problem(complaint, {file.name: text})
+    after = formatted(file.name, text, making_strings(text, file))
+    return LaidOut(file.name, text, after, after.encode() != data, b"\r" in data)
+
+
+def write(path: str, text: str) -> None:
+    """Puts the text in the place of the file, all at once; its permissions stay, and a link to it stays a link."""
+    target = os.path.realpath(path)
+    if not os.access(target, os.W_OK):
+        raise PermissionError(13, os.strerror(13), path)
+    handle, made = tempfile.mkstemp(dir=os.path.dirname(target), prefix=f".{os.path.basename(target)}.", suffix=".new")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(text.encode())
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.chmod(made, stat.S_IMODE(os.stat(target).st_mode))
+        os.replace(made, target)
+    except BaseException:
+        os.unlink(made)
+        raise

@@ -1,0 +1,65 @@
+"""A deck's text, laid out; and the proof that nothing but its layout has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from ic.formatting.layout import laid_out
+from ic.formatting.rows import BLANKS, rows, written
+from ic.text.lexer import SPACE, Text, Token, logical_lines
+from met.diagnostic import Place, Problem, error
+
+MOST_TURNS = 10
+
+
+def formatted(name: str, text: str, making_strings: Collection[str] = ()) -> str:
+    """The text laid out. `name` is the file's, for messages; `making_strings` as in `rows`.
+
+    Raises Problem where the text is broken, and E340 where laying it out would change what it says.
+    """
+    laid = text
+    for _ in range(MOST_TURNS):  # what is aligned only by chance may need a second turn
+        before = laid
+        laid = laid_out(rows(Text(name, before), making_strings))
+        if laid == before:
+            break
+    prove(name, text, laid)
+    return laid
+
+
+def prove(name: str, before: str, after: str) -> None:
+    """Raises Problem E340 where two texts do not have the same tokens, line by line, and the same comments."""
+    old, new = _lines(Text(name, before)), _lines(Text(name, after))
+    at = next((i for i, (one, other) in enumerate(zip(old, new, strict=False)) if one[0] != other[0]), None)
+    if at is None and len(old) != len(new):
+        at = min(len(old), len(new))
+    if at is None and _characters(before) == _characters(after):
+        return
+    place = old[min(at or 0, len(old) - 1)][1] if old else Place(name, 1, 1)
+    message = "laying out this deck would change what it says, so it is left as it is: a defect of MET"
+    raise Problem(error("E340", message, place, help="please report it together with the deck"), {name: before})
+
+
+def _characters(text: str) -> str:
+    """All that is not blank."""
+    return "".join(text.split())
+
+
+def _lines(source: Text) -> list[tuple[list[str], Place]]:
+    """What stands on each line that is not blank, comments included, and where the line begins."""
+    found = []
+    for line in logical_lines(source):
+        said = [each for token in line if (each := _said(token))]
+        if said:
+            first = next(token for token in line if _said(token))
+            found.append((said, first.place))
+    return found
+
+
+def _said(token: Token) -> str:
+    """A token as written, a comment without the blanks at the ends of its lines; empty for white space."""
+    text = written(token)
+    text = Text("", text).joined if "\\" in text else text
+    if token.kind == SPACE and text[:1] != "/":
+        return ""
+    return "\n".join(line.strip(BLANKS) for line in text.split("\n")) if token.kind == SPACE else text

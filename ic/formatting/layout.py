@@ -1,0 +1,189 @@
+"""Where everything on a row goes: indentation, blanks between pieces, and what stands below what.
+
+A line begins four blanks to the right of the line that opened the bracket it stands in, and four more where it goes on
+with an entry. Behind a bracket that is not the last of its line it may stand below what follows the bracket, if it did.
+Comments at the ends of lines stay where they are, two blanks behind their line at least, and stay aligned.
+
+Columns depend on columns to their left and on lines further out, and grow only: the rows are gone through until nothing
+moves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ic.formatting.align import Groups, Node, aligned, offset
+from ic.formatting.begins import goes_on, stands_below
+from ic.formatting.pieces import gap
+from ic.formatting.rows import BLANK, BLANKS, CODE, REMARK, TAB, Row
+
+BEFORE_COMMENT = 2
+MOST_WORK = 3_000_000  # columns looked at; a deck by hand takes some thousand
+MOST_BLANK = 2  # lines at the top level; within a bracket it is one
+
+
+def laid_out(found: Sequence[Row]) -> str:
+    """The text that these rows are to be."""
+    columns = _columns(found)
+    tails = _tails(found, columns)
+    keep = any(token.text == "__LINE__" for row in found for token in row.tokens)  # which counts blank lines too
+    lines: list[str] = []
+    blank, above = 0, None
+    for at, row in enumerate(found):
+        if row.kind == BLANK and not row.exact:
+            blank += 1
+            continue
+        lines += [""] * (blank if keep else min(blank, _most_blank(above, row)))
+        blank, above = 0, row
+        lines.append(_text(row, columns[at], tails[at]))
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _most_blank(above: Row | None, row: Row) -> int:
+    """How many blank lines may stand between two rows: none at the edges of a block and of the file."""
+    if above is None or row.closes is not None or (above.pieces and above.pieces[-1].kind == "open"):
+        return 0
+    return 1 if row.parent else MOST_BLANK
+
+
+def _text(row: Row, columns: Sequence[int], tail: int) -> str:
+    if row.exact:
+        return "\n".join(line.rstrip(BLANKS) for line in row.raw.split("\n"))
+    if row.kind == REMARK:
+        return _remark(row, tail if tail >= 0 else columns[0])
+    line = ""
+    for piece, column in zip(row.pieces, columns, strict=True):
+        line += " " * (column - len(line)) + piece.text
+    if row.tail is not None:
+        line += " " * (tail - len(line)) + row.tail.text
+    return line
+
+
+def _remark(row: Row, column: int) -> str:
+    """A comment that stands alone; the further lines of a long one move with its first."""
+    first, *others = row.raw.split("\n")
+    moved = column - row.column(row.whole[0].offset)
+    lines = [" " * column + first.strip(BLANKS)]
+    for line in others:
+        text = line.strip(BLANKS)
+        before = len(line[: len(line) - len(line.lstrip(BLANKS))].expandtabs(TAB))
+        lines.append(" " * max(0, before + moved) + text if text else "")
+    return "\n".join(lines)
+
+
+def _columns(found: Sequence[Row]) -> list[list[int]]:
+    """The column of each piece of each row; of a remark, that of its comment.
+
+    Columns that the author had are consistent with each other. Those of a paragraph that is to be aligned need not be,
+    and who has written a deck by a program may have more of either than is worth the time: then less is aligned.
+    """
+    for paragraphs in (True, False):
+        columns = _settled(found, aligned(found, paragraphs=paragraphs))
+        if columns is not None:
+            return columns
+    columns = _settled(found, Groups())
+    assert columns is not None, "rows that are aligned with nothing move once"
+    return columns
+
+
+def _settled(found: Sequence[Row], groups: Groups) -> list[list[int]] | None:
+    """The columns with these alignments, None where they do not settle."""
+    columns = [_as_written(row) for row in found]
+    reached: dict[Node, int] = {}  # by group: the column of its anchors
+    positions = {id(row): at for at, row in enumerate(found)}
+    free = [(at, row, stands_below(row), TAB * goes_on(row)) for at, row in enumerate(found)
+            if row.kind in (CODE, REMARK) and not row.exact]  # fmt: skip
+    steps = {at: _steps(at, row, groups) for at, row, _, _ in free}
+    for at, _, _, _ in free:
+        columns[at] = [0] * max(1, len(steps[at]))
+    work, moved = 0, True
+    while moved:
+        if work > MOST_WORK:
+            return None
+        moved = False
+        for at, row, below, further in free:
+            old = columns[at]
+            column = start = _indentation(row, positions, columns, below) + further
+            new = [start]
+            for distance, group, inside, own in steps[at][1:]:
+                column += distance
+                if group is not None:
+                    column = max(column, start + own, reached.get(group, 0) - inside)
+                    reached[group] = column + inside
+                new.append(column)
+            if new != old:
+                columns[at] = new
+                moved = True
+            work += len(new)
+    return columns
+
+
+def _steps(at: int, row: Row, groups: Groups) -> list[tuple[int, Node | None, int, int]]:
+    """For each piece: how far its column is from the one before, at least; the group that it is aligned with, how far
+    in it the anchor is, and how far from the row's beginning it stays at least."""
+    steps: list[tuple[int, Node | None, int, int]] = [(0, None, 0, 0)] if row.pieces else []
+    for i in range(1, len(row.pieces)):
+        before, piece = row.pieces[i - 1 : i + 1]
+        group = groups.group((at, i))
+        inside = offset(piece, groups.anchors[group]) if group is not None else 0
+        distance = len(before.text) + gap(before, piece)
+        own = piece.column - row.pieces[0].column if (at, i) in groups.met else 0
+        steps.append((distance, group, inside, own))
+    return steps
+
+
+def _as_written(row: Row) -> list[int]:
+    columns = [piece.column for piece in row.pieces]
+    return [row.column(row.whole[0].offset), *columns[1:]] if row.whole else []
+
+
+def _indentation(row: Row, positions: dict[int, int], columns: Sequence[Sequence[int]], below: bool) -> int:
+    """Where a row begins that begins anew."""
+    if row.closes is not None:
+        return columns[positions[id(row.closes)]][0]
+    if row.parent is None:
+        return 0
+    outer, opener = row.parent
+    return columns[positions[id(outer)]][opener + 1 if below else 0] + TAB * (not below)
+
+
+def _tails(found: Sequence[Row], columns: Sequence[Sequence[int]]) -> list[int]:
+    """The column of each comment that ends a line, and of those that go on with one below; -1 for all else."""
+    tails = [-1] * len(found)
+    paragraph: list[int] = []
+    for at, row in enumerate([*found, None]):
+        if row is None or row.kind == BLANK:
+            _settle(found, columns, paragraph, tails)
+            paragraph = []
+        elif row.kind == CODE and row.tail is not None and not row.exact:
+            paragraph.append(at)
+    written = -1
+    for at, row in enumerate(found):
+        if row.tail is not None:
+            written = row.tail.column
+            tails[at] = written if row.exact else tails[at]
+        elif row.kind == REMARK and not row.exact and at and row.column(row.whole[0].offset) == written:
+            tails[at] = tails[at - 1]
+        else:
+            written = -1
+    return tails
+
+
+def _settle(
+    found: Sequence[Row], columns: Sequence[Sequence[int]], paragraph: Sequence[int], tails: list[int]
+) -> None:
+    """The same for the rows of a paragraph: comments that were below each other are."""
+    places: dict[int, list[int]] = {}
+    for at in paragraph:
+        tail = found[at].tail
+        assert tail is not None
+        places.setdefault(tail.column, []).append(at)
+    for column, together in places.items():
+        ends = [columns[at][-1] + len(found[at].pieces[-1].text) for at in together]
+        row = found[together[0]]
+        if len(together) == 1:  # alone: as far from its line as it was
+            written = row.column(row.whole[-2].end)
+            column = ends[0] + column - written
+        column = max(column, max(ends) + BEFORE_COMMENT)
+        for at in together:
+            tails[at] = column

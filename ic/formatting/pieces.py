@@ -1,0 +1,211 @@
+"""What stands apart on a line of a deck: tokens that belong together as one piece, and the blanks between pieces.
+
+A path, a unit and a number with its sign are one piece each. Where a unit ends is asked of the parser, so that the
+`*` of `2 kg*m^2` is told from that of `2 * width`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import TYPE_CHECKING, Literal
+
+from ic.grammar.cursor import OPENING
+from ic.grammar.expressions import Expressions
+from ic.text.lexer import END, NAME, NUMBERS, SPACE, STRING, WHOLE, Text, Token, logical_lines
+from ic.text.limits import Findings
+from met import units
+from met.frozen import frozen
+
+if TYPE_CHECKING:
+    from ic.formatting.rows import Row
+
+Kind = Literal[
+    "name", "word", "number", "unit", "string", "open", "close", "stop", "operator", "sign", "comment", "other"
+]  # fmt: skip
+
+WORDS = ("and", "or", "not", "when", "require", "by")
+"""Behind these a value begins."""
+
+OPERATORS = ("+", "-", "*", "/", "^", "=", "+=", "<", "<=", ">", ">=", "==", "!=", "..", "&&", "||")
+_SIGNS = ("-", "+", "!")
+_OPERANDS = ("name", "number", "unit", "string", "close")
+
+
+@frozen
+class Piece:
+    """Tokens that stand together.
+
+    text    as it is laid out
+    column  where it was written, from 0
+    written how many columns it took there
+    gap     blanks that were before it; 0 for the first of a row
+    """
+
+    kind: Kind
+    text: str
+    column: int
+    written: int
+    gap: int
+    tokens: tuple[Token, ...]
+
+
+def cut(rows: Iterable[Row]) -> None:
+    """Gives every row of code its pieces; the comment at its end is none of them."""
+    code = list(rows)
+    tokens = [token for row in code for token in row.tokens]
+    if not tokens:
+        return
+    parser = Expressions([*tokens, Token(END, "", tokens[-1].source, tokens[-1].end, 1)], Findings())
+    at = 0
+    for row in code:
+        row.pieces = _cut(row, at, parser)
+        at += len(row.tokens)
+
+
+def _cut(row: Row, at: int, parser: Expressions) -> list[Piece]:
+    """The pieces of one row, whose first token is the parser's token `at`."""
+    found: list[Piece] = []
+    line = row.whole[: len(row.whole) - (row.tail is not None)]
+    operand = at > 0 and _ends_operand(parser.tokens[at - 1])
+    i = end = 0
+    comments = [k for k, token in enumerate(line) if token.kind == SPACE]
+    while i < len(line):
+        first = line[i]
+        kind: Kind = "comment"
+        count = 1
+        if first.kind != SPACE:
+            free = (comments[0] if comments else len(line)) - i
+            kind, count = _piece(parser, at, free, found[-1] if found else None, operand)
+            operand = kind in _OPERANDS and first.text != "}"
+            at += count
+        else:
+            comments.pop(0)
+        text = "".join(each.source.text[each.offset : each.end] for each in line[i : i + count])
+        column, last = row.column(first.offset), row.column(line[i + count - 1].end)
+        before = column - end if found else 0
+        found.append(Piece(kind, text, column, last - column, before, tuple(line[i : i + count])))
+        i += count
+        end = last
+    return found
+
+
+def _ends_operand(token: Token) -> bool:
+    return (token.kind in (NAME, STRING, *NUMBERS) and token.text not in WORDS) or token.text in (")", "]", "%")
+
+
+def _piece(parser: Expressions, at: int, free: int, before: Piece | None, operand: bool) -> tuple[Kind, int]:
+    """What begins at the parser's token `at`, and how many tokens it has, at most `free`."""
+    token = parser.tokens[at]
+    text = token.text
+    if before is not None and operand and (length := _unit(parser, at, before)) and length <= free:
+        return "unit", length
+    if token.kind == NAME:
+        length = _path(parser, at, free)
+        return ("word" if length == 1 and text in WORDS else "name"), length
+    if token.kind in NUMBERS:
+        return "number", _number(parser, at, free)
+    if token.kind == STRING:
+        return "string", 1
+    if text in OPENING:
+        return "open", 1
+    if text in OPENING.values():
+        return "close", 1
+    if text in (";", ","):
+        return "stop", 1
+    if text in _SIGNS and not operand:
+        if text != "!" and free > 1 and parser.tokens[at + 1].kind in NUMBERS:
+            return "number", 1 + _number(parser, at + 1, free - 1)
+        if text != "!" and free > 1 and parser.tokens[at + 1].kind == NAME:
+            return "name", 1 + _path(parser, at + 1, free - 1)
+        return "sign", 1
+    return ("operator" if text in OPERATORS else "other"), 1
+
+
+def _path(parser: Expressions, at: int, free: int) -> int:
+    """How many tokens the path has that begins here."""
+    length = 1
+    while (
+        length + 2 <= free and parser.tokens[at + length].text == "." and parser.tokens[at + length + 1].kind == NAME
+    ):
+        length += 2
+    return length
+
+
+def _number(parser: Expressions, at: int, free: int) -> int:
+    """How many tokens the number has that begins here: three where it is written as a fraction, `1/3`."""
+    number, line, below = parser.tokens[at : at + 3]
+    fraction = free > 2 and line.text == "/" and below.kind in NUMBERS
+    return 3 if fraction and number.end == line.offset and line.end == below.offset else 1
+
+
+def _unit(parser: Expressions, at: int, before: Piece) -> int:
+    """How many tokens the unit has that begins behind this piece; 0 where none does."""
+    token, following = parser.tokens[at], parser.tokens[at + 1]
+    over = None
+    if token.kind == WHOLE and token.text == "1" and following.text == "/":
+        over = parser.unit_factor(at + 2, -1, 0)
+    if over is None and not ((token.kind == NAME or token.text == "%") and units.is_unit(token.text)):
+        return 0
+    if before.kind == "name" and following.text not in ("*", "/", "^"):  # a macro's name, perhaps: `TEETH V*s/rad`
+        return 0
+    product = parser.unit_product(at, 1, 0, over)
+    return 0 if product is None else product[1] - at
+
+
+def gap(before: Piece, piece: Piece) -> int:
+    """How many blanks stand between two pieces of a line that are not aligned with anything."""
+    wanted = _wanted(before, piece)
+    own = min(piece.gap, 1)
+    if before.kind == piece.kind == "number":
+        return own
+    if wanted is None:
+        return own
+    return wanted if wanted or not own or _stay_apart(before.text, piece.text) else own
+
+
+def _wanted(before: Piece, piece: Piece) -> int | None:
+    """The same by what the two are; None to leave it to the author, whether one or none."""
+    first, second = before.kind, piece.kind
+    if second == "stop" and first != "comment":
+        return 1 if before.text == "{" else 0
+    if first == "comment" or second == "comment":
+        return None
+    if first == "stop":
+        if second == "close":
+            return 1 if piece.text == "}" else 0
+        return 2 if before.text == ";" else 1
+    if "{" in (before.text, piece.text) or "}" in (before.text, piece.text):
+        return _around_brace(before, piece)
+    if first in ("open", "sign") or second == "close":
+        return 0
+    if before.text == "^" or piece.text == "^":
+        return 0
+    if "other" in (first, second):
+        return None
+    if piece.text == "(" and first == "name":
+        return 0
+    if second == "open" and first != "operator" and first != "word":
+        return None
+    return 1
+
+
+def _around_brace(before: Piece, piece: Piece) -> int | None:
+    if before.text == "{" or piece.text == "}":
+        return 1
+    if piece.text == "{":
+        return 0 if before.text in ("(", "[") else 1
+    if piece.kind == "close":
+        return 0
+    return 2 if piece.kind == "name" else 1
+
+
+@lru_cache(maxsize=4096)
+def _stay_apart(before: str, after: str) -> bool:
+    """Whether the lexer still tells two texts apart when nothing stands between them."""
+
+    def texts(text: str) -> list[str]:
+        return [token.text for line in logical_lines(Text("", text)) for token in line if token.kind != SPACE]
+
+    return texts(before + after) == [*texts(before), *texts(after)]
+

@@ -1,0 +1,271 @@
+"""A deck's text as rows, for the formatter: what stands on a line, which bracket it stands in, and what may not be
+touched.
+
+Nothing is expanded and nothing included. What `#if` surrounds is laid out too where each of its parts closes what it
+opens; else it stays as it is, since text that is left out may be anything.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+
+from ic.formatting.pieces import Piece, cut
+from ic.grammar.cursor import OPENING
+from ic.text.lexer import BAD, SPACE, Text, Token, logical_lines
+from ic.text.limits import CONDITION_DEPTH, DEPTH, LONGEST_LINE, MOST_TOKENS, Findings
+from ic.text.preprocess import CONDITIONALS
+from ic.text.strays import complain_of_stray
+from met.diagnostic import Diagnostic, Label, Problem, error
+
+TAB = 4
+BLANKS = " \t\f\v"
+_SPLICE = re.compile(r"\\[ \t\f\v]*(?:\n|\Z)")
+BLANK, DIRECTIVE, REMARK, CODE = "blank", "directive", "remark", "code"
+
+_CLOSING = {closing: opening for opening, closing in OPENING.items()}
+_BY_ITSELF = "a file is laid out by itself: a bracket of a macro's body or of another file is not seen"
+
+
+class Row:
+    """A line, or several that a comment or a backslash joins.
+
+    kind     BLANK; DIRECTIVE; REMARK, of comments alone; CODE
+    raw      its text without the newline
+    whole    its tokens without white space; comments are there, as SPACE
+    tokens   the same without comments
+    exact    whether it stays as it is, but for blanks at its end
+    opaque   whether even its brackets do not count
+    tail     the comment at the end of code, or of a directive
+    pieces   of code: what stands apart on it, in order, without the tail
+    parent   the row and the piece of it that opened the bracket in which this row begins; None at the top level
+    closes   the row that opened the last of the brackets that close at its beginning
+    behind   the last token before it in the same bracket
+    """
+
+    __slots__ = (
+        "_lines", "_tabs", "behind", "closes", "exact", "kind", "opaque", "parent", "pieces", "raw", "start", "tail",
+        "tokens", "whole",
+    )  # fmt: skip
+
+    def __init__(self, source: Text, start: int, line: Sequence[Token]) -> None:
+        self.start = start
+        self.raw = source.text[start : line[-1].offset]
+        self.whole = [token for token in line if token.kind != SPACE or written(token)[:1] == "/"]
+        self.tokens = [token for token in self.whole if token.kind != SPACE]
+        self.opaque = False
+        self.pieces: list[Piece] = []
+        self.tail: Piece | None = None
+        self.parent: tuple[Row, int] | None = None
+        self.closes: Row | None = None
+        self.behind: Token | None = None
+        self._tabs = self._expanded()
+        self._lines = "\n" in self.raw
+        joined = self._lines or _SPLICE.search(self.raw) is not None
+        if self.tokens:
+            directive = self.tokens[0].text == "#"
+            self.kind, self.exact = (DIRECTIVE, True) if directive else (CODE, joined)
+        elif self.whole:
+            self.kind, self.exact = REMARK, len(self.whole) > 1 or _SPLICE.search(self.raw) is not None
+        else:
+            self.kind, self.exact = BLANK, "\\" in self.raw
+        last = self.whole[-1] if self.tokens and not joined else None
+        if last is not None and last.kind == SPACE:
+            self.tail = Piece("comment", written(last).rstrip(BLANKS), self.column(last.offset), last.length, 0, ())
+
+    @property
+    def directive(self) -> str:
+        """The word after the `#`; empty where the row is no directive."""
+        return self.tokens[1].text if self.kind == DIRECTIVE and len(self.tokens) > 1 else ""
+
+    def column(self, offset: int) -> int:
+        """The column, from 0, of what stands at this offset."""
+        inside = offset - self.start
+        before = self.raw.rfind("\n", 0, inside) + 1 if self._lines else 0
+        return inside - before if self._tabs is None else self._tabs[inside]
+
+    def _expanded(self) -> list[int] | None:
+        """By character, how far in its row it is; None where no tab makes this another than its position."""
+        if "\t" not in self.raw:
+            return None
+        at, column = [0], 0
+        for character in self.raw:
+            column = 0 if character == "\n" else column + (TAB - column % TAB if character == "\t" else 1)
+            at.append(column)
+        return at
+
+
+def rows(source: Text, making_strings: Collection[str] = ()) -> list[Row]:
+    """The rows of a file, each knowing the bracket that it stands in. Raises Problem where the text is broken.
+
+    making_strings  macros that make a string of what they are given: their uses stay as they are
+    """
+    findings = Findings()
+    found: list[Row] = []
+    count = start = 0
+    for line in logical_lines(source):
+        count += len(line)
+        if count > MOST_TOKENS:
+            findings.error("D018", f"more than {MOST_TOKENS} tokens", line[0].place)
+            break
+        if line[-1].offset - start > LONGEST_LINE:
+            place = source.place(start + LONGEST_LINE, 1)
+            findings.error("D018", f"a line has at most {LONGEST_LINE} characters", place)
+            break
+        found.append(Row(source, start, line))
+        start = line[-1].offset + 1
+        if len(line) > 1 and line[-2].kind == BAD and line[-2].text == "/*":  # where the lexer has stopped
+            complain_of_stray(line[-2], findings)
+    if start < len(source.text):  # a backslash at the end
+        found.append(Row(source, start, [Token(SPACE, "\n", source, len(source.text), 1)]))
+    if not findings.errors:
+        _match_all(found, findings)
+    if findings.errors:
+        raise Problem(findings.all, {source.name: source.text})
+    if making_strings:
+        _keep_uses(found, making_strings)
+    cut(row for row in found if row.kind == CODE and not row.opaque)
+    _nest(found)
+    return found
+
+
+def written(token: Token) -> str:
+    """The token as the file has it; the lexer makes one blank of a comment."""
+    return token.source.text[token.offset : token.end]
+
+
+class _Open:
+    """A bracket that is open: its token, its row, and which of the row's pieces it is."""
+
+    __slots__ = ("piece", "row", "token")
+
+    def __init__(self, token: Token, row: Row, piece: int = 0) -> None:
+        self.token = token
+        self.row = row
+        self.piece = piece
+
+
+class _If:
+    """A conditional that is open: where it begins, the brackets open before it and behind each of its parts."""
+
+    __slots__ = ("at", "broken", "ends", "otherwise", "start")
+
+    def __init__(self, at: int, start: list[_Open]) -> None:
+        self.at = at
+        self.start = start
+        self.ends: list[list[_Open]] = []
+        self.otherwise = False
+        self.broken = False
+
+
+def _match_all(found: list[Row], findings: Findings) -> None:
+    """Matches the brackets, and makes opaque what `#if` surrounds where they do not match; elsewhere that is told."""
+    stack: list[_Open] = []
+    ifs: list[_If] = []
+    for at, row in enumerate(found):
+        word = row.directive
+        if word in ("if", "ifdef", "ifndef"):
+            if len(ifs) >= CONDITION_DEPTH:
+                findings.error("D018", f"`#if` goes deeper than {CONDITION_DEPTH}", row.tokens[1].place)
+                return
+            ifs.append(_If(at, list(stack)))
+        elif word not in CONDITIONALS:
+            complaint = _match(row, stack) if row.kind == CODE and not (ifs and ifs[-1].broken) else None
+            if complaint is None:
+                continue
+            if not ifs:
+                findings.add(complaint)
+                return
+            ifs[-1].broken = True
+        elif not ifs:
+            help = "leave it out, or write the `#if` that it belongs to"
+            findings.error("D007", f"`#{word}` without an `#if`", row.tokens[1].place, help=help)
+            return
+        elif word == "endif":
+            closed = ifs.pop()
+            ends = [*closed.ends, stack, *([] if closed.otherwise else [closed.start])]
+            if closed.broken or len({"".join(each.token.text for each in end) for end in ends}) > 1:
+                for inside in found[closed.at : at + 1]:
+                    inside.opaque = inside.exact = True
+                stack = closed.start
+            else:
+                stack = ends[0]
+        else:
+            ifs[-1].ends.append(stack)
+            ifs[-1].otherwise = ifs[-1].otherwise or word == "else"
+            stack = list(ifs[-1].start)
+    for left in ifs[-1:]:
+        token = found[left.at].tokens[1]
+        help = f"`{token.source.name}` ends without its `#endif`"
+        findings.error("D008", f"`#{token.text}` is not closed", token.place, help=help)
+        return
+    for opened in stack[-1:]:
+        text, helps = opened.token.text, (f"write the `{OPENING[opened.token.text]}` where it ends", _BY_ITSELF)
+        findings.error("D022", f"this `{text}` is not closed", opened.token.place, help=helps)
+
+
+def _match(row: Row, stack: list[_Open]) -> Diagnostic | None:
+    """Opens and closes the row's brackets. Gives back what is wrong with the row, if anything is."""
+    for token in row.tokens:
+        if token.kind == BAD:
+            findings = Findings()
+            complain_of_stray(token, findings)
+            return findings.all[0]
+        if token.text in OPENING:
+            if len(stack) >= DEPTH:
+                return error("D029", f"braces, brackets and parentheses go deeper than {DEPTH}", token.place)
+            stack.append(_Open(token, row))
+        elif token.text in _CLOSING:
+            if not stack:
+                helps = ("leave it out, or open it where it begins", _BY_ITSELF)
+                return error("D022", f"this `{token.text}` closes nothing", token.place, help=helps)
+            opening = stack.pop().token
+            if opening.text != _CLOSING[token.text]:
+                label = Label(opening.place, f"to close this `{opening.text}`")
+                message = f"expected `{OPENING[opening.text]}`, found `{token.text}`"
+                return error("D022", message, token.place, also=(label,), help=_BY_ITSELF)
+    return None
+
+
+def _keep_uses(found: Sequence[Row], names: Collection[str]) -> None:
+    """Makes exact the rows in which these names are used with arguments."""
+    named, depth = False, 0
+    for row in found:
+        if row.kind != CODE or row.opaque:
+            continue
+        row.exact = row.exact or depth > 0
+        for token in row.tokens:
+            if depth or (named and token.text == "("):
+                row.exact = True
+                depth += {"(": 1, ")": -1}.get(token.text, 0)
+            named = not depth and token.text in names
+
+
+def _nest(found: list[Row]) -> None:
+    """Tells every row the bracket that it begins in. All brackets that count are known to match."""
+    stack: list[_Open] = []
+    ifs: list[tuple[list[_Open], list[list[_Open]]]] = []
+    behind: Token | None = None
+    for row in found:
+        word = "" if row.opaque else row.directive
+        if word in ("if", "ifdef", "ifndef"):
+            ifs.append((list(stack), []))
+        elif word == "endif":
+            stack = [*ifs.pop()[1], stack][0]
+        elif word in CONDITIONALS:
+            ifs[-1][1].append(stack)
+            stack = list(ifs[-1][0])
+        if word in CONDITIONALS or row.opaque:
+            behind = None
+        row.parent = (stack[-1].row, stack[-1].piece) if stack else None
+        row.behind = behind
+        leading = True
+        for position, piece in enumerate(row.pieces):
+            leading = leading and piece.kind == "close"
+            if piece.kind == "open":
+                stack.append(_Open(piece.tokens[0], row, position))
+            elif piece.kind == "close":
+                opened = stack.pop().row
+                row.closes = opened if leading else row.closes
+            if piece.kind != "comment":
+                behind = None if piece.kind == "open" else piece.tokens[-1]

@@ -1,0 +1,63 @@
+"""Macros that make a string of what they are given: `#define SAID(X) #X`. A blank in such an argument is seen, so the
+lines of a use are left as they are."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+
+from ic.text.files import Files, FoundFile
+from ic.text.lexer import Text, Token, logical_lines
+from ic.text.limits import MOST_BYTES, MOST_INCLUDES
+
+_INCLUDE = re.compile(r'\s*#\s*include\s*(?:"([^"\n]*)"|<([^>\n]*)>)')
+
+
+def making_strings(text: str, file: FoundFile) -> frozenset[str]:
+    """Names of such macros that this text or a file that it includes defines."""
+    files = Files()
+    found: set[str] = set()
+    waiting, seen = [(text, file)], {file.identity}
+    while waiting and len(seen) < MOST_INCLUDES:
+        text, file = waiting.pop()
+        if "#" not in text:
+            continue
+        found.update(_defined(Text(file.name, text)))
+        for included in _included(text, file, files):
+            if included.identity not in seen:
+                seen.add(included.identity)
+                waiting.append((_text(included), included))
+    return frozenset(found)
+
+
+def _defined(source: Text) -> Iterator[str]:
+    for line in logical_lines(source):
+        tokens = [token for token in line if token.text.strip()]
+        if [token.text for token in tokens[:2]] == ["#", "define"] and _makes_a_string(tokens[2:]):
+            yield tokens[2].text
+
+
+def _makes_a_string(definition: list[Token]) -> bool:
+    return len(definition) > 1 and definition[1].text == "(" and any(token.text == "#" for token in definition)
+
+
+def _included(text: str, file: FoundFile, files: Files) -> Iterator[FoundFile]:
+    for line in text.split("\n"):
+        written = _INCLUDE.match(line)
+        if written is not None:
+            angled = written[1] is None
+            included = files.find(written[2] if angled else written[1], files.where(file, angled))
+            if included is not None:
+                yield included
+
+
+def _text(file: FoundFile) -> str:
+    """What can be read of a file; `met check` says what is wrong with it."""
+    try:
+        if os.path.isfile(file.path):
+            with open(file.path, encoding="utf-8", errors="replace") as stream:
+                return stream.read(MOST_BYTES)
+    except OSError:
+        pass
+    return ""

@@ -1,0 +1,165 @@
+"""Numbers, and the unit that may follow one.
+
+A unit binds tightest and runs over * / ^ ( ) as long as unit names follow: `1/2 m` is 1/(2 m).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+from ic.grammar.cursor import Cursor, span
+from ic.grammar.syntax import Expression, Number, Unit, Word
+from ic.text.lexer import NAME, NUMBERS, STRING, WHOLE, Token
+from ic.text.limits import LONGEST_NUMBER
+from met import units
+
+_POWERED = re.compile(r"([A-Za-z]+)([2-9])")
+_UNIT_DEPTH = 8
+MOST_FACTORS = 32
+
+
+class Quantities(Cursor):
+    def number(self) -> Expression:
+        token = self.advance()
+        value = self.number_value(token)
+        unit = self.unit()
+        last = self.previous
+        self.not_a_second_number(token)
+        return Number(value, unit, span(token, last), token.text)
+
+    def number_value(self, token: Token) -> float:
+        text = token.text
+        if len(text) > LONGEST_NUMBER:
+            self.fail("D027", f"a number has at most {LONGEST_NUMBER} characters", token)
+        if text[1:2] in ("x", "X"):
+            self.fail(
+                "D027", f"`{text}` is hexadecimal; a deck's numbers are decimal", token, help=f"write `{int(text, 16)}`"
+            )
+        value = float(text)
+        if math.isinf(value):
+            self.fail("D027", f"`{text}` is too large for a number", token, help="the largest is about 1.8e308")
+        if value == 0.0 and any(digit in "123456789" for digit in re.split("[eE]", text)[0]):
+            self.fail("D027", f"`{text}` is too small for a number: it would become 0", token)
+        return value
+
+    def not_a_second_number(self, first: Token) -> None:
+        token = self.token
+        if token.kind not in NUMBERS or self.on_new_line(self.at) or (self.open and self.open[-1].text != "{"):
+            return
+        if token.offset == first.end and token.text.startswith("."):
+            self.fail("D027", f"`{first.text}{token.text}` is not a number", span(first, token))
+
+    def unit(self) -> Unit | None:
+        """The unit that follows, if one does. In `15 1/s` the 1 belongs to it, since no number follows a number."""
+        token = self.token
+        over = None
+        if token.kind == WHOLE and token.text == "1" and self.following.text == "/":
+            over = self.unit_factor(self.at + 2, -1, 0)
+        if token.kind != NAME and token.text != "%" and over is None:
+            return None
+        if self.begins_entry(self.at):
+            return None
+        if over is None and not units.is_unit(token.text):
+            self.unknown_unit()
+            return None
+        start = self.at
+        product = self.unit_product(start, 1, 0, over)
+        if product is None:  # a path or a block begins with this name
+            return None
+        factors, self.at = product
+        if self.token.text == "^":
+            self.fail("D030", "a unit's exponent is a whole number from -9 to 9", self.following,
+                      help=f"for a power of the quantity write `(... {self.previous.text})^n`")  # fmt: skip
+        if len(factors) > MOST_FACTORS:
+            self.fail("D030", f"a unit has at most {MOST_FACTORS} factors", token)
+        self.not_a_second_unit(start)
+        taken = self.tokens[start : self.at]
+        return Unit(tuple(factors), span(taken[0], taken[-1]), "".join(t.text for t in taken))
+
+    def unit_product(
+        self, at: int, sign: int, depth: int, first: tuple[list[tuple[Word, int]], int] | None = None
+    ) -> tuple[list[tuple[Word, int]], int] | None:
+        """Factors from token `at` on, and the token behind them; None where no unit begins there. first: was read."""
+        first = self.unit_factor(at, sign, depth) if first is None else first
+        if first is None:
+            return None
+        factors, at = first
+        while self.tokens[at].text in ("*", "/"):
+            more = self.unit_factor(at + 1, sign if self.tokens[at].text == "*" else -sign, depth)
+            if more is None:
+                break
+            factors = factors + more[0]
+            at = more[1]
+        return factors, at
+
+    def unit_factor(self, at: int, sign: int, depth: int) -> tuple[list[tuple[Word, int]], int] | None:
+        token = self.tokens[at]
+        if token.text == "(" and depth < _UNIT_DEPTH:
+            inner = self.unit_product(at + 1, sign, depth + 1)
+            if inner is None or self.tokens[inner[1]].text != ")":
+                return None
+            factors, at = inner[0], inner[1] + 1
+        elif units.is_unit(token.text) and token.kind != STRING and self.tokens[at + 1].text not in ("{", "."):
+            factors, at = [(Word(token.text, token.place), sign)], at + 1
+        else:
+            return None
+        if self.tokens[at].text == "^":
+            exponent = self.exponent(at + 1)
+            if exponent is not None:
+                factors = [(word, power * exponent[0]) for word, power in factors]
+                at = exponent[1]
+        return factors, at
+
+    def exponent(self, at: int) -> tuple[int, int] | None:
+        bracketed = self.tokens[at].text == "("
+        at += bracketed
+        sign = -1 if self.tokens[at].text == "-" else 1
+        at += self.tokens[at].text in ("-", "+")
+        digit = self.tokens[at]
+        if digit.kind != WHOLE or len(digit.text) != 1 or (bracketed and self.tokens[at + 1].text != ")"):
+            return None
+        return sign * int(digit.text), at + 1 + bracketed
+
+    def not_a_second_unit(self, start: int) -> None:
+        token = self.token
+        if token.kind == NAME and units.is_unit(token.text) and not self.on_new_line(self.at):
+            written = "".join(t.text for t in self.tokens[start : self.at])
+            self.fail("D030", "units are multiplied with `*`", token, help=f"write `{written}*{token.text}`")
+        operator, named = token, self.following
+        if operator.text not in ("*", "/") or named.kind != NAME:
+            return
+        powered = _POWERED.fullmatch(named.text)
+        if powered and units.is_unit(powered.group(1)):
+            self.fail(
+                "D028", f"`{named.text}` is not a unit", named, help=f"write `{powered.group(1)}^{powered.group(2)}`"
+            )
+        near = units.suggest(named.text)
+        if (
+            near
+            and named.text not in ("n", "k", "v", "M", "S")
+            and self.tokens[self.at + 2].text in (";", ",", ")", "]")
+        ):
+            # `rad/sec`: said here, since after a unit this is what was meant more often than a name of one's own
+            self.fail("D028", f"`{named.text}` is not a unit", named, help=f"did you mean `{near}`?")
+
+    def unknown_unit(self) -> None:
+        """A name behind a number that is no unit: says so, and takes it for one."""
+        token = self.token
+        if (
+            self.on_new_line(self.at)
+            or token.text in ("and", "or", "by")
+            or self.following.text in ("=", "+=", "{", "(")
+        ):
+            return
+        powered = _POWERED.fullmatch(token.text)
+        near = units.suggest(token.text)
+        if powered and units.is_unit(powered.group(1)):
+            near = f"{powered.group(1)}^{powered.group(2)}"
+        self.fail(
+            "D028", f"`{token.text}` is not a unit", token, help=f"did you mean `{near}`?" if near else _units_known()
+        )
+
+
+def _units_known() -> str:
+    return "the units: " + ", ".join(units.UNITS)

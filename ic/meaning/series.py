@@ -1,0 +1,61 @@
+"""Rows of numbers between two ends, each the double nearest to what the decimals as written give."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from met.frozen import frozen
+
+
+@frozen
+class Steps:
+    """From one number by equal steps towards another: fractions over `below`. meet: whether they reach it exactly."""
+
+    first: int
+    by: int
+    below: int
+    count: int
+    meet: bool
+
+    @classmethod
+    def between(cls, a: float, b: float, step: float) -> Steps:
+        """From a to b; the step is not zero, and leads there. 0 to 1 by 0.1 has 0.3 in it."""
+        made = [_shortest(x) for x in (a, b, step)]
+        below = math.prod(under for _, under in made)
+        first, last, by = (top * (below // under) for top, under in made)
+        count, left = divmod(abs(last - first), abs(by))
+        return cls(first, by, below, count + 1, not left)
+
+    @property
+    def last(self) -> float:
+        return (self.first + (self.count - 1) * self.by) / self.below
+
+    @property
+    def points(self) -> list[float]:
+        return [(self.first + i * self.by) / self.below for i in range(self.count)]
+
+
+def even(a: float, b: float, n: int) -> Iterable[float]:
+    """Each point is the double nearest to what the ends' shortest decimals give: 0.01 to 0.04 in 7 has 0.015 in it."""
+    (first, under_first), (last, under_last) = _shortest(a), _shortest(b)
+    below = under_first * under_last
+    p, q = first * under_last, last * under_first
+    try:
+        return [(p * (n - 1 - i) + q * i) / (below * (n - 1)) for i in range(n)]
+    except OverflowError:
+        return [a + (b - a) * (i / (n - 1)) for i in range(n)]
+
+
+def _shortest(x: float) -> tuple[int, int]:
+    """The shortest decimal that reads back as x, as a fraction. (Not a `Fraction`: importing them takes 2 ms.)"""
+    digits, _, power = repr(x).partition("e")
+    whole, _, rest = digits.partition(".")
+    exponent = int(power or 0) - len(rest)
+    return int(whole + rest) * 10 ** max(exponent, 0), 10 ** max(-exponent, 0)
+
+
+def by_ratio(a: float, b: float, n: int) -> Iterable[float]:
+    low, high = math.log(abs(a)), math.log(abs(b))
+    inner = (math.copysign(math.exp(low + (high - low) * i / (n - 1)), a) for i in range(1, n - 1))
+    return [a, *inner, b]

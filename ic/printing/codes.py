@@ -1,0 +1,49 @@
+"""What the code of a message means: its entry on the page docs/diagnostics.md, for the terminal."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from met.diagnostic import Problem, did_you_mean, error
+
+PAGE = Path(__file__).parents[2] / "docs" / "diagnostics.md"
+
+_ENTRY = re.compile(r"^### ([A-Z]\d{3}): .*?(?=^##)", re.MULTILINE | re.DOTALL)
+_HIDDEN = re.compile(r"<!-- .*?-->\n?", re.DOTALL)
+
+
+def is_code(word: str) -> bool:
+    """Whether a word looks like the code of a message."""
+    return re.fullmatch(r"[A-Za-z]\d{3}", word) is not None
+
+
+def print_code(word: str) -> Iterator[str]:
+    """The entry of a code. Raises Problem D171 where there is none, or no page."""
+    code = word.upper()
+    if not PAGE.is_file():
+        help = "the entry of every code is in docs/diagnostics.md of a checkout"
+        raise Problem(error("D171", f"the page that explains `{code}` is not installed with MET", help=help))
+    entries = {entry[1]: entry[0] for entry in _ENTRY.finditer(PAGE.read_text(encoding="utf-8") + "\n##")}
+    if code not in entries:
+        helps = [*did_you_mean(code, entries), "a code is printed with its message, as in `error[D060]`"]
+        raise Problem(error("D171", f"no message has the code `{code}`, or none that needs an entry", help=helps))
+    yield from _plain(_HIDDEN.sub("", entries[code]).strip().removeprefix("### ")).rstrip().splitlines()
+
+
+def _plain(text: str) -> str:
+    """Markdown as the terminal shows it: what is code is set in, links are their words."""
+    lines = [""]
+    code = False
+    for line in text.splitlines():
+        if line.startswith("```"):
+            code = not code
+            line = ""
+        elif code:
+            line = f"    {line}".rstrip()
+        else:
+            line = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", line)
+        if line or lines[-1]:
+            lines.append(line)
+    return "\n".join(lines[1:])

@@ -1,0 +1,92 @@
+"""Where a value comes from, in each of the structures that a run or sweep is of, and where need be in other runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from ic.meaning.explain import explained, in_full
+from ic.meaning.lower import Compiled
+from ic.printing.explain import NO_MORE, explain_json, find_paths, print_explain, with_settings
+from met.diagnostic import Label, Problem
+from met.frozen import frozen
+from met.plan import Experiment, Plan
+
+Source = tuple[Plan, Compiled | None]
+"""A plan, and the deck that it was compiled from; None for that of a plan file."""
+
+Sources = Sequence[Callable[[], Source]]
+"""Where to look: the next is made only where the first know nothing of what is asked."""
+
+
+@frozen
+class Found:
+    """An experiment that knows what is asked, in full. alone: whether all of the first source's experiments do."""
+
+    experiment: Experiment
+    plan: Plan
+    compiled: Compiled | None
+    number: int
+    alone: bool
+
+    @property
+    def known(self) -> Mapping[str, Sequence[str]]:
+        return NO_MORE if self.compiled is None else self.compiled.scopes[self.number].known
+
+    def names_of(self, path: str) -> tuple[Label, ...]:
+        if self.compiled is None:
+            return ()
+        return next((found.names for found in explained(self.compiled, path)), ())
+
+
+def print_explained(sources: Sources, path: str) -> Iterator[str]:
+    """Line by line; once where all experiments say the same. Raises Problem where none knows the path."""
+    said: dict[tuple[str, ...], list[Found]] = {}
+    for found in _found(sources, path):
+        texts = {source.name: source.text for source in found.plan.sources}
+        lines = tuple(print_explain(found.experiment, path, texts, found.names_of, found.known))
+        said.setdefault(lines, []).append(found)
+    for position, (lines, where) in enumerate(said.items()):
+        if position:
+            yield ""
+        if len(said) > 1 or not where[0].alone:
+            yield f"in {', '.join(found.experiment.name for found in where)}:"
+        yield from lines
+
+
+def explained_json(sources: Sources, path: str) -> list[dict[str, Any]]:
+    """The same for programs; of several experiments each says its name."""
+    found = _found(sources, path)
+    several = len(found) > 1 or not found[0].alone
+    return [
+        {"experiment": each.experiment.name, **told} if several else told
+        for each in found
+        for told in explain_json(each.experiment, path, each.known)
+    ]
+
+
+def _found(sources: Sources, path: str) -> list[Found]:
+    problem: Problem | None = None
+    for n, source in enumerate(sources):
+        try:
+            plan, compiled = source()
+        except Problem:
+            if problem is not None:  # of the other runs something else is wrong
+                raise problem from None
+            raise
+        made = []
+        for number, experiment in enumerate(plan.experiments):
+            whole = with_settings(experiment if compiled is None else in_full(compiled, number))
+            found = Found(whole, plan, compiled, number, True)
+            try:
+                find_paths(whole, path, found.known)
+            except Problem as one:
+                problem = problem or one
+            else:
+                made.append(found)
+        if made:
+            alone = n == 0 and len(made) == len(plan.experiments)
+            return [replace(each, alone=alone) for each in made]
+    assert problem is not None  # each source has an experiment, and none knew the path
+    raise problem

@@ -1,0 +1,160 @@
+"""The page docs/reference.md: all that models declare, and the subjects of `met doc`, as Markdown."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from ic.meaning import dh, shapes
+from ic.printing import subjects
+from ic.printing.models import HOW, KINDS, default, facts, how, rows, shown_of, unit_in_words, words_in
+from met import models
+
+HEAD = """\
+# Models, their parameters, channels, units
+
+`met doc --markdown` writes this page from what the models declare, and a test holds that it is up to date. `met doc`
+prints the same in a terminal, of models from other packages too; how to write one is in [models](models.md), how they
+stand in a deck in [Writing decks](deck.md).
+
+Defaults and bounds are in SI. `needed` is what the deck must write; `-` is a pure number.
+"""
+
+
+def page() -> Iterator[str]:
+    """The lines of the page, of MET's own models."""
+    yield from HEAD.splitlines()
+    yield ""
+    for kind in KINDS:
+        names = ", ".join(f"[{name}](#{kind}-{name})" for name in models.find_own(kind))
+        yield f"- [{_title(kind)}](#{kind}s): {names}"
+    for name in ("shapes", "dh", "channels", "units"):
+        yield f"- [{TITLES[name]}](#{_anchor(TITLES[name])})"
+    for kind in KINDS:
+        yield ""
+        yield f"## {_title(kind)}"
+        yield ""
+        yield f"In a deck: {_code(HOW[kind])}"
+        for model in models.find_own(kind).values():
+            yield ""
+            yield from _model(kind, model)
+    yield from _shapes()
+    yield from _dh()
+    yield from _channels()
+    yield from _units()
+
+
+TITLES = {
+    "shapes": "Shapes of links", "dh": "Denavit-Hartenberg numbers", "channels": "Channels", "units": "Units",
+}  # fmt: skip
+
+
+def _title(kind: models.Kind) -> str:
+    return f"{kind.capitalize()}s"
+
+
+def _anchor(title: str) -> str:
+    return title.lower().replace(" ", "-")
+
+
+def _model(kind: models.Kind, model: Any) -> Iterator[str]:
+    yield f"### {kind} {model.name}"
+    yield ""
+    yield from _prose(model.doc)
+    yield ""
+    yield f"In a deck: {_code(how(kind, model))}"
+    yield from (f"\n{_escaped(fact)}" for fact in facts(kind, model))
+    parameters = models.written(model)
+    if parameters:
+        yield ""
+        yield from _table(rows(parameters))
+    words = [f"`{word}`: {_escaped(text)}" for word, text in words_in(parameters)]
+    if words:
+        yield ""
+        yield ". ".join(words) + "."
+    for text, parts in shown_of(kind, model):
+        yield ""
+        yield f"{_escaped(text)}:"
+        yield ""
+        yield from _table([("name", "unit", "meaning"), *parts])
+
+
+def _shapes() -> Iterator[str]:
+    yield ""
+    yield f"## {TITLES['shapes']}"
+    yield ""
+    yield from _prose(subjects.BEGIN)
+    for name, shape in shapes.SHAPES.items():
+        yield ""
+        yield f"### shape {name}"
+        yield ""
+        yield from _table(rows(shape.parameters))
+
+
+def _dh() -> Iterator[str]:
+    yield ""
+    yield f"## {TITLES['dh']}"
+    yield ""
+    yield from _prose(dh.__doc__ or "")
+    yield ""
+    yield from _table([("name", "unit", "default", "meaning"),
+                       *((each.name, each.unit, default(each), each.doc) for each in dh.NUMBERS)])  # fmt: skip
+
+
+def _channels() -> Iterator[str]:
+    yield ""
+    yield f"## {TITLES['channels']}"
+    yield ""
+    yield "What can be recorded, and watched by a metric. Without `JOINT.` it is that of all joints that have it; with"
+    yield "`.x`, one component of a vector."
+    yield ""
+    found = subjects.channels()
+    told = [(each["path"], unit_in_words(each["unit"]), each["components"], each["meaning"], each["frame"])
+            for each in found]  # fmt: skip
+    yield from _table([("channel", "unit", "components", "meaning", "axes"), *told])
+    yield ""
+    yield from _table([("channel", "is"), *subjects.OF_ANY])
+    yield ""
+    yield ". ".join(f"`{word}`: {text}" for word, text in subjects.words_of(found)) + "."
+
+
+def _units() -> Iterator[str]:
+    yield ""
+    yield f"## {TITLES['units']}"
+    yield ""
+    told = [(each["name"], each["word"], subjects.in_si(each)) for each in subjects.unit_table()]
+    yield from _table([("unit", "word", "is"), *told])
+
+
+def _table(told: Sequence[Sequence[str]]) -> Iterator[str]:
+    """A table whose first row is its head and whose first column names things."""
+    head, *others = told
+    yield f"| {' | '.join(head)} |"
+    yield f"|{'---|' * len(head)}"
+    for row in others:
+        first = " ".join(f"`{name}`" for name in row[0].split(", "))
+        yield f"| {' | '.join([first, *map(_cell, row[1:])])} |"
+
+
+def _cell(text: str) -> str:
+    return _escaped(text).replace("|", "\\|")
+
+
+def _code(text: str) -> str:
+    return f"`{text.replace(', in a run', '').replace(', in a servo', '')}`" + (
+        ", in a run" if text.endswith("in a run") else ", in a servo" if text.endswith("in a servo") else ""
+    )
+
+
+def _prose(doc: str) -> Iterator[str]:
+    """A docstring: what is set in by four blanks stays as it is, and all else is text."""
+    for line in textwrap.dedent(doc).strip().splitlines():
+        yield line if line.startswith("    ") else _escaped(line)
+
+
+def _escaped(text: str) -> str:
+    """Text in which Markdown finds no marks of its own, but for code between backticks."""
+    parts = re.split(r"(`[^`]*`)", text)
+    return "".join(part if part.startswith("`") else re.sub(r"([*<\[\]])", r"\\\1", part) for part in parts)

@@ -1,0 +1,190 @@
+"""The grammar of decks for editors, docs/editors/met.tmLanguage.json, from the language's own tables.
+
+An editor colours what stands on a line; it knows no meaning. So a word that the language knows is coloured as such
+where it stands as such: a unit behind a number, a key before `=` or `{`, a function before `(`. The expressions are
+those that Oniguruma and Python read alike.
+
+`python -m ic.printing.textmate` writes the files anew.
+"""
+
+from __future__ import annotations
+
+import json
+import plistlib
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ic.meaning import arm, dh, run
+from ic.meaning.resolve import KINDS as DEFINITIONS
+from ic.meaning.shapes import SHAPES
+from ic.meaning.substitution import DEFAULTS
+from ic.meaning.values import CONSTANTS, FUNCTIONS
+from ic.text.preprocess import DIRECTIVES
+from met import models, units
+from met.channel import COMMAND_UNIT
+
+SCOPE = "source.met"
+FOLDER = Path(__file__).parents[2] / "docs" / "editors"
+NAMES = ("met.tmLanguage.json", "met.tmLanguage")
+
+STATEMENTS = ("vary", "zip", "sample", "repeat", "exclude", "when", "require", "remove", "macro", "from")
+"""Words that begin an entry, or stand in one, and name nothing."""
+
+PARTS = ("link", "joint", "metric", "substitute")
+"""Words that begin an entry and are followed by a name."""
+
+WORDS = ("on", "off", "base", "faults")
+NAME = r"[A-Za-z_][A-Za-z0-9_]*"
+PATH = rf"{NAME}(?:\s*\.\s*{NAME})*"
+NUMBER = r"(?<![A-Za-z0-9_.])(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+
+
+def grammar() -> dict[str, Any]:
+    """The whole grammar."""
+    return {
+        "name": "MET deck",
+        "scopeName": SCOPE,
+        "fileTypes": ["ic"],
+        "uuid": "0b4f2c0a-6f0b-4d5e-9d57-5c1d2f6c8a41",
+        "patterns": [{"include": "#preprocessor"}, {"include": "#code"}],
+        "repository": {
+            "preprocessor": _preprocessor(),
+            "code": _patterns(*({"include": f"#{name}"} for name in ("comment", "string", "number", "entry", "value"))),
+            "comment": _patterns(
+                _match("comment.line.double-slash", r"//.*$"),
+                {"name": _named("comment.block"), "begin": r"/\*", "end": r"\*/"},
+            ),
+            "string": {
+                "name": _named("string.quoted.double"), "begin": '"', "end": r'"|$',
+                "patterns": [_match("constant.character.escape", r"\\.")],
+            },
+            "number": _numbers(),
+            "entry": _entries(),
+            "value": _values(),
+        },
+    }  # fmt: skip
+
+
+def _named(scope: str) -> str:
+    return f"{scope}.met"
+
+
+def _match(scope: str, expression: str) -> dict[str, Any]:
+    return {"name": _named(scope), "match": expression}
+
+
+def _groups(expression: str, *scopes: str) -> dict[str, Any]:
+    """A pattern whose groups have these scopes, in order; an empty one has none."""
+    captures = {str(i): {"name": _named(scope)} for i, scope in enumerate(scopes, start=1) if scope}
+    return {"match": expression, "captures": captures}
+
+
+def _patterns(*patterns: Mapping[str, Any]) -> dict[str, Any]:
+    return {"patterns": list(patterns)}
+
+
+def _any(words: Iterable[str]) -> str:
+    """One of these words, the longest that fits."""
+    return "(?:" + "|".join(re.escape(word) for word in sorted(set(words), key=lambda word: (-len(word), word))) + ")"
+
+
+def _preprocessor() -> dict[str, Any]:
+    """A directive up to the end of its line, and of those that a backslash joins to it."""
+    named = ("define", "undef", "ifdef", "ifndef")
+    end = r"(?<!\\)(?=\n)|(?=//|/\*)"
+    keyword = {"1": {"name": _named("punctuation.definition.directive")},
+               "2": {"name": _named("keyword.control.directive")}}  # fmt: skip
+    shared = {"name": _named("meta.preprocessor"), "end": end}
+    inside = [
+        _match("constant.character.escape.line-continuation", r"\\$"),
+        _match("keyword.operator.preprocessor", r"\bdefined\b|##?"),
+        {"include": "#string"}, {"include": "#number"}, {"include": "#entry"}, {"include": "#value"},
+    ]  # fmt: skip
+    return _patterns(
+        {**shared, "begin": r"^\s*(#)\s*(include)\b", "beginCaptures": keyword,
+         "patterns": [_match("string.quoted.other.lt-gt.include", r"<[^>]*>"), {"include": "#string"}]},
+        {**shared, "begin": rf"^\s*(#)\s*({_any(named)})\s+({NAME})",
+         "beginCaptures": {**keyword, "3": {"name": _named("entity.name.function.preprocessor")}}, "patterns": inside},
+        {**shared, "begin": r"^\s*(#)\s*(error|warning)\b", "beginCaptures": keyword,
+         "patterns": [_match("string.unquoted", r".+$")]},
+        {**shared, "begin": rf"^\s*(#)\s*({_any(DIRECTIVES)})\b", "beginCaptures": keyword, "patterns": inside},
+    )  # fmt: skip
+
+
+def _unit() -> str:
+    """A unit, with brackets one deep, as they are written: `N*m/(rad/s)^2`."""
+    letters = _any(name for name in units.UNITS if name.isalpha())
+    one = rf"(?:{letters}(?![A-Za-z0-9_])(?!\s*[.{{])(?:\s*\^\s*(?:-?[0-9]|\(\s*-?[0-9]\s*\)))?|%)"
+    joined = rf"{one}(?:\s*[*/]\s*{one})*"
+    bracket = rf"\(\s*{joined}\s*\)(?:\s*\^\s*-?[0-9])?"
+    return rf"(?:1\s*/\s*)?{one}(?:\s*[*/]\s*(?:{one}|{bracket}))*"
+
+
+def _numbers() -> dict[str, Any]:
+    return _patterns(
+        _groups(rf"({NUMBER})\s*({_unit()})", "constant.numeric", "keyword.other.unit"),
+        _match("constant.numeric", NUMBER),
+        _groups(rf"(?<=[\])])\s*({_unit()})", "keyword.other.unit"),
+    )
+
+
+def _entries() -> dict[str, Any]:
+    """What begins an entry: definitions, parts of them, statements, keys."""
+    kinds = _any(DEFINITIONS)
+    return _patterns(
+        _groups(rf"\b(default)\s+(?={kinds}\b)", "storage.modifier"),
+        _groups(rf"\b({kinds})\s+({NAME})(?=\s+(?:like|of|from)\b|\s*[{{=;])", "storage.type", "entity.name.type"),
+        _groups(rf"\b(like|of)\s+({PATH})(?=\s*(?:[{{;]|\bof\b))", "keyword.other", "entity.other.inherited-class"),
+        _groups(rf"\b(let)\s+({NAME})(?=\s*=)", "storage.type", "variable.other.constant"),
+        _groups(rf"\b(joint)\s+({NAME})\s+({_any(arm.JOINT_KINDS)})\b",
+                "storage.type.part", "entity.name.section", "storage.modifier.joint"),
+        _groups(rf"\b({_any(PARTS)})\s+({NAME})(?=\s*[={{;])", "storage.type.part", "entity.name.section"),
+        _groups(rf"\b({_any(STATEMENTS)})\b(?=\s+[^=\s]|\s*\{{|\s*\(|\s*\")(?!\s*\+=)", "keyword.control"),
+        _groups(rf"\b({_any(_keys())})(?=\s*(?:\+=|=(?!=)|\{{))", "support.type.property-name"),
+        _groups(rf"\b({PATH})(?=\s*(?:\+=|=(?!=)))", "variable.other.property"),
+    )  # fmt: skip
+
+
+def _values() -> dict[str, Any]:
+    known = {*FUNCTIONS, *SHAPES, *COMMAND_UNIT, *(name for kind in models.GROUPS for name in models.find_own(kind))}
+    return _patterns(
+        _groups(rf"\b({_any(known)})(?=\s*[({{])", "support.function"),
+        _groups(rf"\b({_any(known)})(?=\s*[;,)])(?<![.])", "support.constant"),
+        _groups(rf"\b({NAME})(?=\s*\()", "entity.name.function"),
+        _match("keyword.operator.word", r"\b(?:and|or|not|by)\b(?!\s*=)"),
+        _match("constant.language", rf"\b{_any((*CONSTANTS, *WORDS))}\b(?!\s*[.=])"),
+        _match("variable.other", PATH),
+        _match("keyword.operator", r"\.\.|[<>=!]=|\+=|[-+*/^<>=]"),
+        _match("punctuation.terminator", r";"),
+        _match("punctuation.separator", r","),
+        _match("punctuation.section", r"[\[\](){}]"),
+    )
+
+
+def _keys() -> set[str]:
+    """Every key that the language or a model of MET's own knows."""
+    declared = {parameter.name for kind in models.GROUPS for model in models.find_own(kind).values()
+                for parameter in models.written(model)}  # fmt: skip
+    shaped = {parameter.name for shape in SHAPES.values() for parameter in shape.parameters}
+    numbered = {number.name for number in dh.NUMBERS}
+    written = {"model", "command", "rate", "of", "velocity_products", "q", "qd"}
+    return declared | shaped | numbered | written | {*arm.LINK_KEYS, *arm.JOINT_KEYS, *run.KEYS, *run.RATES, *DEFAULTS}
+
+
+def texts() -> dict[str, bytes]:
+    """The files by name: for VS Code and others, and for Sublime Text and TextMate."""
+    made = grammar()
+    as_json = json.dumps(made, indent=2, ensure_ascii=False) + "\n"
+    return dict(zip(NAMES, (as_json.encode(), plistlib.dumps(made, sort_keys=False)), strict=True))
+
+
+def main() -> None:
+    for name, text in texts().items():
+        (FOLDER / name).write_bytes(text)
+        print(f"wrote {FOLDER / name}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,198 @@
+"""A robot as a deck to go on with: its arm entry by entry, what the file says besides as comments, and runs to begin.
+
+What is printed of the arm are the entries themselves, so the deck's arm is the one that `from urdf(...)` makes, number
+for number. The first run holds the arm; where the file has damping or friction, another lets it fall under these.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Collection, Iterator, Mapping
+
+from ic.grammar.spell import spell
+from ic.grammar.syntax import Setting
+from ic.robots.attributes import shown
+from ic.robots.entries import Body, Part, spelled
+from ic.robots.names import word
+from ic.robots.robot import MOVING, Inertial, Joint
+from ic.robots.told import limits
+
+WIDE = 100  # columns of a block on one line
+WIDEST = 120  # with what is said of it behind
+FREE = "follows `{}` in the file{}; here it moves by itself"
+HELD = "follows `{}` in the file{}; here it is held at 0"
+
+
+def print_deck(body: Body, title: str) -> Iterator[str]:
+    """The deck's lines. title: its first comment."""
+    arm = arm_name(body)
+    yield f"// {_safe(title)}"
+    yield from _about(body)
+    yield ""
+    yield f"arm {arm} {{"
+    changed = {(each.kind, each.name): each.written.text for each in body.names.changed}
+    for part in body.links:
+        yield from _block(part, _link_notes(part, changed))
+    yield ""
+    for part in body.joints:
+        yield from _block(part, _joint_notes(part, changed))
+    yield "}"
+    yield from _runs(body, arm)
+
+
+def arm_name(body: Body) -> str:
+    stem = os.path.basename(body.robot.file).partition(".")[0]
+    return word(body.robot.name or stem, "arm")
+
+
+def _about(body: Body) -> Iterator[str]:
+    root = body.robot.root
+    weight = " What it weighs rests on the ground." if root.inertial is not None else ""
+    yield f"// `base` is the file's link `{_safe(root.name.text)}`.{weight}"
+    if body.robot.dropped:
+        kinds = sorted(body.robot.dropped.items(), key=lambda kind: (-len(kind[1]), kind[0]))
+        yield f"// Not in this deck: {', '.join(f'{len(places)} {_safe(tag)}' for tag, places in kinds)}."
+
+
+def _block(part: Part, notes: list[str]) -> Iterator[str]:
+    """An entry on one line where it is short, else a line for each key; notes behind the first line, or above it."""
+    words = " ".join(word.text for word in part.entry.words)
+    entries = [entry for entry in part.entry.body if isinstance(entry, Setting)]
+    settings = [(entry.path[0].text, f"{spell(entry.value)};") for entry in entries]
+    note = f"// {'; '.join(map(_safe, notes))}" if notes else ""
+    ends = [each for each in settings if each[0] in ("parent", "child")]
+    others = settings[len(ends):]
+    head = "  ".join(f"{key} = {value}" for key, value in ends)
+    line = f"    {words} {{ {'  '.join(f'{key} = {value}' for key, value in settings)} }}"
+    first = line if len(line) <= WIDE else f"    {words} {{"
+    if note and len(f"{first}  {note}") > WIDEST:
+        yield f"    {note}"
+        note = ""
+    yield f"{first}  {note}".rstrip()
+    if first == line:
+        return
+    if head:
+        yield f"        {head}"
+    width = max((len(key) for key, _ in [*ends[:1], *others]), default=0)
+    for key, value in others:
+        yield f"        {key:{width}} = {value}"
+    yield "    }"
+
+
+def _link_notes(part: Part, changed: Mapping[tuple[str, str], str]) -> list[str]:
+    notes = _called(part, "link", changed)
+    inertial = getattr(part.of, "inertial", None)
+    if isinstance(inertial, Inertial) and inertial.rpy is not None and not inertial.rpy.nothing:
+        notes.append(f"inertia turned from axes at rpy {' '.join(map(spelled, inertial.rpy.values))}")
+    return notes
+
+
+def _joint_notes(part: Part, changed: Mapping[tuple[str, str], str]) -> list[str]:
+    notes = _called(part, "joint", changed)
+    joint = part.of
+    assert isinstance(joint, Joint)
+    if joint.type.text == "continuous":
+        notes.append("continuous")
+    if joint.followed is not None:
+        law = f" ({joint.law})" if joint.law else ""
+        notes.append((HELD if joint.type.text == "fixed" else FREE).format(shown(joint.followed.text), law))
+    notes += _limit_notes(joint)
+    if joint.type.text in MOVING:
+        notes += [f"{name} {spelled(value)}" for name, value in joint.friction.items() if value]
+    return notes
+
+
+def _limit_notes(joint: Joint) -> Iterator[str]:
+    found = limits(joint)
+    length, effort = ("m", "N") if joint.type.text == "prismatic" else ("rad", "N*m")
+    if "lower" in found:
+        yield f"from {spelled(found['lower'])} to {spelled(found['upper'])} {length}"
+    if "velocity" in found:
+        yield f"at most {spelled(found['velocity'])} {length}/s"
+    if "effort" in found:
+        yield f"at most {spelled(found['effort'])} {effort}"
+
+
+def _called(part: Part, kind: str, changed: Mapping[tuple[str, str], str]) -> list[str]:
+    name = changed.get((kind, part.entry.words[1].text))
+    return [] if name is None else [f"`{shown(name)}` in the file"]
+
+
+# Runs to begin with
+
+
+def _runs(body: Body, arm: str) -> Iterator[str]:
+    joints = {part.entry.words[1].text: part.of for part in body.joints
+              if isinstance(part.of, Joint) and part.of.type.text in MOVING}  # fmt: skip
+    if not joints:
+        return
+    taken = {*joints, *(part.entry.words[1].text for part in body.links)}
+    held, slide = _free("held", taken), _free("held_slide", taken)
+    poses = {name: pose(joint) for name, joint in joints.items()}
+    slides = [name for name, joint in joints.items() if joint.type.text == "prismatic"]
+    yield ""
+    yield "// Each joint is held, and `tau` is what that takes. Put servos of yours in the place of these."
+    yield f"servo {held} {{ model = ideal;  bandwidth = 20 1/s;  command = position(0 rad); }}"
+    if slides:
+        yield f"servo {slide} like {held} {{ command = position(0 m); }}"
+    yield ""
+    yield "default run hold {"
+    yield f"    arm         = {arm};"
+    yield "    servos      {"
+    for name in joints:
+        servo, at = slide if name in slides else held, _at(poses[name], name in slides)
+        own = f" {{ command = position({at}); }}" if poses[name] else ""
+        yield f"        {name} = {servo}{own};" + ("  // the middle of its range, which 0 is not in" if own else "")
+    yield "    }"
+    moved = [f"{name}.q = {_at(poses[name], name in slides)};" for name in joints if poses[name]]
+    yield from (["    initial {", *(f"        {each}" for each in moved), "    }"] if moved else [])
+    yield "    environment { gravity = [0, 0, -9.81] m/s^2; }"
+    yield "    rates       { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }"
+    yield "    duration    = 1 s;"
+    yield "    record      = [q, tau];"
+    yield "}"
+    rubbing = {name: joint for name, joint in joints.items() if joint.friction_at is not None}
+    if rubbing:
+        yield from _fall(joints, rubbing, slides, lambda name: _free(name, taken))
+
+
+def _fall(joints: Mapping[str, Joint], rubbing: Mapping[str, Joint], slides: Collection[str],
+          free: Callable[[str], str]) -> Iterator[str]:
+    yield ""
+    yield "// The joints let go, with the damping and friction of the file."
+    for name in joints:
+        damping, friction = ("N*s/m", "N") if name in slides else ("N*m*s/rad", "N*m")
+        found = rubbing[name].friction if name in rubbing else {}
+        units = {"damping": damping, "friction": friction}
+        keys = "".join(f"  {key} = {spelled(value)} {units[key]};" for key, value in found.items() if value)
+        yield f"servo {free(f'{name}_bearing')} {{ model = passive;{keys} }}"
+    yield ""
+    yield "run fall like hold {"
+    yield "    servos {"
+    for name in joints:
+        yield f"        {name} = {free(f'{name}_bearing')};"
+    yield "    }"
+    yield "}"
+
+
+def pose(joint: Joint) -> float:
+    """Where a joint is held: at 0, or in the middle of its range where 0 is not within it."""
+    found = limits(joint)
+    lower, upper = found.get("lower", -1.0), found.get("upper", 1.0)
+    return 0.0 if lower <= 0.0 <= upper else float(f"{(lower + upper) / 2.0:.4g}")
+
+
+def _at(value: float, slides: bool) -> str:
+    return f"{spelled(value)} {'m' if slides else 'rad'}"
+
+
+def _free(name: str, taken: Collection[str]) -> str:
+    """The name, with underscores behind it while it is a joint's or a link's."""
+    while name in taken:
+        name += "_"
+    return name
+
+
+def _safe(text: str) -> str:
+    """Text that stays in its comment: printable, and no backslash, which would join the next line to it."""
+    return "".join(c if c.isprintable() and c != "\\" else "?" for c in text)

@@ -1,0 +1,168 @@
+"""A robot as the entries that a deck would hold for its arm, each with its place in the URDF file.
+
+    link upper { mass = 2 kg; com = [0, 0, 0.1] m; inertia = [...] kg*m^2; }
+    joint elbow revolute { parent = upper; child = lower; at = [...] m; rpy = [...] rad; axis = z; }
+
+A link without an inertia is `mass = 0 kg`. A continuous joint is a revolute one. Where the frame of inertia is turned,
+the moments are written in the link's axes. What is zero by itself is left out.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ic.grammar.syntax import Entry, Expression, Group, List, Name, Number, Setting, Unary, Unit, WithUnit, Word
+from ic.robots.names import Names, deck_names
+from ic.robots.robot import Inertial, Joint, Link, Numbers, Robot, Written
+from met.diagnostic import Place
+from met.frozen import frozen
+
+AXES = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
+UNITS = {"kg": (("kg", 1),), "m": (("m", 1),), "rad": (("rad", 1),), "kg*m^2": (("kg", 1), ("m", 2))}
+NOISE = 1e-15  # of sines and cosines of right angles, whose size is 1: cos(pi/2) is 6e-17 in doubles
+
+
+@frozen
+class Part:
+    """A link or joint of the robot as an entry."""
+
+    of: Link | Joint
+    entry: Group
+
+
+@frozen
+class Body:
+    """A robot's arm: its entries, links and then joints, in the file's order, and what its names are in decks."""
+
+    robot: Robot
+    names: Names
+    links: tuple[Part, ...]
+    joints: tuple[Part, ...]
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        return tuple(part.entry for part in (*self.links, *self.joints))
+
+
+def body(robot: Robot) -> Body:
+    names = deck_names(robot)
+    links = tuple(Part(link, _link(link, names.links[link.name.text])) for link in robot.carried)
+    joints = tuple(Part(joint, _joint(joint, names)) for joint in robot.joints)
+    return Body(robot, names, links, joints)
+
+
+def _link(link: Link, name: str) -> Group:
+    found = link.inertial
+    if found is None:
+        settings = [_setting("mass", _number(0.0, "kg", link.name.place), link.name.place)]
+    else:
+        settings = [_setting("mass", _number(found.mass.values[0], "kg", found.mass.place), found.mass.place)]
+        if found.com is not None and not found.com.nothing:
+            settings.append(_vector("com", found.com, "m"))
+        if found.mass.values[0] != 0.0 or not found.moments.nothing:
+            settings.append(_vector("inertia", moments(found), "kg*m^2"))
+    return _group("link", name, None, settings, link.name.place)
+
+
+def moments(inertial: Inertial) -> Numbers:
+    """xx, yy, zz in the link's axes, and xy, xz, yz where one of them is not zero."""
+    found = inertial.moments
+    if inertial.rpy is not None and not inertial.rpy.nothing:
+        found = Numbers(_turned(found.values, inertial.rpy.values), found.place)  # each of them made of all
+    return found if any(found.values[3:]) else Numbers(found.values[:3], found.place, found.each[:3])
+
+
+def _turned(found: tuple[float, ...], rpy: tuple[float, ...]) -> tuple[float, ...]:
+    """R I R' with R = Rz(yaw) Ry(pitch) Rx(roll): the same inertia in axes that are turned back."""
+    xx, yy, zz, xy, xz, yz = found
+    inertia = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    R = rotation(*rpy)
+    half = [[sum(R[i][k] * inertia[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
+    made = [[sum(half[i][k] * R[j][k] for k in range(3)) for j in range(3)] for i in range(3)]
+    off = [(made[i][j] + made[j][i]) / 2.0 + 0.0 for i, j in ((0, 1), (0, 2), (1, 2))]
+    return (made[0][0], made[1][1], made[2][2], *off)
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> tuple[tuple[float, float, float], ...]:
+    (cr, sr), (cp, sp), (cy, sy) = (_turn(angle) for angle in (roll, pitch, yaw))
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+
+
+def _turn(angle: float) -> tuple[float, float]:
+    """Cosine and sine; 0 where that is meant."""
+    c, s = math.cos(angle), math.sin(angle)
+    return (0.0 if abs(c) < NOISE else c), (0.0 if abs(s) < NOISE else s)
+
+
+def _joint(joint: Joint, names: Names) -> Group:
+    kind = "revolute" if joint.type.text == "continuous" else joint.type.text
+    settings = [_end("parent", joint.parent, names), _end("child", joint.child, names)]
+    if joint.at is not None and not joint.at.nothing:
+        settings.append(_vector("at", joint.at, "m"))
+    if joint.rpy is not None and not joint.rpy.nothing:
+        settings.append(_vector("rpy", joint.rpy, "rad"))
+    if kind in ("revolute", "prismatic"):
+        axis = joint.axis or Numbers((1.0, 0.0, 0.0), joint.name.place)  # URDF's default
+        settings.append(_setting("axis", _axis(axis), axis.place))
+    if joint.mimic is not None:
+        followed = names.joints.get(joint.mimic.text, joint.mimic.text)
+        settings.append(_setting("mimic", _name(followed, joint.mimic.place), joint.mimic.place))
+    return _group("joint", names.joints[joint.name.text], Word(kind, joint.type.place), settings, joint.name.place)
+
+
+def _end(key: str, link: Written, names: Names) -> Setting:
+    return _setting(key, _name(names.links[link.text], link.place), link.place)
+
+
+def _axis(axis: Numbers) -> Expression:
+    x, y, z = axis.values
+    if (x, y, z) in AXES:
+        return _name(AXES[x, y, z], axis.place)
+    if (-x + 0.0, -y + 0.0, -z + 0.0) in AXES:
+        return Unary("-", _name(AXES[-x + 0.0, -y + 0.0, -z + 0.0], axis.place), axis.place)
+    return List(tuple(_bare(value, axis.place) for value in axis.values), axis.place)
+
+
+# Nodes of the syntax tree
+
+
+def _group(kind: str, name: str, detail: Word | None, settings: list[Setting], place: Place) -> Group:
+    words = (Word(kind, place), Word(name, place), *((detail,) if detail is not None else ()))
+    return Group(words, None, None, tuple(settings), place)
+
+
+def _setting(key: str, value: Expression, place: Place) -> Setting:
+    return Setting((), (Word(key, place),), "=", value, place)
+
+
+def _vector(key: str, numbers: Numbers, unit: str) -> Setting:
+    place = numbers.place
+    places = numbers.each or (place,) * len(numbers.values)
+    items = tuple(_bare(value, each) for value, each in zip(numbers.values, places, strict=True))
+    return _setting(key, WithUnit(List(items, place), _unit(unit, place), place), place)
+
+
+def _number(value: float, unit: str, place: Place) -> Number:
+    return Number(value, _unit(unit, place), place, spelled(value))
+
+
+def _bare(value: float, place: Place) -> Number:
+    return Number(value, None, place, spelled(value))
+
+
+def _unit(text: str, place: Place) -> Unit:
+    return Unit(tuple((Word(name, place), power) for name, power in UNITS[text]), place, text)
+
+
+def _name(text: str, place: Place) -> Name:
+    return Name((Word(text, place),), place)
+
+
+def spelled(value: float) -> str:
+    """The shortest text that a deck reads as this very number."""
+    text = repr(value)
+    return text.removesuffix(".0")

@@ -1,0 +1,83 @@
+"""Names of a robot as a deck can hold them, no two alike.
+
+The root is `base`. Another name stays as it is where a deck can write it: letters, digits and `_`, not a digit first.
+Else, in this order:
+
+1. each run of other characters becomes one `_`, and a name that begins with a digit gets `_` before it;
+2. `_link` or `_joint` is added to a word that means something else (`base`, a unit such as `m`; a joint's `initial`),
+   and `_joint` to a joint of a link's name;
+3. `_2`, `_3`, ... is added to one that is taken.
+
+Names that can stay as they are have the first choice, so that `arm-1` never takes the place of `arm_1`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+from ic.meaning.resolve import RESERVED
+from ic.robots.robot import Robot, Written
+from met import units
+from met.frozen import frozen
+
+LONGEST = 200  # characters; a deck's names have 256 at most
+
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
+_OTHER = re.compile(r"[^A-Za-z0-9_]+", re.ASCII)
+_MACRO = re.compile(r"__\w+__")  # __LINE__ and its like: the preprocessor's
+
+
+@frozen
+class Changed:
+    """A name that is another in decks."""
+
+    kind: str  # "link", "joint"
+    written: Written
+    name: str
+
+
+@frozen
+class Names:
+    """The deck's name of each link and joint, by the file's; changed: those that differ, without the root."""
+
+    links: Mapping[str, str]
+    joints: Mapping[str, str]
+    changed: tuple[Changed, ...]
+
+
+def deck_names(robot: Robot) -> Names:
+    links = {robot.root.name.text: "base"}
+    links |= _named([link.name for link in robot.carried], "link", {"base"})
+    joints = _named([joint.name for joint in robot.joints], "joint", set(links.values()))
+    changed = [Changed("link", each.name, links[each.name.text]) for each in robot.carried]
+    changed += [Changed("joint", each.name, joints[each.name.text]) for each in robot.joints]
+    return Names(links, joints, tuple(each for each in changed if each.name != each.written.text))
+
+
+def word(text: str, kind: str) -> str:
+    """One name by itself: rules 1 and 2."""
+    made = _OTHER.sub("_", text)[:LONGEST]
+    made = made if _PLAIN.fullmatch(made) else f"_{made}"
+    return f"{made}_{kind}" if _means_something(made, kind) else made
+
+
+def _named(written: Sequence[Written], kind: str, taken: set[str]) -> dict[str, str]:
+    """taken: names of other kinds."""
+    names: dict[str, str] = {}
+    others, taken = taken, set(taken)
+    for each in sorted(written, key=lambda name: word(name.text, kind) != name.text):  # those that can stay first
+        made = word(each.text, kind)
+        if made in others and kind == "joint":
+            made = f"{made}_joint"
+        base, n = made, 2
+        while made in taken:
+            made, n = f"{base}_{n}", n + 1
+        names[each.text] = made
+        taken.add(made)
+    return names
+
+
+def _means_something(name: str, kind: str) -> bool:
+    reserved = name == "base" or units.is_unit(name) or _MACRO.fullmatch(name) is not None
+    return reserved or (kind != "link" and name in RESERVED)

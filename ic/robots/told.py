@@ -1,0 +1,71 @@
+"""What of a URDF file an arm does not have: one warning, a line for each kind; and which names it changes: another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from ic.robots.attributes import shown
+from ic.robots.entries import Body
+from ic.robots.robot import MOVING, Joint
+from met.diagnostic import Diagnostic, Label, Place
+
+MOST_NAMED = 8  # names, kinds of elements
+MOST_JOINTS = 4  # in a line; of more the first and the last
+
+
+def told(body: Body, named: Place) -> Iterator[Diagnostic]:
+    """named: where the deck names the file."""
+    labels = list(_left_out(body))
+    if labels:
+        yield Diagnostic("D210", f"not all that `{body.robot.file}` says is in this arm", Label(named), tuple(labels),
+                         ("`met import` makes a deck of such a file, with limits and friction beside each joint",),
+                         "warning")  # fmt: skip
+    changed = body.names.changed
+    if changed:
+        also = tuple(Label(each.written.place, f"{each.kind} `{shown(each.written.text)}` is `{each.name}`")
+                     for each in changed[:MOST_NAMED])  # fmt: skip
+        more = f", and {len(changed) - MOST_NAMED} more" if len(changed) > MOST_NAMED else ""
+        what = f"{_count(len(changed), 'name')} of `{body.robot.file}`"
+        yield Diagnostic("D211", f"{what} {'is' if len(changed) == 1 else 'are'} another in decks{more}", Label(named),
+                         also, ("a deck's names are letters, digits and `_`, each once",), "warning")  # fmt: skip
+
+
+def _left_out(body: Body) -> Iterator[Label]:
+    robot = body.robot
+    root = robot.root.inertial
+    if root is not None and root.mass.values[0] != 0.0:
+        yield Label(root.place, f"the inertia of `{shown(robot.root.name.text)}`: it is `base`, the ground")
+    limited = [joint for joint in robot.joints if limits(joint)]
+    if limited and limited[0].limits_at is not None:
+        yield Label(limited[0].limits_at, f"limits of {_joints(body, limited)}: an arm has none")
+    rubbing = [joint for joint in robot.joints if joint.friction_at is not None and joint.type.text in MOVING]
+    if rubbing and rubbing[0].friction_at is not None:
+        yield Label(rubbing[0].friction_at, f"damping and friction of {_joints(body, rubbing)}: a servo has these, "
+                    "such as `passive`")  # fmt: skip
+    if robot.dropped:
+        kinds = sorted(robot.dropped.items(), key=lambda kind: (-len(kind[1]), kind[0]))
+        told = [f"{len(places)} `{shown(tag)}`" for tag, places in kinds[:MOST_NAMED]]
+        more = f" and {len(kinds) - MOST_NAMED} kinds more" if len(kinds) > MOST_NAMED else ""
+        yield Label(kinds[0][1][0], f"not read: {', '.join(told)}{more}")
+
+
+def limits(joint: Joint) -> dict[str, float]:
+    """The limits that the joint has: none of position where it is continuous, and what is zero or less says nothing."""
+    if joint.type.text not in MOVING:
+        return {}
+    found = {name: value for name, value in joint.limits.items() if name in ("effort", "velocity") and value > 0.0}
+    lower, upper = joint.limits.get("lower", 0.0), joint.limits.get("upper", 0.0)
+    if joint.type.text != "continuous" and lower < upper:
+        found |= {"lower": lower, "upper": upper}
+    return found
+
+
+def _joints(body: Body, joints: Sequence[Joint]) -> str:
+    names = [body.names.joints[joint.name.text] for joint in joints]
+    listed = names if len(names) <= MOST_JOINTS else [*names[:2], "...", names[-1]]
+    return f"{_count(len(names), 'joint')} ({', '.join(listed)})"
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}{'s' * (n != 1)}"
+

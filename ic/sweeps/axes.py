@@ -1,0 +1,338 @@
+"""A sweep's block, read: what varies over which values, in the order written.
+
+Every `vary`, `zip`, `from` and `sample` is an axis. The cases are the product of the axes, in the order written: the
+first is the outermost and the last varies fastest, as digits of a number do; `repeat` is the innermost of all.
+`exclude when` then drops rows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from ic.grammar.syntax import Call, Expression, Group, Name, Setting, Statement, String, Word
+from ic.meaning.checks import Varied
+from ic.meaning.complaints import Complaints, belongs, known_words
+from ic.meaning.names import Names
+from ic.meaning.resolve import Definition, Definitions
+from ic.meaning.values import PURE, Value, evaluate_number, measure_of, place_of
+from ic.sweeps.choices import MACRO, Chosen, check_still, chosen, decides, path_place, refuse_words
+from ic.sweeps.designs import DESIGNS, read_sample
+from met import units
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.frozen import frozen
+from met.trace import Graph, Scalar
+
+MOST_CASES = 10_000_000
+KNOWN = ("vary", "zip", "from", "sample", "repeat", "exclude when", "seed", "seeds")
+SETTINGS = ("seed", "seeds")
+
+Column = Varied | Chosen
+
+
+@frozen
+class Axis:
+    """What varies together: columns of one length. note: what to tell of how they were made."""
+
+    columns: tuple[Column, ...]
+    note: str = ""
+
+    @property
+    def size(self) -> int:
+        return len(self.columns[0])
+
+
+@frozen
+class Sweep:
+    """What a sweep's block says.
+
+    repeat       how often each case is run; repeated: where that is written, if it is
+    independent  where `seeds = independent` is written, if it is
+    """
+
+    name: str
+    axes: tuple[Axis, ...]
+    excludes: tuple[Statement, ...]
+    seed: Setting | None
+    independent: Place | None
+    repeat: int
+    repeated: Place | None
+    place: Place
+
+    @property
+    def varied(self) -> tuple[Varied, ...]:
+        return tuple(column for axis in self.axes for column in axis.columns if isinstance(column, Varied))
+
+    @property
+    def chosen(self) -> tuple[Chosen, ...]:
+        return tuple(column for axis in self.axes for column in axis.columns if isinstance(column, Chosen))
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Of the axes, then of the repeats."""
+        return (*(axis.size for axis in self.axes), self.repeat)
+
+
+def read_sweep(definitions: Definitions, complaints: Complaints, definition: Definition, graph: Graph, *,
+               seed: int = 0) -> Sweep:
+    """The sweep's axes with their values; tells what is wrong with them. seed: the run's, for what is drawn."""
+    reader = _Reader(definitions, complaints, definition, graph, seed)
+    for entry in definition.group.body:
+        with complaints.gather():
+            reader.enter(entry)
+        if math.prod((*(axis.size for axis in reader.axes), reader.repeat)) > MOST_CASES:
+            break
+    sweep = Sweep(definition.name, tuple(reader.axes), tuple(reader.excludes), reader.seed, reader.independent,
+                  reader.repeat, reader.repeated, definition.place)
+    if not sweep.axes and sweep.repeated is None and not complaints.errors:
+        complaints.error("D126", f"sweep `{definition.name}` varies nothing", definition.place,
+                         help="write `vary PATH = [...] UNIT;`")
+    if math.prod(sweep.sizes) > MOST_CASES:
+        sizes = [str(size) for size in sweep.sizes[: None if sweep.repeated else -1]]
+        complaints.error("D134", f"sweep `{definition.name}` has {math.prod(sweep.sizes):.3g} cases", definition.place,
+                         help=f"{MOST_CASES} are possible: {' x '.join(sizes)} is more")
+    return sweep
+
+
+class _Reader:
+    """Entry after entry of a sweep's block."""
+
+    def __init__(self, definitions: Definitions, complaints: Complaints, definition: Definition, graph: Graph,
+                 seed: int) -> None:
+        self.definitions, self.complaints, self.graph, self.drawn = definitions, complaints, graph, 0
+        self.axes: list[Axis] = []
+        self.excludes: list[Statement] = []
+        self.seed: Setting | None = None
+        self.independent: Place | None = None
+        self.repeat = 1
+        self.repeated: Place | None = None
+        self.written: dict[str, Place] = {}
+        self.places: dict[str, list[Place]] = {}  # of the numbers of a path
+        self.base = definition.group.of.text if definition.group.of is not None else "RUN"
+        self.paths = {path: place for entry in definition.group.body for path, place in _paths(definitions, entry)}
+        self.seed_of_designs = seed
+        for entry in definition.group.body:
+            if isinstance(entry, Setting) and _is(entry, "seed"):
+                self.seed = entry
+                with complaints.gather():
+                    self.seed_of_designs = whole(definitions, entry.value, "a seed", least=0)
+
+    def enter(self, entry: object) -> None:
+        words = [word.text for word in getattr(entry, "words", ())]
+        match entry:
+            case Setting() if words in (["vary"], ["vary", "macro"]):
+                column = self.column(entry, entry.words[1:])
+                check_equal([column], self.places.get(column.path, ()))
+                self.axes.append(Axis((column,)))
+            case Group() if words == ["zip"]:
+                self.zip(entry)
+            case Statement() if words == ["from"]:
+                self.file(entry)
+            case Statement() if words == ["sample"]:
+                self.sample(entry)
+            case Statement() if words == ["repeat"]:
+                self.repeats(entry)
+            case Statement() if words == ["exclude", "when"]:
+                self.excludes.append(entry)
+            case Setting() if _is(entry, "seed"):
+                pass
+            case Setting() if _is(entry, "seeds"):
+                word = entry.value.text if isinstance(entry.value, Name) else ""
+                if word not in ("common", "independent"):
+                    raise Problem(error("D221", "`seeds` is `common` or `independent`", place_of(entry.value),
+                                        help=["common: cases that differ in what is varied feel the same noise",
+                                              "independent: each case has noise of its own"]))
+                self.independent = entry.place if word == "independent" else None
+            case _:
+                _refuse(entry, words, self.base)
+
+    # Axes
+
+    def zip(self, group: Group) -> None:
+        columns: list[Column] = []
+        before = len(self.complaints.errors)
+        for entry in group.body:
+            with self.complaints.gather():
+                words = [word.text for word in entry.words] if isinstance(entry, Setting) else None
+                if words is None or words not in ([], ["vary"], ["macro"], ["vary", "macro"]):
+                    raise Problem(error("D136", "a zip holds `PATH = [...];` and nothing else", entry.place,
+                                        help="all else stands in the sweep, beside the zip"))
+                assert isinstance(entry, Setting)
+                columns.append(self.column(entry, entry.words[-1:] if "macro" in words else ()))
+        if not group.body:
+            raise Problem(error("D126", "this zip is empty", group.place, help="write `PATH = [...];` in it"))
+        for other in columns[1:]:
+            if len(other) != len(columns[0]):
+                raise Problem(error(
+                    "D135", f"`{columns[0].path}` has {len(columns[0])} values and `{other.path}` has {len(other)}",
+                    other.place, also=[Label(columns[0].place, f"{len(columns[0])} values")],
+                    help="what is zipped goes in step: as many values each"))
+        if columns and len(self.complaints.errors) == before:
+            check_equal(columns, self.places.get(columns[0].path, ()))
+            self.axes.append(Axis(tuple(columns)))
+
+    def file(self, statement: Statement) -> None:
+        """`from "cases.csv";`: a row of the file a case, or a value of the axis; its columns are paths."""
+        if not isinstance(statement.value, String):
+            raise Problem(error("D222", "`from` takes the name of a CSV file", place_of(statement.value),
+                                help='write `from "cases.csv";`: its first line names paths, with units'))
+        from ic.sweeps.files import columns_of
+
+        columns, rows = columns_of(self.definitions, statement.value, self.graph)
+        for column in columns:
+            self.note(column.path, column.place)
+        check_equal(columns, rows)
+        self.axes.append(Axis(tuple(columns)))
+
+    def sample(self, statement: Statement) -> None:
+        sample = read_sample(self.definitions, self.complaints, statement, self.paths, self.seed_of_designs)
+        for part in sample.parts:
+            self.note(part.path, part.place)
+        self.drawn += 1
+        drawn = sample.draw(self.drawn)
+        columns: list[Column] = []
+        for part, numbers in zip(sample.parts, drawn, strict=True):
+            columns.append(self.varied(part.path, part.place, numbers, part.low, part.unit))
+        if sample.warning is not None:
+            self.complaints.remark("D228", *sample.warning, help="take a power of 2")
+        self.axes.append(Axis(tuple(columns), sample.note))
+
+    def repeats(self, statement: Statement) -> None:
+        if self.repeated is not None:
+            raise Problem(error("D040", "`repeat` is written twice", statement.place,
+                                also=[Label(self.repeated, "first")], help="leave one out"))
+        self.repeat = whole(self.definitions, statement.value, "a number of repeats", least=2)
+        self.repeated = statement.place
+
+    # One column
+
+    def note(self, path: str, place: Place) -> None:
+        if path in self.written:
+            raise Problem(error("D040", f"`{path}` is varied twice", place, also=[Label(self.written[path], "first")],
+                                help="leave one out"))
+        self.written[path] = place
+
+    def column(self, entry: Setting, detail: Sequence[Word] = ()) -> Column:
+        """detail: `macro` where it is written."""
+        path = ".".join(word.text for word in entry.path)
+        place = path_place(entry)
+        if detail:
+            path = f"{MACRO} {path}"
+        self.note(path, place)
+        if entry.operator == "+=":
+            raise Problem(error("D056", "nothing to append to in a sweep", place, help="write `=`"))
+        names = Names(self.definitions, {}, watched=set(self.paths))
+        if detail or decides(self.definitions, path, entry.value, names):
+            return chosen(path, entry, names)
+        refuse_words(path, place, entry.value, names)
+        return self.numbers(path, entry, names)
+
+    def numbers(self, path: str, entry: Setting, names: Names) -> Varied:
+        found = names.evaluate(entry.value)
+        check_still(path, entry, names, self.paths)
+        if isinstance(found, Value):
+            raise Problem(error("D126", f"`{path}` varies over a list of values, and this is one value", found.place,
+                                help=["write `[a, b, c] UNIT`, `(a .. b by c) UNIT` or `linspace(from, to, count) "
+                                      "UNIT`", "one value that stands still belongs into the run"]))
+        values = [value for value in found.items if isinstance(value, Value)]
+        if len(values) != len(found.items):
+            raise Problem(error("D126", "a list inside a list", found.place,
+                                help=f"a vector varies by its parts: `vary {path}.x = [...];`"))
+        if not values:
+            raise Problem(error("D126", f"`{path}` has no values", found.place, help="one at least"))
+        first = values[0]
+        for value in values[1:]:
+            if not units.same(value.dimension, first.dimension):
+                raise Problem(error("D063", f"{named(value)} in a list that begins with {named(first)}", value.place,
+                                    also=[Label(first.place, named(first))], help="all must be of one dimension"))
+        unit = found.unit or first.unit
+        bare = all(value.bare for value in values)
+        self.places[path] = [value.place for value in values]
+        return self.varied(path, path_place(entry), np.array([value.number for value in values], dtype=float),
+                           Value(0.0, first.dimension, first.place, bare, unit), unit)
+
+    def varied(self, path: str, place: Place, numbers: np.ndarray, like: Value, unit) -> Varied:  # type: ignore[no-untyped-def]
+        """A column of numbers in SI. like: a value of its dimension; unit: the one that the deck wrote."""
+        scale = 1.0
+        if unit is not None and measure_of(unit).dimension == like.dimension:
+            scale = measure_of(unit).scale
+        value = Value(self.graph.input(path), like.dimension, like.place, like.bare, unit)
+        return Varied(path, place, numbers, value, unit, scale)
+
+
+def _is(entry: Setting, name: str) -> bool:
+    return not entry.words and len(entry.path) == 1 and entry.path[0].text == name
+
+
+def whole(definitions: Definitions, expression: Expression, what: str, *, least: int) -> int:
+    """A whole number that no sweep varies. Raises Problem D113."""
+    found = evaluate_number(expression, Names(definitions, {}).find)
+    number = found.number
+    if isinstance(number, Scalar) or found.dimension != PURE or not float(number).is_integer() \
+            or not least <= number <= 2**53:
+        most = "2^53" if least == 0 else f"{MOST_CASES}"
+        raise Problem(error("D113", f"{what} is a whole number from {least} to {most}", found.place))
+    return int(number)
+
+
+def _paths(definitions: Definitions, entry: object) -> list[tuple[str, Place]]:
+    """Paths that an entry of the sweep varies, and where."""
+    if isinstance(entry, Setting):
+        return [(".".join(word.text for word in entry.path), path_place(entry))]
+    if isinstance(entry, Group):
+        return [path for inner in entry.body for path in _paths(definitions, inner)]
+    if isinstance(entry, Statement) and isinstance(entry.value, Call) and entry.value.body is not None:
+        return [path for inner in entry.value.body for path in _paths(definitions, inner)]
+    if isinstance(entry, Statement) and isinstance(entry.value, String) and entry.words[0].text == "from":
+        with suppress(Problem):  # which is told where the file's columns are read
+            return [(column.name, column.place) for column in definitions.csv_files.table(entry.value).columns]
+    return []
+
+
+def _refuse(entry: object, words: list[str], base: str) -> None:
+    """Tells that an entry has no business in a sweep."""
+    place = entry.place  # type: ignore[attr-defined]  # every entry has one
+    if isinstance(entry, Setting) and not words and len(entry.path) == 1 and entry.path[0].text in ("repeat", "sample"):
+        usage = {"repeat": "repeat 5;", "sample": "sample lhs(200) { PATH = uniform(a, b) UNIT; }"}
+        raise Problem(error("D136", f"`{entry.path[0].text} = ...` in a sweep", place,
+                            help=f"write `{usage[entry.path[0].text]}`"))
+    if isinstance(entry, Setting) and not words:
+        path = ".".join(word.text for word in entry.path)
+        raise Problem(error("D136", f"`{path} = ...` in a sweep", place,
+                            help=[f"`vary {path} = [...];` to vary it",
+                                  f"or set it in a run `like {base}`, and sweep that"]))
+    if words[:1] == ["sample"]:
+        raise Problem(error("D136", "a sample names its design and how many", place,
+                            help=f"write `sample lhs(200) {{ ... }}`; {known_words('designs', DESIGNS)}"))
+    if words[:3] == ["exclude", "when", "macro"]:
+        raise Problem(error("D136", "a condition names a macro by its name alone", place,
+                            help="leave out the word `macro`: the macro's value is put in as text"))
+    if words[:1] == ["require"]:
+        raise Problem(error("D136", "`require` in a sweep", place,
+                            help=f"it belongs to the run: write a run `like {base}` with it, and sweep that"))
+    raise Problem(error("D136", f"no `{' '.join(words)}` in a sweep", place,
+                        help=[*did_you_mean(" ".join(words), KNOWN), *belongs(words[0] if words else ""),
+                              known_words("a sweep has", KNOWN)]))
+
+
+def named(value: Value) -> str:
+    return "a pure number" if value.dimension == PURE else units.text(value.dimension)
+
+
+def check_equal(columns: Sequence[Column], places: Sequence[Place]) -> None:
+    """The same values twice are the same case twice. places: of the rows, or of the first column's numbers."""
+    seen: dict[tuple[float | str, ...], int] = {}
+    keys = [column.values.tolist() if isinstance(column, Varied) else [o.text for o in column.options]
+            for column in columns]
+    for n, row in enumerate(zip(*keys, strict=True)):
+        if row in seen:
+            if isinstance(columns[0], Chosen) and not places:
+                places = [option.place for option in columns[0].options]
+            first, again = places[seen[row]], places[n]
+            raise Problem(error("D133", f"values number {seen[row] + 1} and {n + 1} are the same", again,
+                                also=[Label(first, "first")] if first != again else [],
+                                help="leave one out: each case stands in the table once"))
+        seen[row] = n

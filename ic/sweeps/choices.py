@@ -1,0 +1,254 @@
+"""What decides the structure of a case: words, models, rates, macros. A run with one choice of each put in.
+
+A number that a model takes is an input of the program, and cases that differ in it alone run together. What decides
+the program itself makes another structure: a servo, a law, an integrator, a rate, a word such as `world`. For each
+choice the run is resolved as the deck that one would write by hand, `run NAME like BASE { ... }` with the choice in it;
+for each value of a macro the deck is read again with `-D`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from ic.grammar.spell import spell
+from ic.grammar.syntax import Call, Entry, Expression, Group, List, Name, Number, Setting, String, Unit, WithUnit, Word
+from ic.meaning.names import Names
+from ic.meaning.resolve import Definition, Definitions
+from ic.meaning.values import FUNCTIONS, Value, Values, evaluate, measure_of, place_of, spanned
+from met import units
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.frozen import frozen
+from met.trace import Scalar
+
+MACRO = "macro"
+"""What a path of a macro begins with, before a space: `macro PAYLOAD`."""
+
+OF_RUN = ("integrator", "arm", "duration")
+OF_JOINT = ("servo", "law", "bed")
+OF_SERVO = ("model", "command", "rate")
+NEVER_NUMBERS = ("shape", "along", "of", "parent", "child", "axes", "interpolation", "growth")
+A_RUN_FOR_EACH = "write a run for each, `like` the first, and `sweep NAME = ONE + OTHER;`"
+
+
+@frozen
+class Option:
+    """One choice: as text, as an entry's value, and where it is written."""
+
+    text: str
+    expression: Expression
+    place: Place
+
+
+@frozen
+class Chosen:
+    """A column of a sweep that decides the structure, with an option for each of its values."""
+
+    path: str
+    place: Place
+    options: tuple[Option, ...]
+
+    def __len__(self) -> int:
+        return len(self.options)
+
+    @property
+    def macro(self) -> str:
+        """The macro's name; "" where it is none."""
+        head, _, name = self.path.partition(" ")
+        return name if head == MACRO else ""
+
+
+Choices = tuple[tuple[Chosen, Option], ...]
+
+
+def decides(definitions: Definitions, path: str, values: Expression, names: Names) -> bool:
+    """Whether what this path names decides the structure; of a model's parameters, words do."""
+    first, *rest = path.split(".")
+    if path in definitions.lets:
+        return False
+    if path in OF_RUN or (first == "rates" and rest) or path == "environment.velocity_products":
+        return True
+    if first in definitions.of_kind("servo"):
+        return (len(rest) == 1 and rest[0] in OF_SERVO) or _are_words(values, names)
+    if len(rest) == 1 and rest[0] in OF_JOINT:
+        return True
+    if rest[:1] == ["servo"] and len(rest) == 2 and rest[1] in OF_SERVO:
+        return True
+    return (first == "environment" or rest[:1] in [[each] for each in OF_JOINT]) and _are_words(values, names)
+
+
+def _are_words(values: Expression, names: Names) -> bool:
+    items = values.items if isinstance(values, List) else ()
+    models = any(isinstance(item, Call) and item.name.text not in FUNCTIONS for item in items)
+    return models or word_in(values, names) is not None
+
+
+def word_in(listed: Expression, names: Names) -> Name | String | None:
+    """The first item of a list of texts, or of names that have no value and are like none that has."""
+
+    def is_word(item: Expression) -> bool:
+        if not isinstance(item, Name):
+            return isinstance(item, String)
+        known = names.knows(item.text) or units.is_unit(item.text) or did_you_mean(item.text, names.definitions.lets)
+        return len(item.path) == 1 and not known
+
+    items = listed.items if isinstance(listed, List) else ()
+    return next((item for item in items if all(is_word(each) for each in items)), None)  # type: ignore[return-value]
+
+
+def refuse_words(path: str, place: Place, values: Expression, names: Names) -> None:
+    """Raises Problem D122 for words, models and lists where numbers vary. place: of the path."""
+    if path == "record":
+        raise Problem(error("D122", "`record` cannot vary", place, help="record all that any case needs"))
+    items = values.items if isinstance(values, List) else ()
+    model = next((item for item in items if isinstance(item, Call) and item.name.text not in FUNCTIONS), None)
+    if model is not None:
+        raise Problem(error("D122", f"`{path}` cannot vary over `{model.name.text}` and the like", place_of(model),
+                            help=[f"vary a parameter of it: `vary {path}.PARAMETER = [...];`", A_RUN_FOR_EACH]))
+    word = word_in(values, names)
+    if word is not None:
+        helps = [A_RUN_FOR_EACH]
+        if isinstance(word, Name) and path.rpartition(".")[2] not in NEVER_NUMBERS:
+            helps.append(f"where a number is meant, define it: `let {word.text} = ...;`")
+        raise Problem(error("D122", f"`{path}` cannot vary over words", place_of(word), help=helps))
+
+
+def path_place(entry: Setting) -> Place:
+    """Of the path of a `vary`, without that word."""
+    return spanned(entry.path[0].place, entry.path[-1].place)
+
+
+def check_still(path: str, entry: Setting, names: Names, varied: Mapping[str, Place]) -> None:
+    """Raises Problem D121 where the values were computed from what varies. varied: all paths of the sweep."""
+    for other in names.followed:
+        if other == path:
+            raise Problem(error("D121", f"the values of `{path}` depend on `{path}` itself, which varies",
+                                place_of(entry.value), help="write numbers that stand still"))
+        raise Problem(error("D121", f"the values of `{path}` depend on `{other}`, which varies too",
+                            place_of(entry.value), also=[Label(varied[other], "varies here")],
+                            help=["write numbers that stand still",
+                                  f"or compute it from `{other}` where it is defined, and vary `{other}` alone"]))
+
+
+def chosen(path: str, entry: Setting, names: Names) -> Chosen:
+    """The options of a `vary` or of a line of a `zip`."""
+    values = entry.value
+    if isinstance(values, List):
+        options = [_option(item, names, None) for item in values.items]
+    elif isinstance(values, WithUnit) and isinstance(values.inner, List):
+        options = [_option(WithUnit(item, values.unit, place_of(item)), names, values.unit)
+                   for item in values.inner.items]
+    else:
+        found = evaluate(values, names.find) if not isinstance(values, (Name, String)) else None
+        if not isinstance(found, Values):
+            raise Problem(error("D126", f"`{path}` varies over a list, and this is one value", place_of(values),
+                                help=f"write `vary {path} = [{spell(values)}, ...];`"))
+        options = [_number(item, found.unit) for item in found.items if isinstance(item, Value)]
+    if not options:
+        raise Problem(error("D126", f"`{path}` has no values", place_of(values), help="one at least"))
+    return Chosen(path, path_place(entry), tuple(options))
+
+
+def _option(item: Expression, names: Names, unit: Unit | None) -> Option:
+    """A list's item; one that is a number is named by its value, however it is written."""
+    place = place_of(item.inner if isinstance(item, WithUnit) and unit is not None else item)
+    is_model = isinstance(item, Call) and item.name.text not in FUNCTIONS
+    if not is_model and not isinstance(item, String) and not (isinstance(item, Name) and not names.knows(item.text)):
+        found = names.evaluate(item)
+        if isinstance(found, Value):
+            if isinstance(item, WithUnit) and unit is not None:  # whose unit stands behind the list
+                item = WithUnit(item.inner, replace(unit, place=place), place)
+            return Option(_number(found, unit or found.unit).text, item, place)
+    return Option(spell(item), item, place)
+
+
+def _number(value: Value, unit: Unit | None) -> Option:
+    if isinstance(value.number, Scalar):
+        raise Problem(error("D121", "this value depends on what the sweep varies", value.place,
+                            help="write numbers that stand still"))
+    scale = measure_of(unit).scale if unit is not None else 1.0
+    number = float(value.number) / scale
+    text = f"{number:.12g}"
+    shown = f"{text} {unit.text}" if unit is not None else text
+    return Option(shown, Number(number, unit, value.place, text), value.place)
+
+
+# A run with its choices put in
+
+
+def put_in(definitions: Definitions, run: Definition, choices: Choices) -> tuple[Definitions, Definition]:
+    """The deck's definitions and the run, changed to what is chosen (macros apart, which make another deck)."""
+    tree: dict[str, Any] = {}
+    servos: list[Definition] = []
+    told = []
+    for column, option in choices:
+        if column.macro:
+            continue
+        told.append(f"{column.path} = {option.text}")
+        first, *rest = column.path.split(".")
+        servo = definitions.of_kind("servo").get(first)
+        if servo is not None and rest:
+            if len(rest) > 1:
+                raise Problem(error("D122", f"`{column.path}` cannot vary by itself", column.place,
+                                    help=f"vary all of it: `vary {first}.{rest[0]} = [...];`"))
+            earlier = next((each for each in servos if each.name == first), servo)
+            servos = [*(each for each in servos if each is not earlier), _changed(earlier, rest[0], column, option)]
+            continue
+        _place(tree, _keys(first, rest), column, option)
+    made = definitions.instead(*servos)
+    if not tree:
+        return made, run
+    body = tuple(_entries(tree))
+    base = Name((Word(run.name, run.place),), run.place)
+    name = f"{run.name} with {', '.join(told)}"
+    group = Group((*run.group.words[:-1], Word(name, run.place)), base, None, body, run.place)
+    return made, Definition("run", name, group)
+
+
+def _keys(first: str, rest: Sequence[str]) -> tuple[str, ...]:
+    """Where in a run's block the path's value is written."""
+    if rest and rest[0] == "servo":
+        return ("servos", first, *rest[1:])
+    return (first, *rest)
+
+
+def _place(tree: dict[str, Any], keys: Sequence[str], column: Chosen, option: Option) -> None:
+    at = tree
+    for key in keys[:-1]:
+        at = at.setdefault(key, {})
+        if not isinstance(at, dict):
+            raise _both(at[0], column)
+    there = at.get(keys[-1])
+    if there is not None:
+        raise _both(there[0] if isinstance(there, tuple) else column, column)
+    at[keys[-1]] = (column, option)
+
+
+def _both(earlier: Chosen, later: Chosen) -> Problem:
+    return Problem(error("D123", f"`{earlier.path}` and `{later.path}` set the same", later.place,
+                         also=[Label(earlier.place, "the first")], help="vary one of them, or go two ways: "
+                         "two sweeps, and `sweep NAME = ONE + OTHER;`"))
+
+
+def _entries(tree: dict[str, Any]) -> list[Entry]:
+    made: list[Entry] = []
+    for key, inner in tree.items():
+        if isinstance(inner, dict):
+            entries = tuple(_entries(inner))
+            place = entries[0].place
+            made.append(Group((Word(key, place),), None, None, entries, place))
+        else:
+            column, option = inner
+            made.append(Setting((), (Word(key, column.place),), "=", option.expression, column.place))
+    return made
+
+
+def _changed(servo: Definition, key: str, column: Chosen, option: Option) -> Definition:
+    """A servo's definition with one key set otherwise."""
+    kept = [entry for entry in servo.group.body
+            if not (isinstance(entry, Setting) and [word.text for word in entry.path] == [key])
+            and not (isinstance(entry, Group) and [word.text for word in entry.words] == [key])]
+    entry = Setting((), (Word(key, column.place),), "=", option.expression, column.place)
+    group = Group(servo.group.words, servo.group.like, servo.group.of, (*kept, entry), servo.group.place)
+    return Definition(servo.kind, servo.name, group, servo.default)

@@ -1,0 +1,225 @@
+"""Samples: cases drawn from distributions, when the plan is made; the plan holds the numbers.
+
+    lhs(n)      a Latin hypercube: each parameter's range in n equal parts, one value from each
+    sobol(n)    a scrambled Sobol sequence: evenly spread, best where n is a power of 2
+    random(n)   independent draws
+
+A design makes n points in the unit cube, a distribution's quantiles turn them into values. Those are rounded to 12
+digits in the deck's unit: so a table that is printed and read back is the same table, and a last place in which
+versions of a library differ makes no other case.
+"""
+
+from __future__ import annotations
+
+import warnings
+import zlib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ic.grammar.syntax import Call, Expression, Setting, Statement, Unit, WithUnit
+from ic.meaning.complaints import Complaints, known_words
+from ic.meaning.names import Names
+from ic.meaning.resolve import Definitions
+from ic.meaning.values import PURE, Value, evaluate_number, measure_of, place_of
+from ic.sweeps.choices import check_still
+from met import units
+from met.diagnostic import Place, Problem, did_you_mean, error
+from met.frozen import frozen
+from met.trace import Scalar
+
+DIGITS = 12
+MOST_SAMPLES = 1_000_000
+MOST_SOBOL = 1 << 30
+DESIGNS = ("lhs", "sobol", "random")
+DISTRIBUTIONS: Mapping[str, tuple[str, ...]] = {
+    "uniform": ("from", "to"), "loguniform": ("from", "to"), "normal": ("mean", "deviation"),
+    "truncated": ("mean", "deviation", "from", "to"),
+}  # fmt: skip
+
+
+@frozen
+class Part:
+    """One parameter that is drawn: its distribution, with arguments in SI. low: the first of them as written."""
+
+    path: str
+    place: Place
+    distribution: str
+    arguments: tuple[float, ...]
+    low: Value
+    unit: Unit | None
+
+    def values(self, points: np.ndarray) -> np.ndarray:
+        """Quantiles at these points of (0, 1), SI, rounded in the deck's unit."""
+        scale = measure_of(self.unit).scale if self.unit is not None else 1.0
+        exact = QUANTILES[self.distribution](points, *(x / scale for x in self.arguments))
+        rounded = np.array([float(f"{x:.{DIGITS}g}") for x in exact])
+        if self.distribution != "normal":
+            low, high = (x / scale for x in self.arguments[-2:])
+            rounded = np.clip(rounded, low, high)
+        return rounded * scale
+
+
+@frozen
+class Sample:
+    """What a `sample` says. warning: message and place of what to tell of it."""
+
+    design: str
+    count: int
+    seed: int
+    parts: tuple[Part, ...]
+    warning: tuple[str, Place] | None = None
+
+    @property
+    def note(self) -> str:
+        lasting = ": another count would draw other values" if self.design == "lhs" else ""
+        return f"sample {self.design}({self.count}), seed {self.seed}{lasting}"
+
+    def draw(self, number: int) -> list[np.ndarray]:
+        """The values of each part. number: of the sample in its sweep, from 1. Raises Problem where they are one."""
+        points = _points(self.design, self.count, [part.path for part in self.parts], self.seed, number)
+        found = [part.values(column) for part, column in zip(self.parts, points.T, strict=True)]
+        for part, values in zip(self.parts, found, strict=True):
+            different = len(np.unique(values))
+            if 2 * different < self.count:
+                raise Problem(error("D225", f"`{part.path}` hardly varies: {self.count} samples have {different} "
+                                    f"value{'s' * (different != 1)}", part.place,
+                                    help=[f"values have {DIGITS} digits: draw it from a wider distribution",
+                                          "or leave it out"]))
+        return found
+
+
+def _points(design: str, count: int, paths: list[str], seed: int, number: int) -> np.ndarray:
+    """Points of the open unit cube, [count, len(paths)]."""
+    if design == "random":  # a stream for each path, so that more samples or parameters change no old value
+        streams = [np.random.Generator(np.random.Philox(key=[seed, zlib.crc32(path.encode()) << 32 | number]))
+                   for path in paths]
+        points = np.stack([stream.random(count) for stream in streams], axis=1)
+    else:
+        from scipy.stats import qmc  # takes most of a second to import
+
+        stream = np.random.Generator(np.random.PCG64([seed, number]))
+        sampler = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}[design](len(paths), rng=stream)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of counts that are no power of 2, which we tell
+            points = sampler.random(count)
+    return np.asarray(np.clip(points, 2.0**-54, 1.0 - 2.0**-53))
+
+
+def _truncated(points: np.ndarray, mean: float, deviation: float, low: float, high: float) -> np.ndarray:
+    from scipy.stats import truncnorm
+
+    found = truncnorm.ppf(points, (low - mean) / deviation, (high - mean) / deviation, loc=mean, scale=deviation)
+    return np.asarray(found, dtype=float)
+
+
+def _normal(points: np.ndarray, mean: float, deviation: float) -> np.ndarray:
+    from scipy.special import ndtri
+
+    return np.asarray(mean + deviation * ndtri(points), dtype=float)
+
+
+QUANTILES: Mapping[str, Callable[..., np.ndarray]] = {
+    "uniform": lambda points, low, high: low + (high - low) * points,
+    "loguniform": lambda points, low, high: low * np.exp(np.log(high / low) * points),
+    "normal": _normal,
+    "truncated": _truncated,
+}
+
+
+# Reading
+
+
+def read_sample(definitions: Definitions, complaints: Complaints, statement: Statement, paths: Mapping[str, Place],
+                seed: int) -> Sample:
+    """`sample lhs(200) { PATH = uniform(a, b) UNIT; ... }`. paths: what the sweep varies, and where.
+
+    Raises Problem, placed.
+    """
+    call = statement.value
+    if not isinstance(call, Call) or call.body is None:
+        raise Problem(error("D224", "a sample is a design and a block", place_of(call),
+                            help="write `sample lhs(200) { PATH = uniform(a, b) UNIT; }`"))
+    design = call.name.text
+    if design not in DESIGNS:
+        raise Problem(error("D224", f"no design `{design}`", call.name.place,
+                            help=[*did_you_mean(design, DESIGNS), known_words("designs", DESIGNS)]))
+    if len(call.positional) != 1 or call.named:
+        raise Problem(error("D224", f"`{design}` takes the number of samples", call.name.place,
+                            help=f"write `sample {design}(200) {{ ... }}`"))
+    names = Names(definitions, {}, watched=set(paths))
+    count = _count(evaluate_number(call.positional[0], names.find))
+    parts = []
+    before = len(complaints.errors)
+    for entry in call.body:
+        with complaints.gather():
+            if not isinstance(entry, Setting) or entry.words or entry.operator != "=":
+                other = [f"leave out `{entry.words[0].text}`"] if isinstance(entry, Setting) and entry.words else []
+                raise Problem(error("D224", "a sample holds `PATH = DISTRIBUTION(...);` and nothing else", entry.place,
+                                    help=[*other, known_words("distributions", DISTRIBUTIONS)]))
+            parts.append(_part(entry, names, paths))
+    if len(complaints.errors) > before:
+        raise Problem(())
+    if not parts:
+        raise Problem(error("D224", "this sample is empty", statement.place,
+                            help="write `PATH = uniform(a, b) UNIT;` in it"))
+    warning = None
+    if design == "sobol" and count & (count - 1):
+        lower = 1 << (count.bit_length() - 1)
+        warning = (f"{count} points of a Sobol sequence are less even than {lower} or {2 * lower}",
+                   place_of(call.positional[0]))
+    return Sample(design, count, seed, tuple(parts), warning)
+
+
+def _count(found: Value) -> int:
+    number = found.number
+    if isinstance(number, Scalar) or found.dimension != PURE or not float(number).is_integer() \
+            or not 1 <= number <= MOST_SAMPLES:
+        raise Problem(error("D113", f"a number of samples is a whole number from 1 to {MOST_SAMPLES}", found.place))
+    return int(number)
+
+
+def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> Part:
+    path = ".".join(word.text for word in entry.path)
+    unit, call = None, entry.value
+    if isinstance(call, WithUnit):
+        unit, call = call.unit, call.inner
+    if not isinstance(call, Call) or call.name.text not in DISTRIBUTIONS:
+        near = did_you_mean(call.name.text, DISTRIBUTIONS) if isinstance(call, Call) else ()
+        raise Problem(error("D225", f"`{path}` is drawn from a distribution", place_of(entry.value),
+                            help=[*near, f"write `{path} = uniform(a, b) UNIT;`",
+                                  known_words("distributions", DISTRIBUTIONS)]))
+    name = call.name.text
+    wanted = DISTRIBUTIONS[name]
+    usage = f"write `{name}({', '.join(wanted)}) UNIT`"
+    if len(call.positional) != len(wanted) or call.named or call.body is not None:
+        raise Problem(error("D225", f"`{name}` takes {len(wanted)} numbers, in order", call.name.place, help=usage))
+    found = [evaluate_number(_in_unit(each, unit), names.find) for each in call.positional]
+    check_still(path, entry, names, paths)
+    for other in found[1:]:
+        if not units.same(other.dimension, found[0].dimension):
+            raise Problem(error("D063", f"`{name}` of {units.text(found[0].dimension)} and "
+                                f"{units.text(other.dimension)}", other.place, help="all must be of one dimension"))
+    arguments = tuple(float(value.number) for value in found)
+    _check_arguments(name, arguments, found)
+    unit = unit or next((value.unit for value in found if value.unit is not None), None)
+    if unit is not None and measure_of(unit).dimension != found[0].dimension:
+        unit = None
+    return Part(path, entry.place, name, arguments, found[0], unit)
+
+
+def _in_unit(expression: Expression, unit: Unit | None) -> Expression:
+    return expression if unit is None else WithUnit(expression, unit, place_of(expression))
+
+
+def _check_arguments(name: str, arguments: tuple[float, ...], found: list[Any]) -> None:
+    if name in ("normal", "truncated") and not arguments[1] > 0.0:
+        raise Problem(error("D225", "a standard deviation is above 0", found[1].place,
+                            help="a parameter that does not vary belongs into the run"))
+    if name != "normal" and not arguments[-2] < arguments[-1]:
+        raise Problem(error("D225", f"`{name}` goes from a lower to a higher value", found[-1].place,
+                            help="change the two about, or leave the parameter out where they are equal"))
+    if name == "loguniform" and not arguments[0] * arguments[1] > 0.0:
+        raise Problem(error("D225", "the ends of a loguniform are both above or both below zero", found[0].place,
+                            help="`uniform` has no such limit"))

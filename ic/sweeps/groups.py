@@ -1,0 +1,293 @@
+"""A run, a sweep or a sum of them as experiments: one for each structure, with its cases and their positions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ic.grammar.syntax import Deck, Word
+from ic.meaning.complaints import Complaints, known_words
+from ic.meaning.experiment import experiment
+from ic.meaning.resolve import Definition, Definitions
+from ic.meaning.run import resolve_run
+from ic.meaning.scope import Scope
+from ic.sweeps.axes import Sweep, read_sweep, whole
+from ic.sweeps.choices import Choices, put_in
+from ic.sweeps.reach import check_coordinates, coordinates, idle
+from ic.sweeps.table import columns, kept, repeats, structures
+from met import keys
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.frozen import frozen
+from met.plan import Cases, Choice, Experiment
+from met.trace import Formulas, Graph, Scalar
+
+Group = tuple[Experiment, Scope]
+Reread = Callable[[Sequence[str]], Deck]
+"""The deck read again with further macros, `NAME=VALUE`. Raises Problem."""
+
+MOST_STRUCTURES = 256
+
+
+@frozen
+class Source:
+    """Where definitions come from: what is known of the deck, and how to read it with other macros."""
+
+    definitions: Definitions
+    complaints: Complaints
+    reread: Reread
+
+
+def lower(source: Source, definition: Definition) -> list[Group]:
+    """The experiments of a run or sweep; none where something of it is wrong, which was told."""
+    if definition.kind == "run":
+        scope = Scope(source.definitions, source.complaints)
+        resolved = resolve_run(scope, definition)
+        if resolved is None:
+            return []
+        return [(experiment(scope, definition.name, definition.place, resolved, Cases(1, (), resolved.seed)), scope)]
+    return _sum(source, definition, ()) if definition.parts else _Sweep(source, definition).groups()
+
+
+# Sweeps
+
+
+class _Sweep:
+    """One sweep on its way to experiments."""
+
+    def __init__(self, source: Source, definition: Definition) -> None:
+        self.source, self.definition = source, definition
+        self.definitions, self.complaints = source.definitions, source.complaints
+        self.base = _base(self.definitions, definition)
+        self.graph = Graph()
+        self.read_again: dict[tuple[str, ...], tuple[Definitions, Definition, Definition, Sweep, Graph]] = {}
+
+    def groups(self) -> list[Group]:
+        before = len(self.complaints.errors)
+        sweep = read_sweep(self.definitions, self.complaints, self.definition, self.graph, seed=self._run_seed())
+        if len(self.complaints.errors) > before:
+            resolve_run(Scope(self.definitions, self.complaints), self.base)
+            return []
+        self.read_again[()] = (self.definitions, self.definition, self.base, sweep, self.graph)
+        found = structures(sweep)
+        if len(found) > MOST_STRUCTURES:
+            raise Problem(error("D229", f"sweep `{sweep.name}` is of {len(found)} structures", sweep.place,
+                                help=[f"{MOST_STRUCTURES} are possible, each with a program of its own",
+                                      "what is a number of a model, varied as such, needs no other structure"]))
+        made: list[tuple[Group, np.ndarray]] = []
+        dropped: dict[Place, int] = {}  # by each `exclude when`, of which a macro may bring other ones
+        for choices, rows in found:
+            errors = len(self.complaints.errors)
+            noted = len(self.complaints.all)
+            with self.complaints.gather():
+                one = self._group(sweep, choices, rows)
+                if one is not None:
+                    for place, count in one[1]:
+                        dropped[place] = dropped.get(place, 0) + count
+                    if one[0] is not None:
+                        made.append(one[0])
+            if len(self.complaints.errors) > errors:
+                self.complaints.mark(noted, *(Label(option.place, f"where `{column.path}` is `{option.text}`")
+                                              for column, option in choices))
+                return []
+        self._tell_of_exclusions(dropped, bool(made))
+        if not made:
+            return []
+        self._tell_of_idle_choices(sweep, [group for group, _ in made])
+        return _numbered(sweep.name, made)
+
+    def _run_seed(self) -> int:
+        """The run's seed, for what the sweep draws; the run itself tells where it is wrong."""
+        block = self.definitions.block(self.base)
+        item = block.get("seed") if block is not None else None
+        try:
+            return whole(self.definitions, item.value, "a seed", least=0) if item is not None and item.value else 0
+        except Problem:
+            return 0
+
+    def _group(self, sweep: Sweep, choices: Choices,
+               rows: np.ndarray) -> tuple[tuple[Group, np.ndarray] | None, list[tuple[Place, int]]] | None:
+        """The cases of one structure, with their rows of the product; and how many each `exclude when` drops."""
+        before = len(self.complaints.errors)
+        definitions, _, base, there, graph = self._with_macros(sweep, choices)
+        definitions, run = put_in(definitions, base, choices)
+        scope = Scope(definitions, self.complaints, {varied.path: varied for varied in there.varied}, graph)
+        resolved = resolve_run(scope, run)
+        check_coordinates(scope, complete=resolved is not None)
+        if resolved is None:
+            return None
+        values = columns(there, rows)
+        keep, counts = kept(scope, there, values, choices, len(rows), resolved.structure)
+        dropped = [(statement.place, count) for statement, count in zip(there.excludes, counts, strict=True)]
+        if not keep.any():
+            return None, dropped
+        values = {path: column[keep] for path, column in values.items()}
+        count = int(np.count_nonzero(keep))
+        scope.checks.run(values, count)
+        seed = resolved.seed if there.seed is None else whole(definitions, there.seed.value, "a seed", least=0)
+        dependents = _dependents(scope)
+        if len(self.complaints.errors) == before:
+            self._check_followed(scope, dependents, there)
+        cases = Cases(
+            count, coordinates(scope, there, values, dependents), seed,
+            "independent" if there.independent is not None else "common",
+            tuple(Choice(column.path, option.text, option.place) for column, option in choices),
+            repeats(there, rows[keep]),
+        )  # fmt: skip
+        made = experiment(scope, sweep.name, sweep.place, resolved, cases)
+        made = replace(made, notes=(*(axis.note for axis in there.axes if axis.note), *made.notes))
+        if not self.complaints.errors:
+            idle(self.complaints, there, made)
+        return ((made, scope), rows[keep]), dropped
+
+    def _check_followed(self, scope: Scope, dependents: Mapping[str, Sequence[str]], sweep: Sweep) -> None:
+        for varied in sweep.varied:
+            taken = scope.sets.get(varied.path) or varied.path in scope.names.followed
+            if taken and not dependents[varied.path]:
+                self.complaints.error("D137", f"`{varied.path}` changes nothing in this run", varied.place,
+                                      help="no parameter's value depends on it: leave it out")
+
+    def _with_macros(self, sweep: Sweep, choices: Choices) -> tuple[Definitions, Definition, Definition, Sweep, Graph]:
+        """The deck as it is with the macros that are chosen."""
+        macros = tuple(f"{column.macro}={option.text}" for column, option in choices if column.macro)
+        if macros not in self.read_again:
+            deck = self.source.reread(macros)
+            definitions = Definitions(deck, self.complaints)
+            definition = definitions.of_kind("sweep").get(self.definition.name)
+            if definition is None or definition.parts:
+                raise Problem(error("D226", f"with this macro the deck has no sweep `{sweep.name}`", sweep.place,
+                                    help="let the sweep stand outside `#if`"))
+            graph = Graph()
+            base = _base(definitions, definition)
+            there = read_sweep(definitions, self.complaints, definition, graph, seed=self._run_seed())
+            if there.sizes != sweep.sizes or _what_varies(there) != _what_varies(sweep):
+                raise Problem(error("D226", f"with this macro sweep `{sweep.name}` varies something else", sweep.place,
+                                    help="what is varied, and over how many values, must not depend on a varied macro"))
+            self.read_again[macros] = (definitions, definition, base, there, graph)
+        return self.read_again[macros]
+
+    def _tell_of_exclusions(self, dropped: Mapping[Place, int], some: bool) -> None:
+        if not some and dropped:
+            *others, last = dropped
+            self.complaints.error("D139", "every case is excluded", last,
+                                  also=[Label(place, "together with this") for place in others],
+                                  help="`exclude when` says which cases are left out, not which are kept")
+        for place, count in dropped.items():
+            if some and not count:
+                self.complaints.remark("D138", "this excludes no case", place, help="the sweep is the same without it")
+
+    def _tell_of_idle_choices(self, sweep: Sweep, groups: Sequence[Group]) -> None:
+        """A choice of which every option makes the same program of the same numbers is none."""
+        for column in sweep.chosen:
+            same: dict[tuple[str, ...], list[str]] = {}
+            for made, _ in groups:
+                others = tuple(choice.value for choice in made.cases.choices if choice.path != column.path)
+                bare = replace(made.cases, choices=(), coordinates=(), repeats=None, count=1)
+                same.setdefault(others, []).append(
+                    keys.structure_key(made.structure, keys.inputs(made)) + keys.case_ids(replace(made, cases=bare))[0]
+                )
+            if all(len(found) > 1 and len(set(found)) == 1 for found in same.values()):
+                remedy = "with each of its values the run is the same: leave it out"
+                if column.macro:
+                    remedy = f"the run is the same with each of its values: does an `#if` ask for `{column.macro}`?"
+                self.complaints.error("D137", f"`{column.path}` changes nothing in this run", column.place, help=remedy)
+
+
+def _what_varies(sweep: Sweep) -> list[list[list[str]]]:
+    """Axis by axis the paths, and what is chosen; numbers may differ."""
+    return [[[column.path, *(option.text for option in getattr(column, "options", ()))] for column in axis.columns]
+            for axis in sweep.axes]
+
+
+def _base(definitions: Definitions, definition: Definition) -> Definition:
+    of = definition.group.of
+    assert of is not None  # a sweep without one is no definition
+    if len(of.path) > 1:
+        raise Problem(error("D059", f"`{of.text}` is a path; the name of a run is needed", of.place,
+                            help=f"write `{of.path[0].text}`"))
+    return definitions.find("run", Word(of.text, of.place))
+
+
+def _dependents(scope: Scope) -> dict[str, list[str]]:
+    """Parameters whose formulas need each coordinate."""
+    found: dict[str, list[str]] = {path: [] for path in scope.varied}
+    for path, settled in scope.parameters.items():
+        if isinstance(settled.value, Scalar):
+            for name in Formulas.of(scope.graph, [settled.value]).inputs:
+                found[name].append(path)
+    return found
+
+
+def _numbered(name: str, made: Sequence[tuple[Group, np.ndarray]]) -> list[Group]:
+    """The groups with their names, and the positions of their cases in the sweep's table."""
+    if len(made) == 1:
+        return [made[0][0]]
+    everything = np.sort(np.concatenate([rows for _, rows in made]))
+    slugs = _slugs([group for (group, _), _ in made])
+    out = []
+    for ((group, scope), rows), slug in zip(made, slugs, strict=True):
+        positions = np.searchsorted(everything, rows).astype(float)
+        out.append((replace(group, name=f"{name}.{slug}", sweep=name, cases=replace(group.cases, positions=positions)),
+                    scope))
+    return out
+
+
+def _slugs(groups: Sequence[Experiment]) -> list[str]:
+    """A short name for each group: what is chosen otherwise in others, in letters that a file's group may have."""
+    rows = [[choice.value for choice in group.cases.choices] for group in groups]
+    differ = [n for n, column in enumerate(zip(*rows, strict=True)) if len(set(column)) > 1]
+    made = ["-".join(re.sub(r"[^\w+-]+", "_", row[n]).strip("_") or "_" for n in differ) for row in rows]
+    repeated = {slug for slug in made if made.count(slug) > 1}
+    return [f"{slug}-{n}" if slug in repeated else slug for n, slug in enumerate(made, start=1)]
+
+
+# Sums
+
+
+def _sum(source: Source, definition: Definition, within: tuple[str, ...]) -> list[Group]:
+    """The groups of all parts, one part's cases after the other's."""
+    parts = []
+    for named in definition.parts:
+        known = {**source.definitions.of_kind("run"), **source.definitions.of_kind("sweep")}
+        part = known.get(named.text)
+        if part is None:
+            raise Problem(error("D041", f"no run or sweep `{named.text}`", named.place,
+                                help=[*did_you_mean(named.text, known),
+                                      known_words("runs and sweeps of this deck", known)]))
+        if named.text in (*within, definition.name):
+            raise Problem(error("D043", f"sweep `{definition.name}` is made of itself", named.place,
+                                help="leave it out"))
+        found = _sum(source, part, (*within, definition.name)) if part.parts else lower(source, part)
+        if not found:
+            return []
+        parts.append((named, found))
+    made: list[Group] = []
+    seen: dict[tuple[str, str], str] = {}
+    first = 0
+    names = [name.text for name in definition.parts]
+    if len(set(names)) < len(names):
+        twice = next(name for n, name in enumerate(definition.parts) if name.text in names[:n])
+        raise Problem(error("D040", f"`{twice.text}` is in this sweep twice", twice.place, help="leave one out"))
+    for named, found in parts:
+        size = sum(group.cases.count for group, _ in found)
+        for group, scope in found:
+            program = keys.structure_key(group.structure)
+            ids = [(program, each) for each in keys.case_ids(group)]
+            again = [n for n, each in enumerate(ids) if each in seen]
+            if again and not source.complaints.errors:  # parts that are wrong may be the same until they are mended
+                there, position = seen[ids[again[0]]], int(group.cases.table[again[0]])
+                told = f"case #{position} of `{named.text}` is in `{there}` too"
+                if len(again) > 1:
+                    told = f"{len(again)} cases of `{named.text}` are in `{there}` too, the first is #{position}"
+                them = "it" if len(again) == 1 else "them"
+                raise Problem(error("D227", told, named.place, also=[Label(definition.place, "in this sweep")],
+                                    help=[f"exclude {them} in one of the two: each case stands in the table once",
+                                          f"`met cases DECK {named.text}` prints {them}"]))
+            seen |= dict.fromkeys(ids, named.text)
+            positions = (group.cases.table + first).astype(float)
+            made.append((replace(group, name=f"{definition.name}.{group.name}", sweep=definition.name,
+                                 cases=replace(group.cases, positions=positions)), scope))
+        first += size
+    return made

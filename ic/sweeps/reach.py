@@ -1,0 +1,119 @@
+"""What a sweep's coordinates reach: the parameters that each sets, and that each sets something."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ic.meaning.complaints import Complaints, known_words
+from ic.meaning.scope import Scope
+from ic.sweeps.axes import Sweep
+from met import units
+from met.diagnostic import Label, did_you_mean
+from met.plan import REPEAT, Coordinate, Experiment
+
+DECIDES = "decides the program"
+"""What a scope says of a number that makes another structure where it is another."""
+
+
+def check_coordinates(scope: Scope, *, complete: bool) -> None:
+    """Every coordinate sets something.
+
+    complete  all of the run was resolved; else nothing is said of what hangs on the rest, since that was told
+    """
+    for path, varied in scope.varied.items():
+        if path in scope.sets or path in scope.names.followed or scope.hangs(path):
+            continue
+        unknown = path in scope.definitions.lets or path.startswith("metrics.") or not scope.known
+        if unknown and (not complete or scope.gone or scope.lost):
+            continue
+        place = varied.place
+        if path in scope.whole:
+            decides = scope.whole[path] == DECIDES
+            scope.complaints.error("D122", f"`{path}` cannot vary{' like this' if decides else ''}", place,
+                                   help=f"it {scope.whole[path]}" + (f": write `vary {path} = [...];`" * decides))
+            continue
+        first, _, rest = path.partition(".")
+        if path in ("integrator", "arm") or rest in ("servo", "law", "bed", "servo.model", "servo.command"):
+            scope.complaints.error("D122", f"`{path}` cannot vary over numbers", place,
+                                   help=f"it varies over names: `vary {path} = [...];`")
+            continue
+        overridden = _overridden(scope, first, rest)
+        if (
+            first in ("rates", "duration", "record", "servos")
+            or path == "environment.velocity_products"
+        ):
+            scope.complaints.error("D122", f"`{path}` cannot vary", place,
+                                   help="vary one of its parts, or what it names")
+        elif overridden is not None:
+            scope.complaints.error(
+                "D137",
+                f"`{path}` changes nothing in this run",
+                place,
+                also=overridden,
+                help="every use overrides it, or the run does not use it; vary it where it is overridden",
+            )
+        else:
+            scope.complaints.error("D128", f"no parameter `{path}` in this run", place,
+                                   help=did_you_mean(path, (*scope.known, *scope.whole, *scope.definitions.lets))
+                                   or _continued(scope, path) or _beginnings(scope))
+
+
+def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
+    """Places of a definition's or a let's value that exists but that no parameter of the run takes."""
+    let = scope.definitions.lets.get(first)
+    if let is not None and not rest:
+        return [Label(let.name.place, "defined here")]
+    definition = scope.definitions.of_kind("servo").get(first)
+    block = scope.definitions.block(definition) if definition is not None else None
+    item = block.get(rest) if block is not None else None
+    return [Label(item.place, "written here")] if item is not None else None
+
+
+def _beginnings(scope: Scope) -> list[str]:
+    """What the paths of this run begin with."""
+    return [known_words("paths begin with", dict.fromkeys(known.partition(".")[0] for known in scope.known))]
+
+
+def _continued(scope: Scope, path: str) -> list[str]:
+    """Parameters of the thing that the path's first words name, where they name one."""
+    parts = path.split(".")
+    for length in range(len(parts) - 1, 0, -1):
+        head = ".".join(parts[:length]) + "."
+        inside = sorted(known for known in scope.known if known.startswith(head))
+        if inside:
+            return [known_words(f"parameters of `{head[:-1]}`", inside)]
+    return []
+
+
+def coordinates(scope: Scope, sweep: Sweep, columns: dict[str, np.ndarray], dependents: dict[str, list[str]],
+                ) -> tuple[Coordinate, ...]:
+    """The coordinates as a plan holds them. dependents: parameters whose formulas need each coordinate."""
+    made = []
+    for varied in sweep.varied:
+        direct = [path for path in scope.sets.get(varied.path, ()) if path in scope.parameters]
+        unit = varied.unit.text if varied.unit is not None else units.text(varied.value.dimension)
+        made.append(Coordinate(varied.path, unit, varied.scale, columns[varied.path],
+                               tuple(direct or dependents.get(varied.path, ())), varied.place))
+    return tuple(made)
+
+
+def idle(complaints: Complaints, sweep: Sweep, experiment: Experiment) -> None:
+    """Every coordinate changes something in the program, and so do repeats: else cases would be equal in silence."""
+    if not experiment.cases.coordinates and not experiment.cases.noise:
+        return
+    from met.audit import idle as without_effect
+
+    places = {varied.path: varied.place for varied in sweep.varied}
+    with complaints.gather():
+        for name in without_effect(experiment):
+            if name in places:
+                complaints.error("D137", f"`{name}` changes nothing in this run", places[name],
+                                 help="nothing that the run computes depends on it: leave it out")
+            elif name == REPEAT:
+                complaints.error("D230", "there is no noise in this run, so a repeat is the same case again",
+                                 sweep.repeated, help=["leave `repeat` out",
+                                                       "the tachometer of a bed is noisy: `substitute JOINT "
+                                                       "{ bed = emulated(faults = typical); }`"])
+            elif REPEAT not in experiment.cases.noise:
+                complaints.error("D230", "there is no noise in this run, so no case has noise of its own",
+                                 sweep.independent, help="leave `seeds` out")

@@ -1,0 +1,200 @@
+"""The case table: rows of the product of a sweep's axes, parted by structure, less those that are excluded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from contextlib import suppress
+
+import numpy as np
+
+from ic.grammar.spell import spell
+from ic.grammar.syntax import Binary, Expression, Name, Unary
+from ic.meaning.complaints import known_words
+from ic.meaning.scope import Scope
+from ic.meaning.values import COMPARISONS, PURE, Value, Values, evaluate_number, place_of
+from ic.sweeps.axes import Sweep, named
+from ic.sweeps.choices import Choices
+from met import units
+from met.channel import channels
+from met.diagnostic import Label, Problem, did_you_mean, error
+from met.plan import Structure
+from met.trace import Formulas, Scalar
+
+MOST_NAMED = 4
+ROUNDING = 1e-12  # relative: some thousand roundings, and far below what anyone means to tell apart
+
+
+def _index(sweep: Sweep, rows: np.ndarray) -> dict[str, np.ndarray]:
+    """By path, which value of its column each of these rows of the product has."""
+    found: dict[str, np.ndarray] = {}
+    after = math.prod(sweep.sizes)
+    for axis, size in zip(sweep.axes, sweep.sizes, strict=False):
+        after //= size
+        index = (rows // after) % size
+        found |= {column.path: index for column in axis.columns}
+    return found
+
+
+def columns(sweep: Sweep, rows: np.ndarray) -> dict[str, np.ndarray]:
+    """Values of the numbers that vary, by path, in these rows of the product."""
+    index = _index(sweep, rows)
+    return {column.path: column.values[index[column.path]] for column in sweep.varied}
+
+
+def repeats(sweep: Sweep, rows: np.ndarray) -> np.ndarray | None:
+    """Number of the repeat of each of these rows; None where nothing is repeated."""
+    return None if sweep.repeated is None else (rows % sweep.repeat).astype(float)
+
+
+def structures(sweep: Sweep) -> list[tuple[Choices, np.ndarray]]:
+    """The structures that a sweep is of: what is chosen, and the rows of the product; in order of first appearance."""
+    rows = np.arange(math.prod(sweep.sizes))
+    if not sweep.chosen:
+        return [((), rows)]
+    index = _index(sweep, rows)
+    code = np.zeros(len(rows), dtype=np.int64)
+    for column in sweep.chosen:
+        known: dict[str, int] = {}
+        numbers = np.array([known.setdefault(option.text, len(known)) for option in column.options])
+        code = code * len(known) + numbers[index[column.path]]
+    order = np.argsort(code, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(code[order])) + 1)
+    made = []
+    for there in sorted(parts, key=lambda part: int(part[0])):
+        chosen = tuple((column, column.options[int(index[column.path][there[0]])]) for column in sweep.chosen)
+        made.append((chosen, there))
+    return made
+
+
+# Exclusion
+
+
+def kept(scope: Scope, sweep: Sweep, values: Mapping[str, np.ndarray], choices: Choices, count: int,
+         structure: Structure) -> tuple[np.ndarray, list[int]]:
+    """Which of these rows no `exclude when` drops, and how many each drops; warns where rounding decides.
+
+    values, choices  what varies in the `count` rows, and what they have in common
+    structure        theirs
+    """
+    keep = np.ones(count, dtype=bool)
+    dropped = []
+    truths = _Truths(scope, values, choices, count, structure)
+    for statement in sweep.excludes:
+        drops = np.zeros(count, dtype=bool)
+        with scope.complaints.gather():
+            drops = np.broadcast_to(truths.of(statement.value, keep), count)
+        dropped.append(int(drops.sum()))
+        keep &= ~drops
+    return keep, dropped
+
+
+class _Truths:
+    """Conditions over rows of the table."""
+
+    def __init__(self, scope: Scope, values: Mapping[str, np.ndarray], choices: Choices, count: int,
+                 structure: Structure) -> None:
+        self.scope, self.values, self.count, self.structure = scope, values, count, structure
+        self.words = {column.path: option.text for column, option in choices}
+        self.options = {column.path: [option.text for option in column.options] for column, _ in choices}
+
+    def of(self, expression: Expression, asked: np.ndarray) -> np.ndarray:
+        """Rows for which it holds. asked: rows for which it matters, as behind an `and` those that may still hold."""
+        if isinstance(expression, Unary) and expression.operator == "not":
+            return ~self.of(expression.operand, asked)
+        if isinstance(expression, Binary) and expression.operator in ("and", "or"):
+            left = self.of(expression.left, asked)
+            if expression.operator == "and":
+                return left & self.of(expression.right, asked & left)
+            return left | self.of(expression.right, asked & ~left)
+        if not isinstance(expression, Binary) or expression.operator not in COMPARISONS:
+            raise Problem(error("D130", "a comparison is needed here", place_of(expression),
+                                help="such as `gearbox.kp > 0.03 V*s/rad`, joined by `and`, `or`, `not`"))
+        word = self._words(expression)
+        return np.full(self.count, word) if word is not None else self._numbers(expression, asked)
+
+    def _words(self, expression: Binary) -> bool | None:
+        """Whether a choice is the one that is written; None where no choice is compared, or one that is a number."""
+        for side, other in ((expression.left, expression.right), (expression.right, expression.left)):
+            if isinstance(side, Name) and side.text in self.words:
+                text = self.words[side.text]
+                if text[:1].isdigit() or text[:1] in "-.":
+                    return None
+                if expression.operator not in ("==", "!="):
+                    raise Problem(error("D130", f"`{side.text}` is a word, which is not less or more than another",
+                                        expression.place, help="compare with `==` or `!=`"))
+                written = spell(other)
+                if written not in self.options[side.text]:
+                    known = self.options[side.text]
+                    raise Problem(error("D130", f"`{side.text}` is never `{written}` in this sweep", place_of(other),
+                                        help=[*did_you_mean(written, known), known_words("it varies over", known)]))
+                return (written == text) == (expression.operator == "==")
+        return None
+
+    def _numbers(self, expression: Binary, asked: np.ndarray) -> np.ndarray:
+        scope, count = self.scope, self.count
+        sides = [evaluate_number(side, self._find) for side in (expression.left, expression.right)]
+        if not units.same(sides[0].dimension, sides[1].dimension):
+            helps = "both must be of one dimension"
+            for one, other in (sides, sides[::-1]):
+                if one.bare and one.dimension == PURE and not isinstance(one.number, Scalar):
+                    helps = f"write `{one.number:g} {units.text(other.dimension)}`"
+            raise Problem(error("D063", f"`{expression.operator}` of {named(sides[0])} and {named(sides[1])}",
+                                expression.place, also=[Label(side.place, named(side)) for side in sides], help=helps))
+        formulas = Formulas.of(scope.graph, [side.number for side in sides])
+        left, right = (np.broadcast_to(np.asarray(x, dtype=float), count) for x in formulas.replay(self.values))
+        lost = asked & (np.isnan(left) | np.isnan(right))
+        cases = f"of {count} {'case' if count == 1 else 'cases'}"
+        if lost.any():
+            raise Problem(error(
+                "D066", f"a side of this comparison has no value in {int(lost.sum())} {cases}", expression.place,
+                help=["it is the root of a negative number, or zero divided by zero",
+                      "ask before whether there is one: `exclude when x >= 0 m^2 and sqrt(x) > 1 m;`"]))
+        finite = np.isfinite(left) & np.isfinite(right) & (left != right) & asked
+        edge = finite.copy()
+        edge[finite] = np.abs(left - right)[finite] <= ROUNDING * np.maximum(np.abs(left), np.abs(right))[finite]
+        if edge.any():
+            row = int(np.flatnonzero(edge)[0])
+            scope.complaints.remark(
+                "D127", f"rounding decides this comparison in {int(edge.sum())} {cases}", expression.place,
+                also=[Label(sides[0].place, f"{float(left[row])!r}"), Label(sides[1].place, f"{float(right[row])!r}")],
+                help="compare with a limit between two values, not with one of them")
+        holds = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal, "==": np.equal,
+                 "!=": np.not_equal}[expression.operator]
+        return np.asarray(holds(left, right))
+
+    def _find(self, name: Name) -> Value | Values:
+        """Names in `exclude when`: coordinates, parameters of the run, then what any expression may name."""
+        scope = self.scope
+        if scope.checks.failed(name.text):
+            raise Problem(())  # which was told
+        if name.text in scope.varied:
+            return scope.varied[name.text].value
+        paths = scope.known.get(name.text) or [name.text]
+        found = {path: settled for path in paths if (settled := scope.settled(path)) is not None}
+        numbers = {x.ref if isinstance(x := each.value, Scalar) else x for each in found.values()}
+        if name.path[0].text in scope.definitions.of_kind("servo"):
+            with suppress(Problem):  # a default, which the definition does not write
+                own = scope.names.find(name)
+                if isinstance(own, Value):
+                    numbers.add(own.number.ref if isinstance(own.number, Scalar) else own.number)
+        if len(numbers) > 1:
+            choice = " or ".join(f"`{path}`" for path in list(found)[:MOST_NAMED])
+            raise Problem(error("D165", f"`{name.text}` is not the same wherever it is used in this sweep", name.place,
+                                help=f"say which is meant: write {choice}"))
+        for settled in found.values():
+            if isinstance(settled.value, (float, int, Scalar)):
+                return Value(settled.value, units.parse_unit(settled.unit).dimension, name.place)
+        try:
+            return scope.names.find(name)
+        except Problem as problem:
+            later = "a metric" if name.text in {use.name for use in self.structure.metrics} else ""
+            later = later or ("a channel" if name.text in channels(self.structure, [name.text]) else "")
+            if later:
+                raise Problem(error("D065", f"`{name.text}` is {later}, which has no value before a case has run",
+                                    name.place, help="exclude by what varies, or by parameters of the run")) from None
+            known = [*scope.varied, *self.words, *scope.known]
+            raise Problem(error("D065", f"no value `{name.text}`", name.place,
+                                help=did_you_mean(name.text, known) or problem.diagnostics[0].help)) from None
+
+

@@ -1,0 +1,45 @@
+"""docs/reference.md is what the models declare."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from ic.printing.reference import page
+from met import channel, cli, models, units
+
+PAGE = (Path(__file__).parents[2] / "docs" / "reference.md").read_text(encoding="utf-8")
+
+
+def test_the_page_is_up_to_date() -> None:
+    assert PAGE.splitlines() == "\n".join(page()).splitlines(), "write it anew: met doc --markdown > docs/reference.md"
+
+
+def test_the_command_prints_the_page(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["doc", "--markdown"]) == 0
+    assert capsys.readouterr().out == PAGE
+    assert cli.main(["doc", "servo", "--markdown"]) == 2
+
+
+def test_every_model_parameter_unit_and_channel_is_on_it() -> None:
+    for kind in models.GROUPS:
+        for name, model in models.find_own(kind).items():
+            section = re.search(rf"^### {kind} {name}\n(.*?)(?=^##)", PAGE, re.DOTALL | re.MULTILINE)
+            assert section is not None, name
+            for parameter in models.written(model):
+                assert f"\n| `{parameter.name}` |" in section[1], (name, parameter.name)
+    assert all(f"\n| `{name}` |" in PAGE for name in units.UNITS)
+    assert all(f"\n| `{name}` |" in PAGE for name, *_ in channel.OF_ARM)
+
+
+def test_its_links_lead_somewhere() -> None:
+    headings = {line.lstrip("# ").lower().replace(" ", "-") for line in PAGE.splitlines() if line.startswith("#")}
+    assert set(re.findall(r"\]\(#(.*?)\)", PAGE)) <= headings
+    assert all((Path(__file__).parents[2] / "docs" / name).is_file() for name in re.findall(r"\]\((\w+\.md)\)", PAGE))
+
+
+def test_no_table_has_a_row_of_another_width() -> None:
+    for table in re.findall(r"(?:^\|.*\n)+", PAGE, re.MULTILINE):
+        assert len({len(re.findall(r"(?<!\\)\|", row)) for row in table.splitlines()}) == 1, table

@@ -1,0 +1,197 @@
+"""What `met new` writes checks, runs and is laid out as it is; a model is installed by pip and found by its name."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+import batch
+import ic
+from ic.beginnings import files
+from ic.beginnings.models import MODELS
+from ic.formatting.formatter import formatted
+from met import cli, models
+from tests.met import test_every_model as every
+
+ROOT = Path(__file__).parents[3]
+USES = {
+    "servo": {
+        "more": "servo mine { model = begun; gain = 20 N*m*s/rad; limit = 5 N*m; rotor = 0.2 kg*m^2; }",
+        "servos": "hinge = mine { command = rate(0.5 rad/s); };",
+    },
+    "environment": {"environment": "drag = begun { link = tip; damping = 3 N*s/m; };"},
+    "command": {"servos": every.DRIVEN.format("rate(begun(to = 0.5 rad/s, over = 0.1 s))")},
+    "metric": {"metric": "begun { of = slide.qd; }"},
+    "integrator": {"integrator": "begun"},
+}
+"""The model `begun` of each kind in the small deck that every model of MET's own must run from."""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def new(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    status = cli.main(["new", *words])
+    return (status, *capsys.readouterr())
+
+
+def test_a_deck_is_written_and_what_to_do_next_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    assert new(capsys, "deck", "my_arm") == (0, """\
+wrote my_arm.ic
+
+  met check my_arm.ic  says what is wrong with it, if anything is
+  met run my_arm.ic    simulates it and shows what came of it
+""", "")  # fmt: skip
+    text = Path("my_arm.ic").read_text()
+    assert formatted("my_arm.ic", text) == text
+    assert cli.main(["check", "my_arm.ic"]) == 0
+    assert capsys.readouterr() == ("my_arm.ic: 1 run, 1 sweep, 7 cases: no errors\n", "")
+
+
+def test_the_deck_runs_and_meets_its_requirement_in_every_case() -> None:
+    cli.main(["new", "deck", "my_arm", "-q"])
+    archive = batch.run(ic.compile("my_arm.ic", select="all"), histories="none")
+    assert archive.ok
+    with batch.open(archive.path) as data:
+        assert (data["gains"]["met"].values == 1).all() and data["gains"]["effort"].values.std() > 1.0
+
+
+def test_every_line_of_the_decks_head_that_begins_with_met_is_a_command_that_works(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    cli.main(["new", "deck", "my_arm", "-q"])
+    lines = Path("my_arm.ic").read_text().splitlines()
+    commands = [line[5:].split("  ")[0].split() for line in lines if line.startswith("//   met ")]
+    assert len(commands) == 6
+    for _, *words in commands:
+        assert cli.main([*words, *(["--no-picture"] if words[0] == "run" else [])]) == 0, words
+
+
+def installed(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    """The package in this folder as an installer would leave it: on the path, with its entry points beside."""
+    project = tomllib.loads((folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    info = folder / f"{project['name'].replace('-', '_')}-{project['version']}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
+    lines = []
+    for group, points in project["entry-points"].items():
+        lines += [f"[{group}]", *(f"{name} = {value}" for name, value in points.items())]
+    (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
+    monkeypatch.syspath_prepend(str(folder))
+    importlib.invalidate_caches()
+    sys.modules.pop("begun_for_met", None)
+    models.available.cache_clear()
+
+
+@pytest.fixture
+def begin(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], Path]]:
+    """Begins a model of a kind and installs it."""
+
+    def begin(kind: str) -> Path:
+        assert cli.main(["new", kind, "begun", "-q"]) == 0
+        installed(monkeypatch, folder / "begun")
+        return folder / "begun"
+
+    yield begin
+    sys.modules.pop("begun_for_met", None)
+    models.available.cache_clear()
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_a_model_does_what_every_model_must(
+    kind: models.Kind, begin: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin(kind)
+    monkeypatch.setitem(every.SMALLEST, (kind, "begun"), USES[kind])
+    every.test_a_model_declares_what_its_numbers_are(kind, "begun")
+    every.test_it_runs_from_a_small_deck_and_its_bits_depend_on_the_case_alone(kind, "begun", tmp_path)
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_its_deck_checks_without_a_word_and_runs_and_is_laid_out(kind: str, begin: Callable[[str], Path]) -> None:
+    deck = begin(kind) / "begun.ic"
+    text = deck.read_text()
+    assert formatted("begun.ic", text) == text
+    assert ic.check(deck).diagnostics == ()
+    assert batch.run(ic.compile(deck), output="begun.h5").ok
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_its_file_passes_the_projects_own_linter(kind: str, folder: Path) -> None:
+    cli.main(["new", kind, "begun", "-q"])
+    command = [sys.executable, "-m", "ruff", "check", "--config", str(ROOT / "pyproject.toml"), "begun"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+def test_pip_installs_what_is_written_and_met_finds_it(folder: Path) -> None:
+    for kind in MODELS:
+        cli.main(["new", kind, f"my_{kind}", "-q"])
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index",
+               "--disable-pip-version-check", "--target", "site", *(f"./my_{kind}" for kind in MODELS)]  # fmt: skip
+    subprocess.run(command, check=True, capture_output=True, text=True)
+    surroundings = os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{folder / 'site'}"}
+    listed = subprocess.run([sys.executable, "-m", "met.cli", "doc", "--format", "json"], env=surroundings,
+                            capture_output=True, text=True, check=True)  # fmt: skip
+    found = {(model["kind"], model["name"]) for model in json.loads(listed.stdout)}
+    assert {(kind, f"my_{kind}") for kind in MODELS} <= found
+
+
+def test_what_is_there_is_not_written_over_without_force(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("my_arm.ic").write_text("mine")
+    assert new(capsys, "deck", "my_arm") == (2, "", """\
+error[E344]: `my_arm.ic` is there already
+ = help: --force writes over it; -o writes to another place
+
+1 error
+""")  # fmt: skip
+    assert Path("my_arm.ic").read_text() == "mine"
+    assert new(capsys, "deck", "my_arm", "--force", "-q") == (0, "", "")
+    assert Path("my_arm.ic").read_text().startswith("// my_arm.ic")
+
+
+def test_of_a_model_nothing_is_written_where_one_file_is_there(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("spring").mkdir()
+    Path("spring/pyproject.toml").write_text("mine")
+    status, _, err = new(capsys, "servo", "spring")
+    assert status == 2 and "`spring/pyproject.toml` is there already" in err
+    assert os.listdir("spring") == ["pyproject.toml"]
+
+
+def test_o_says_where_and_the_name_may_have_its_ending(capsys: pytest.CaptureFixture[str]) -> None:
+    assert new(capsys, "deck", "my_arm.ic", "-o", "decks/first.ic", "-q") == (0, "", "")
+    assert "arm my_arm {" in Path("decks/first.ic").read_text()
+    status, out, _ = new(capsys, "metric", "total", "-o", "packages/one")
+    assert sorted(os.listdir("packages/one")) == ["pyproject.toml", "total.ic", "total_for_met.py"]
+    assert status == 0 and "-m pip install -e ./packages/one " in out and "met run packages/one/total.ic " in out
+
+
+@pytest.mark.parametrize(("words", "said"), [
+    (("deck", "3 links"), ("an arm cannot be called `3 links`", "`links` would do")),
+    (("deck", "m"), ("an arm cannot be called `m`: that is the unit metre", "choose another name")),
+    (("servo", "ideal"), ("there is a servo model `ideal` already", "`met doc servo ideal` says")),
+])  # fmt: skip
+def test_a_name_that_nothing_may_have_is_refused(
+    words: tuple[str, str], said: tuple[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, out, err = new(capsys, *words)
+    assert (status, out) == (2, "") and err.startswith(f"error[E343]: {said[0]}\n") and said[1] in err
+    assert os.listdir() == []
+
+
+def test_the_kinds_of_the_command_are_those_that_can_be_begun() -> None:
+    from ic.cli_new import new
+
+    assert new.params[0].type.choices == ("deck", *MODELS)  # type: ignore[attr-defined]
+    assert set(files.MODELS) | {"bed", "law"} == set(models.GROUPS)

@@ -1,0 +1,284 @@
+"""What `met fmt` makes of a deck: indentation, blanks, alignment, and what it leaves alone."""
+
+from __future__ import annotations
+
+import pytest
+
+from ic.formatting.formatter import formatted, prove
+from met.diagnostic import Problem
+from met.render import render
+
+
+def fmt(text: str, *strings: str) -> str:
+    return formatted("a.ic", text, strings)
+
+
+def told(text: str) -> str:
+    with pytest.raises(Problem) as caught:
+        fmt(text)
+    return render(caught.value.diagnostics, caught.value.sources)
+
+
+def test_a_line_is_indented_by_the_brackets_it_stands_in() -> None:
+    assert fmt("""\
+run hold {
+arm=bar;
+    servos {
+  shoulder = drive {
+            command = rate(
+    table(times = [0, 1] s,
+          values = [0, 2] rad/s
+    )
+    );
+  }
+    }
+}
+""") == """\
+run hold {
+    arm = bar;
+    servos {
+        shoulder = drive {
+            command = rate(
+                table(times = [0, 1] s,
+                      values = [0, 2] rad/s
+                )
+            );
+        }
+    }
+}
+"""  # fmt: skip
+
+
+def test_brackets_that_open_on_one_line_indent_once() -> None:
+    assert fmt("a { b = f(g([\n1,\n2\n]));\n}\n") == "a { b = f(g([\n    1,\n    2\n]));\n}\n"
+
+
+def test_a_line_that_goes_on_with_an_entry_is_indented_further() -> None:
+    assert fmt("a {\nb =\nc\n+ d;\nexclude when x > 1 m\nand y < 2 m;\nROD(x, 1 kg)\nROD(y, 2 kg)\n}\n") == (
+        "a {\n    b =\n        c\n        + d;\n    exclude when x > 1 m\n        and y < 2 m;\n"
+        "    ROD(x, 1 kg)\n    ROD(y, 2 kg)\n}\n"
+    )
+
+
+@pytest.mark.parametrize(("written", "laid"), [
+    ("a=b", "a = b"),
+    ("a+=[ q ,qd ]", "a += [q, qd]"),
+    ("f ( x=1 , y=2 )", "f(x = 1, y = 2)"),
+    ("a=3kg * m ^ 2", "a = 3 kg*m^2"),
+    ("a = 2 N*m / (rad / s)*reach", "a = 2 N*m/(rad/s) * reach"),
+    ("a = 15   1 / s", "a = 15 1/s"),
+    ("a = [1,2]m", "a = [1, 2] m"),
+    ("a = linspace(0,1,5)V * s / rad", "a = linspace(0, 1, 5) V*s/rad"),
+    ("a = TEETH V*s/rad", "a = TEETH V*s/rad"),
+    ("a=2%", "a = 2 %"),
+    ("a=b*c", "a = b * c"),
+    ("a=(1/3)*b", "a = (1/3) * b"),
+    ("a = b ^ 2/c", "a = b^2 / c"),
+    ("a = - 3 m", "a = -3 m"),
+    ("a = b- 3 m", "a = b - 3 m"),
+    ("a = [- b, + 2]", "a = [-b, +2]"),
+    ("a=-(b+c)", "a = -(b + c)"),
+    ("require a<-3 m", "require a < -3 m"),
+    ("exclude when not(a<b)and-c>=d", "exclude when not (a < b) and -c >= d"),
+    ("vary  h . kp=1..5 by 2", "vary h.kp = 1 .. 5 by 2"),
+    ("a{b=c;d=e;}", "a { b = c;  d = e; }"),
+    ("a {}", "a { }"),
+    ("a { b { c = d; } e = f; }", "a { b { c = d; }  e = f; }"),
+    ("a = f{ b = c; } ;", "a = f { b = c; };"),
+    ("a = b;c = d ;   // why", "a = b;  c = d;   // why"),
+    ("a = b;// why", "a = b;  // why"),
+    ("f(/*n*/3,x)", "f(/*n*/3, x)"),
+    ("a\t=\tb;", "a = b;"),
+])  # fmt: skip
+def test_blanks_between_tokens(written: str, laid: str) -> None:
+    assert fmt(written) == laid + "\n"
+
+
+def test_blank_lines_at_most_one_in_a_block_two_outside_and_none_at_the_edges() -> None:
+    assert fmt("\n\na {\n\n\nb = 1;\n\n\n\nc = 2;\n\n}\n\n\n\nd { }\n\n\n") == (
+        "a {\n    b = 1;\n\n    c = 2;\n}\n\n\nd { }\n"
+    )
+
+
+def test_where_lines_are_counted_they_stay() -> None:
+    text = "let a = 1;\n\n\n\nlet b = __LINE__;\n"
+    assert fmt(text) == text
+
+
+def test_what_the_author_aligned_stays_aligned_when_something_before_it_grows() -> None:
+    assert fmt("mass   =1;\ninertia=2;\n") == "mass    = 1;\ninertia = 2;\n"
+    assert fmt("a { x=1;  y = 2; }\nb { xx=1; y = 2; }\n") == "a { x = 1;   y = 2; }\nb { xx = 1;  y = 2; }\n"
+
+
+def test_a_name_that_has_become_longer_takes_the_others_with_it() -> None:
+    assert fmt("mass    = 1 kg;\ninertia_of_it = [1, 1, 1] kg*m^2;\ncom     = [0, 0, 0] m;\n") == (
+        "mass          = 1 kg;\ninertia_of_it = [1, 1, 1] kg*m^2;\ncom           = [0, 0, 0] m;\n"
+    )
+
+
+def test_the_brace_of_a_block_is_aligned_like_a_sign() -> None:
+    text = "run r {\n    rates       { base = 1 kHz; }\n    environment { gravity = g; }\n    duration    = 1 s;\n}\n"
+    assert fmt(text.replace("    rates ", "  rates ")) == text
+
+
+def test_what_is_not_aligned_has_the_blanks_it_needs() -> None:
+    assert fmt("a  = 1;\n\nbc =    2;\n") == "a = 1;\n\nbc = 2;\n"
+
+
+def test_numbers_keep_their_ends_and_their_points_below_each_other() -> None:
+    text = "a = [  0, -45, 10.25] deg;\nb = [ 90,   5,  1.5] deg;\nc = [-90,  45,  0] deg;\n"
+    assert fmt(text) == text
+
+
+def test_comments_at_the_ends_of_lines_stay_aligned() -> None:
+    assert fmt("let a=1;    // one\n            // and more of it\nlet width=2;     // two\n") == (
+        "let a = 1;    // one\n              // and more of it\nlet width = 2;     // two\n"
+    )
+    assert fmt("let a=12;   // one\nlet width=2;// two\nlet bb=3;   // three\n") == (
+        "let a = 12;     // one\nlet width = 2;  // two\nlet bb = 3;     // three\n"
+    )
+    text = "let a = 1;              // far out\nlet bb = 2;\nlet ccc = 3;            // and below\n"
+    assert fmt(text.replace("a = 1; ", "a=1;   ")) == text
+
+
+def test_a_long_comment_moves_as_a_whole() -> None:
+    assert fmt("a {\n  /* one\n     two\n\n   three */\n  b = 1;  \n}\n") == (
+        "a {\n    /* one\n       two\n\n     three */\n    b = 1;\n}\n"
+    )
+
+
+def test_comments_and_preprocessor_lines_keep_what_is_in_them() -> None:
+    text = (
+        '#include   <two_link.ic>\t// a\n#  define  ROD( N,M )  link N{mass=M;}  \\\n\t  shape=x\n'
+        "//\ttabs  and   blanks\n#if  A==1\n#endif\n"
+    )
+    assert fmt(text.replace("\n", "  \n")) == text
+
+
+def test_what_stands_between_if_and_endif_is_laid_out_where_its_parts_agree_about_brackets() -> None:
+    assert fmt("#if A\nrun x {\n#else\nrun y {\n#endif\narm=b;\n#ifdef C\nd=e;\n#endif\n}\n") == (
+        "#if A\nrun x {\n#else\nrun y {\n#endif\n    arm = b;\n#ifdef C\n    d = e;\n#endif\n}\n"
+    )
+
+
+def test_what_if_leaves_out_may_be_anything_and_stays() -> None:
+    text = "#if 0\n  don't   touch ( this\n\n\n\n#endif\nlet a = 1;\n#ifdef B\n  run x {\n#endif\n"
+    assert fmt(text) == text
+
+
+def test_a_use_of_a_macro_that_makes_a_string_of_its_argument_stays() -> None:
+    text = "a = SAID(b  +c,\n d);\ne=f;\n"
+    assert fmt(text, "SAID") == "a = SAID(b  +c,\n d);\ne = f;\n"
+
+
+def test_a_line_that_a_backslash_or_a_comment_joins_stays() -> None:
+    text = "a=b \\\n  +c;\nd=e; /* f\n  g */ h=i;\n"
+    assert fmt(text) == text
+
+
+def test_a_line_ends_with_a_newline_and_the_last_one_too() -> None:
+    assert fmt("a = b;  \n  ") == "a = b;\n"
+    assert fmt("") == fmt(" \n\t\n") == ""
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("a {\n    b = [1, 2;\n}\n", """\
+error[D022]: expected `]`, found `}`
+ --> a.ic:3:1
+  |
+3 | }
+  | ^
+ ::: a.ic:2:9  to close this `[`
+  = help: a file is laid out by itself: a bracket of a macro's body or of another file is not seen
+
+1 error
+"""),
+    ("a { b = 1;\n", """\
+error[D022]: this `{` is not closed
+ --> a.ic:1:3
+  |
+1 | a { b = 1;
+  |   ^
+  = help: write the `}` where it ends
+  = help: a file is laid out by itself: a bracket of a macro's body or of another file is not seen
+
+1 error
+"""),
+    ("a = 1; }\n", """\
+error[D022]: this `}` closes nothing
+ --> a.ic:1:8
+  |
+1 | a = 1; }
+  |        ^
+  = help: leave it out, or open it where it begins
+  = help: a file is laid out by itself: a bracket of a macro's body or of another file is not seen
+
+1 error
+"""),
+    ("#if A\n/* on and on\n#endif\n", """\
+error[D003]: this comment is not closed
+ --> a.ic:2:1
+  |
+2 | /* on and on
+  | ^^
+  = help: its `*/` is missing
+
+1 error
+"""),
+    ("#endif\n", """\
+error[D007]: `#endif` without an `#if`
+ --> a.ic:1:2
+  |
+1 | #endif
+  |  ^^^^^
+  = help: leave it out, or write the `#if` that it belongs to
+
+1 error
+"""),
+    ("a = 1;\n#ifdef B\n", """\
+error[D008]: `#ifdef` is not closed
+ --> a.ic:2:2
+  |
+2 | #ifdef B
+  |  ^^^^^
+  = help: `a.ic` ends without its `#endif`
+
+1 error
+"""),
+    ('a = "b;\n', """\
+error[D003]: this string is not closed
+ --> a.ic:1:5
+  |
+1 | a = "b;
+  |     ^^^
+  = help: a string ends with `"` on the line it began on
+
+1 error
+"""),
+])  # fmt: skip
+def test_a_broken_deck_is_told_where_it_is_broken(text: str, said: str) -> None:
+    assert told(text) == said
+
+
+@pytest.mark.parametrize("changed", [
+    "let a = 2;\n", "let a = 1; let b = 2;\n", "let a = 1;\n", "let a =\n1;\nlet b = 2;\n",
+    "let a = 1;  // no\nlet b = 2;\n",
+])  # fmt: skip
+def test_a_layout_that_would_change_a_token_a_line_or_a_comment_is_refused(changed: str) -> None:
+    with pytest.raises(Problem, match="E340"):
+        prove("a.ic", "let a = 1;\nlet b = 2;\n", changed)
+
+
+def test_a_refusal_names_the_place_and_asks_for_a_report() -> None:
+    with pytest.raises(Problem) as caught:
+        prove("a.ic", "let a = 1;\nlet b = 2;\n", "let a = 1;\nlet b = 3;\n")
+    assert render(caught.value.diagnostics, caught.value.sources) == """\
+error[E340]: laying out this deck would change what it says, so it is left as it is: a defect of MET
+ --> a.ic:2:1
+  |
+2 | let b = 2;
+  | ^^^
+  = help: please report it together with the deck
+
+1 error
+"""

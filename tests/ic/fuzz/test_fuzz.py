@@ -1,0 +1,114 @@
+"""The fuzzer for a minute, and the smallest decks of what it has found."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import ic
+from tests.ic.fuzz import mutations, one, worker
+from tests.ic.fuzz.__main__ import Fault, Findings, fuzz, told
+
+ARM = """\
+arm chain {
+    link bar { mass = 4 kg;  shape = rod(length = 0.5 m, along = x); }
+    joint hinge revolute { parent = base;  child = bar;  axis = z; }
+}
+run swing {
+    arm      = chain;
+    rates    { dynamics = 500 Hz;  record = 100 Hz; }
+    duration = 1 s;
+    record   = [q];
+}
+"""
+
+
+@pytest.mark.slow
+def test_a_minute_of_decks_that_nobody_would_write_shows_no_fault() -> None:
+    seed = int(time.time())
+    print(f"seed {seed}")
+    found = fuzz(seed, 60.0)
+    assert not found.faults, told(found, seed)
+    assert found.decks > 100
+
+
+def test_what_was_found_stays_mended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run of more ticks than a plan may have was sound for `met check`, and its plan file damaged for `met run`."""
+    monkeypatch.chdir(tmp_path)
+    deck = Path("deck.ic")
+    deck.write_text(ARM.replace("1 s;", "999999999999 s;"))
+    assert one.fault_of(deck) is None
+    assert [d.code for d in ic.check(deck).diagnostics] == ["D103"]
+
+
+def test_a_deck_of_the_series_is_the_same_each_time() -> None:
+    assert mutations.changed_bytes(_rng(), ARM.encode()) == mutations.changed_bytes(_rng(), ARM.encode())
+    for change in mutations.GENTLE:
+        assert change(_rng(), ARM) == change(_rng(), ARM)
+
+
+def _rng() -> random.Random:
+    return random.Random("7")
+
+
+# the fuzzer itself: what it must see
+
+
+def test_a_traceback_is_a_fault_told_with_a_short_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def breaks(path: Path, **_more: object) -> None:
+        if b"hinge" in Path(path).read_bytes():
+            raise KeyError("hinge")
+        raise ValueError("another fault")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(ic, "check", breaks)
+    deck = Path("deck.ic")
+    deck.write_text(ARM)
+    fault = one.fault_of(deck)
+    assert fault is not None
+    assert fault[0].startswith("KeyError in")
+    assert worker.shortened(ARM.encode(), lambda data: worker._still(deck, fault[0], data)) == b"hinge"
+
+
+def test_a_deck_that_takes_too_long_is_a_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def hangs(_path: Path, **_more: object) -> None:
+        while True:
+            pass
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(ic, "check", hangs)
+    monkeypatch.setattr(one, "MOST_SECONDS", 0.05)
+    Path("deck.ic").write_text(ARM)
+    fault = one.fault_of(Path("deck.ic"))
+    assert fault is not None
+    assert fault[0].startswith("Hung in")
+
+
+def test_a_deck_that_takes_too_much_memory_is_a_fault() -> None:
+    """In a process of its own, which is then limited for good."""
+    script = "from tests.ic.fuzz import one; one.limit_memory(); kept = bytearray(2**29); bytearray(2**30)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=Path(__file__).parents[3])
+    assert done.stderr.endswith("MemoryError\n")
+
+
+def test_a_soundly_compiled_deck_is_no_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("deck.ic").write_text("#include <two_link.ic>\n")
+    assert one.fault_of(Path("deck.ic")) is None
+
+
+def test_findings_are_told_with_their_decks() -> None:
+    found = Findings(12, (Fault("KeyError in a.py:f", 7, "x = 1;", "Traceback ...\n"),), (0.5, 3))
+    assert told(found, 5) == """\
+12 decks of seed 5; the slowest, number 3, took 0.5 s
+
+=== KeyError in a.py:f (deck 7)
+Traceback ...
+
+--- the deck
+x = 1;"""

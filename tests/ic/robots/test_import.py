@@ -1,0 +1,214 @@
+"""`met import`: what it prints and writes, what it refuses, and that its decks run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ic
+from ic.robots.importing import imported
+from met import cli, run
+from met.diagnostic import Problem
+from tests.ic.robots.two import TWO, changed, refused
+
+# ruff: noqa: E501 - messages are as wide as they are
+
+ARM = """\
+<robot name="pick-up">
+  <link name="floor"/>
+  <link name="upper">
+    <inertial>
+      <origin xyz="0.25 0 0" rpy="0 0 1.5707963267948966"/>
+      <mass value="4.5"/>
+      <inertia ixx="0.2" iyy="0.01" izz="0.2" ixy="0" ixz="0" iyz="0"/>
+    </inertial>
+    <visual/>
+  </link>
+  <link name="hand">
+    <inertial> <mass value="1e-2"/> <inertia ixx="1e-05" iyy="2e-05" izz="2.5e-05"/> </inertial>
+  </link>
+  <link name="tool 1"/>
+  <joint name="shoulder" type="revolute">
+    <origin xyz="0 0 0.3" rpy="0 -0.1 0"/> <parent link="floor"/> <child link="upper"/> <axis xyz="0 -1 0"/>
+    <limit lower="0.5" upper="2" effort="50" velocity="3"/> <dynamics damping="0.5" friction="0.2"/>
+  </joint>
+  <joint name="roll" type="continuous">
+    <origin xyz="0.5 0 0"/> <parent link="upper"/> <child link="hand"/> <limit effort="5" velocity="0"/>
+  </joint>
+  <joint name="finger" type="prismatic">
+    <parent link="hand"/> <child link="tool 1"/> <mimic joint="roll" multiplier="0.1"/>
+    <limit lower="0" upper="0.04" effort="0" velocity="0"/>
+  </joint>
+</robot>
+"""
+PRINTED = """\
+// made by `met import arm.urdf --mimic fixed` from a file with the SHA-256 HASH...
+// `base` is the file's link `floor`.
+// Not in this deck: 1 visual.
+
+arm pick_up {
+    // inertia turned from axes at rpy 0 0 1.5707963267948966
+    link upper { mass = 4.5 kg;  com = [0.25, 0, 0] m;  inertia = [0.01, 0.2, 0.2] kg*m^2; }
+    link hand { mass = 0.01 kg;  inertia = [1e-05, 2e-05, 2.5e-05] kg*m^2; }
+    link tool_1 { mass = 0 kg; }  // `tool 1` in the file
+
+    joint shoulder revolute {  // from 0.5 to 2 rad; at most 3 rad/s; at most 50 N*m; damping 0.5; friction 0.2
+        parent = base;  child = upper;
+        at     = [0, 0, 0.3] m;
+        rpy    = [0, -0.1, 0] rad;
+        axis   = -y;
+    }
+    joint roll revolute { parent = upper;  child = hand;  at = [0.5, 0, 0] m;  axis = x; }  // continuous; at most 5 N*m
+    // follows `roll` in the file (multiplier 0.1); here it is held at 0
+    joint finger fixed { parent = hand;  child = tool_1; }
+}
+
+// Each joint is held, and `tau` is what that takes. Put servos of yours in the place of these.
+servo held { model = ideal;  bandwidth = 20 1/s;  command = position(0 rad); }
+
+default run hold {
+    arm         = pick_up;
+    servos      {
+        shoulder = held { command = position(1.25 rad); };  // the middle of its range, which 0 is not in
+        roll = held;
+    }
+    initial {
+        shoulder.q = 1.25 rad;
+    }
+    environment { gravity = [0, 0, -9.81] m/s^2; }
+    rates       { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }
+    duration    = 1 s;
+    record      = [q, tau];
+}
+
+// The joints let go, with the damping and friction of the file.
+servo shoulder_bearing { model = passive;  damping = 0.5 N*m*s/rad;  friction = 0.2 N*m; }
+servo roll_bearing { model = passive; }
+
+run fall like hold {
+    servos {
+        shoulder = shoulder_bearing;
+        roll = roll_bearing;
+    }
+}
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "arm.urdf").write_text(ARM, encoding="utf-8")
+    return tmp_path
+
+
+def test_the_deck_is_printed_to_be_read(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["import", "arm.urdf", "--mimic", "fixed"]) == 0
+    out, err = capsys.readouterr()
+    first = out.partition("\n")[0]
+    assert out == PRINTED.replace("HASH", first.rpartition(" ")[2].removesuffix("...")) and err == ""
+
+
+def test_the_deck_is_checked_without_a_word_and_runs_hold_and_fall(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["import", "arm.urdf", "-o", "arm.ic", "--mimic", "fixed"]) == 0
+    assert capsys.readouterr() == ("wrote arm.ic\n", "")
+    assert cli.main(["check", "arm.ic"]) == 0
+    assert capsys.readouterr() == ("arm.ic: 2 runs, 2 cases: no errors\n", "")
+    plan = ic.compile("arm.ic", select="all")
+    held, fell = (run.run(experiment) for experiment in plan.experiments)
+    assert (held.status == 0).all() and (fell.status == 0).all()
+    assert np.ptp(held.signals["q"], axis=1).max() == 0.0
+    assert np.ptp(fell.signals["q"][0, :, 0]) > 0.1
+    # rpy turns the shoulder's frame by -0.1 about y, and it turns by 1.25 about -y: the bar is at 1.35 above the horizon
+    weight = 9.81 * (4.5 * 0.25 + 0.01 * 0.5) * np.cos(1.35)
+    assert held.signals["tau"][0, :, 0] == pytest.approx(weight, rel=1e-12)
+
+
+def test_the_deck_is_laid_out_as_met_fmt_would(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["import", "arm.urdf", "-o", "arm.ic", "--mimic", "fixed"]) == 0
+    assert cli.main(["fmt", "--check", "arm.ic"]) == 0
+
+
+def test_a_joint_that_follows_another_is_refused_until_one_says_what_it_does(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["import", "arm.urdf", "-o", "arm.ic"]) == 2
+    assert capsys.readouterr().err == """\
+error[D213]: joint `finger` follows `roll`, which is not in this version
+  --> arm.urdf:23:64
+   |
+23 |     <parent link="hand"/> <child link="tool 1"/> <mimic joint="roll" multiplier="0.1"/>
+   |                                                                ^^^^
+   = help: `--mimic free` lets such joints move by themselves, `--mimic fixed` holds them at 0
+
+1 error
+"""
+    assert not Path("arm.ic").exists()
+
+
+def test_a_joint_that_is_let_go_and_moves_nothing_is_refused() -> None:
+    with pytest.raises(Problem) as problem:
+        imported("arm.urdf", "free")
+    assert refused(problem.value).startswith("error[D217]: joint `finger` moves nothing that has mass\n  --> arm.urdf:22:16\n")
+
+
+def test_a_robot_that_is_no_arm_is_told_with_what_a_deck_could_do() -> None:
+    Path("two.urdf").write_text(changed(TWO, ('izz="0.2"', 'izz="0.9"')), encoding="utf-8")
+    with pytest.raises(Problem) as problem:
+        imported("two.urdf")
+    assert refused(problem.value) == """\
+error[D087]: the inertia of link `bar` is no body's
+ --> two.urdf:7:7
+  |
+7 |       <inertia ixx="0.1" iyy="0.2" izz="0.9" ixy="0" ixz="0" iyz="0"/>
+  |       ^^^^^^^^ principal moments 0.1, 0.2 and 0.9 kg*m^2; no body has one above the sum of the others
+  = help: inertia is about the centre of mass, in link axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2
+  = help: products have the sign of -sum(m x y)
+  = help: write a deck with `arm NAME from urdf("FILE") { ... }`: its block can change what the file says
+"""
+
+
+def test_a_file_that_is_there_is_left_alone_unless_forced(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("arm.ic").write_text("mine", encoding="utf-8")
+    assert cli.main(["import", "arm.urdf", "-o", "arm.ic", "--mimic", "fixed"]) == 2
+    assert capsys.readouterr().err == """\
+error[D216]: `arm.ic` is there already
+ = help: --force writes over it, -o names another
+
+1 error
+"""
+    assert Path("arm.ic").read_text(encoding="utf-8") == "mine"
+    assert cli.main(["import", "arm.urdf", "-o", "arm.ic", "--mimic", "fixed", "--force", "-q"]) == 0
+    assert capsys.readouterr() == ("", "")
+    assert Path("arm.ic").read_text(encoding="utf-8").startswith("// made by")
+    assert cli.main(["import", "arm.urdf", "--force"]) == 2
+    assert "--force is for -o" in capsys.readouterr().err
+
+
+def test_no_such_file(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["import", "leg.urdf"]) == 2
+    assert capsys.readouterr().err == """\
+error[D001]: cannot read `leg.urdf`: No such file or directory
+ = help: look at the name, and at who may read the file
+
+1 error
+"""
+
+
+def test_comments_hold_whatever_a_file_says() -> None:
+    nasty = changed(TWO, ('"two"', '"a&#10;b"'), ('"ground"', '"x &#10; } \\"'), ('"ground"', '"x &#10; } \\"'),
+                    ('<link name="bar">', '<link name="bar\\"> <sensor/>'), ('"bar"', '"bar\\"'))  # fmt: skip
+    Path("two.urdf").write_text(nasty, encoding="utf-8")
+    Path("two.ic").write_text(imported("two.urdf"), encoding="utf-8")
+    compiled = ic.check("two.ic")
+    assert compiled.plan is not None and compiled.diagnostics == ()
+
+
+def test_servos_of_the_deck_never_bear_a_joints_name() -> None:
+    Path("two.urdf").write_text(TWO.replace("hinge", "held").replace('"bar"', '"held_"'), encoding="utf-8")
+    text = imported("two.urdf")
+    assert "servo held__ {" in text and "held = held__;" in text
+
+
+def test_a_robot_without_a_joint_that_moves_makes_an_arm_and_no_run() -> None:
+    Path("two.urdf").write_text(TWO.replace("revolute", "fixed"), encoding="utf-8")
+    assert imported("two.urdf").endswith("joint hinge fixed { parent = base;  child = bar; }\n}\n")
