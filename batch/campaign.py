@@ -280,10 +280,16 @@ def _selected(
         if len(matches) > 1 and not _is_row(case):
             some = ", ".join(f"#{e.cases.table[row]} of `{e.asked}`" for e, row in matches[:4])
             message = f"case `{case}` may be any of {len(matches)}: {some}"
-            raise Problem(error("E312", message, help="give more of its id, or its position: `--case '#0'`"))
+            position, alike = matches[0][0].cases.table[matches[0][1]], len({_id_of(*match) for match in matches}) == 1
+            remedy = "" if alike else "give more of its id, or "  # cases that differ in structure alone share their ids
+            raise Problem(error("E312", message, help=f"{remedy or 'give '}its position: `--case '#{position}'`"))
         for experiment, row in matches:
             found[experiment.name].add(row)
     return [(e, np.array(sorted(found[e.name]), dtype=np.int64)) for e in experiments if found[e.name]]
+
+
+def _id_of(experiment: Experiment, row: int) -> str:
+    return keys.case_ids(experiment, [row])[0]
 
 
 def _is_row(case: int | str) -> bool:

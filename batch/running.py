@@ -130,7 +130,8 @@ def _part_lines(part: Part, verbose: bool) -> list[str]:
     count, whole = len(part.rows), experiment.cases.count
     cases = f"{count:,} case{'s' if count != 1 else ''}" + (f" of {whole:,}" if count < whole else "")
     if count == 1 and whole > 1:
-        cases = f"case #{experiment.cases.table[part.rows[0]]} of {whole:,}"
+        of = f"`{experiment.sweep}`" if experiment.sweep else f"{whole:,}"
+        cases = f"case #{experiment.cases.table[part.rows[0]]} of {of}"
     steps = schedule.ticks // schedule.dynamics
     out = [
         f"{experiment.name}: {cases}, {schedule.duration:g} s in {steps:,} steps of {1e3 * schedule.step:g} ms, "

@@ -31,6 +31,8 @@ def fmt(paths: tuple[str, ...], check: bool, diff: bool, quiet: bool, verbose: b
     for path in found:
         try:
             deck = lay_out(path)
+            if deck.changes and path != STDIN and not (check or diff):
+                write(path, deck.after)
         except Problem as problem:
             complain(problem.diagnostics, problem.sources)
             broken = True
@@ -40,8 +42,6 @@ def fmt(paths: tuple[str, ...], check: bool, diff: bool, quiet: bool, verbose: b
             click.echo("".join(deck.diff()), nl=False)
         if path == STDIN and not (check or diff):
             click.echo(deck.after, nl=False)
-        elif deck.changes and not (check or diff):
-            write(path, deck.after)
         if path != STDIN and not quiet and (verbose or deck.changes) and (check or not diff):
             told = "as it should be" if not deck.changes else "would be formatted" if check else "formatted"
             ends = "; its lines end with a newline alone" if deck.changes and deck.ends else ""

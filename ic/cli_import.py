@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 import click
 
@@ -25,6 +24,7 @@ def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet
     `met import panda.urdf -o panda.ic`, then `met run panda.ic`. A deck can also take the file as it is:
     `arm panda from urdf("panda.urdf") { ... }`.
     """
+    from ic.beginnings.files import put
     from ic.robots.importing import imported
 
     if force and output is None:
@@ -33,9 +33,12 @@ def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet
     if output is None:
         click.echo(text, nl=False)
         return
-    target = Path(output)
-    if os.path.lexists(target) and not force:
+    if not output or os.path.isdir(output):
+        raise Problem(error("D216", f"`{output}` is no name of a file", help="name the deck: `-o arm.ic`"))
+    if os.path.exists(output) and os.path.samefile(output, file):
+        raise Problem(error("D216", f"`{output}` is the file that is read", help="-o names another"))
+    if os.path.lexists(output) and not force:
         raise Problem(error("D216", f"`{output}` is there already", help="--force writes over it, -o names another"))
-    target.write_text(text, encoding="utf-8")
+    put(output, text)
     if not quiet:
         click.echo(f"wrote {output}")

@@ -11,6 +11,7 @@ from typing import get_args
 
 from ic.beginnings.deck import DECK
 from ic.beginnings.models import MODELS, PROJECT, TRIAL, Beginning
+from ic.meaning.resolve import RESERVED
 from met import models, units
 from met.diagnostic import Problem, error
 
@@ -46,15 +47,21 @@ def model(kind: str, name: str, folder: str | None) -> dict[str, str]:
 
 
 def check_name(what: str, name: str) -> None:
-    """Raises Problem E343 where no arm and no model may have this name."""
+    """Raises Problem E343 where no arm, or no model, may have this name."""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         near = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lstrip("0123456789_")
-        helps = [f"`{near}` would do"] if near else []
+        helps = [f"`{near}` would do"] if near and not _meaning(what, near) else []
         helps.append("a name is letters, digits and `_`, and begins with a letter")
         raise Problem(error("E343", f"{what} cannot be called `{name}`", help=helps))
+    if meaning := _meaning(what, name):
+        raise Problem(error("E343", f"{what} cannot be called `{name}`: {meaning}", help="choose another name"))
+
+
+def _meaning(what: str, name: str) -> str:
+    """What else a name means, so that it cannot be given; nothing where it can."""
     if units.is_unit(name):
-        message = f"{what} cannot be called `{name}`: that is the unit {units.UNITS[name].word}"
-        raise Problem(error("E343", message, help="choose another name"))
+        return f"that is the unit {units.UNITS[name].word}"
+    return "with that word paths of a run begin" if what == "an arm" and name in RESERVED else ""
 
 
 def write(texts: Mapping[str, str], *, force: bool) -> None:
@@ -65,8 +72,19 @@ def write(texts: Mapping[str, str], *, force: bool) -> None:
     for path, text in texts.items():
         if folder := os.path.dirname(path):
             os.makedirs(folder, exist_ok=True)
+        put(path, text)
+
+
+def put(path: str, text: str) -> None:
+    """Writes a file. Raises Problem E338 where the system refuses; what was not there before is not there then."""
+    there = os.path.lexists(path)
+    try:
         with open(path, "w", encoding="utf-8", newline="\n") as stream:
             stream.write(text)
+    except OSError as reason:
+        if not there and os.path.lexists(path):
+            os.unlink(path)
+        raise Problem(error("E338", f"cannot write `{path}`: {reason.strerror}")) from None
 
 
 def _there(paths: Sequence[str]) -> str:

@@ -47,7 +47,8 @@ class LaidOut:
 def decks(paths: Sequence[str]) -> list[str]:
     """The files that these paths stand for: those of a folder and of its folders are all its `.ic` files.
 
-    Raises Problem E341 where a folder has none.
+    A file that is named twice, or by a link too, is taken once. Raises Problem E341 where a folder has none, OSError
+    where one cannot be looked into.
     """
     found: list[str] = []
     for path in paths:
@@ -59,11 +60,17 @@ def decks(paths: Sequence[str]) -> list[str]:
             found += inside
         else:
             found.append(path)
-    return list(dict.fromkeys(found))
+    by_file: dict[str, str] = {}
+    for path in found:
+        by_file.setdefault(path if path == STDIN else os.path.realpath(path), path)
+    return list(by_file.values())
 
 
 def _inside(folder: str) -> Iterator[str]:
-    for at, folders, files in os.walk(folder):
+    def refuse(reason: OSError) -> None:
+        raise reason
+
+    for at, folders, files in os.walk(folder, onerror=refuse):
         folders[:] = [name for name in folders if not name.startswith(".")]
         yield from (os.path.normpath(os.path.join(at, name)) for name in files if name.endswith(".ic"))
 
@@ -71,6 +78,8 @@ def _inside(folder: str) -> Iterator[str]:
 def lay_out(path: str) -> LaidOut:
     """One deck. Raises Problem where it cannot be read, is broken, or is no deck."""
     if path == STDIN:
+        if sys.stdin is None:
+            raise Problem(error("D001", "cannot read standard input: it is closed", help="name a deck, or pipe one in"))
         return _laid_out(FoundFile("<stdin>", "<stdin>"), sys.stdin.buffer.read(MOST_BYTES + 1))
     if path.endswith(".json"):
         help = "`met fmt` is for decks"
@@ -92,14 +101,25 @@ def _laid_out(file: FoundFile, data: bytes) -> LaidOut:
 
 
 def write(path: str, text: str) -> None:
-    """Puts the text in the place of the file, all at once; its permissions stay, and a link to it stays a link."""
+    """Puts the text in the place of the file, all at once; its permissions stay, and a link to it stays a link.
+
+    Raises Problem E338, and leaves the file as it was, where the system refuses.
+    """
     target = os.path.realpath(path)
-    if not os.access(target, os.W_OK):
-        raise PermissionError(13, os.strerror(13), path)
+    try:
+        if not os.access(target, os.W_OK):
+            raise PermissionError(13, os.strerror(13))
+        _replace(target, text.encode())
+    except OSError as reason:
+        help = "it is as it was; what takes its place is written beside it, so its folder must allow that"
+        raise Problem(error("E338", f"cannot write `{path}`: {reason.strerror}", help=help)) from None
+
+
+def _replace(target: str, data: bytes) -> None:
     handle, made = tempfile.mkstemp(dir=os.path.dirname(target), prefix=f".{os.path.basename(target)}.", suffix=".new")
     try:
         with os.fdopen(handle, "wb") as stream:
-            stream.write(text.encode())
+            stream.write(data)
             stream.flush()
             os.fsync(stream.fileno())
         os.chmod(made, stat.S_IMODE(os.stat(target).st_mode))

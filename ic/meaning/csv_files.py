@@ -69,12 +69,19 @@ class Table:
         return self._numbers(column, measure), measure
 
     def words(self, column: Column) -> list[tuple[str, Place]] | None:
-        """The column's cells and their places, where all of them are words and it has no unit; else None."""
-        if column.unit is not None:
-            return None
+        """The column's cells and their places, where they are words and it has no unit; None where they are numbers.
+
+        Raises Problem D194 for a cell that is no word below one that is.
+        """
         cells = [(_stripped(row.split(",")[column.number])[0], line, row) for line, row in self.rows]
-        if not cells or not all(_WORD.fullmatch(cell) for cell, _, _ in cells):
+        if column.unit is not None or not cells or not _WORD.fullmatch(cells[0][0]):
             return None
+        first = Label(self._cell(*cells[0][1:], column.number), "this column begins with one")
+        for cell, line, row in cells:
+            if not _WORD.fullmatch(cell):
+                raise Problem(error("D194", f"`{cell[:40]}` is no word" if cell else "there is no word here",
+                                    self._cell(line, row, column.number), also=[first],
+                                    help="a column without a unit holds words, or pure numbers"))
         return [(cell, self._cell(line, row, column.number)) for cell, line, row in cells]
 
     def _numbers(self, column: Column, measure: Measure) -> tuple[float, ...]:

@@ -405,6 +405,8 @@ class Scope:
         return value
 
     def _coordinate(self, owner: Owner, name: str, homes: tuple[str, ...]) -> Varied | None:
+        if not self.varied:
+            return None
         paths = owner.paths(name, homes)
         found = [varied for path, varied in self.varied.items() if path in paths]
         for other in found[1:]:

@@ -179,7 +179,11 @@ def pose(joint: Joint) -> float:
     """Where a joint is held: at 0, or in the middle of its range where 0 is not within it."""
     found = limits(joint)
     lower, upper = found.get("lower", -1.0), found.get("upper", 1.0)
-    return 0.0 if lower <= 0.0 <= upper else float(f"{(lower + upper) / 2.0:.4g}")
+    if lower <= 0.0 <= upper:
+        return 0.0
+    middle = lower / 2.0 + upper / 2.0  # the sum might be beyond all numbers
+    short = float(f"{middle:.4g}")
+    return short if lower <= short <= upper else middle
 
 
 def _at(value: float, slides: bool) -> str:

@@ -18,6 +18,7 @@ from met.diagnostic import Diagnostic, Label, Place, Problem, error
 SHOWN = 60  # characters of a name or a value in a message
 
 _ATTRIBUTE = re.compile(rb"""([^\s=<>/"']+)\s*=\s*(?:"[^"]*"|'[^']*')""")
+_NO_URDF = "a URDF file is XML, `<robot> ... </robot>`: is this the right file?"
 _REMEDY = "URDF needs neither: write the values out"
 
 
@@ -134,12 +135,26 @@ def _not_xml(source: Source, at: int, code: int, open_: list[Element]) -> Diagno
         "no element found": f"the file ends inside {name}: its end is missing" if open_ else "the file is empty",
         "mismatched tag": f"{name} is open here: it is to be closed first",
         "junk after document element": "a file has one outermost element, `<robot>`",
-        "unclosed token": "a `<` begins a tag, which `>` ends",
+        "unclosed token": "`<!--` begins a comment, which `-->` ends" if source.data.startswith(b"<!--", at)
+                          else "a `<` begins a tag, which `>` ends",
+        "not well-formed (invalid token)": _of_token(source.data, at),
         "duplicate attribute": "an attribute stands once in a tag",
         "undefined entity": "five have a meaning: &lt; &gt; &amp; &quot; &apos;",
         "unbound prefix": "declare it in `<robot xmlns:PREFIX=\"...\">`",
     }  # fmt: skip
     left_open = bool(open_) and why in ("mismatched tag", "no element found")
     return error("D200", f"`{source.name}` is no XML: {why}", place,
-                 also=[Label(open_[-1].place, "opened here")] if left_open else [],
-                 help=helps.get(why, "a URDF file is XML, `<robot> ... </robot>`: is this the right file?"))
+                 also=[Label(open_[-1].place, "opened here")] if left_open else [], help=helps.get(why, _NO_URDF))
+
+
+def _of_token(data: bytes, at: int) -> str:
+    """What to do where something stands that may not stand there."""
+    if data.rfind(b"<!--", 0, at) > data.rfind(b"-->", 0, at):
+        return "`--` stands in a comment at its end only, as `-->`"
+    if re.search(rb"&\w*\Z", data[max(0, at - SHOWN) : at]):
+        return "`&` is written `&amp;`"
+    if data[at : at + 1] == b"<":
+        return "in a value `<` is written `&lt;`; else a `\"` or a `>` is missing before it"
+    if data.rfind(b"<", 0, at) > data.rfind(b">", 0, at):
+        return "within a tag stands `NAME=\"...\"`, in quotes, with a blank before it"
+    return _NO_URDF

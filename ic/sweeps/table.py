@@ -14,7 +14,7 @@ from ic.meaning.complaints import known_words
 from ic.meaning.scope import Scope
 from ic.meaning.values import COMPARISONS, PURE, Value, Values, evaluate_number, place_of
 from ic.sweeps.axes import Sweep, named
-from ic.sweeps.choices import Choices
+from ic.sweeps.choices import OF_JOINT, OF_RUN, Choices
 from met import units
 from met.channel import channels
 from met.diagnostic import Label, Problem, did_you_mean, error
@@ -194,6 +194,9 @@ class _Truths:
                 raise Problem(error("D065", f"`{name.text}` is {later}, which has no value before a case has run",
                                     name.place, help="exclude by what varies, or by parameters of the run")) from None
             known = [*scope.varied, *self.words, *scope.known]
+            if name.text in OF_RUN or (len(name.path) > 1 and name.path[-1].text in (*OF_JOINT, "command", "model")):
+                raise Problem(error("D065", f"`{name.text}` is no number, and does not vary in this sweep", name.place,
+                                    help=f"leave the comparison out, or `vary {name.text} = [...];`")) from None
             raise Problem(error("D065", f"no value `{name.text}`", name.place,
                                 help=did_you_mean(name.text, known) or problem.diagnostics[0].help)) from None
 

@@ -307,7 +307,7 @@ def test_the_beginning_of_an_id_that_several_cases_have(monkeypatch: pytest.Monk
     with in_a_folder():
         assert whole(lambda: campaign.prepare(made, cases=[begins])) == (
             f"error[E312]: case `{begins}` may be any of 2: #{first} of `gains`, #{second} of `gains`\n"
-            " = help: give more of its id, or its position: `--case '#0'`\n"
+            f" = help: give more of its id, or its position: `--case '#{first}'`\n"
         )
         batch.run(made, output="a.h5")
         with ArchiveFile("a.h5") as file:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import io
 import os
 import subprocess
 import sys
@@ -178,7 +179,10 @@ def test_o_says_where_and_the_name_may_have_its_ending(capsys: pytest.CaptureFix
 
 
 @pytest.mark.parametrize(("words", "said"), [
-    (("deck", "3 links"), ("an arm cannot be called `3 links`", "`links` would do")),
+    (("deck", "3 bars"), ("an arm cannot be called `3 bars`", "`bars` would do")),
+    (("deck", "3 links"), ("an arm cannot be called `3 links`", " = help: a name is letters")),
+    (("deck", "links"), ("an arm cannot be called `links`: with that word paths of a run begin", "choose another")),
+    (("metric", "m."), ("a model cannot be called `m.`", " = help: a name is letters")),
     (("deck", "m"), ("an arm cannot be called `m`: that is the unit metre", "choose another name")),
     (("servo", "ideal"), ("there is a servo model `ideal` already", "`met doc servo ideal` says")),
 ])  # fmt: skip
@@ -187,6 +191,26 @@ def test_a_name_that_nothing_may_have_is_refused(
 ) -> None:
     status, out, err = new(capsys, *words)
     assert (status, out) == (2, "") and err.startswith(f"error[E343]: {said[0]}\n") and said[1] in err
+    assert os.listdir() == []
+
+
+def test_what_cannot_be_written_leaves_nothing(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Full(io.StringIO):
+        def write(self, text: str) -> int:
+            raise OSError(28, os.strerror(28))
+
+    def open_full(path: str, *words: str, **named: str) -> Full:
+        Path(path).touch()
+        return Full()
+
+    monkeypatch.setattr(files, "open", open_full, raising=False)
+    assert new(capsys, "deck", "bars") == (2, "", """\
+error[E338]: cannot write `bars.ic`: No space left on device
+
+1 error
+""")  # fmt: skip
     assert os.listdir() == []
 
 

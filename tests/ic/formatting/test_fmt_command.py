@@ -145,3 +145,60 @@ def test_a_macro_of_an_included_file_that_makes_strings_is_known(capsys: pytest.
     Path("a.ic").write_text('#include "parts/said.ic"\na { SAID(b  .c); }\nd=e;\n')
     fmt(capsys, "a.ic")
     assert Path("a.ic").read_text() == '#include "parts/said.ic"\na { SAID(b  .c); }\nd = e;\n'
+
+
+def test_a_deck_that_cannot_be_written_stays_and_the_others_are_laid_out(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("a.ic").write_text(LOOSE)
+    Path("b.ic").write_text(LOOSE)
+    replace = os.replace
+
+    def no_space_for_a(made: str, target: str) -> None:
+        if target.endswith("a.ic"):
+            raise OSError(28, os.strerror(28))
+        replace(made, target)
+
+    monkeypatch.setattr("os.replace", no_space_for_a)
+    assert fmt(capsys, ".") == (2, "b.ic: formatted\n", """\
+error[E338]: cannot write `a.ic`: No space left on device
+ = help: it is as it was; what takes its place is written beside it, so its folder must allow that
+
+1 error
+""")  # fmt: skip
+    assert Path("a.ic").read_text() == LOOSE and sorted(os.listdir()) == ["a.ic", "b.ic"]
+
+
+def test_a_file_that_is_named_twice_is_one_deck(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("a.ic").write_text(LOOSE)
+    Path("link.ic").symlink_to("a.ic")
+    assert fmt(capsys, "--check", "a.ic", "./a.ic", ".") == (1, "a.ic: would be formatted\n", "")
+
+
+def test_a_folder_that_cannot_be_looked_into_is_told(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("in/locked").mkdir(parents=True)
+    Path("in/a.ic").write_text(LOOSE)
+    look = os.scandir
+
+    def refuse(path: str) -> object:
+        if path.endswith("locked"):
+            raise PermissionError(13, os.strerror(13), path)
+        return look(path)
+
+    monkeypatch.setattr("os.scandir", refuse)  # for root there is no folder that it may not see
+    assert fmt(capsys, "in") == (2, "", "error[E338]: `in/locked`: Permission denied\n\n1 error\n")
+    assert Path("in/a.ic").read_text() == LOOSE
+
+
+def test_standard_input_that_is_closed_is_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", None)
+    assert fmt(capsys, "-") == (2, "", """\
+error[D001]: cannot read standard input: it is closed
+ = help: name a deck, or pipe one in
+
+1 error
+""")  # fmt: skip

@@ -102,6 +102,12 @@ warning[D169]: the command of joint `hinge` begins at 0.5 rad, and the joint at 
 """
 
 
+def test_what_to_write_is_in_the_unit_that_the_deck_wrote(tmp_path: Path) -> None:
+    said = shown(tmp_path, ARM, changed(IDEAL, ("0 rad", "30 deg")), RUN)
+    assert "begins at 30 deg, and the joint at 0 deg: it jumps" in said
+    assert "write `hinge.q = 30 deg;` in `initial`" in said
+
+
 @pytest.mark.parametrize(("course", "jumps"), [
     ("trapezoid(start = 1 rad, to = 2 rad, max_rate = 1 rad/s, max_acceleration = 1 rad/s^2)", True),
     ("chirp(amplitude = 1 rad, f0 = 1 Hz, f1 = 2 Hz, over = 1 s, phase = 90 deg)", True),

@@ -184,6 +184,20 @@ error[D216]: `arm.ic` is there already
     assert "--force is for -o" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("output", "says"), [
+    ("two.urdf", "`two.urdf` is the file that is read\n = help: -o names another"),
+    (".", "`.` is no name of a file\n = help: name the deck: `-o arm.ic`"),
+    ("", "`` is no name of a file\n = help: name the deck: `-o arm.ic`"),
+])  # fmt: skip
+def test_neither_the_file_that_is_read_nor_a_folder_is_written_over(
+    output: str, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("two.urdf").write_text(TWO, encoding="utf-8")
+    assert cli.main(["import", "two.urdf", "-o", output, "--force"]) == 2
+    assert capsys.readouterr().err == f"error[D216]: {says}\n\n1 error\n"
+    assert Path("two.urdf").read_text(encoding="utf-8") == TWO
+
+
 def test_no_such_file(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["import", "leg.urdf"]) == 2
     assert capsys.readouterr().err == """\
@@ -201,6 +215,19 @@ def test_comments_hold_whatever_a_file_says() -> None:
     Path("two.ic").write_text(imported("two.urdf"), encoding="utf-8")
     compiled = ic.check("two.ic")
     assert compiled.plan is not None and compiled.diagnostics == ()
+
+
+@pytest.mark.parametrize(("lower", "upper", "held"), [
+    ("0.1", "0.3123456", "0.2062"), ("10.00001", "10.00002", "10.000015"), ("1e308", "1.5e308", "1.25e+308"),
+    ("-1.5e308", "-1e308", "-1.25e+308"),
+])  # fmt: skip
+def test_a_joint_whose_range_is_without_0_is_held_within_it(lower: str, upper: str, held: str) -> None:
+    limit = f'<limit lower="{lower}" upper="{upper}"/><axis'
+    Path("two.urdf").write_text(changed(TWO, ("<axis", limit)), encoding="utf-8")
+    text = imported("two.urdf")
+    assert f"command = position({held} rad);" in text and float(lower) <= float(held) <= float(upper)
+    Path("two.ic").write_text(text, encoding="utf-8")
+    assert ic.check("two.ic").plan is not None
 
 
 def test_servos_of_the_deck_never_bear_a_joints_name() -> None:

@@ -386,6 +386,21 @@ error[D002]: `two.urdf` is not text: it holds the byte 0x7f
 """)
 
 
+@pytest.mark.parametrize(("text", "remedy"), [
+    ('<robot name="a & b"/>', "`&` is written `&amp;`"),
+    ('<robot name="a < b"/>',
+     "in a value `<` is written `&lt;`; else a `\"` or a `>` is missing before it"),
+    ('<robot name="a>\n<link name="b"/></robot>',
+     "in a value `<` is written `&lt;`; else a `\"` or a `>` is missing before it"),
+    ("<robot name=two/>", 'within a tag stands `NAME="..."`, in quotes, with a blank before it'),
+    ("<robot><!-- the left -- and the right --></robot>", "`--` stands in a comment at its end only, as `-->`"),
+    ("<robot><!-- the left </robot>", "`<!--` begins a comment, which `-->` ends"),
+    ("<robot><link", "a `<` begins a tag, which `>` ends"),
+])  # fmt: skip
+def test_what_is_no_xml_is_told_with_what_to_do(text: str, remedy: str, tmp_path: Path) -> None:
+    assert said(tmp_path, text).endswith(f"  = help: {remedy}\n")
+
+
 @pytest.mark.parametrize(("text", "says"), [each[1:] for each in MISTAKES], ids=[each[0] for each in MISTAKES])
 def test_a_mistake_is_told_at_its_place(text: str | bytes, says: str, tmp_path: Path) -> None:
     assert said(tmp_path, text) == says

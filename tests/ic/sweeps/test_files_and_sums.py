@@ -76,7 +76,8 @@ error[D128]: no parameter `links.bar.mas` in this run
     ("drive.kp [V]\n1\n", "error[D061]: `kp` of servo `drive` is in V*s/rad, and this is in V"),
     ("drive.kp [Vs]\n1\n", "error[D193]: `Vs` is not a unit"),
     ("drive.kp [V*s/rad]\nmany\n", "error[D194]: `many` is not a number"),
-    ("drive kp [V*s/rad]\n1\n", "error[D223]: `drive kp` is no path of a run"),
+    ("hinge.servo\ndrive\n3\n", "error[D194]: `3` is no word"),
+        ("drive kp [V*s/rad]\n1\n", "error[D223]: `drive kp` is no path of a run"),
     ("drive.kp [V*s/rad]\n", "error[D223]: `cases.csv` has no rows: no case is in it"),
     ("drive.kp [V*s/rad]\n1\n1\n", "error[D133]: values number 1 and 2 are the same"),
     ("drive.kp [V*s/rad], drive.kp [V*s/rad]\n1, 1\n", "error[D198]: column `drive.kp` is there twice"),
@@ -211,7 +212,7 @@ error[D230]: there is no noise in this run, so a repeat is the same case again
 18 | sweep it of hold { repeat 3; }
    |                    ^^^^^^
    = help: leave `repeat` out
-   = help: the tachometer of a bed is noisy: `substitute JOINT { }`
+   = help: the tachometer of a bed is noisy: `substitute JOINT { bed = emulated(faults = typical); }`
 
 1 error
 """
