@@ -11,6 +11,7 @@ from batch.archive.read import ArchiveFile
 from batch.campaign import Campaign, Part, history_bytes, perform, prepare, quoted, size_text
 from batch.progress import Bar, duration
 from batch.show import verdict
+from batch.structures import structures
 from batch.summary import Summary, as_json, summarise
 from met.diagnostic import Problem
 from met.frozen import frozen
@@ -20,7 +21,7 @@ WORST = 3
 """Cases of a sweep that the verdict names."""
 
 MOST_GROUPS = 4
-"""Structures of a sweep that are told of in full; of more, a line each."""
+"""Structures of a sweep that are told of in full; of more, the table alone, and what failed."""
 
 
 def run_and_tell(
@@ -52,12 +53,13 @@ def run_and_tell(
     with ArchiveFile(campaign.output) as file:
         summaries = summarise(file)
         worst = worst_cases(file)
+        tables = list(structures(file))
         picture, excuse = (None, "") if no_picture else first_picture(file)
     ok = all(summary.ok for summary in summaries)
     if json:
         print(verdict_json(campaign, summaries, worst, picture, timings, ok))
     else:
-        say("\n".join(told(source, campaign, summaries, worst, picture, excuse, timings, ok)))
+        say("\n".join(told(source, campaign, summaries, worst, picture, excuse, timings, ok, tables)))
     return ok
 
 
@@ -177,21 +179,21 @@ def worst_cases(archive: ArchiveFile) -> tuple[Worst, ...]:
 
 def told(
     source: str, campaign: Campaign, summaries: tuple[Summary, ...], worst: tuple[Worst, ...], picture: Path | None,
-    excuse: str, timings: list[dict[str, Any]], ok: bool,
+    excuse: str, timings: list[dict[str, Any]], ok: bool, tables: list[list[str]],
 ) -> list[str]:  # fmt: skip
-    """The verdict, and where everything is."""
+    """The verdict, and where everything is. tables: of sweeps of several structures."""
     out: list[str] = []
     many = {s.sweep for s in summaries if sum(s.sweep == other.sweep for other in summaries) > MOST_GROUPS} - {""}
     for summary, cases, timing in zip(summaries, worst, timings, strict=True):
         lines = verdict(summary, 100)
         if summary.sweep in many:
-            said = "; ".join([lines[0], *(f"{r.text} met by {r.met:,}" for r in summary.requirements)])
-            out.append(f"{summary.name}: {said}")
+            if summary.failed:
+                out += ["", f"{summary.name}: {lines[0]}", *lines[1 : 1 + len(summary.failures)]]
             continue
         name = f"{summary.name}: " if len(summaries) > 1 else ""
         out += ["", f"{name}{lines[0]}, in {duration(timing['seconds'])}", *lines[1:]]
         out += ["", *cases.lines] if cases.lines else []
-    out += yields(summaries)
+    out += [line for table in tables for line in ("", *table)]
     path = campaign.output
     out += ["", f"archive  {path}  ({size_text(path.stat().st_size)})"]
     if picture is not None:
@@ -207,21 +209,6 @@ def told(
         out.append(f"         met run {quoted(source)} {summaries[0].name} --case '#0'")
     if not ok:
         out.append(f"exit 1: {_why_not(summaries)}")
-    return out
-
-
-def yields(summaries: tuple[Summary, ...]) -> list[str]:
-    """Of each sweep of several structures, how many of all its cases meet each requirement."""
-    out = []
-    for sweep in dict.fromkeys(summary.sweep for summary in summaries if summary.sweep):
-        groups = [summary for summary in summaries if summary.sweep == sweep]
-        if len(groups) > 1:
-            cases, failed = sum(group.cases for group in groups), sum(group.failed for group in groups)
-            out += ["", f"{sweep}: {cases - failed:,} of {cases:,} cases reached their end"]
-            for text in dict.fromkeys(r.text for group in groups for r in group.requirements):
-                found = [(group, r) for group in groups for r in group.requirements if r.text == text]
-                met, of = sum(r.met for _, r in found), sum(group.cases for group, _ in found)
-                out.append(f"  require {text}  met by {met:,} of {of:,} ({100 * met / of:.3g} %)")
     return out
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,10 +12,14 @@ import numpy as np
 
 from batch import braille, cases
 from batch.archive.read import ArchiveFile, Group
-from batch.campaign import size_text
+from batch.campaign import quoted, size_text
 from batch.signals import case_text, history, number_text, panels, pretty_unit
+from batch.structures import structures
 from batch.summary import MetricSummary, Summary, summary_of
 from met.diagnostic import Problem, error
+
+MOST_GROUPS = 4
+"""So many structures of a sweep are shown in full unless they are named; of more, their table alone."""
 
 PLOTS = 4
 """Signals that are drawn unless some are asked for."""
@@ -37,7 +42,16 @@ def show(
     unless `signals` are asked for.
     """
     out = [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
-    for group, position in picked(archive, experiments, case):
+    shown = picked(archive, experiments, case)
+    if not experiments and case is None and not signals:
+        out += [line for table in structures(archive) for line in ("", *table)]
+        counts = Counter(group.sweep for group, _ in shown if group.sweep)
+        hidden = [group.name for group, _ in shown if counts[group.sweep] > MOST_GROUPS and not all_cases]
+        if hidden:
+            remedy = f"`met show {quoted(archive.path)} --run {hidden[0]}`"
+            out += ["", f"one structure in full: {remedy}; the cases of all: `--all-cases`"]
+            shown = [each for each in shown if each[0].name not in hidden]
+    for group, position in shown:
         out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, width), ""]
         if plots and (signals or position is not None or not all_cases):
             out += _plots(group, signals, position, width, colour)
@@ -149,6 +163,7 @@ def verdict(summary: Summary, width: int) -> list[str]:
     if summary.limited:
         of = "" if summary.cases == 1 else f" in {summary.limited:,} of {summary.cases:,} cases"
         out.append(f"  note: the load motor of a bed was at its limit{of}: the run is not what the joint would do")
+        out.append("  what gives it more: `i_max` and `kt_load` of the bed; what asks less: the arm, or its command")
     if summary.metrics:
         out += _metric_table(summary)
     wide = max((len(r.text) for r in summary.requirements), default=0)

@@ -190,7 +190,8 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
 
     KIND is servo, command, environment, metric, integrator, bed or law; MODEL one of them by name. Also:
     `met doc channels`, what can be recorded; `dh`, Denavit-Hartenberg numbers; `shapes`, of links; `substitute`, motors
-    on beds; `units`; and the code of a message, as in `met doc D060`.
+    on beds; `units`; `functions`; `sweep`, its `designs` and `distributions`; and the code of a message, as in
+    `met doc D060`.
     """
     from ic.printing import models as print_models
     from ic.printing.codes import is_code, print_code

@@ -25,6 +25,9 @@ from met.parameter import Parameter
 Kind = Literal["servo", "environment", "command", "metric", "integrator", "bed", "law"]
 
 
+OF_ONES_OWN = ("a model of your own is known once its package is installed, `pip install -e FOLDER`; `met new` writes "
+               "such a package")
+
 FAULTS = "faults"
 """The parameter of a bed that a deck writes as a word: what its presets are called."""
 
@@ -162,7 +165,8 @@ def find(kind: Kind, name: str, place: Place | None = None) -> Any:
     models = available(kind)
     if name in models:
         return models[name]
-    helps = [*did_you_mean(name, models), f"{kind} models: {', '.join(sorted(models))}"]
+    near = did_you_mean(name, models)
+    helps = [*near, f"{kind} models: {', '.join(sorted(models))}", *([] if near else [OF_ONES_OWN])]
     raise Problem(error("D140", f"no {kind} model `{name}`", place, help=helps))
 
 

@@ -1,8 +1,11 @@
 """Which pieces of neighbouring lines the author has aligned.
 
 Neighbours are lines of one block with no blank line between; lines within a nested block do not count. Two pieces are
-aligned where one of them has more blanks before it than it needs, and both begin at the same column, or end there, or
+aligned where they are of one family, one of them is set apart, and both begin at the same column, or end there, or
 have their decimal points there. They stay as far out as they were, or go as far as they must.
+
+A piece is set apart by two blanks at least, and by more than it needs. All else that meets does so by chance: a number
+and a `<`, or two `=` with a blank before each.
 
 Where one `=` of a paragraph of entries has more than it needs, all are to be aligned: so a name that has become longer
 takes the others with it. For this the `{` of `rates { ... }` is as good as a `=`.
@@ -17,6 +20,7 @@ from ic.formatting.pieces import Piece, gap
 from ic.formatting.rows import BLANK, CODE, REMARK, Row
 
 REACH = 3  # lines: two that are aligned may have as many less one between them
+COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 ANCHORS = ("start", "end", "point")
 Anchor = str  # what of the pieces of a group is at one column
 Node = tuple[int, int]  # a row's position, and that of a piece on it
@@ -27,11 +31,13 @@ class Groups:
 
     anchors  of all pieces that are in a group
     met      those whose anchors met others as they were written: they do not come closer to their line's beginning
+    unsigned numbers behind a `[` and a blank, where a list of that name on a line nearby has a sign
     """
 
     def __init__(self) -> None:
         self.anchors: dict[Node, Anchor] = {}
         self.met: set[Node] = set()
+        self.unsigned: set[Node] = set()
         self._leaders: dict[Node, Node] = {}
 
     def group(self, node: Node) -> Node | None:
@@ -71,12 +77,15 @@ def aligned(found: Sequence[Row], *, paragraphs: bool) -> Groups:
             for at in rows:
                 paragraph[at] = rows[0]
                 groups.join((rows[0], separators[rows[0]]), (at, separators[at]), "start")
-    lines = {at: _Line(row.pieces) for at, row in enumerate(found) if row.kind == CODE and not row.exact}
-    pairs = [pair for pair in _neighbours(found) if _may_meet(lines[pair[0]], lines[pair[1]])]
+    lines = lines_of(found)
+    pairs = [pair for pair in neighbours(found) if _may_meet(lines[pair[0]], lines[pair[1]])]
+    for pair in pairs:
+        for signed, bare in (pair, pair[::-1]):
+            groups.unsigned |= {(bare, at) for at in _unsigned(lines[signed].lists, lines[bare].lists)}
     for anchor in ANCHORS:
         for one, other in pairs:
             together = one in paragraph and paragraph[one] == paragraph.get(other)
-            for first, second in _meeting(lines[one], lines[other], anchor):
+            for first, second in meeting(lines[one], lines[other], anchor):
                 if together and _side(first, separators[one]) != _side(second, separators[other]):
                     continue
                 groups.join((one, first), (other, second), anchor)
@@ -84,20 +93,24 @@ def aligned(found: Sequence[Row], *, paragraphs: bool) -> Groups:
     return groups
 
 
-class _Line:
+class Line:
     """What alignment asks of the pieces of a row.
 
-    wide     those that have more blanks before them than they need
-    entries  those that begin an entry within the line
-    columns  by anchor, the pieces by the column of their anchor as it was written, from where the line begins
+    wide      those that are set apart
+    entries   those that begin an entry within the line
+    families  of each piece, what it may be aligned with: its like, in as many brackets of the line
+    lists     of each list that begins with a number: its name, which piece that number is, and the number
+    columns   by anchor, the pieces by the column of their anchor as it was written, from where the line begins
     """
 
-    __slots__ = ("_columns", "entries", "pieces", "wide")
+    __slots__ = ("_columns", "entries", "families", "lists", "pieces", "wide")
 
     def __init__(self, pieces: Sequence[Piece]) -> None:
         self.pieces = pieces
         self.wide = {at for at in range(1, len(pieces)) if _is_wide(pieces, at)}
+        self.families = list(_families(pieces))
         self.entries = {at for at in range(1, len(pieces)) if pieces[at - 1].text == ";"}
+        self.lists = [(pieces[at - 3].text, at, pieces[at]) for at in range(3, len(pieces)) if _begins_list(pieces, at)]
         self._columns: dict[Anchor, dict[int, int]] = {}
 
     def columns(self, anchor: Anchor) -> dict[int, int]:
@@ -112,23 +125,65 @@ class _Line:
         return self._columns[anchor]
 
 
-def _may_meet(one: _Line, other: _Line) -> bool:
+def lines_of(found: Sequence[Row]) -> dict[int, Line]:
+    """What there is to align, by the position of its row."""
+    return {at: Line(row.pieces) for at, row in enumerate(found) if row.kind == CODE and not row.exact}
+
+
+def _families(pieces: Sequence[Piece]) -> Iterator[tuple[int, str]]:
+    depth, before = 0, ""
+    for piece in pieces:
+        depth -= piece.kind == "close"
+        called = piece.text == "(" and before == "name" and not piece.gap
+        yield depth, "(" if called else _family(piece)
+        depth, before = depth + (piece.kind == "open"), piece.kind
+
+
+def _family(piece: Piece) -> str:
+    if piece.text in ("=", "+=", "{"):
+        return "="
+    if piece.text in COMPARISONS:
+        return "<"
+    if piece.kind in ("operator", "other"):
+        return piece.text
+    return piece.kind if piece.kind in ("unit", "close", "stop", "comment") else "value"
+
+
+def _begins_list(pieces: Sequence[Piece], at: int) -> bool:
+    return pieces[at].kind == "number" and pieces[at - 1].text == "[" and pieces[at - 2].text in ("=", "+=")
+
+
+def _unsigned(lists: Sequence[tuple[str, int, Piece]], others: Sequence[tuple[str, int, Piece]]) -> Iterator[int]:
+    """Of the other lists, numbers with a blank before them where one of these lists, of the same name, has a sign."""
+    signed = {name for name, _, number in lists if number.text[0] in "+-"}
+    for name, at, number in others:
+        if name in signed and number.gap == 1 and number.text[0] not in "+-":
+            yield at
+
+
+def _may_meet(one: Line, other: Line) -> bool:
     return bool(one.wide or other.wide or (one.entries and other.entries))
 
 
-def _meeting(one: _Line, other: _Line, anchor: Anchor) -> Iterator[tuple[int, int]]:
-    """Pieces of two lines whose anchors meet, one of them with more blanks before it than it needs.
+def meeting(one: Line, other: Line, anchor: Anchor) -> Iterator[tuple[int, int]]:
+    """Pieces of two lines whose anchors meet, one of them set apart. Behind the first word they may be of any family.
 
-    Entries within lines also meet where the blanks before them differ, as where one blank is thought enough.
+    Entries of one name also meet where one of them has two blanks before it, as where one blank is thought enough.
     """
     above = one.columns(anchor)
     for column, at in other.columns(anchor).items():
         met = above.get(column)
-        if met is None:
+        if met is None or (one.families[met] != other.families[at] and not met == at == 1):
             continue
-        entries = met in one.entries and at in other.entries
-        if met in one.wide or at in other.wide or (entries and one.pieces[met].gap != other.pieces[at].gap):
+        if met in one.wide or at in other.wide or (anchor == "start" and _is_one_entry(one, met, other, at)):
             yield met, at
+
+
+def _is_one_entry(one: Line, first: int, other: Line, second: int) -> bool:
+    """Whether two pieces begin entries of one name, with blanks before them that differ."""
+    above, below = one.pieces[first], other.pieces[second]
+    entries = first in one.entries and second in other.entries
+    return entries and above.text == below.text and above.gap != below.gap
 
 
 def _side(piece: int, separator: int) -> int:
@@ -171,7 +226,7 @@ def _alike(one: Row, other: Row, first: int, second: int) -> bool:
     return alike and (first == 1 or one.pieces[0].text == other.pieces[0].text)
 
 
-def _neighbours(found: Sequence[Row]) -> Iterator[tuple[int, int]]:
+def neighbours(found: Sequence[Row]) -> Iterator[tuple[int, int]]:
     """Positions of rows that stand below each other in one bracket, at most REACH apart."""
     last: dict[tuple[int, int], dict[tuple[bool, bool], list[int]]] = {}  # by bracket, and by how the row begins
     for at, row in enumerate(found):
@@ -185,5 +240,8 @@ def _neighbours(found: Sequence[Row]) -> Iterator[tuple[int, int]]:
 
 
 def _is_wide(pieces: Sequence[Piece], at: int) -> bool:
-    """Whether this piece has more blanks before it than it needs."""
-    return at > 0 and pieces[at].kind != "stop" and pieces[at].gap > gap(pieces[at - 1], pieces[at])
+    """Whether this piece is set apart. Behind a `[` one blank does that, as in `[ 90, 5]` below `[-90, 5]`."""
+    before, piece = pieces[at - 1], pieces[at]
+    needed = gap(before, piece)
+    least = 1 if before.text == "[" or (before.kind == "open" and piece.kind == "number") else 2
+    return at > 0 and piece.kind != "stop" and piece.gap > needed and piece.gap >= least

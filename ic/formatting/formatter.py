@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from ic.formatting.layout import laid_out
-from ic.formatting.rows import BLANKS, rows, written
+from ic.formatting.rows import BLANKS, written
+from ic.formatting.tabs import rows_as_seen
 from ic.text.lexer import SPACE, Text, Token, logical_lines
 from met.diagnostic import Place, Problem, error
 
@@ -20,7 +21,7 @@ def formatted(name: str, text: str, making_strings: Collection[str] = ()) -> str
     laid = text
     for _ in range(MOST_TURNS):  # what is aligned only by chance may need a second turn
         before = laid
-        laid = laid_out(rows(Text(name, before), making_strings))
+        laid = laid_out(rows_as_seen(Text(name, before), making_strings))
         if laid == before:
             break
     prove(name, text, laid)

@@ -66,7 +66,7 @@ def _remark(row: Row, column: int) -> str:
     lines = [" " * column + first.strip(BLANKS)]
     for line in others:
         text = line.strip(BLANKS)
-        before = len(line[: len(line) - len(line.lstrip(BLANKS))].expandtabs(TAB))
+        before = len(line[: len(line) - len(line.lstrip(BLANKS))].expandtabs(row.tab))
         lines.append(" " * max(0, before + moved) + text if text else "")
     return "\n".join(lines)
 
@@ -126,7 +126,7 @@ def _steps(at: int, row: Row, groups: Groups) -> list[tuple[int, Node | None, in
         before, piece = row.pieces[i - 1 : i + 1]
         group = groups.group((at, i))
         inside = offset(piece, groups.anchors[group]) if group is not None else 0
-        distance = len(before.text) + gap(before, piece)
+        distance = len(before.text) + gap(before, piece) + ((at, i) in groups.unsigned)
         own = piece.column - row.pieces[0].column if (at, i) in groups.met else 0
         steps.append((distance, group, inside, own))
     return steps

@@ -41,15 +41,18 @@ class Row:
     parent   the row and the piece of it that opened the bracket in which this row begins; None at the top level
     closes   the row that opened the last of the brackets that close at its beginning
     behind   the last token before it in the same bracket
+    tab      how far apart its tab stops are
+    tabbed   whether a tab stands between its tokens, or before them
     """
 
     __slots__ = (
-        "_lines", "_tabs", "behind", "closes", "exact", "kind", "opaque", "parent", "pieces", "raw", "start", "tail",
-        "tokens", "whole",
+        "_lines", "_tabs", "behind", "closes", "exact", "kind", "opaque", "parent", "pieces", "raw", "start", "tab",
+        "tabbed", "tail", "tokens", "whole",
     )  # fmt: skip
 
-    def __init__(self, source: Text, start: int, line: Sequence[Token]) -> None:
+    def __init__(self, source: Text, start: int, line: Sequence[Token], tab: int) -> None:
         self.start = start
+        self.tab = tab
         self.raw = source.text[start : line[-1].offset]
         self.whole = [token for token in line if token.kind != SPACE or written(token)[:1] == "/"]
         self.tokens = [token for token in self.whole if token.kind != SPACE]
@@ -60,6 +63,9 @@ class Row:
         self.closes: Row | None = None
         self.behind: Token | None = None
         self._tabs = self._expanded()
+        self.tabbed = self._tabs is not None and any(
+            token.kind == SPACE and written(token)[:1] != "/" and "\t" in written(token) for token in line
+        )
         self._lines = "\n" in self.raw
         joined = self._lines or _SPLICE.search(self.raw) is not None
         if self.tokens:
@@ -90,15 +96,16 @@ class Row:
             return None
         at, column = [0], 0
         for character in self.raw:
-            column = 0 if character == "\n" else column + (TAB - column % TAB if character == "\t" else 1)
+            column = 0 if character == "\n" else column + (self.tab - column % self.tab if character == "\t" else 1)
             at.append(column)
         return at
 
 
-def rows(source: Text, making_strings: Collection[str] = ()) -> list[Row]:
+def rows(source: Text, making_strings: Collection[str] = (), tab: int = TAB) -> list[Row]:
     """The rows of a file, each knowing the bracket that it stands in. Raises Problem where the text is broken.
 
     making_strings  macros that make a string of what they are given: their uses stay as they are
+    tab             how far apart the tab stops are
     """
     findings = Findings()
     found: list[Row] = []
@@ -112,12 +119,12 @@ def rows(source: Text, making_strings: Collection[str] = ()) -> list[Row]:
             place = source.place(start + LONGEST_LINE, 1)
             findings.error("D018", f"a line has at most {LONGEST_LINE} characters", place)
             break
-        found.append(Row(source, start, line))
+        found.append(Row(source, start, line, tab))
         start = line[-1].offset + 1
         if len(line) > 1 and line[-2].kind == BAD and line[-2].text == "/*":  # where the lexer has stopped
             complain_of_stray(line[-2], findings)
     if start < len(source.text):  # a backslash at the end
-        found.append(Row(source, start, [Token(SPACE, "\n", source, len(source.text), 1)]))
+        found.append(Row(source, start, [Token(SPACE, "\n", source, len(source.text), 1)], tab))
     if not findings.errors:
         _match_all(found, findings)
     if findings.errors:

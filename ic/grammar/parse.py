@@ -17,7 +17,7 @@ from contextlib import suppress
 from ic.grammar.cursor import OPENING, SHOWN, Ended, Unreadable, found, span
 from ic.grammar.expressions import Expressions
 from ic.grammar.syntax import Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
-from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, Token
+from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import Findings, GiveUp, without_collection
 from met import units
 from met.diagnostic import Diagnostic, Label
@@ -297,12 +297,23 @@ class _Parser(Expressions):
         helps = {
             "=": "to compare, write `==`; to set two things, write two entries",
             "..": "a range is written `first .. last by step`",
-            ",": "a list stands in brackets: `[a, b]`",
+            ",": self.decimal_comma() or "a list stands in brackets: `[a, b]`",
             "?": "there is no `?:` in a deck; `#if` chooses between builds",
         }
         self.unexpected(
             "`;`" if token.kind in (*NUMBERS, STRING, NAME) else "`;` or an operator", help=helps.get(token.text, ())
         )
+
+
+    def decimal_comma(self) -> str:
+        """What to say of `0,325`; "" where the comma stands otherwise."""
+        whole, part = self.previous, self.following
+        if not (whole.kind == part.kind == WHOLE and whole.end == self.token.offset and self.token.end == part.offset):
+            return ""
+        said = f"a number has a decimal point: `{whole.text}.{part.text}`"
+        if len(part.text) == 3 and whole.text != "0":
+            said += f"; thousands have no mark: `{whole.text}{part.text}`"
+        return said
 
 
 def _word(token: Token) -> Word:

@@ -15,8 +15,9 @@ from ic.meaning.dh import use_dh
 from ic.meaning.foreign import refused
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, refuse_values, word_of
+from ic.meaning.owner import Owner
 from ic.meaning.resolve import RESERVED, Definition
-from ic.meaning.scope import Owner, Scope
+from ic.meaning.scope import Scope
 from ic.meaning.shapes import SHAPES, Solid
 from ic.meaning.values import place_of
 from met.diagnostic import Label, Place, did_you_mean
@@ -38,6 +39,8 @@ AXIS = Parameter(name="axis", unit="1", shape="vector", doc="axis of motion, joi
 
 LINK_KEYS = ("mass", "com", "inertia", "shape")
 JOINT_KEYS = ("parent", "child", "at", "rpy", "axis", "dh")
+NO_STOPS = "a joint has no stops in this version; a metric with `require` tells where it goes beyond"
+NOT_OF_A_JOINT = dict.fromkeys(("limit", "limits", "range", "stops"), NO_STOPS)
 
 
 @frozen
@@ -220,7 +223,7 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str,
                                item.place, help="give the joint another name")
         return None
     body = item.body
-    check_keys(scope, body, JOINT_KEYS, owner)
+    check_keys(scope, body, JOINT_KEYS, owner, NOT_OF_A_JOINT)
     parent = _end(scope, owner, "parent", body.get("parent"), {"base": None, **links})
     child = _end(scope, owner, "child", body.get("child"), links)
     if body.get("dh") is not None:
@@ -285,7 +288,8 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
     if written is None:
         return
     scope.checks.hold(written, _no_direction, code="D097", message=f"the axis of {owner.label} has no direction",
-                      place=_value_at(item), needs=(owner.join("axis"),), help="one of its numbers must not be zero")
+                      place=_value_at(item), needs=(owner.join("axis"),),
+                      help="write numbers of ordinary size, not all of them zero")
     x, y, z = written
     length = sqrt(x * x + y * y + z * z)
     if isinstance(length, Scalar) or 0.0 < length < math.inf:

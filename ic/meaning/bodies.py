@@ -11,7 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ic.meaning.merge import Item
-from ic.meaning.scope import Owner, Scope
+from ic.meaning.owner import Owner
+from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
 from met.diagnostic import Place
 from met.plan import Joint, Link

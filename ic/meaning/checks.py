@@ -19,7 +19,10 @@ Test = Callable[[np.ndarray], tuple[np.ndarray, list[str]]]
 
 @frozen
 class Varied:
-    """A coordinate of a sweep while the run is resolved: its values in SI, and the scalar that stands for them."""
+    """A coordinate of a sweep while the run is resolved: its values in SI, and the scalar that stands for them.
+
+    drawn  the distribution that they are drawn from; "" where the deck lists them
+    """
 
     path: str
     place: Place
@@ -27,6 +30,7 @@ class Varied:
     value: Value
     unit: Unit | None
     scale: float
+    drawn: str = ""
 
     def __len__(self) -> int:
         return len(self.values)
@@ -99,7 +103,17 @@ class Checks:
             more = f", and {int(bad.sum()) - 1} more" if bad.sum() > 1 else ""
             self.complaints.error(check.code, f"{check.message}; case #{row} breaks it{more}",
                                   Label(check.place, causes[0] if causes else ""),
-                                  help=(f"case #{row}: {where}", *check.help))
+                                  help=(f"case #{row}: {where}", *(self._narrower(check) or check.help)))
+
+    def _narrower(self, check: Check) -> tuple[str, ...]:
+        """The remedy where what is checked was drawn from a normal distribution, which has no bounds."""
+        checked = {value.ref for value in check.values if isinstance(value, Scalar)} if check.code == "D077" else set()
+        for varied in self.varied.values():
+            drawn = varied.value.number
+            if varied.drawn == "normal" and isinstance(drawn, Scalar) and drawn.ref in checked:
+                unit = f" {varied.unit.text}" if varied.unit else ""
+                return (f"a normal distribution has no bounds: `truncated(mean, deviation, from, to){unit}` has two",)
+        return ()
 
     def shown(self, path: str, value: float) -> str:
         """A coordinate's value in the unit of the deck."""

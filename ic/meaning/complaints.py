@@ -9,7 +9,9 @@ from met.diagnostic import Diagnostic, Label, Place, Problem, error
 
 MOST = 200  # a deck with more mistakes than this is told the first ones: the rest seldom say more
 
-OF_A_VALUE = ("D060", "D061", "D077", "D087")  # a bare number, a wrong unit, out of range, no body's inertia
+ONCE = ("D060", "D061", "D077", "D087", "D104", "D125", "D141")
+"""What is told once of a place, whoever finds it: a bare number, a wrong unit, out of range, no body's inertia, a rate
+too slow, no channel, no such key."""
 
 
 class Complaints:
@@ -38,10 +40,11 @@ class Complaints:
 
     def _told_of_another_user(self, diagnostic: Diagnostic) -> bool:
         """Whether this value's mistake is known: what a base or a `let` writes is found wrong at each of its users."""
-        return diagnostic.code in OF_A_VALUE and any(
-            each.code == diagnostic.code and each.at is not None and diagnostic.at is not None
-            and each.at.place == diagnostic.at.place for each in self._found
-        )
+        if diagnostic.at is None or diagnostic.code not in (*ONCE, "D075"):
+            return False
+        missing = diagnostic.message.rpartition(" has no ")[2] if diagnostic.code == "D075" else ""
+        return any(each.code == diagnostic.code and each.at is not None and each.at.place == diagnostic.at.place
+                   and each.message.endswith(missing) for each in self._found)
 
     def error(self, code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
               help: Iterable[str] | str = ()) -> None:

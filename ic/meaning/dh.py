@@ -18,7 +18,8 @@ from collections.abc import Callable
 from ic.grammar.syntax import Call
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, word_of
-from ic.meaning.scope import XYZ, Owner, Scope
+from ic.meaning.owner import XYZ, Owner
+from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
 from met.diagnostic import Label, did_you_mean
 from met.frozen import frozen

@@ -11,7 +11,8 @@ import numpy as np
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Expression, Name, children
 from ic.meaning.lower import Compiled, Select, check
-from ic.meaning.scope import Scope, Settled
+from ic.meaning.owner import Settled
+from ic.meaning.scope import Scope
 from ic.meaning.values import Value, place_of
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error

@@ -88,7 +88,10 @@ def compile_deck(deck: Deck, *, select: Select = None, defines: Iterable[str] = 
 
 
 def chosen(definitions: Definitions, complaints: Complaints, select: Select) -> list[Definition]:
-    """The runs and sweeps that are asked for: by name, all, or the only one, or the one marked `default`."""
+    """The runs and sweeps that are asked for: by name, all, or the deck's only one, or the one marked `default`.
+
+    A deck's own come before those of files that it includes, whatever these mark.
+    """
     known = {d.name: d for kind in ("run", "sweep") for d in definitions.of_kind(kind).values()}
     if select == "all":
         return list(known.values())
@@ -99,7 +102,9 @@ def chosen(definitions: Definitions, complaints: Complaints, select: Select) -> 
                 complaints.error("D164", f"no run or sweep `{name}` in this deck",
                                  help=[*did_you_mean(name, known), known_words("it has", known)])
         return [known[name] for name in names if name in known]
-    default = definitions.default()
+    own = {name: definition for name, definition in known.items() if definitions.writes(definition)}
+    default = definitions.default() if not own or any(d.default for d in own.values()) else None
+    known = own or known
     if len(known) == 1 or default is not None:
         return [default] if default is not None else list(known.values())
     if complaints.errors and not known:

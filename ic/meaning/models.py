@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from ic.grammar.syntax import Call, Expression, Name
 from ic.meaning.complaints import an, belongs, known_words
 from ic.meaning.merge import Block, Item
-from ic.meaning.scope import Owner, Scope
+from ic.meaning.owner import Owner
+from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
 from met import models
 from met.diagnostic import Place, Problem, did_you_mean
@@ -35,8 +37,9 @@ def refuse_values(scope: Scope, expression: Expression | None, names: Iterable[s
     return True
 
 
-def check_keys(scope: Scope, body: Block, known: Iterable[str], owner: Owner) -> None:
-    """Tells every entry of the body that is none of the known plain keys."""
+def check_keys(scope: Scope, body: Block, known: Iterable[str], owner: Owner,
+               others: Mapping[str, str] = MappingProxyType({})) -> None:
+    """Tells every entry of the body that is none of the known plain keys. others: what to say of keys one expects."""
     known = list(known)
     for item in body.items.values():
         if item.kind:
@@ -44,7 +47,8 @@ def check_keys(scope: Scope, body: Block, known: Iterable[str], owner: Owner) ->
                                    help=[*belongs(item.kind), known_words("it has", known)])
         elif item.name not in known:
             scope.complaints.error("D141", f"{owner.label} has no `{item.name}`", item.place,
-                                   help=[*did_you_mean(item.name, known), known_words("it has", known)])
+                                   help=[*([others[item.name]] if item.name in others
+                                           else did_you_mean(item.name, known)), known_words("it has", known)])
     for statement in body.statements:
         scope.complaints.error("D142", f"`{statement.words[0].text}` inside {owner.label}", statement.place,
                                help="it belongs to a run or a sweep")

@@ -10,11 +10,12 @@ from ic.grammar.syntax import Binary, Expression, List, Name, Statement
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import find_model, refuse_values, use_model, word_of
-from ic.meaning.scope import Owner, Scope
+from ic.meaning.owner import Owner
+from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
 from met import models
 from met.channel import FAMILIES, Channel, carries, channels, recordable, watched_unit
-from met.diagnostic import Label, Place, did_you_mean
+from met.diagnostic import Label, Place, did_you_mean, nearest
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import MetricUse, Recorded, Requirement, Structure
@@ -87,7 +88,10 @@ def _nearest(name: Name, known: dict[str, tuple[Recorded, ...]], structure: Stru
     head = ".".join(word.text for word in name.path[:2]) if first == "links" else first
     own = [each for each in whole if each.startswith(head + ".")]
     if own:
-        return [*did_you_mean(name.text, known), known_words(f"channels of `{head}`", own)]
+        rests = [each.removeprefix(f"{head}.") for each in known if each.startswith(f"{head}.")]
+        near = nearest(name.text.removeprefix(f"{head}."), rests)  # all that begins with the joint looks alike
+        meant = [] if near is None else [f"did you mean `{head}.{near}`?"]
+        return [*meant, known_words(f"channels of `{head}`", own)]
     joints = [each for each in whole if known[each][0].joints and not each.startswith("links.")]
     arm = [each for each in whole if each in FAMILIES and not known[each][0].joints]
     links = [each for each in whole if each.startswith("links.")]
@@ -153,6 +157,8 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
         channel = known[of.value.text]
     if channel is None:
         return None
+    scope.setting(f"metrics.{item.name}.model", metric.name, item=item)
+    scope.setting(f"metrics.{item.name}.of", channel.path, item=of)
     owner = Owner(f"metric `{item.name}`", item.place, f"metrics.{item.name}", of=channel.unit)
     use_model(scope, owner, metric.parameters, body, ("of",))
     return MetricUse(item.name, metric.name, channel.path, item.place)

@@ -16,6 +16,7 @@ from ic.robots.files import RobotFiles
 from ic.text.files import library_defines
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
+from met.render import shown_place
 
 KINDS = ("arm", "servo", "run", "sweep")
 RESERVED = ("links", "initial", "environment", "metrics", "rates")  # what paths of a run begin with, besides joints
@@ -37,6 +38,11 @@ class Definition:
     @property
     def place(self) -> Place:
         return self.group.place
+
+    @property
+    def home(self) -> str:
+        """What paths that reach its entries begin with; a run with choices of a sweep's in it is called after both."""
+        return self.name.partition(" ")[0]
 
 
 class Definitions:
@@ -122,7 +128,7 @@ class Definitions:
                 if block is None:
                     self._failed.update((d.kind, d.name) for d in chain)
                     return None
-            block = merge(block, each.group.body, home=each.name, base_name=base_name, complaints=self._complaints)
+            block = merge(block, each.group.body, home=each.home, base_name=base_name, complaints=self._complaints)
             self._merged[(each.kind, each.name)] = block
             above = each
         return block
@@ -241,10 +247,14 @@ class Definitions:
     def _defaults(self) -> list[Definition]:
         return [d for kind in ("run", "sweep") for d in self._by_kind[kind].values() if d.default]
 
+    def writes(self, definition: Definition) -> bool:
+        """Whether the deck itself writes a definition, and no file that it includes."""
+        return shown_place(definition.place).file == self._file
+
     def default(self) -> Definition | None:
         """The run or sweep marked `default`: the deck's own, else that of the one included file that has one."""
         found = self._defaults()
-        own = [each for each in found if each.place.file == self._file]
+        own = [each for each in found if self.writes(each)]
         return own[0] if own else found[0] if len({each.place.file for each in found}) == 1 else None
 
 

@@ -12,10 +12,11 @@ from ic.meaning.arm import Arm, resolve_arm
 from ic.meaning.complaints import belongs, known_words
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import find_bare_model, find_model, refuse_values, use_model, word_of
+from ic.meaning.owner import Owner
 from ic.meaning.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
 from ic.meaning.resolve import Definition
-from ic.meaning.schedule import Rate, base_rate, check_stability, divisor, make_schedule
-from ic.meaning.scope import Owner, Scope
+from ic.meaning.schedule import Rate, base_rate, check_stability, divisor, fastest_rate, make_schedule
+from ic.meaning.scope import Scope
 from ic.meaning.servos import RATE, Use, check_rest, check_start, fixed_rate, resolve_servos
 from ic.meaning.substitution import check_ticks, resolve_substitutions
 from ic.meaning.values import Value, Values, place_of
@@ -81,16 +82,19 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         return None
     check_ticks(scope, substitutions, divisors, schedule)
     _keep_settings(scope, block, arm, integrator, rates, schedule)
-    stability = []
+    fastest = {}
     on_beds = [each.joint for each in substitutions]
     for use in uses:
         if use.parameters is not None and use.joint not in on_beds:  # there the motor is no part of the step
-            x = check_stability(
-                scope, f"servo `{use.definition}`", use.servo, use.parameters, schedule, integrator, rates["dynamics"],
-                f"{use.joint}.servo",
-            )  # fmt: skip
+            x = fastest_rate(scope, use.servo, use.parameters, f"{use.joint}.servo")
             if x is not None:
-                stability.append((use.joint, x))
+                fastest[use.joint] = (use, x)
+    stability: dict[str, Real] = {}
+    for use, x in sorted(fastest.values(), key=lambda each: -scope.checks.first(each[1])):  # the worst is told
+        h_lambda = check_stability(scope, f"servo `{use.definition}`", x, schedule, integrator, rates["dynamics"],
+                                   f"{use.joint}.servo")
+        if h_lambda is not None:
+            stability[use.joint] = h_lambda
     servos = tuple(ServoUse(use.joint, use.definition, use.servo.name, use.command, divisors[use.joint], use.place)
                    for use in uses)
     structure = Structure(
@@ -102,7 +106,8 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     structure = replace(structure, metrics=metrics, record=record)
     scope.setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure)
-    return Resolved(structure, requirements, seed, tuple(stability), definition.place)
+    in_order = tuple((joint, stability[joint]) for joint in fastest if joint in stability)
+    return Resolved(structure, requirements, seed, in_order, definition.place)
 
 
 def _keep_settings(scope: Scope, block: Block, arm: Arm, integrator: Any, rates: Mapping[str, Rate],

@@ -130,11 +130,9 @@ def make_schedule(complaints: Complaints, dynamics: Rate, record: Rate, base: Ra
     return Schedule(base.hz, step, row, whole)
 
 
-def check_stability(scope: Scope, label: str, servo: Any, parameters: Mapping[str, Any], schedule: Schedule,
-                    integrator: Any, dynamics: Rate, path: str) -> Real | None:
-    """h lambda of a joint under its servo (`Servo.fastest`): given back, and warned of or told as an error.
+def fastest_rate(scope: Scope, servo: Any, parameters: Mapping[str, Any], path: str) -> Real | None:
+    """The fastest rate constant of a joint under its servo (`Servo.fastest`); None where the servo does not know it.
 
-    label  the servo in words; joints with the same servo and the same figure are told of once
     path   of the servo: where a parameter of it is out of its range, that is told, and nothing is computed of it
     """
     if servo.fastest is None or scope.checks.failed(path):
@@ -142,7 +140,20 @@ def check_stability(scope: Scope, label: str, servo: Any, parameters: Mapping[st
     from types import SimpleNamespace
 
     with scope.complaints.gather():
-        fastest = servo.fastest(SimpleNamespace(**parameters))
+        found: Real = servo.fastest(SimpleNamespace(**parameters))
+        return found
+    return None
+
+
+def check_stability(scope: Scope, label: str, fastest: Real, schedule: Schedule, integrator: Any, dynamics: Rate,
+                    path: str) -> Real | None:
+    """h lambda of a joint under its servo: given back, and warned of or told as an error.
+
+    label  the servo in words; joints with the same servo and the same figure are told of once, and of several servos
+           for which one rate is too slow the first that is checked
+    path   of the servo
+    """
+    with scope.complaints.gather():
         limit, h = integrator.real_limit, schedule.step
         slowest = _slowest_that_fits(schedule, limit)
 

@@ -19,70 +19,17 @@ from ic.meaning.checks import Checks, Varied
 from ic.meaning.complaints import Complaints
 from ic.meaning.merge import Item
 from ic.meaning.names import Names
+from ic.meaning.owner import XYZ, Owner, Settled
 from ic.meaning.remedies import components, mended
 from ic.meaning.resolve import Definitions
 from ic.meaning.unit_words import either, in_deck, in_degrees, unit_here
 from ic.meaning.values import Value, Values, place_of
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
-from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import JointKind, Origin, Quantity
 from met.trace import Graph, Real, Scalar
 from met.units import PURE, Dimension
-
-XYZ = ("x", "y", "z")
-
-
-@frozen
-class Owner:
-    """What parameters belong to: in words, where it is, and the first part of their paths.
-
-    homes    definitions under which a parameter that nobody wrote is reached
-    local    first part of the path under a definition's name
-    joint, command, of   what the words `joint`, `effort`, `command`, `of` in declared units mean here
-    """
-
-    label: str
-    place: Place
-    path: str
-    homes: tuple[str, ...] = ()
-    local: str | None = None
-    joint: JointKind = "revolute"
-    command: str | None = None
-    of: str | None = None
-    called: str | None = None  # what to call its one parameter, which has no name in the deck
-    short: str = ""  # the parameter that a path may leave out: `environment.gravity.x` for `environment.gravity.g.x`
-
-    def what(self, wanted: Parameter) -> str:
-        return self.called or f"`{wanted.name}` of {self.label}"
-
-    def join(self, name: str) -> str:
-        return f"{self.path}.{name}" if self.path else name
-
-    def paths(self, name: str, homes: Iterable[str]) -> tuple[str, ...]:
-        """Every path of a parameter: its own first, then those under definitions."""
-        names = [name, name.removeprefix(f"{self.short}.")] if self.short else [name]
-        made = [path for each in names for path in (self.join(each), *(self.join_local(home, each) for home in homes))]
-        return tuple(dict.fromkeys(made))
-
-    def join_local(self, home: str, name: str) -> str:
-        local = self.path if self.local is None else self.local
-        return ".".join(part for part in (home, local, name) if part)
-
-
-@dataclass
-class Settled:
-    """A parameter as it goes to the plan, but with a recorded scalar where the plan has a formula; and what it means.
-
-    expression  what the deck wrote, None where it wrote nothing
-    """
-
-    value: Real | tuple[float, ...] | str
-    unit: str
-    origin: Origin
-    doc: str = ""
-    expression: Expression | None = None
 
 
 @dataclass
@@ -99,6 +46,7 @@ class Scope:
     sets: dict[str, list[str]] = field(default_factory=dict)  # coordinate -> parameters that took it directly
     whole: dict[str, str] = field(default_factory=dict)  # paths that cannot vary -> why
     notes: list[str] = field(default_factory=list)
+    moved: dict[str, set[str]] = field(default_factory=dict)  # servo definition -> kinds of joints it moves
     lost: frozenset[str] = frozenset()  # joints whose servo failed: nothing can be said of its channels
     gone: frozenset[str] = frozenset()  # joints and links that failed: nothing can be said of what begins with them
 
@@ -347,6 +295,11 @@ class Scope:
 
     def _missing(self, owner: Owner, wanted: Parameter) -> None:
         self.checks.fail(owner.join(wanted.name))
+        servos = self.definitions.of_kind("servo")
+        bases = [servos[home].place for home in owner.homes[:-1] if home in servos]
+        if any(each.code == "D075" and each.at is not None and each.at.place in bases
+               and each.message.endswith(f" has no `{wanted.name}`") for each in self.complaints.errors):
+            return  # what a base has not was told of the base
         unit = self.unit(owner, wanted)[0]
         shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
         shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {in_deck(unit)}"
@@ -365,7 +318,7 @@ class Scope:
         elif written is not None:
             place = written.place
             with self.complaints.gather():
-                self.check_dimension(owner, wanted, written)
+                self.check_dimension(replace(owner, homes=homes), wanted, written)
                 value = self._plain(written.number)
             origin = _origin(item, place)
         coordinate = self._coordinate(owner, name, homes)
@@ -443,6 +396,7 @@ class Scope:
             return
         what = owner.what(wanted)
         also = self.names.label(value)
+        apart = self._of_its_own(owner, wanted, value, text)
         if value.dimension == PURE:
             shown = f"a number in {text}"
             if not isinstance(value.number, Scalar):
@@ -451,10 +405,29 @@ class Scope:
                 shown = f"the unit in square brackets behind the column's name: `[{in_deck(text)}]`"
             raise Problem(error(
                 "D060", f"{what} is in {text}, and this is a {'bare' if value.bare else 'pure'} number", value.place,
-                also=also, help=f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}"))
+                also=also,
+                help=apart or (f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}")))
         found = units.text(value.dimension)
         message = f"{what} is " + ("a pure number" if dimension == PURE else f"in {text}") + f", and this is in {found}"
-        raise Problem(error("D061", message, value.place, also=also, help=mended(value, text, dimension)))
+        raise Problem(error("D061", message, value.place, also=also,
+                            help=apart or mended(value, text, dimension)))
+
+    def _of_its_own(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> str:
+        """The remedy where a value is right for the other joints of its servo definition, which move otherwise."""
+        other: JointKind = "revolute" if owner.joint == "prismatic" else "prismatic"
+        both = [home for home in owner.homes if other in self.moved.get(home, ())]
+        if not both or not units.same(value.dimension, unit_here(wanted.unit, other, owner.command, owner.of)[1]):
+            return ""
+        joint = owner.path.partition(".servo")[0]
+        key = wanted.name if owner.command is None else "command"
+        shown = f"{value.number:g}" if value.bare and not isinstance(value.number, Scalar) else "..."
+        shown += "" if text == "1" else f" {in_deck(text)}"
+        written = f"{key} = {shown};" if owner.command is None else f"{key} = {owner.command}(...);"
+        moves, others = ("slides", "turn") if owner.joint == "prismatic" else ("turns", "slide")
+        why = f"joint `{joint}` {moves}, and others of servo `{both[-1]}` {others}"
+        if owner.homes[-1] != both[-1]:
+            return f"{why}: write `{written}` in servo `{owner.homes[-1]}`"
+        return f"{why}: give its servo a {key} of its own, `{joint} = {both[-1]} {{ {written} }}`"
 
     def _check_range(self, owner: Owner, wanted: Parameter, value: Real, place: Place, path: str = "",
                      needs: tuple[str, ...] = ()) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,9 @@ from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item, open_call, overlay
 from ic.meaning.models import check_keys, find_bare_model, find_model, refuse_values, use_model, word_of
+from ic.meaning.owner import Owner, Settled
 from ic.meaning.schedule import Rate
-from ic.meaning.scope import Owner, Scope, Settled
+from ic.meaning.scope import Scope
 from ic.meaning.trajectories import use_file, with_file_named
 from ic.meaning.unit_words import in_deck
 from ic.meaning.values import measure_of, place_of
@@ -33,6 +34,12 @@ SLOWEST, FASTEST = 1e-3, 1e9
 APART = 1e-9  # rad or m: far above rounding of a deck's numbers, far below what anyone sees
 RATE = Parameter(name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, doc="how often the servo's computer ticks")
 NOT_PARAMETERS = ("model", "command", "rate")
+ASKED: Mapping[str, Mapping[str, str]] = MappingProxyType({
+    "revolute": {"rate": "0.03 rad/s", "position": "30 deg", "torque": "2 N*m", "acceleration": "0.1 rad/s^2"},
+    "prismatic": {"rate": "0.03 m/s", "position": "0.1 m", "torque": "2 N", "acceleration": "0.1 m/s^2"},
+})
+"""What a command may ask of a joint, to show how one is written."""
+
 BESIDE = "write `model = {};`, and its parameters beside it"
 
 
@@ -52,6 +59,7 @@ class Use:
 def resolve_servos(scope: Scope, body: Block, arm: Arm) -> tuple[list[Use], frozenset[str]]:
     """Every servo of the run, in the order of the arm's joints, and the joints whose servo failed, which was told."""
     uses = {}
+    _note_kinds(scope, body, arm)
     for item in body.items.values():
         with scope.complaints.gather():
             use = _use(scope, item, arm)
@@ -59,6 +67,15 @@ def resolve_servos(scope: Scope, body: Block, arm: Arm) -> tuple[list[Use], froz
                 uses[use.joint] = use
     lost = frozenset(item.name for item in body.items.values()) - set(uses)
     return [uses[joint.name] for joint in arm.joints if joint.name in uses], lost
+
+
+def _note_kinds(scope: Scope, body: Block, arm: Arm) -> None:
+    """Of every servo definition and its bases, which kinds of joints it moves in this run."""
+    for item in body.items.values():
+        kind, definition = arm.kind(item.name), scope.definitions.of_kind("servo").get(word_of(item.value) or "")
+        if kind is not None and kind != "fixed" and definition is not None:
+            for home in scope.definitions.homes(definition):
+                scope.moved.setdefault(home, set()).add(kind)
 
 
 def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
@@ -114,6 +131,7 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
                                block.items["rate"].place, help="leave `rate` out")
     elif block.get("rate") is not None:
         rate = fixed_rate(scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`")
+    scope.setting(f"{item.name}.servo.model", servo.name, item=model)
     scope.whole[f"{item.name}.servo.model"] = f"decides the program: vary `{item.name}.servo` over definitions"
     return Use(item.name, name, servo, command, rate, parameters, item.place)
 
@@ -269,9 +287,10 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
                                help=[f"write `{kind}({word}(...))`", f"{servo.name} takes {known}"])
         return None
     if not isinstance(call, Call) or item.body is not None or len(call.positional) != 1:
+        first = servo.commands[0]
         scope.complaints.error("D151", "a command is its kind and one value or course in time", place,
-                               help=f"{servo.name} takes {known}: `{servo.commands[0]}(0.03 rad/s)` or "
-                                    f"`{servo.commands[0]}(step(to = ...))`")
+                               help=f"{servo.name} takes {known}: `{first}({ASKED[owner.joint][first]})` or "
+                                    f"`{first}(step(to = ...))`")
         return None
     kind = call.name.text
     if kind not in servo.commands:

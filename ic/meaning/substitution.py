@@ -11,7 +11,8 @@ from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, find_model, refuse_values, use_model, word_of
-from ic.meaning.scope import Owner, Scope
+from ic.meaning.owner import Owner
+from ic.meaning.scope import Scope
 from ic.meaning.servos import Use, moving_kind
 from ic.meaning.values import place_of
 from met import models

@@ -10,7 +10,8 @@ from ic.grammar.syntax import Call, Name, String, Word
 from ic.meaning.csv_files import missing_column
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, use_model
-from ic.meaning.scope import Owner, Scope, Settled
+from ic.meaning.owner import Owner, Settled
+from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
 from met.commands.profile import COLUMN, FILE, Profile
 from met.diagnostic import Label, Problem, error

@@ -305,11 +305,11 @@ def _call(call: Call, lookup: Lookup) -> Value | Values:
                             help=[*did_you_mean(name, FUNCTIONS), known_words("functions", FUNCTIONS)]))
     if call.named or call.body is not None:
         raise Problem(error("D070", f"`{name}` takes its arguments in order, without names", call.name.place,
-                            help=f"write `{name}({', '.join(_USAGE[name])})`"))
-    if len(call.positional) != len(_USAGE[name]) and not (name in ("min", "max") and call.positional):
-        count = f"{len(_USAGE[name])} argument{'s' * (len(_USAGE[name]) != 1)}"
+                            help=f"write `{name}({', '.join(USAGE[name])})`"))
+    if len(call.positional) != len(USAGE[name]) and not (name in ("min", "max") and call.positional):
+        count = f"{len(USAGE[name])} argument{'s' * (len(USAGE[name]) != 1)}"
         raise Problem(error("D070", f"`{name}` takes {count}, not {len(call.positional)}",
-                            call.name.place, help=f"write `{name}({', '.join(_USAGE[name])})`"))
+                            call.name.place, help=f"write `{name}({', '.join(USAGE[name])})`"))
     arguments = [evaluate_number(argument, lookup) for argument in call.positional]
     if name in ("linspace", "logspace"):
         return _spaced(call, arguments)
@@ -330,7 +330,7 @@ def _call(call: Call, lookup: Lookup) -> Value | Values:
     return Value(_plain(sin(first.number) if name == "sin" else cos(first.number)), PURE, call.place)
 
 
-_USAGE = {"sqrt": ("x",), "sin": ("x",), "cos": ("x",), "min": ("a", "b"), "max": ("a", "b"),
+USAGE = {"sqrt": ("x",), "sin": ("x",), "cos": ("x",), "min": ("a", "b"), "max": ("a", "b"),
           "linspace": ("from", "to", "count"), "logspace": ("from", "to", "count")}
 
 

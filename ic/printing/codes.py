@@ -11,21 +11,24 @@ from met.diagnostic import Problem, did_you_mean, error
 PAGE = Path(__file__).parents[2] / "docs" / "diagnostics.md"
 
 _ENTRY = re.compile(r"^### ([A-Z]\d{3}): .*?(?=^##)", re.MULTILINE | re.DOTALL)
+_ROW = re.compile(r"^\| ([A-Z]\d{3}) \| (.*?) \|", re.MULTILINE)  # of codes that no deck brings about
 _HIDDEN = re.compile(r"<!-- .*?-->\n?", re.DOTALL)
 
 
 def is_code(word: str) -> bool:
-    """Whether a word looks like the code of a message."""
-    return re.fullmatch(r"[A-Za-z]\d{3}", word) is not None
+    """Whether a word looks like the code of a message: `D063`, `d063`, `d63`."""
+    return re.fullmatch(r"[A-Za-z]\d{2,3}", word) is not None
 
 
 def print_code(word: str) -> Iterator[str]:
     """The entry of a code. Raises Problem D171 where there is none, or no page."""
-    code = word.upper()
+    code = word[0].upper() + word[1:].zfill(3)
     if not PAGE.is_file():
         help = "the entry of every code is in docs/diagnostics.md of a checkout"
         raise Problem(error("D171", f"the page that explains `{code}` is not installed with MET", help=help))
-    entries = {entry[1]: entry[0] for entry in _ENTRY.finditer(PAGE.read_text(encoding="utf-8") + "\n##")}
+    page = PAGE.read_text(encoding="utf-8")
+    entries = {row[1]: f"{row[1]}: {row[2]}" for row in _ROW.finditer(page)}
+    entries |= {entry[1]: entry[0] for entry in _ENTRY.finditer(page + "\n##")}
     if code not in entries:
         helps = [*did_you_mean(code, entries), "a code is printed with its message, as in `error[D060]`"]
         raise Problem(error("D171", f"no message has the code `{code}`, or none that needs an entry", help=helps))

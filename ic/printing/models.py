@@ -24,7 +24,7 @@ HOW = {
     "law": "substitute JOINT { law = MODEL(...); ... }, in a run",
 }
 
-OTHERS = ("channels", "dh", "shapes", "substitute", "units")
+OTHERS = ("channels", "designs", "dh", "distributions", "functions", "shapes", "substitute", "sweep", "units")
 """What else `met doc` has a page on (ic/printing/subjects.py)."""
 
 FIELDS = ("name", "unit", "doc", "default", "above", "at_least", "below", "at_most", "shape", "words", "source")
@@ -51,6 +51,9 @@ def chosen(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
     found = [(k, model) for k, model in everything if model.name == words[0]]
     if found and len(words) == 1:
         return found
+    if len(words) > 1 and (words[0] in OTHERS or found):
+        whole = f"{found[0][0]} {words[0]}" if found else words[0]
+        raise Problem(error("D171", f"`{words[0]}` takes no second word", help=f"`met doc {whole}` says it all"))
     known = [*KINDS, *OTHERS, *(model.name for _, model in everything)]
     helps = [*did_you_mean(words[0], known), f"kinds: {', '.join(KINDS)}; also: {', '.join(OTHERS)}"]
     raise Problem(error("D171", f"no kind of model and no model `{words[0]}`", help=helps))

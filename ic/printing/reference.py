@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ic.meaning import dh, shapes
-from ic.printing import subjects
+from ic.printing import subjects, sweeps
 from ic.printing.models import HOW, KINDS, default, facts, how, rows, shown_of, unit_in_words, words_in
 from met import models
 
@@ -30,7 +30,7 @@ def page() -> Iterator[str]:
     for kind in KINDS:
         names = ", ".join(f"[{name}](#{kind}-{name})" for name in models.find_own(kind))
         yield f"- [{_title(kind)}](#{kind}s): {names}"
-    for name in ("shapes", "dh", "channels", "units"):
+    for name in TITLES:
         yield f"- [{TITLES[name]}](#{_anchor(TITLES[name])})"
     for kind in KINDS:
         yield ""
@@ -44,10 +44,13 @@ def page() -> Iterator[str]:
     yield from _dh()
     yield from _channels()
     yield from _units()
+    for name in sweeps.SUBJECTS:
+        yield from _words(name)
 
 
 TITLES = {
     "shapes": "Shapes of links", "dh": "Denavit-Hartenberg numbers", "channels": "Channels", "units": "Units",
+    "functions": "Functions", "sweep": "Sweeps", "designs": "Designs of samples", "distributions": "Distributions",
 }  # fmt: skip
 
 
@@ -128,13 +131,27 @@ def _units() -> Iterator[str]:
     yield from _table([("unit", "word", "is"), *told])
 
 
-def _table(told: Sequence[Sequence[str]]) -> Iterator[str]:
-    """A table whose first row is its head and whose first column names things."""
+def _words(name: str) -> Iterator[str]:
+    subject = sweeps.SUBJECTS[name]
+    yield ""
+    yield f"## {TITLES[name]}"
+    yield ""
+    yield f"{_escaped(subject.what)}."
+    yield ""
+    yield f"In a deck: `{subject.example}`"
+    yield ""
+    yield from _table([("written", "is"), *((f"{written}", text) for _, written, text in subject.rows())], whole=True)
+    yield ""
+    yield _escaped(subject.more)
+
+
+def _table(told: Sequence[Sequence[str]], *, whole: bool = False) -> Iterator[str]:
+    """A table whose first row is its head and whose first column names things, several behind commas; or one, whole."""
     head, *others = told
     yield f"| {' | '.join(head)} |"
     yield f"|{'---|' * len(head)}"
     for row in others:
-        first = " ".join(f"`{name}`" for name in row[0].split(", "))
+        first = f"`{row[0]}`" if whole else " ".join(f"`{name}`" for name in row[0].split(", "))
         yield f"| {' | '.join([first, *map(_cell, row[1:])])} |"
 
 

@@ -1,9 +1,11 @@
-"""What `met doc` says besides models: channels, Denavit-Hartenberg numbers, shapes, motors on beds, units."""
+"""What `met doc` says besides models: channels, Denavit-Hartenberg numbers, shapes, motors on beds, units, and the
+words of values and sweeps (ic/printing/sweeps.py)."""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -11,6 +13,7 @@ from ic.meaning import dh, shapes
 from ic.meaning.substitution import DEFAULTS
 from ic.printing.columns import columns, number
 from ic.printing.models import FIELDS, WORDS, default, rows, summary, unit_in_words
+from ic.printing.sweeps import print_words, words_json
 from met import channel, models, units
 
 OF_ANY = (
@@ -143,9 +146,13 @@ Subject = tuple[Callable[[], Iterator[str]], Callable[[], list[Any]]]
 
 SUBJECTS: Mapping[str, Subject] = MappingProxyType({
     "channels": (print_channels, channels),
+    "designs": (partial(print_words, "designs"), partial(words_json, "designs")),
     "dh": (print_dh, dh_json),
+    "distributions": (partial(print_words, "distributions"), partial(words_json, "distributions")),
+    "functions": (partial(print_words, "functions"), partial(words_json, "functions")),
     "shapes": (print_shapes, shapes_json),
     "substitute": (print_substitute, substitute_json),
+    "sweep": (partial(print_words, "sweep"), partial(words_json, "sweep")),
     "units": (print_units, unit_table),
 })
 """By the word that `met doc` takes: what it prints, and the same for programs."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -195,7 +196,8 @@ class _Reader:
         drawn = sample.draw(self.drawn)
         columns: list[Column] = []
         for part, numbers in zip(sample.parts, drawn, strict=True):
-            columns.append(self.varied(part.path, part.place, numbers, part.low, part.unit))
+            column = self.varied(part.path, part.place, numbers, part.low, part.unit)
+            columns.append(replace(column, drawn=part.distribution))
         if sample.warning is not None:
             self.complaints.remark("D228", *sample.warning, help="take a power of 2")
         self.axes.append(Axis(tuple(columns), sample.note))

@@ -55,7 +55,7 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
         else:
             scope.complaints.error("D128", f"no parameter `{path}` in this run", place,
                                    help=did_you_mean(path, (*scope.known, *scope.whole, *scope.definitions.lets))
-                                   or _continued(scope, path) or _beginnings(scope))
+                                   or _continued(scope, path) or _ends(scope, path) or _beginnings(scope))
 
 
 def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
@@ -72,6 +72,12 @@ def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
 def _beginnings(scope: Scope) -> list[str]:
     """What the paths of this run begin with."""
     return [known_words("paths begin with", dict.fromkeys(known.partition(".")[0] for known in scope.known))]
+
+
+def _ends(scope: Scope, path: str) -> list[str]:
+    """Parameters whose last word the path is: `kp` where `motor.kp` was meant."""
+    found = [known for known in scope.known if known.endswith(f".{path}")]
+    return [known_words(f"there is `{path}` of", (known.removesuffix(f".{path}") for known in found))] if found else []
 
 
 def _continued(scope: Scope, path: str) -> list[str]:

@@ -299,11 +299,10 @@ class _Preprocessor(Macros):
             )  # fmt: skip
         else:
             meant = "elif" if name in ("elseif", "elsif") else name
-            self.findings.error(
-                "D007", f"`#{name}` is not a directive", directive.place,
-                help=did_you_mean(meant, CONDITIONALS if name.startswith(("if", "el", "end")) else DIRECTIVES)
-                or "a comment begins with `//`",
-            )  # fmt: skip
+            near = did_you_mean(meant, CONDITIONALS if name.startswith(("if", "el", "end")) else DIRECTIVES)
+            apart = directive.source.text[directive.offset - 1] != "#"
+            self.findings.error("D007", f"`#{name}` is not a directive", directive.place,
+                                help=[*near, *(["a comment begins with `//`"] if apart or not near else [])])
         raise _REMOVE
 
     def _announce(self, name: str, directive: Token, args: list[Token]) -> None:

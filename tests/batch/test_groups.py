@@ -100,9 +100,34 @@ def test_the_verdict_sums_up_the_sweep(
     compiled(tmp_path, TIMED, STRUCTURES)
     monkeypatch.chdir(tmp_path)
     assert main(["run", "deck.ic", "it", "--no-picture"]) == 1
-    assert (
-        "it: 6 of 6 cases reached their end\n  require end > 150 mrad  met by 3 of 6 (50 %)" in capsys.readouterr().out
-    )
+    told = capsys.readouterr().out
+    assert """\
+it: 6 of 6 cases reached their end, of 2 structures
+  require end > 150 mrad  met by 3 of 6 (50 %)
+
+                        cases  meet all    end
+  median of the cases:                    mrad
+  it.drive                  3         0  95.05
+  it.brisk                  3         3  190.5
+""" in told
+
+
+def test_of_many_structures_the_table_alone_is_told_and_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    many = "sweep it of hold { vary duration = (1 .. 6 by 1) s; vary drive.kp = [0.1, 0.2] V*s/rad; }\n"
+    compiled(tmp_path, TIMED, many)
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "deck.ic", "it", "--no-picture"]) == 1
+    told = capsys.readouterr().out
+    assert "it: 12 of 12 cases reached their end, of 6 structures" in told
+    assert "worst" not in told
+    assert main(["show", "deck.it.h5", "--no-plots"]) == 0
+    told = capsys.readouterr().out
+    assert "one structure in full: `met show deck.it.h5 --run it.1_s`; the cases of all: `--all-cases`" in told
+    assert len(told.splitlines()) < 20
+    assert main(["show", "deck.it.h5", "--no-plots", "--run", "it.3_s"]) == 0
+    assert "duration = 3 s" in capsys.readouterr().out
 
 
 def test_cases_lists_the_table_of_all_groups_in_order(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

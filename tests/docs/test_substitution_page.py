@@ -14,7 +14,7 @@ from met.plan import Experiment
 from tests.paper.stability_map import limits
 
 PAGE = (Path(__file__).parents[2] / "docs" / "substitution.md").read_text(encoding="utf-8")
-(DECK,) = re.findall(r"```c\n(.*?)```", PAGE, re.DOTALL)
+DECK, MOTORS = re.findall(r"```c\n(.*?)```", PAGE, re.DOTALL)
 RATIO, SLOW = 1570.0, 0.03
 LIGHT_TO_HEAVY = (0.5, 1.5, 5.0, 20.0)
 
@@ -31,6 +31,17 @@ def test_the_deck_of_the_page_runs(tmp_path: Path) -> None:
     shaft = result.signals["swing.bed.shaft_rate"].ravel()
     # After 5 s, with an arm of five rotors; the error of the whole course is held to below.
     assert abs(shaft[-1] / RATIO / SLOW - 1.0) < 0.01
+
+
+def test_as_many_motors_pass_as_the_page_says(tmp_path: Path) -> None:
+    result = engine.run(experiment(tmp_path, MOTORS, "motors"), record=False)
+    met = result.met["late < 1.8 s"]
+    (said, of) = re.search(r"met by (\d+) of (\d+) cases", PAGE).groups()  # type: ignore[union-attr]
+    assert (met.sum(), met.size) == (int(said), int(of))
+    passing = met.reshape(100, 3).sum(axis=1)
+    assert f"{(passing == 3).sum()} motors pass and {(passing == 0).sum()} do not" in PAGE
+    worst = int(np.argmax(result.metrics["late"]))
+    assert f"--case '#{worst}'" in PAGE
 
 
 @pytest.mark.parametrize("rate", ["100 Hz", "200 Hz", "1 kHz", "2 kHz"])

@@ -190,6 +190,13 @@ def test_a_file_that_cannot_be_read_is_the_users_to_mend_not_a_defect(
     assert capsys.readouterr().err == "error[E338]: `/no/such/file`: No such file or directory\n\n1 error\n"
 
 
+@pytest.mark.parametrize("closed", ["stdout", "stderr"])
+def test_a_stream_that_the_shell_has_closed_is_no_defect(closed: str) -> None:
+    program = f"import sys; sys.{closed} = None; from met.cli import main; sys.exit(main(['check', 'two_link.ic']))"
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, getattr(done, closed)) == (0, "")
+
+
 def test_a_closed_pipe_ends_quietly() -> None:
     """`met doc | true`: nobody reads what is printed."""
     reader, writer = os.pipe()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import importlib
-import json
 import io
+import json
 import os
 import subprocess
 import sys

@@ -125,9 +125,78 @@ def test_what_is_not_aligned_has_the_blanks_it_needs() -> None:
     assert fmt("a  = 1;\n\nbc =    2;\n") == "a = 1;\n\nbc = 2;\n"
 
 
+@pytest.mark.parametrize(("written", "laid"), [
+    (  # stops of four: the signs are at column 28
+        "run r {\n\trequire t_shoulder\t\t< 0.8 s;\n\trequire t_z\t\t\t\t< 1.1 s;\n}\n",
+        "run r {\n    require t_shoulder      < 0.8 s;\n    require t_z             < 1.1 s;\n}\n",
+    ),
+    (  # of eight: at column 32
+        "run r {\n\trequire t_shoulder\t< 0.8 s;\n\trequire t_z\t\t< 1.1 s;\n}\n",
+        "run r {\n    require t_shoulder      < 0.8 s;\n    require t_z             < 1.1 s;\n}\n",
+    ),
+    (  # of two: at column 16
+        "run r {\n\trequire over1\t< 2 %;\n\trequire t\t\t\t< 1.1 s;\n}\n",
+        "run r {\n    require over1 < 2 %;\n    require t     < 1.1 s;\n}\n",
+    ),
+    (
+        "a {\n\tlink upper\t{mass=6.5 kg;\tshape=x;}\n\tlink fore\t{mass=5.25 kg;\tshape=x;}\n}\n",
+        "a {\n    link upper  { mass = 6.5 kg;   shape = x; }\n    link fore   { mass = 5.25 kg;  shape = x; }\n}\n",
+    ),
+    ("let a=1;\t// one\nlet inertia=2;\t// two\n", "let a = 1;        // one\nlet inertia = 2;  // two\n"),
+    ("a = table(b = [0,1],\n\t  c = [1,2]\n);\n", "a = table(b = [0, 1],\n          c = [1, 2]\n);\n"),
+], ids=["four", "eight", "two", "braces", "comments", "below"])  # fmt: skip
+def test_tab_stops_are_where_most_columns_meet(written: str, laid: str) -> None:
+    assert fmt(written) == laid
+
+
+@pytest.mark.parametrize(("written", "laid"), [
+    (  # with stops of four, the last `<` is below the number above it
+        "a {\n\trequire t_shoulder < 0.8 s;\n\trequire t_z\t\t< 1.1 s;\n\trequire over1\t  < 2 %;\n}\n",
+        "a {\n    require t_shoulder < 0.8 s;\n    require t_z < 1.1 s;\n    require over1 < 2 %;\n}\n",
+    ),
+    (  # and here `mass` is below the brace
+        "a {\n\tlink upper   {mass=6.5 kg;}\n\tlink fore\t{mass=5.2 kg;}\n}\n",
+        "a {\n    link upper { mass = 6.5 kg; }\n    link fore { mass = 5.2 kg; }\n}\n",
+    ),
+])  # fmt: skip
+def test_tabs_with_which_nothing_meets_are_blanks(written: str, laid: str) -> None:
+    assert fmt(written) == laid
+
+
+@pytest.mark.parametrize(("written", "laid"), [
+    (  # two `=`, and the ends of two names, with one blank and two before them
+        "servo wrist like motor { ratio = 30;  kt = 0.05; }\nservo perfect { model = ideal; bandwidth = 60; }\n",
+        "servo wrist like motor { ratio = 30;  kt = 0.05; }\nservo perfect { model = ideal;  bandwidth = 60; }\n",
+    ),
+    (  # two entries of other names, with a line between
+        "servos { one = gear;  two = gear; }\nq { x = 0; }\nrates { base = 2 kHz; servos = 1 kHz; }\n",
+        "servos { one = gear;  two = gear; }\nq { x = 0; }\nrates { base = 2 kHz;  servos = 1 kHz; }\n",
+    ),
+    ("a =  b;\nc = f(g);\n", "a = b;\nc = f(g);\n"),  # a name that is set apart, and a bracket
+    ("ab = f(g,   h);\nc = [d, e, i];\n", "ab = f(g, h);\nc = [d, e, i];\n"),  # and a comma
+    ("a = b   + c;\na = [b, c];\n", "a = b + c;\na = [b, c];\n"),  # a sign, and a name
+    ("a { b = [c, d]; }\ne = [f,     g];\n", "a { b = [c, d]; }\ne = [f, g];\n"),  # in one bracket, and in two
+    ("f( x = 1);\nf(g(y = 2));\n", "f(x = 1);\nf(g(y = 2));\n"),  # one blank sets nothing apart
+])  # fmt: skip
+def test_what_meets_by_chance_is_not_aligned(written: str, laid: str) -> None:
+    assert fmt(written) == laid
+
+
+def test_what_two_blanks_set_apart_is_aligned_with_its_like() -> None:
+    text = "servos  { shoulder = gear;  elbow = gear; }\ninitial { q = 0 rad;        qd = 0 rad/s; }\n"
+    assert fmt(text) == text
+    assert fmt("servos  { shoulder=gear;   elbow=gear; }\ninitial { q = 0 rad;       qd=0 rad/s; }\n") == text
+
+
 def test_numbers_keep_their_ends_and_their_points_below_each_other() -> None:
     text = "a = [  0, -45, 10.25] deg;\nb = [ 90,   5,  1.5] deg;\nc = [-90,  45,  0] deg;\n"
     assert fmt(text) == text
+
+
+def test_a_blank_stands_where_a_list_of_the_same_name_has_a_sign() -> None:
+    text = "joint one { parent = base;  rpy = [-90, 0] deg; }\njoint two { rpy = [ 90, 0] deg; }\n"
+    assert fmt(text.replace(" = ", "=")) == text
+    assert fmt(text.replace("[-90", "[90")) == text.replace("[-90", "[90").replace("[ 90", "[90")
 
 
 def test_comments_at_the_ends_of_lines_stay_aligned() -> None:

@@ -94,7 +94,6 @@ error[D125]: no channel `links.hook.J_eff`
    |
 22 |     record = [links.hook.J_eff];
    |               ^^^^^^^^^^^^^^^^
-   = help: did you mean `links.hook.rate`?
    = help: channels of `links.hook`: links.hook.position, links.hook.orientation, links.hook.velocity, links.hook.rate, links.hook.jacobian
 """  # noqa: E501 - as it is printed
 

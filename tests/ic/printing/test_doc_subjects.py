@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 
 from ic.meaning.shapes import SHAPES
+from ic.meaning.values import CONSTANTS, FUNCTIONS
 from ic.printing import codes
+from ic.sweeps.axes import KNOWN
+from ic.sweeps.designs import DESIGNS, DISTRIBUTIONS
 from met import cli, models, units
 
 
@@ -47,8 +50,36 @@ def test_units_lists_them_all_with_what_they_are_in_si(capsys: pytest.CaptureFix
 
 def test_the_list_of_models_ends_with_what_else_there_is(capsys: pytest.CaptureFixture[str]) -> None:
     assert printed(capsys).endswith(
-        "Also: dh, shapes, substitute, units; and the code of a message, as in `met doc D060`.\n"
+        "Also: designs, dh, distributions, functions, shapes, substitute, sweep, units; and the code of a message, as "
+        "in `met doc D060`.\n"
     )
+
+
+WORDS = {"functions": FUNCTIONS, "sweep": KNOWN, "designs": DESIGNS, "distributions": tuple(DISTRIBUTIONS)}
+
+
+@pytest.mark.parametrize("subject", WORDS)
+def test_every_word_of_values_and_sweeps_is_said(subject: str, capsys: pytest.CaptureFixture[str]) -> None:
+    told = {each["name"]: each for each in json.loads(printed(capsys, subject, "--format", "json"))}
+    assert set(WORDS[subject]) <= set(told) <= {*WORDS[subject], *CONSTANTS}
+    lines = printed(capsys, subject).splitlines()
+    assert all(any(line.split() == [*each["written"].split(), *each["doc"].split()] for line in lines)
+               for each in told.values())
+
+
+def test_distributions_are_shown_with_what_they_take(capsys: pytest.CaptureFixture[str]) -> None:
+    assert printed(capsys, "distributions") == """\
+distributions: what a parameter of a sample is drawn from
+
+In a deck: sample lhs(200) { PATH = uniform(0.09, 0.11) N*m/A; }
+
+  uniform(from, to)                     evenly between two values
+  loguniform(from, to)                  evenly in the logarithm
+  normal(mean, deviation)               normal, without bounds
+  truncated(mean, deviation, from, to)  normal, cut off on either side
+
+The unit behind the brackets is for all numbers inside. Values are rounded to 12 digits in it.
+"""
 
 
 ENTRY = """\
@@ -92,7 +123,7 @@ A number where a dimension belongs.
 
     error[D060]: no
 """
-    assert printed(capsys, "D061") == "D061: another\n"
+    assert printed(capsys, "D061") == printed(capsys, "d61") == "D061: another\n"
 
 
 def test_a_code_without_an_entry_or_a_page_is_told(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -107,6 +138,20 @@ error[D171]: no message has the code `D062`, or none that needs an entry
     assert complained(capsys, "D060") == """\
 error[D171]: the page that explains `D060` is not installed with MET
  = help: the entry of every code is in docs/diagnostics.md of a checkout
+
+1 error
+"""
+
+
+def test_a_code_that_no_deck_brings_about_is_explained_by_its_row(capsys: pytest.CaptureFixture[str]) -> None:
+    assert printed(capsys, "E338") == "E338: the system refuses a file, in words of its own\n"
+
+
+@pytest.mark.parametrize(("words", "whole"), [(("channels", "q"), "channels"), (("ideal", "servo"), "servo ideal")])
+def test_a_word_too_many_is_told(words: tuple[str, str], whole: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert complained(capsys, *words) == f"""\
+error[D171]: `{words[0]}` takes no second word
+ = help: `met doc {whole}` says it all
 
 1 error
 """

@@ -36,7 +36,7 @@ def explained(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, obje
     ("rates.dynamics", 1000.0, "Hz", 14),
     ("rates.base", 1000.0, "Hz", None),
     ("hinge.servo.rate", 1000.0, "Hz", None),
-    ("hinge.servo.model", "rigid_gearbox", "", 13),
+    ("hinge.servo.model", "rigid_gearbox", "", 6),
     ("hinge.parent", "base", "", 3),
     ("servos.hinge", "drive", "", 13),
     ("environment.velocity_products", "on", "", None),
@@ -48,6 +48,14 @@ def test_a_setting_of_a_run_can_be_asked_for(
     path: str, value: object, unit: str, line: int | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert explained(capsys, "a.ic", path) == {path: (value, unit, line)}
+
+
+def test_a_metric_is_written_where_its_model_and_its_channel_are(capsys: pytest.CaptureFixture[str]) -> None:
+    run = changed(RUN, ("record = [q];", "record = [q];\n    metric top = max {\n        of = hinge.qd;\n    }"))
+    Path("b.ic").write_text(ARM + SERVO + run)
+    assert explained(capsys, "b.ic", "metrics.top") == {
+        "metrics.top.model": ("max", "", 17), "metrics.top.of": ("hinge.qd", "", 18),
+    }  # fmt: skip
 
 
 def test_explain_shows_a_setting_as_it_shows_a_parameter(capsys: pytest.CaptureFixture[str]) -> None:

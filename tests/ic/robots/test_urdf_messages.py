@@ -189,7 +189,7 @@ error[D097]: the axis of joint `hinge` has no direction
    |
 13 |     <axis xyz="0 0 0"/>
    |                ^^^^^
-   = help: one of its numbers must not be zero
+   = help: write numbers of ordinary size, not all of them zero
 """)
 mistake("negative damping", ('    <axis xyz="0 0 1"/>\n', '    <dynamics damping="-1"/>\n'), says="""\
 error[D206]: `damping` is below 0

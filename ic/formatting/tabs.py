@@ -1,0 +1,50 @@
+"""Where the author's tab stops were. A deck does not say; its columns do: they meet where the author saw them meet."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from ic.formatting.align import ANCHORS, lines_of, meeting, neighbours
+from ic.formatting.begins import stands_below
+from ic.formatting.rows import BLANK, CODE, REMARK, Row, rows
+from ic.text.lexer import Text
+
+OTHER_STOPS = (8, 2)  # what terminals have, and the narrowest that editors are set to
+
+
+def rows_as_seen(source: Text, making_strings: Collection[str] = ()) -> list[Row]:
+    """The rows of a file with the tab stops at which most of its columns meet; of equals, those that `rows` takes.
+
+    Raises Problem as `rows` does.
+    """
+    found = rows(source, making_strings)
+    if not any(row.tabbed for row in found if row.kind == CODE and not row.exact):
+        return found
+    return max((found, *(rows(source, making_strings, tab) for tab in OTHER_STOPS)), key=_met)
+
+
+def _met(found: Sequence[Row]) -> int:
+    """How much stands below what it may have been aligned with."""
+    lines = lines_of(found)
+    met = {
+        (one, first, other, second)
+        for one, other in neighbours(found)
+        if found[one].tabbed or found[other].tabbed
+        for anchor in ANCHORS
+        for first, second in meeting(lines[one], lines[other], anchor)
+    }
+    return len(met) + sum(stands_below(row) for row in found if row.tabbed) + _comments_met(found)
+
+
+def _comments_met(found: Sequence[Row]) -> int:
+    """How many comments stand below one that ends a line of the same paragraph."""
+    met, above = 0, -1
+    for row in found:
+        if row.kind == BLANK:
+            above = -1
+        elif row.tail is not None:
+            met += row.tail.column == above
+            above = row.tail.column
+        elif row.kind == REMARK:
+            met += row.column(row.whole[0].offset) == above
+    return met

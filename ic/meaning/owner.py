@@ -1,0 +1,66 @@
+"""What parameters belong to, and a parameter that is settled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from ic.grammar.syntax import Expression
+from met.diagnostic import Place
+from met.frozen import frozen
+from met.parameter import Parameter
+from met.plan import JointKind, Origin
+from met.trace import Real
+
+XYZ = ("x", "y", "z")
+
+
+@frozen
+class Owner:
+    """What parameters belong to: in words, where it is, and the first part of their paths.
+
+    homes    definitions under which a parameter that nobody wrote is reached
+    local    first part of the path under a definition's name
+    joint, command, of   what the words `joint`, `effort`, `command`, `of` in declared units mean here
+    """
+
+    label: str
+    place: Place
+    path: str
+    homes: tuple[str, ...] = ()
+    local: str | None = None
+    joint: JointKind = "revolute"
+    command: str | None = None
+    of: str | None = None
+    called: str | None = None  # what to call its one parameter, which has no name in the deck
+    short: str = ""  # the parameter that a path may leave out: `environment.gravity.x` for `environment.gravity.g.x`
+
+    def what(self, wanted: Parameter) -> str:
+        return self.called or f"`{wanted.name}` of {self.label}"
+
+    def join(self, name: str) -> str:
+        return f"{self.path}.{name}" if self.path else name
+
+    def paths(self, name: str, homes: Iterable[str]) -> tuple[str, ...]:
+        """Every path of a parameter: its own first, then those under definitions."""
+        names = [name, name.removeprefix(f"{self.short}.")] if self.short else [name]
+        made = [path for each in names for path in (self.join(each), *(self.join_local(home, each) for home in homes))]
+        return tuple(dict.fromkeys(made))
+
+    def join_local(self, home: str, name: str) -> str:
+        local = self.path if self.local is None else self.local
+        return ".".join(part for part in (home, local, name) if part)
+
+
+@dataclass
+class Settled:
+    """A parameter as it goes to the plan, but with a recorded scalar where the plan has a formula; and what it means.
+
+    expression  what the deck wrote, None where it wrote nothing
+    """
+
+    value: Real | tuple[float, ...] | str
+    unit: str
+    origin: Origin
+    doc: str = ""
+    expression: Expression | None = None

@@ -1,0 +1,108 @@
+"""What `met doc` says of the words in values and sweeps: functions, entries of a sweep, designs, distributions.
+
+The names, and what each takes, are those that the compiler reads by; here stands what they mean.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
+
+from ic.meaning.values import CONSTANTS, FUNCTIONS, USAGE
+from ic.printing.columns import columns, number
+from ic.sweeps.axes import KNOWN
+from ic.sweeps.designs import DESIGNS, DIGITS, DISTRIBUTIONS
+from met.frozen import frozen
+
+Row = tuple[str, str, str]
+"""A name, how it is written, what it is."""
+
+OF_FUNCTIONS: Mapping[str, str] = MappingProxyType({
+    "sqrt": "root; the unit's too", "sin": "of an angle, or of a bare number of radians", "cos": "the same",
+    "min": "least of values of one dimension, two or more", "max": "greatest of values of one dimension, two or more",
+    "linspace": "evenly spaced values, both ends included",
+    "logspace": "values in one ratio, both ends included (ends, not exponents)",
+})  # fmt: skip
+
+OF_ENTRIES: Mapping[str, tuple[str, str]] = MappingProxyType({
+    "vary": ("vary PATH = LIST;", "an axis: one case or more for each value"),
+    "zip": ("zip { PATH = LIST;  PATH = LIST; }", "an axis of several parameters in step, as many values each"),
+    "from": ('from "cases.csv";', "an axis of the rows of a file"),
+    "sample": ("sample DESIGN(COUNT) { PATH = DISTRIBUTION; }", "an axis of values drawn at random"),
+    "repeat": ("repeat COUNT;", "each case so many times, with noise of its own"),
+    "exclude when": ("exclude when CONDITION;", "leaves out the cases for which it holds"),
+    "seed": ("seed = 7;", "of the noise, and of what is drawn; the run's unless written"),
+    "seeds": ("seeds = independent;", "each case has noise of its own, not that of its position alone; `common` unless "
+                                      "written"),
+})  # fmt: skip
+
+OF_DESIGNS: Mapping[str, str] = MappingProxyType({
+    "lhs": "a Latin hypercube: each range in n equal parts, one value from each; more samples are other ones",
+    "sobol": "a scrambled Sobol sequence, evenly spread; n a power of 2; more samples change no old case",
+    "random": "independent draws; neither more samples nor more parameters change an old case",
+})
+
+OF_DISTRIBUTIONS: Mapping[str, str] = MappingProxyType({
+    "uniform": "evenly between two values", "loguniform": "evenly in the logarithm", "normal": "normal, without bounds",
+    "truncated": "normal, cut off on either side",
+})  # fmt: skip
+
+
+def _functions() -> list[Row]:
+    calls = [(name, f"{name}({', '.join(USAGE[name])})", OF_FUNCTIONS[name]) for name in FUNCTIONS]
+    return [*calls, *((name, name, number(value)) for name, value in CONSTANTS.items())]
+
+
+def _entries() -> list[Row]:
+    return [(name, *OF_ENTRIES[name]) for name in KNOWN]
+
+
+def _designs() -> list[Row]:
+    return [(name, f"{name}(n)", OF_DESIGNS[name]) for name in DESIGNS]
+
+
+def _distributions() -> list[Row]:
+    return [(name, f"{name}({', '.join(takes)})", OF_DISTRIBUTIONS[name]) for name, takes in DISTRIBUTIONS.items()]
+
+
+@frozen
+class Subject:
+    """A page: what it is about, how that stands in a deck, a row for each word, and what holds for all of them."""
+
+    what: str
+    example: str
+    rows: Callable[[], list[Row]]
+    more: str
+
+
+SUBJECTS: Mapping[str, Subject] = MappingProxyType({
+    "functions": Subject(
+        "What values may call, and the constants", "let step = max(1 mm, sqrt(2) * 3 mm);", _functions,
+        "The arguments bear units, or the whole has one behind its bracket: `linspace(1, 2, 5) kg`."),
+    "sweep": Subject(
+        "What stands in the block of a sweep; the cases are the product of its axes",
+        "sweep NAME of RUN { vary motor.kp = linspace(0.03, 0.12, 4) V*s/rad; }", _entries,
+        "The first axis is the slowest. `sweep NAME = ONE + OTHER;` joins the cases of several sweeps and runs."),
+    "designs": Subject(
+        "How the points of a sweep's sample lie", "sample lhs(200) { PATH = normal(20, 1) kg; }", _designs,
+        "What values the points become, `met doc distributions` says."),
+    "distributions": Subject(
+        "What a parameter of a sample is drawn from", "sample lhs(200) { PATH = uniform(0.09, 0.11) N*m/A; }",
+        _distributions,
+        f"The unit behind the brackets is for all numbers inside. Values are rounded to {DIGITS} digits in it."),
+})
+
+
+def print_words(name: str) -> Iterator[str]:
+    subject = SUBJECTS[name]
+    yield f"{name}: {subject.what[0].lower()}{subject.what[1:]}"
+    yield ""
+    yield f"In a deck: {subject.example}"
+    yield ""
+    yield from columns([(written, text) for _, written, text in subject.rows()])
+    yield ""
+    yield subject.more
+
+
+def words_json(name: str) -> list[dict[str, str]]:
+    return [{"name": each, "written": written, "doc": text} for each, written, text in SUBJECTS[name].rows()]
