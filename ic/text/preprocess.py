@@ -98,9 +98,6 @@ class _If:
         self.otherwise: Token | None = None
 
 
-_REMOVE = OutputDirective(Action.IgnoreAndRemove)
-
-
 class _Preprocessor(Macros):
     def __init__(self, files: Files, findings: Findings) -> None:
         self.files = files
@@ -279,12 +276,12 @@ class _Preprocessor(Macros):
             self._conditional(name, directive, args, ifs)
             return True
         if ifs and not ifs[-1].active and not name.startswith(("el", "end")):  # `#elseif` was meant for us
-            raise _REMOVE
+            raise OutputDirective(Action.IgnoreAndRemove)
         if name in ("define", "undef", "include"):
             if not args and name != "include":
                 usage = "#define NAME VALUE" if name == "define" else "#undef NAME"
                 self.findings.error("D007", f"`#{name}` needs a name", directive.place, help=f"write `{usage}`")
-                raise _REMOVE
+                raise OutputDirective(Action.IgnoreAndRemove)
             return True
         if name in ("error", "warning"):
             self._announce(name, directive, args)
@@ -303,7 +300,7 @@ class _Preprocessor(Macros):
             apart = directive.source.text[directive.offset - 1] != "#"
             self.findings.error("D007", f"`#{name}` is not a directive", directive.place,
                                 help=[*near, *(["a comment begins with `//`"] if apart or not near else [])])
-        raise _REMOVE
+        raise OutputDirective(Action.IgnoreAndRemove)
 
     def _announce(self, name: str, directive: Token, args: list[Token]) -> None:
         said = " ".join(directive.source.rest_of_line(args[0].offset).split()) if args else f"`#{name}`"
@@ -327,7 +324,7 @@ class _Preprocessor(Macros):
         if not ifs:
             self.findings.error("D007", f"`#{name}` without an `#if`", directive.place,
                                 help="leave it out, or write the `#if` that it belongs to")  # fmt: skip
-            raise _REMOVE
+            raise OutputDirective(Action.IgnoreAndRemove)
         opened = ifs[-1]
         if name == "endif":
             ifs.pop()
@@ -336,7 +333,7 @@ class _Preprocessor(Macros):
             label = Label(opened.otherwise.place, "the `#else` is here")
             self.findings.error("D007", f"`#{name}` after `#else`", directive.place, also=(label,),
                                 help="`#elif` comes before the one `#else`")  # fmt: skip
-            raise _REMOVE
+            raise OutputDirective(Action.IgnoreAndRemove)
         elif name == "else":
             opened.otherwise = directive
             opened.active = opened.outer and not opened.done

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from pathlib import Path
+from types import TracebackType
 
 import pytest
 
+from ic.text.preprocess import preprocess
 from tests.ic.decktext import Desk
 
 # numbers, units and macros
@@ -436,3 +439,19 @@ def test_nothing_is_written_beside_the_deck_or_the_library(desk: Desk):
     desk.tokens("#if 1\nx\n#endif")
     assert sorted(p.name for p in desk.directory.iterdir()) == ["a.ic", "library"]
     assert sorted(p.name for p in Path(pcpp.__file__).parent.iterdir()) == before
+
+
+def test_a_deck_that_was_read_is_forgotten(tmp_path: Path) -> None:
+    """An exception made once for all keeps every place it was raised at: 60 KB a deck, which the fuzzer found."""
+    deck = tmp_path / "deck.ic"
+    deck.write_text("#if 0\n#elseif\n#endif\n#error no\n#odd\n#define\nlet a = 1;\n", encoding="utf-8")
+
+    def kept() -> int:
+        gc.collect()
+        return sum(isinstance(each, TracebackType) for each in gc.get_objects())
+
+    preprocess(deck)
+    before = kept()
+    for _ in range(20):
+        preprocess(deck)
+    assert kept() == before
