@@ -21,6 +21,7 @@ import numpy as np
 from batch.archive import layout as archive_layout
 from batch.archive.sink import Busy, Sink, temporary_of
 from batch.rows import row_of
+from ic.printing.columns import size as size_text
 from met import keys
 from met.diagnostic import Problem, error
 from met.frozen import frozen
@@ -64,7 +65,7 @@ class Part:
         """Cases a batch: whole blocks of the kernel where there are many."""
         if not self.recorded:
             return BATCH_CASES
-        cases = max(1, min(BATCH_CASES, BATCH_BYTES // history_bytes(self.experiment)))
+        cases = max(1, min(BATCH_CASES, BATCH_BYTES // self.experiment.structure.history_bytes))
         return cases if cases < 64 else cases // 32 * 32
 
 
@@ -86,12 +87,6 @@ class Campaign:
         return sum(part.bytes for part in self.parts)
 
 
-def history_bytes(experiment: Experiment) -> int:
-    """Size of one case's histories."""
-    columns = sum(len(recorded.channels) for recorded in experiment.structure.record)
-    return 8 * columns * experiment.structure.schedule.rows
-
-
 def prepare(
     plan: Plan,
     *,
@@ -111,7 +106,7 @@ def prepare(
     selected = _selected(chosen, cases)
     target = Path(output) if output is not None else default_output(plan, experiments, selected)
     kept = {"default": True, "all": True, "none": False}[histories]
-    parts = tuple(Part(e, rows, kept and history_bytes(e) > 0) for e, rows in selected)
+    parts = tuple(Part(e, rows, kept and e.structure.history_bytes > 0) for e, rows in selected)
     notes: list[str] = []
     whole = sum(part.bytes for part in parts)
     if histories == "default" and whole > KEPT_BYTES:
@@ -362,12 +357,3 @@ def quoted(path: Any) -> str:
     """A path as a word of a command line: for a shell, and not to be taken for an option."""
     text = str(path)
     return shlex.quote(f"./{text}" if text.startswith("-") else text)
-
-
-def size_text(size: float) -> str:
-    """1536 -> `1.5 KiB`."""
-    units = ["B", "KiB", "MiB", "GiB", "TiB"]
-    while size >= 1024 and len(units) > 1:
-        size /= 1024
-        units.pop(0)
-    return f"{size:.0f} {units[0]}" if size >= 100 or units[0] == "B" else f"{size:.1f} {units[0]}"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from batch.archive.read import ArchiveFile
-from batch.campaign import Campaign, Part, history_bytes, perform, prepare, quoted, size_text
+from batch.campaign import Campaign, Part, perform, prepare, quoted, size_text
 from batch.progress import Bar, duration
 from batch.show import verdict
 from batch.structures import structures
@@ -141,7 +141,8 @@ def _part_lines(part: Part, verbose: bool) -> list[str]:
     ]
     recorded = ", ".join(recorded.name for recorded in experiment.structure.record)
     if part.recorded:
-        out.append(f"  histories: {recorded}; {schedule.rows:,} rows, {size_text(history_bytes(experiment))} a case")
+        each = size_text(experiment.structure.history_bytes)
+        out.append(f"  histories: {recorded}; {schedule.rows:,} rows, {each} a case")
     else:
         out.append("  histories: none" + (f" (would be {recorded})" if recorded else ""))
     for coordinate in experiment.cases.coordinates if verbose else ():

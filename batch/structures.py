@@ -8,6 +8,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, Group
 from batch.signals import deck_unit, number_text
+from batch.summary import Summary, median, summary_of
 
 
 def structures(archive: ArchiveFile) -> Iterator[list[str]]:
@@ -15,22 +16,19 @@ def structures(archive: ArchiveFile) -> Iterator[list[str]]:
     for sweep in dict.fromkeys(group.sweep for group in archive.groups if group.sweep):
         groups = [group for group in archive.groups if group.sweep == sweep]
         if len(groups) > 1:
-            yield [*_all_of(sweep, groups), *_table(groups)]
+            yield [*_all_of(sweep, [summary_of(group) for group in groups]), *_table(groups)]
 
 
-def _all_of(sweep: str, groups: Sequence[Group]) -> list[str]:
+def _all_of(sweep: str, summaries: Sequence[Summary]) -> list[str]:
     """How the sweep went as a whole: how many cases reached their end, and met each requirement."""
-    cases = sum(group.count for group in groups)
-    done = sum(int((group.values("status") == 0).sum()) for group in groups)
-    out = [f"{sweep}: {done:,} of {cases:,} cases reached their end, of {len(groups)} structures"]
-    yields: dict[str, list[int]] = {}
-    for group in groups:
-        for text, met in _met(group).items():
-            of = yields.setdefault(text, [0, 0])
-            of[0], of[1] = of[0] + met, of[1] + group.count
-    wide = max(map(len, yields), default=0)
-    for text, (met, of_all) in yields.items():
-        out.append(f"  require {text:<{wide}}  met by {met:,} of {of_all:,} ({100 * met / of_all:.3g} %)")
+    cases, failed = (sum(getattr(each, name) for each in summaries) for name in ("cases", "failed"))
+    out = [f"{sweep}: {cases - failed:,} of {cases:,} cases reached their end, of {len(summaries)} structures"]
+    texts = list(dict.fromkeys(r.text for each in summaries for r in each.requirements))
+    wide = max(map(len, texts), default=0)
+    for text in texts:
+        found = [(each.cases, r.met) for each in summaries for r in each.requirements if r.text == text]
+        of, met = map(sum, zip(*found, strict=True))
+        out.append(f"  require {text:<{wide}}  met by {met:,} of {of:,} ({100 * met / of:.3g} %)")
     return out
 
 
@@ -39,7 +37,7 @@ def _table(groups: Sequence[Group]) -> list[str]:
     from ic.printing.columns import columns
 
     metrics = list(dict.fromkeys(variable.name for group in groups for variable in group.role("metric")))
-    judged = any(_met(group) for group in groups)
+    judged = any("met" in group.variables for group in groups)
     units = {v.name: deck_unit(v)[1] for group in reversed(groups) for v in group.role("metric")}
     head = ["", "cases", *(["meet all"] if judged else []), *metrics]
     rows = [head]
@@ -48,9 +46,8 @@ def _table(groups: Sequence[Group]) -> list[str]:
     for group in groups:
         met = group.values("met") if "met" in group.variables else np.ones((group.count, 0), np.int8)
         whole = [str(int((met == 1).all(axis=1).sum()))] if judged else []
-        known = {variable.name: variable for variable in group.role("metric")}
-        scales = {variable.name: deck_unit(variable)[0] for variable in known.values()}
-        cells = [_median(group, name, scales[name]) if name in known else "" for name in metrics]
+        scales = {variable.name: deck_unit(variable)[0] for variable in group.role("metric")}
+        cells = [_median(group, name, scales[name]) if name in scales else "" for name in metrics]
         rows.append([group.name, str(group.count), *whole, *cells])
     return ["", *columns(rows, right=range(1, len(head)))]
 
@@ -59,15 +56,4 @@ def _median(group: Group, name: str, scale: float) -> str:
     """The middle of a metric's values, of which infinite ones count; `-` where none is a number."""
     values = np.sort(group.values(name))
     values = values[~np.isnan(values)] / scale
-    if not len(values):
-        return "-"
-    half = len(values) // 2
-    return number_text(float(values[half] if len(values) % 2 else 0.5 * (values[half - 1] + values[half])))
-
-
-def _met(group: Group) -> dict[str, int]:
-    """How many cases of a group meet each requirement."""
-    if "met" not in group.variables:
-        return {}
-    met = group.values("met")
-    return {str(text): int((met[:, n] == 1).sum()) for n, text in enumerate(group.values("requirement"))}
+    return number_text(median(values)) if len(values) else "-"

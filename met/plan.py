@@ -226,6 +226,11 @@ class Structure:
     substitutions: tuple[Substitution, ...] = ()
 
     @property
+    def history_bytes(self) -> int:
+        """Size of one case's histories: doubles, a column a channel."""
+        return 8 * self.schedule.rows * sum(len(recorded.channels) for recorded in self.record)
+
+    @property
     def moving(self) -> tuple[Joint, ...]:
         """The joints that have a coordinate, in the order of `joints`: the order of every `joint` dimension."""
         return tuple(joint for joint in self.joints if joint.kind != "fixed")

@@ -20,6 +20,7 @@ class Complaints:
     def __init__(self, found: Iterable[Diagnostic] = ()) -> None:
         self._found: dict[Diagnostic, None] = dict.fromkeys(found)
         self._remarks: dict[Diagnostic, None] = {}
+        self.lacking: set[tuple[Place, str]] = set()  # definitions, and what they lack, as was told
 
     @property
     def all(self) -> tuple[Diagnostic, ...]:
@@ -40,11 +41,10 @@ class Complaints:
 
     def _told_of_another_user(self, diagnostic: Diagnostic) -> bool:
         """Whether this value's mistake is known: what a base or a `let` writes is found wrong at each of its users."""
-        if diagnostic.at is None or diagnostic.code not in (*ONCE, "D075"):
+        if diagnostic.at is None or diagnostic.code not in ONCE:
             return False
-        missing = diagnostic.message.rpartition(" has no ")[2] if diagnostic.code == "D075" else ""
         return any(each.code == diagnostic.code and each.at is not None and each.at.place == diagnostic.at.place
-                   and each.message.endswith(missing) for each in self._found)
+                   for each in self._found)
 
     def error(self, code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
               help: Iterable[str] | str = ()) -> None:

@@ -13,18 +13,16 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 import re
 from collections.abc import Iterable, Iterator
 
-from ic.grammar.syntax import Deck, SourceText, String
+from ic.grammar.syntax import Deck
 from ic.meaning.complaints import known_words
+from ic.meaning.named_files import NamedFiles
 from ic.meaning.unit_words import in_degrees
-from ic.text.files import LIBRARY, Files, FoundFile
-from ic.text.lexer import COMMAND_LINE
 from ic.text.limits import MOST_CSV_BYTES, MOST_CSV_ROWS
 from met import units
-from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.units import PURE, Dimension, Measure
 
@@ -116,45 +114,9 @@ class Table:
         return Place(self.file, line, start + 1, max(len(text), 1))
 
 
-class CsvFiles:
-    """The files that a deck's commands name, each read once: beside the deck that names it, then where `-I` says."""
-
-    def __init__(self, deck: Deck) -> None:
-        self._deck = deck.file
-        self._files = Files(deck.include_dirs)
-        self._read: dict[str, Table | Problem] = {}
-
-    @property
-    def sources(self) -> tuple[SourceText, ...]:
-        """The files that were read, whole, in order."""
-        return tuple(self._files.read_so_far.values())
-
-    def table(self, named: String) -> Table:
-        """The table of the file of this name. Raises Problem, where that is the file's own fault the same each time."""
-        found = self._find(named)
-        if found.name not in self._read:
-            try:
-                text = self._files.text(found, kind="CSV file", most=MOST_CSV_BYTES)
-                self._read[found.name] = _table(found.name, text)
-            except Problem as problem:
-                placed = (d if d.at else Diagnostic(d.code, d.message, Label(named.place), d.also, d.help)
-                          for d in problem.diagnostics)
-                self._read[found.name] = Problem(placed)
-        table = self._read[found.name]
-        if isinstance(table, Problem):
-            raise table
-        return table
-
-    def _find(self, named: String) -> FoundFile:
-        file = self._deck if named.place.file == COMMAND_LINE else named.place.file
-        path = os.path.join(LIBRARY, file[1:-1]) if file.startswith("<") else file
-        folders = self._files.where(FoundFile(path, file), False)
-        found = self._files.find(named.value, folders) if named.value.strip() else None
-        if found is None:
-            near = did_you_mean(named.value, self._files.listed(folders, ".csv"))
-            looked = f"looked in {', '.join(dict.fromkeys(folder.said for folder in folders))}"
-            raise Problem(error("D190", f'cannot find "{named.value}"', named.place, help=(*near, looked)))
-        return found
+def csv_files(deck: Deck) -> NamedFiles[Table]:
+    """The CSV files that a deck names."""
+    return NamedFiles(deck, _table, kind="CSV file", ending=".csv", most=MOST_CSV_BYTES, missing="D190")
 
 
 def _table(file: str, text: str) -> Table:

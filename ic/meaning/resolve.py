@@ -10,7 +10,7 @@ from copy import copy
 
 from ic.grammar.syntax import Binary, Call, Deck, Entry, Group, Let, Name, Setting, Word
 from ic.meaning.complaints import Complaints, an, belongs, known_words
-from ic.meaning.csv_files import CsvFiles
+from ic.meaning.csv_files import csv_files
 from ic.meaning.merge import Block, merge, twice
 from ic.robots.files import RobotFiles
 from ic.text.files import library_defines
@@ -50,7 +50,7 @@ class Definitions:
 
     def __init__(self, deck: Deck, complaints: Complaints) -> None:
         self.lets: dict[str, Let] = {}
-        self.csv_files = CsvFiles(deck)
+        self.csv_files = csv_files(deck)
         self.robot_files = RobotFiles(deck)
         self._by_kind: dict[str, dict[str, Definition]] = {kind: {} for kind in KINDS}
         self._merged: dict[tuple[str, str], Block] = {}

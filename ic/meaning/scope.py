@@ -296,10 +296,10 @@ class Scope:
     def _missing(self, owner: Owner, wanted: Parameter) -> None:
         self.checks.fail(owner.join(wanted.name))
         servos = self.definitions.of_kind("servo")
-        bases = [servos[home].place for home in owner.homes[:-1] if home in servos]
-        if any(each.code == "D075" and each.at is not None and each.at.place in bases
-               and each.message.endswith(f" has no `{wanted.name}`") for each in self.complaints.errors):
-            return  # what a base has not was told of the base
+        bases = [servos[home].place for home in owner.homes if home in servos]
+        if any((place, wanted.name) in self.complaints.lacking for place in (owner.place, *bases)):
+            return  # which was told: of another use, or of a base
+        self.complaints.lacking.add((owner.place, wanted.name))
         unit = self.unit(owner, wanted)[0]
         shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
         shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {in_deck(unit)}"

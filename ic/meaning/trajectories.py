@@ -61,7 +61,7 @@ def _columns(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: s
     wanted, place = _column_name(owner, body.get(COLUMN.name), joint), named.place
     if body.get(COLUMN.name) is not None:
         place = place_of(body.items[COLUMN.name].value or named)
-    table = scope.definitions.csv_files.table(named)
+    table = scope.definitions.csv_files.get(named)
     here = Label(named.place, "read here")  # the same for all joints, so that the file's own faults are told once
     columns = {}
     for name, column_name, at in zip(LISTS, (TIME, wanted), (named.place, place), strict=True):

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ic.printing.columns import columns, count, number, size
-from ic.printing.plan import history_bytes
 from met import keys
 from met.plan import Coordinate, Experiment
 
@@ -29,7 +28,7 @@ def print_cases(groups: Sequence[Experiment], *, everything: bool = False) -> It
         yield from _structures(groups)
         yield ""
     else:
-        each = history_bytes(groups[0])
+        each = groups[0].structure.history_bytes
         yield title + (f", {size(each)} of histories each" if each and total > 1 else "")
     for note in dict.fromkeys(note for group in groups for note in group.notes if note.startswith(SAMPLED)):
         yield f"  {note}"
@@ -56,7 +55,7 @@ def _structures(groups: Sequence[Experiment]) -> Iterator[str]:
     for group in groups:
         chosen = {choice.path: choice.value for choice in group.cases.choices}
         values = [chosen.get(path, "") for path in paths]
-        rows.append([group.name, *values, str(group.cases.count), size(history_bytes(group))])
+        rows.append([group.name, *values, str(group.cases.count), size(group.structure.history_bytes)])
     yield from columns(rows, right=(len(paths) + 1, len(paths) + 2))
 
 
@@ -120,7 +119,7 @@ def cases_json(groups: Sequence[Experiment]) -> dict[str, Any]:
                 "name": group.name,
                 "count": group.cases.count,
                 "choices": {choice.path: choice.value for choice in group.cases.choices},
-                "history_bytes": history_bytes(group),
+                "history_bytes": group.structure.history_bytes,
             }
             for group in groups
         ],

@@ -12,7 +12,6 @@ from ic.printing.columns import columns, count, number, quantity, size, vector
 from met import models
 from met.plan import Experiment, Formula, Joint, Plan, Structure
 
-NUMBER_BYTES = 8
 CHOSEN = 88  # columns, of parameters that stand in one cell
 FIXED_SPACE = "\u00a0"  # no line ends at one
 STABILITY = "stability of "  # how the compiler's notes on it begin
@@ -245,7 +244,7 @@ def _channels(structure: Structure) -> Iterator[str]:
         yield "Recorded: nothing"
         return
     rows_ = structure.schedule.rows
-    bytes_ = size(width * rows_ * NUMBER_BYTES)
+    bytes_ = size(structure.history_bytes)
     yield f"Recorded: {count(width, 'channel')} in {count(rows_, 'row')}, {bytes_} a case"
     rows = []
     for recorded in structure.record:
@@ -265,15 +264,9 @@ def _metrics(experiment: Experiment) -> Iterator[str]:
     yield from columns(rows)
 
 
-def history_bytes(experiment: Experiment) -> int:
-    """Size of one case's histories."""
-    columns = sum(len(recorded.channels) for recorded in experiment.structure.record)
-    return NUMBER_BYTES * columns * experiment.structure.schedule.rows
-
-
 def _cases(experiment: Experiment) -> Iterator[str]:
     cases = experiment.cases
-    each = history_bytes(experiment)
+    each = experiment.structure.history_bytes
     written = f"{size(cases.count * each)} of histories" if each else "metrics alone are written"
     yield f"Cases: {cases.count}, {written}"
     rows = [(choice.path, choice.value) for choice in cases.choices]

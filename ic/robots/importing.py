@@ -14,9 +14,10 @@ from ic.meaning.scope import Scope
 from ic.read import in_order
 from ic.robots.deck import arm_name, print_deck
 from ic.robots.entries import Body, body
-from ic.robots.files import load
+from ic.robots.files import KIND, load
 from ic.robots.robot import Joint, Robot
 from ic.text.files import Files, FoundFile
+from ic.text.limits import MOST_URDF_BYTES
 from met.diagnostic import Diagnostic, Problem
 
 Mimic = Literal["free", "fixed"]
@@ -26,7 +27,8 @@ def imported(path: str, mimic: Mimic | None = None) -> str:
     """The deck's text. mimic: what joints that follow others do instead. Raises Problem, with the file's text."""
     files = Files()
     try:
-        made = load(files, FoundFile(path, os.path.normpath(path)))
+        found = FoundFile(path, os.path.normpath(path))
+        made = load(found.name, files.text(found, kind=KIND, most=MOST_URDF_BYTES))
         if mimic is not None:
             made = body(without_mimics(made.robot, mimic))
         _check(made)

@@ -29,7 +29,6 @@ from met.trace import Graph, Scalar
 
 MOST_CASES = 10_000_000
 KNOWN = ("vary", "zip", "from", "sample", "repeat", "exclude when", "seed", "seeds")
-SETTINGS = ("seed", "seeds")
 
 Column = Varied | Chosen
 
@@ -57,7 +56,7 @@ class Sweep:
     name: str
     axes: tuple[Axis, ...]
     excludes: tuple[Statement, ...]
-    seed: Setting | None
+    seed: int | None
     independent: Place | None
     repeat: int
     repeated: Place | None
@@ -106,7 +105,7 @@ class _Reader:
         self.definitions, self.complaints, self.graph, self.drawn = definitions, complaints, graph, 0
         self.axes: list[Axis] = []
         self.excludes: list[Statement] = []
-        self.seed: Setting | None = None
+        self.seed: int | None = None
         self.independent: Place | None = None
         self.repeat = 1
         self.repeated: Place | None = None
@@ -114,12 +113,11 @@ class _Reader:
         self.places: dict[str, list[Place]] = {}  # of the numbers of a path
         self.base = definition.group.of.text if definition.group.of is not None else "RUN"
         self.paths = {path: place for entry in definition.group.body for path, place in _paths(definitions, entry)}
-        self.seed_of_designs = seed
-        for entry in definition.group.body:
+        self.run_seed = seed
+        for entry in definition.group.body:  # first of all: what is drawn needs it, wherever it stands
             if isinstance(entry, Setting) and _is(entry, "seed"):
-                self.seed = entry
                 with complaints.gather():
-                    self.seed_of_designs = whole(definitions, entry.value, "a seed", least=0)
+                    self.seed = whole(definitions, entry.value, "a seed", least=0)
 
     def enter(self, entry: object) -> None:
         words = [word.text for word in getattr(entry, "words", ())]
@@ -189,7 +187,8 @@ class _Reader:
         self.axes.append(Axis(tuple(columns)))
 
     def sample(self, statement: Statement) -> None:
-        sample = read_sample(self.definitions, self.complaints, statement, self.paths, self.seed_of_designs)
+        sample = read_sample(self.definitions, self.complaints, statement, self.paths,
+                             self.run_seed if self.seed is None else self.seed)
         for part in sample.parts:
             self.note(part.path, part.place)
         self.drawn += 1
@@ -290,7 +289,7 @@ def _paths(definitions: Definitions, entry: object) -> list[tuple[str, Place]]:
         return [path for inner in entry.value.body for path in _paths(definitions, inner)]
     if isinstance(entry, Statement) and isinstance(entry.value, String) and entry.words[0].text == "from":
         with suppress(Problem):  # which is told where the file's columns are read
-            return [(column.name, column.place) for column in definitions.csv_files.table(entry.value).columns]
+            return [(column.name, column.place) for column in definitions.csv_files.get(entry.value).columns]
     return []
 
 

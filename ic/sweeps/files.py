@@ -19,7 +19,7 @@ _PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 
 def columns_of(definitions: Definitions, named: String, graph: Graph) -> tuple[list[Varied | Chosen], list[Place]]:
     """The columns of the file, in its order, and the places of its rows. Raises Problem, placed in the file."""
-    table = definitions.csv_files.table(named)
+    table = definitions.csv_files.get(named)
     made: list[Varied | Chosen] = []
     for column in table.columns:
         if not _PATH.fullmatch(column.name):

@@ -54,23 +54,32 @@ def lower(source: Source, definition: Definition) -> list[Group]:
 # Sweeps
 
 
+@frozen
+class _Read:
+    """A sweep as it is read with some macros: the deck's definitions, the run it is of, its axes over a graph."""
+
+    definitions: Definitions
+    base: Definition
+    sweep: Sweep
+    graph: Graph
+
+
 class _Sweep:
     """One sweep on its way to experiments."""
 
     def __init__(self, source: Source, definition: Definition) -> None:
         self.source, self.definition = source, definition
         self.definitions, self.complaints = source.definitions, source.complaints
-        self.base = _base(self.definitions, definition)
-        self.graph = Graph()
-        self.read_again: dict[tuple[str, ...], tuple[Definitions, Definition, Definition, Sweep, Graph]] = {}
+        self.read_so_far: dict[tuple[str, ...], _Read] = {}
 
     def groups(self) -> list[Group]:
         before = len(self.complaints.errors)
-        sweep = read_sweep(self.definitions, self.complaints, self.definition, self.graph, seed=self._run_seed())
+        read = self._read(self.definitions, self.definition)
+        sweep = read.sweep
         if len(self.complaints.errors) > before:
-            resolve_run(Scope(self.definitions, self.complaints), self.base)
+            resolve_run(Scope(self.definitions, self.complaints), read.base)
             return []
-        self.read_again[()] = (self.definitions, self.definition, self.base, sweep, self.graph)
+        self.read_so_far[()] = read
         found = structures(sweep)
         if len(found) > MOST_STRUCTURES:
             raise Problem(error("D229", f"sweep `{sweep.name}` is of {len(found)} structures", sweep.place,
@@ -98,22 +107,18 @@ class _Sweep:
         self._tell_of_idle_choices(sweep, [group for group, _ in made])
         return _numbered(sweep.name, made)
 
-    def _run_seed(self) -> int:
-        """The run's seed, for what the sweep draws; the run itself tells where it is wrong."""
-        block = self.definitions.block(self.base)
-        item = block.get("seed") if block is not None else None
-        try:
-            return whole(self.definitions, item.value, "a seed", least=0) if item is not None and item.value else 0
-        except Problem:
-            return 0
+    def _read(self, definitions: Definitions, definition: Definition) -> _Read:
+        graph, base = Graph(), _base(definitions, definition)
+        sweep = read_sweep(definitions, self.complaints, definition, graph, seed=_seed_of(definitions, base))
+        return _Read(definitions, base, sweep, graph)
 
     def _group(self, sweep: Sweep, choices: Choices,
                rows: np.ndarray) -> tuple[tuple[Group, np.ndarray] | None, list[tuple[Place, int]]] | None:
         """The cases of one structure, with their rows of the product; and how many each `exclude when` drops."""
-        before = len(self.complaints.errors)
-        definitions, _, base, there, graph = self._with_macros(sweep, choices)
-        definitions, run = put_in(definitions, base, choices)
-        scope = Scope(definitions, self.complaints, {varied.path: varied for varied in there.varied}, graph)
+        read = self._with_macros(sweep, choices)
+        there = read.sweep
+        definitions, run = put_in(read.definitions, read.base, choices)
+        scope = Scope(definitions, self.complaints, {varied.path: varied for varied in there.varied}, read.graph)
         resolved = resolve_run(scope, run)
         check_coordinates(scope, complete=resolved is not None)
         if resolved is None:
@@ -126,12 +131,9 @@ class _Sweep:
         values = {path: column[keep] for path, column in values.items()}
         count = int(np.count_nonzero(keep))
         scope.checks.run(values, count)
-        seed = resolved.seed if there.seed is None else whole(definitions, there.seed.value, "a seed", least=0)
-        dependents = _dependents(scope)
-        if len(self.complaints.errors) == before:
-            self._check_followed(scope, dependents, there)
         cases = Cases(
-            count, coordinates(scope, there, values, dependents), seed,
+            count, coordinates(scope, there, values, _dependents(scope)),
+            resolved.seed if there.seed is None else there.seed,
             "independent" if there.independent is not None else "common",
             tuple(Choice(column.path, option.text, option.place) for column, option in choices),
             repeats(there, rows[keep]),
@@ -142,31 +144,22 @@ class _Sweep:
             idle(self.complaints, there, made)
         return ((made, scope), rows[keep]), dropped
 
-    def _check_followed(self, scope: Scope, dependents: Mapping[str, Sequence[str]], sweep: Sweep) -> None:
-        for varied in sweep.varied:
-            taken = scope.sets.get(varied.path) or varied.path in scope.names.followed
-            if taken and not dependents[varied.path]:
-                self.complaints.error("D137", f"`{varied.path}` changes nothing in this run", varied.place,
-                                      help="no parameter's value depends on it: leave it out")
-
-    def _with_macros(self, sweep: Sweep, choices: Choices) -> tuple[Definitions, Definition, Definition, Sweep, Graph]:
+    def _with_macros(self, sweep: Sweep, choices: Choices) -> _Read:
         """The deck as it is with the macros that are chosen."""
         macros = tuple(f"{column.macro}={option.text}" for column, option in choices if column.macro)
-        if macros not in self.read_again:
+        if macros not in self.read_so_far:
             deck = self.source.reread(macros)
             definitions = Definitions(deck, self.complaints)
             definition = definitions.of_kind("sweep").get(self.definition.name)
             if definition is None or definition.parts:
                 raise Problem(error("D226", f"with this macro the deck has no sweep `{sweep.name}`", sweep.place,
                                     help="let the sweep stand outside `#if`"))
-            graph = Graph()
-            base = _base(definitions, definition)
-            there = read_sweep(definitions, self.complaints, definition, graph, seed=self._run_seed())
-            if there.sizes != sweep.sizes or _what_varies(there) != _what_varies(sweep):
+            read = self._read(definitions, definition)
+            if read.sweep.sizes != sweep.sizes or _what_varies(read.sweep) != _what_varies(sweep):
                 raise Problem(error("D226", f"with this macro sweep `{sweep.name}` varies something else", sweep.place,
                                     help="what is varied, and over how many values, must not depend on a varied macro"))
-            self.read_again[macros] = (definitions, definition, base, there, graph)
-        return self.read_again[macros]
+            self.read_so_far[macros] = read
+        return self.read_so_far[macros]
 
     def _tell_of_exclusions(self, dropped: Mapping[Place, int], some: bool) -> None:
         if not some and dropped:
@@ -208,6 +201,16 @@ def _base(definitions: Definitions, definition: Definition) -> Definition:
         raise Problem(error("D059", f"`{of.text}` is a path; the name of a run is needed", of.place,
                             help=f"write `{of.path[0].text}`"))
     return definitions.find("run", Word(of.text, of.place))
+
+
+def _seed_of(definitions: Definitions, run: Definition) -> int:
+    """The run's seed, for what the sweep draws; the run itself tells where it is wrong."""
+    block = definitions.block(run)
+    item = block.get("seed") if block is not None else None
+    try:
+        return whole(definitions, item.value, "a seed", least=0) if item is not None and item.value else 0
+    except Problem:
+        return 0
 
 
 def _dependents(scope: Scope) -> dict[str, list[str]]:

@@ -135,7 +135,7 @@ def test_the_bytes_do_not_depend_on_batches_or_the_clock(here: Path, monkeypatch
     plan = plans.plan(plans.nominal(), plans.gains(23))
     found = set()
     for case_bytes in (1, 5, 23):
-        monkeypatch.setattr(campaign, "BATCH_BYTES", case_bytes * campaign.history_bytes(plans.gains(1)))
+        monkeypatch.setattr(campaign, "BATCH_BYTES", case_bytes * plans.gains(1).structure.history_bytes)
         batch.run(plan, output="a.h5")
         found.add((here / "a.h5").read_bytes())
         time.sleep(1.1)  # HDF5's times count seconds

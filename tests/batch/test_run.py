@@ -105,7 +105,7 @@ class TestWhatIsKept:
 
     def test_memory_is_bounded_by_batches(self, here: Path) -> None:
         part = campaign.prepare(plans.plan(plans.gains(400_000)), histories="all").parts[0]
-        assert part.batch * campaign.history_bytes(part.experiment) <= campaign.BATCH_BYTES
+        assert part.batch * part.experiment.structure.history_bytes <= campaign.BATCH_BYTES
         assert part.batch % 32 == 0
 
     def test_the_size_said_is_about_the_size_written(self, here: Path) -> None:
@@ -541,7 +541,7 @@ class TestTheRealEngine:
         plan = plans.plan(plans.gains(9))
         found = []
         for cases in (9, 2):
-            monkeypatch.setattr(campaign, "BATCH_BYTES", cases * campaign.history_bytes(plans.gains(1)))
+            monkeypatch.setattr(campaign, "BATCH_BYTES", cases * plans.gains(1).structure.history_bytes)
             found.append(batch.run(plan, output="a.h5").path.read_bytes())
         assert found[0] == found[1]
 

@@ -9,7 +9,6 @@ import numpy as np
 import ic
 from ic.robots.entries import Body
 from ic.robots.files import load
-from ic.text.files import Files, FoundFile
 from met.dynamics.kinematics import link_motions
 from met.dynamics.recursion import solve
 from met.plan import Experiment
@@ -30,7 +29,7 @@ run fall {{
 
 
 def body(path: Path) -> Body:
-    return load(Files(), FoundFile(str(path), str(path)))
+    return load(str(path), path.read_text(encoding="utf-8"))
 
 
 def made_from(path: Path, folder: Path) -> Experiment:
