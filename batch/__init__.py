@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 from met.frozen import frozen
 
 if TYPE_CHECKING:
-    from batch.campaign import Histories, Progress
+    from batch.drive import Progress
+    from batch.executors import Executor
     from batch.summary import Summary
     from met.plan import Plan
 
@@ -45,25 +46,47 @@ def run(
     output: str | os.PathLike[str] | None = None,
     experiments: Sequence[str] | None = None,
     cases: Sequence[int | str] | None = None,
-    histories: Histories = "default",
+    histories: str | int | Sequence[str | int] = "default",
+    float32: bool = False,
     threads: int | None = None,
+    processes: int | None = None,
+    dask: Any = None,
+    timeout: float | None = None,
+    max_failures: int | None = None,
+    fresh: bool = False,
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Archive:
-    """Run a plan's cases into an archive.
+    """Run a plan's cases into an archive: what is missing of it, where an earlier run was interrupted.
 
-    plan         what `ic.compile` gives, or a plan file (`met plan DECK -o p.json`)
-    output       the archive; None: in the current folder, called as `met run` calls it: the deck's name, and those of
-                 the runs and sweeps that were asked for (`two_link.gains.h5`)
-    experiments  names of runs and sweeps; None: all of the plan's
-    cases        rows of the case table, `"#7"`, or the beginnings of case_ids; None: all
-    histories    "default": all while the archive stays below 1 GiB, else metrics only; "all"; "none"
-    threads      None: as many as there are cores
+    plan          what `ic.compile` gives, or a plan file (`met plan DECK -o p.json`)
+    output        the archive; None: in the current folder, called as `met run` calls it: the deck's name, and those of
+                  the runs and sweeps that were asked for (`two_link.gains.h5`)
+    experiments   names of runs and sweeps; None: all of the plan's
+    cases         rows of the case table, `"#7"`, or the beginnings of case_ids; None: all
+    histories     whose signals are kept, one word or several: "default" (all while the archive stays below 1 GiB, else
+                  none), "all", "none", "every:N", "failed", "worst:N", "worst:N:METRIC", or cases as above
+    float32       keep signals as numbers of four bytes
+    threads       None: as many as there are cores
+    processes     run in so many processes, so that a case that kills its process is found out
+    dask          run on a Dask cluster: the address of its scheduler, "local", or a `distributed.Client`
+    timeout       s without any progress after which a case is given up; in processes
+    max_failures  stop when more cases have failed
+    fresh         start over, rather than run what is missing
+    executor      who runs it, in place of threads, processes and dask (batch/executors)
+
+    Raises met.diagnostic.Problem for what a user can mend.
     """
-    from batch.campaign import perform, prepare
+    from batch.campaign import prepare
+    from batch.executors.choose import choose
+    from batch.performing import perform
 
-    campaign = prepare(_plan(plan), output=output, experiments=experiments, cases=cases, histories=histories)
-    perform(campaign, threads=threads, progress=progress)
-    return look(campaign.output, campaign.notes)
+    chosen = executor or choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
+    campaign = prepare(
+        _plan(plan), output=output, experiments=experiments, cases=cases, histories=histories, float32=float32
+    )
+    performed = perform(campaign, executor=chosen, fresh=fresh, max_failures=max_failures, progress=progress)
+    return look(campaign.output, (*campaign.notes, *performed.notes))
 
 
 def _plan(given: object) -> Plan:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group, Stored
+from batch.failures import STATUS
 from batch.signals import deck_unit, number_text, value_text
 from batch.summary import finite
 from met.diagnostic import Problem
@@ -91,7 +92,7 @@ def rows_json(
             "row": int(values["case"][i]),
             "case_id": str(values["case_id"][i]),
             **{each: int(found[i]) for each, found in repeats.items()},
-            "status": "failed" if values["status"][i] else "done",
+            "status": STATUS.get(int(values["status"][i]), "unknown"),
             "cause": str(values["cause"][i]),
             "coordinates": {v.path: finite(float(values[v.name][i])) for v in group.role("coordinate")},
             "metrics": {v.name: finite(float(values[v.name][i])) for v in group.role("metric")},
@@ -148,7 +149,7 @@ def _outcomes(group: Group, positions: np.ndarray | None = None) -> np.ndarray:
 
 def _outcome(status: int, outcomes: np.ndarray) -> str:
     if status != 0:
-        return "failed"
+        return STATUS.get(int(status), "failed")
     if not len(outcomes):
         return ""
     return "missed" if (outcomes == 0).any() else "unknown" if (outcomes < 0).any() else "met"

@@ -62,6 +62,9 @@ STYLE: dict[str, Any] = {
     "agg.path.chunksize": 20000,
 }
 
+MANY, DOTS = 20_000, (1600, 500)
+"""Points from which on it is looked which of them hide others; dots of a panel, across and up, that are told apart."""
+
 
 def plot(
     archive: ArchiveFile,
@@ -79,7 +82,7 @@ def plot(
     check_picture(output)
     matplotlib = _matplotlib()
     with matplotlib.rc_context(STYLE):
-        if group.recorded or signals or cases:
+        if signals or cases or group.recorded == group.count or (group.recorded and not group.role("metric")):
             figure = _histories(archive, group, signals, cases)
         else:
             figure = _metrics(archive, group)
@@ -139,7 +142,7 @@ def _save(figure: Any, output: Path) -> None:
 
 
 def _histories(archive: ArchiveFile, group: Group, signals: Sequence[str], cases: Sequence[str]) -> Any:
-    positions = [_recorded_position(group, case) for case in cases] if cases else list(range(group.recorded))
+    positions = [_recorded_position(group, case) for case in cases] if cases else group.recorded_positions.tolist()
     single, fan = len(positions) == 1, len(positions) > OVERLAID
     found = panels(group, signals)
     commands = overlaid(group, found, positions, apart=not single and not fan)
@@ -191,7 +194,7 @@ def _is_zero(group: Group, row: Sequence[Cell | None], positions: Sequence[int])
 
 def _recorded_position(group: Group, case: str) -> int:
     panels(group)  # refuses an archive without histories
-    return group.find_case(case)
+    return group.recorded_position(case)
 
 
 def _joint_colour(joints: list[str], panel: Panel, line: int) -> str:
@@ -338,12 +341,28 @@ def _marker_scale(count: int) -> float:
     return 1.0 if count < 400 else 1.7 if count < 20_000 else 3.7
 
 
+def _apart(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Places of the points to draw, of many: of those that fall on one dot of the picture, the last, which hides the
+    others. So none that stands alone is left out."""
+    if len(x) <= MANY:
+        return np.arange(len(x))
+    there = np.flatnonzero(np.isfinite(y))[::-1]
+    dots = np.zeros(len(there), np.int64)
+    for values, count in ((x, DOTS[0]), (y, DOTS[1])):
+        low, high = values[there].min(initial=np.inf), values[there].max(initial=-np.inf)
+        dots = dots * (count + 1) + (count * (values[there] - low) / ((high - low) or 1.0)).astype(np.int64)
+    return np.sort(there[np.unique(dots, return_index=True)[1]])
+
+
 def _scatter(ax: Any, group: Group, x: np.ndarray, y: np.ndarray, by: Stored | None) -> None:
+    drawn_ones = _apart(x, y)
     size = MARKER / _marker_scale(len(x)) ** 2
+    x, y = x[drawn_ones], y[drawn_ones]
     if by is None:
         ax.scatter(x, y, s=size, color=COLOURS[0], linewidths=0, rasterized=True)
         return
     values, label = _shown(group, by)
+    values = values[drawn_ones]
     levels = np.unique(values)
     if len(levels) <= OVERLAID:
         name, _, unit = label.partition("  (")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import time
 from collections.abc import Callable
@@ -12,13 +13,16 @@ FIRST_SECONDS = 0.3
 """What is over sooner needs no bar."""
 
 BAR_SECONDS = 0.1
-LINE_SECONDS = 5.0
+LINE_SECONDS, SELDOM = 5.0, 60.0
+"""Between two plain lines, at first and after a while: a log of a night's run should still be read."""
+
 WIDTH = 24
 
 
 @dataclass
 class Bar:
-    """Told of cases done, it prints at most ten times a second on a terminal, every five seconds elsewhere."""
+    """Told of cases done, it draws ten times a second on a terminal; elsewhere it prints a line, at first every five
+    seconds, after some minutes one a minute."""
 
     stream: TextIO = field(default_factory=lambda: sys.stderr)
     clock: Callable[[], float] = time.monotonic
@@ -26,23 +30,30 @@ class Bar:
     def __post_init__(self) -> None:
         self._live = self.stream.isatty()
         self._now = self.clock
-        self._name, self._cases, self._began, self._next, self._drawn = "", 0, 0.0, 0.0, False
+        self._name, self._cases, self._first, self._workers = "", 0, 0, ""
+        self._began, self._next, self._drawn = 0.0, 0.0, False
 
-    def begin(self, name: str, cases: int) -> None:
-        """A new experiment starts."""
-        self._name, self._cases, self._began = name, cases, self._now()
+    def begin(self, name: str, cases: int, done: int = 0, failed: int = 0, workers: str = "") -> None:
+        """A new experiment starts, of which some cases are done already."""
+        self._name, self._cases, self._first, self._workers = name, cases, done, workers
+        self._began = self._now()
         self._next = self._began + (FIRST_SECONDS if self._live else LINE_SECONDS)
         self._drawn = False
 
-    def advance(self, done: int) -> None:
-        """So many of its cases are done."""
+    def advance(self, done: int, failed: int = 0) -> None:
+        """So many of its cases are done, and so many of these failed."""
         now = self._now()
         if now < self._next or done >= self._cases:
             return
-        self._next = now + (BAR_SECONDS if self._live else LINE_SECONDS)
-        line = status(self._name, done, self._cases, now - self._began, bar=self._live)
+        elapsed = now - self._began
+        self._next = now + (BAR_SECONDS if self._live else min(max(LINE_SECONDS, 0.2 * elapsed), SELDOM))
+        line = status(
+            self._name, done, self._cases, elapsed, bar=self._live, first=self._first, failed=failed,
+            workers=self._workers,
+        )  # fmt: skip
         if self._live:
-            self.stream.write(f"\r{line}\x1b[K")
+            width = shutil.get_terminal_size().columns
+            self.stream.write(f"\r{line[: width - 1]}\x1b[K")
         else:
             self.stream.write(line + "\n")
         self.stream.flush()
@@ -55,8 +66,10 @@ class Bar:
             self.stream.flush()
 
 
-def status(name: str, done: int, cases: int, seconds: float, *, bar: bool) -> str:
-    """One line: share, cases, rate, time left."""
+def status(
+    name: str, done: int, cases: int, seconds: float, *, bar: bool, first: int = 0, failed: int = 0, workers: str = ""
+) -> str:
+    """One line: share, cases, failed ones, rate, time left, workers. first: cases that were done when it began."""
     share = done / cases
     drawn = ""
     if bar:
@@ -65,11 +78,13 @@ def status(name: str, done: int, cases: int, seconds: float, *, bar: bool) -> st
         drawn = "█" * full + (" ▏▎▍▌▋▊▉"[rest] if rest else "")
         drawn = drawn.ljust(WIDTH) + "▏ "
     text = f"{name}  {drawn}{100 * share:3.0f} %  {done:,} of {cases:,} cases"
-    if done and seconds > 0.0:
-        rate = done / seconds
+    if failed:
+        text += f", {failed:,} failed"
+    if done > first and seconds > 0.0:
+        rate = (done - first) / seconds
         text += f"  {rate:,.3g} cases/s" if rate < 1000 else f"  {rate:,.0f} cases/s"
         text += f"  {duration((cases - done) / rate)} left"
-    return text
+    return f"{text}  {workers}" if workers else text
 
 
 def duration(seconds: float) -> str:

@@ -12,10 +12,12 @@ import numpy as np
 
 from batch import braille, cases
 from batch.archive.read import ArchiveFile, Group
-from batch.campaign import quoted, size_text
+from batch.failures import failure_lines
+from batch.output import quoted
 from batch.signals import case_text, history, number_text, panels, pretty_unit
 from batch.structures import structures
 from batch.summary import MetricSummary, Summary, summary_of
+from ic.printing.columns import size as size_text
 from met.diagnostic import Problem, error
 
 MOST_GROUPS = 4
@@ -155,11 +157,7 @@ def heading(group: Group, width: int) -> list[str]:
 def verdict(summary: Summary, width: int) -> list[str]:
     """How it went: cases, metrics, requirements."""
     out = [_counts(summary)]
-    for failure in summary.failures:
-        head = f"  #{failure.row} {failure.case_id[:8]}  "
-        out += textwrap.wrap(failure.cause, max(width, 40), initial_indent=head, subsequent_indent=" " * len(head))
-    if summary.failed > len(summary.failures):
-        out.append(f"  and {summary.failed - len(summary.failures):,} more; `cause` in the archive has them all")
+    out += failure_lines(summary.failures, width)
     if summary.limited:
         of = "" if summary.cases == 1 else f" in {summary.limited:,} of {summary.cases:,} cases"
         out.append(f"  note: the load motor of a bed was at its limit{of}: the run is not what the joint would do")
@@ -223,7 +221,10 @@ def _plots(group: Group, signals: Sequence[str], case: int | None, width: int, c
         if signals:
             panels(group, signals)  # says that there are none
         return ["no histories kept"]
-    position = case or 0
+    position = int(group.recorded_positions[0]) if case is None else case
+    if position not in group.recorded_positions:
+        remedy = f"`met run {quoted(group.path)} --case '#{group.values('case')[position]}'` runs it again"
+        return [f"its history was not kept: {remedy}"]
     wanted = panels(group, signals)
     drawn = wanted if signals else wanted[:PLOTS]
     out = [case_text(group, position)] if group.count > 1 and case is None else []

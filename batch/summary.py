@@ -8,16 +8,8 @@ from typing import Any
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group, Stored
+from batch.failures import Failure, failures
 from met.frozen import frozen
-
-
-@frozen
-class Failure:
-    """A case that did not reach its end."""
-
-    row: int
-    case_id: str
-    cause: str
 
 
 @frozen
@@ -58,7 +50,7 @@ class RequirementSummary:
 class Summary:
     """One experiment's outcome.
 
-    failures  a few of them, unlike ones first
+    failures  all of them, by cause
     sweep     of which this is a group; "" where it is the whole of its run or sweep
     limited   cases in which the load motor of a bed was at its limit at some tick
     """
@@ -79,9 +71,6 @@ class Summary:
         return self.failed == 0 and all(r.met == self.cases for r in self.requirements)
 
 
-SHOWN_FAILURES = 5
-
-
 def summarise(archive: ArchiveFile) -> tuple[Summary, ...]:
     """The outcome of every experiment of an archive."""
     return tuple(summary_of(group) for group in archive.groups)
@@ -90,11 +79,12 @@ def summarise(archive: ArchiveFile) -> tuple[Summary, ...]:
 def summary_of(group: Group, position: int | None = None) -> Summary:
     """The outcome of one experiment, or of its case at this position."""
     here = slice(None) if position is None else slice(position, position + 1)
-    failed = np.flatnonzero(group.values("status")[here] != 0)
-    failures: tuple[Failure, ...] = ()
+    status = group.values("status")[here]
+    failed = np.flatnonzero(status != 0)
+    found: tuple[Failure, ...] = ()
     if len(failed):
-        rows, ids, causes = (group.values(name)[here] for name in ("case", "case_id", "cause"))
-        failures = tuple(Failure(int(rows[i]), str(ids[i]), str(causes[i])) for i in _one_of_each(causes, failed))
+        rows, ids, causes = (group.values(name)[here][failed] for name in ("case", "case_id", "cause"))
+        found = failures(status[failed], causes, rows, ids)
     requirements: tuple[RequirementSummary, ...] = ()
     if "met" in group.variables:
         met, done = group.values("met")[here], group.values("status")[here] == 0
@@ -112,25 +102,13 @@ def summary_of(group: Group, position: int | None = None) -> Summary:
         name=group.name,
         cases=group.count if position is None else 1,
         failed=len(failed),
-        recorded=group.recorded if position is None else min(1, group.recorded),
-        failures=failures,
+        recorded=group.recorded if position is None else int(position in group.recorded_positions),
+        failures=found,
         metrics=tuple(_metric(v, group.values(v.name)[here]) for v in group.role("metric")),
         requirements=requirements,
         sweep=str(group.attributes.get("sweep", "")),
         limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
     )
-
-
-def _one_of_each(causes: np.ndarray, failed: np.ndarray) -> list[int]:
-    """The first few failed cases, unlike ones first: a cause without its numbers is what counts as alike."""
-    first: dict[str, int] = {}
-    for position in failed.tolist():
-        kind = "".join(c for c in str(causes[position]).partition(": ")[2] if not c.isdecimal())
-        first.setdefault(kind, position)
-        if len(first) >= SHOWN_FAILURES:
-            break
-    more = [int(i) for i in failed[:SHOWN_FAILURES] if i not in first.values()]
-    return sorted([*first.values(), *more][:SHOWN_FAILURES])
 
 
 def _metric(variable: Stored, values: np.ndarray) -> MetricSummary:

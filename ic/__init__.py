@@ -7,7 +7,7 @@ Importing this package loads nothing of it: each function imports what it needs 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Literal
 
@@ -19,23 +19,29 @@ __all__ = ["check", "compile"]
 
 
 def check(path: str | PathLike[str], *, include_dirs: Iterable[str | PathLike[str]] = (), defines: Iterable[str] = (),
+          set: Mapping[str, object] | Iterable[str] = (),
           select: Sequence[str] | Literal["all"] | None = "all") -> Compiled:
     """The plan of all runs and sweeps or None, all diagnostics, every file's text. A mistake raises nothing."""
     from ic.meaning.lower import check as lowered
 
-    return lowered(path, include_dirs=tuple(include_dirs), defines=tuple(defines), select=select)
+    settings = [f"{path}={value}" for path, value in set.items()] if isinstance(set, Mapping) else set
+    return lowered(path, include_dirs=tuple(include_dirs), defines=tuple(defines), select=select,
+                   settings=tuple(settings))
 
 
 def compile(path: str | PathLike[str], *, include_dirs: Iterable[str | PathLike[str]] = (),
-            defines: Iterable[str] = (), select: Sequence[str] | Literal["all"] | None = None) -> Plan:
+            defines: Iterable[str] = (), set: Mapping[str, object] | Iterable[str] = (),
+            select: Sequence[str] | Literal["all"] | None = None) -> Plan:
     """The run plan of a deck.
 
+    set     values in the stead of the deck's, as the deck would write them: `{"gearbox.kp": "0.02 V*s/rad"}`, or
+            texts, `["gearbox.kp=0.02 V*s/rad"]`
     select  names of runs and sweeps, "all", or None: the only one, else the one marked `default`
     Raises `met.diagnostic.Problem` with every error and warning found, and the text of every file read.
     """
     from met.diagnostic import Problem
 
-    compiled = check(path, include_dirs=include_dirs, defines=defines, select=select)
+    compiled = check(path, include_dirs=include_dirs, defines=defines, set=set, select=select)
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)
     return compiled.plan

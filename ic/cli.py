@@ -25,20 +25,21 @@ DECK = click.argument("deck")
 @format_option
 @loudness_options
 def check(
-    deck: str, defines: tuple[str, ...], include_dirs: tuple[str, ...], form: str, quiet: bool, verbose: bool
-) -> int:
+    deck: str, defines: tuple[str, ...], include_dirs: tuple[str, ...], settings: tuple[str, ...], form: str,
+    quiet: bool, verbose: bool,
+) -> int:  # fmt: skip
     """Find all that is wrong with a deck.
 
     Every run and sweep of it is compiled to its plan; nothing is run. A plan file is read, and what it holds is said.
     """
-    check_options(deck, defines=defines, include_dirs=include_dirs)
+    check_options(deck, defines=defines, include_dirs=include_dirs, settings=settings)
     if deck.endswith(".json"):
         return _check_plan(deck, form, quiet)
     import ic
     from ic.find import find
 
     find(deck, include_dirs)
-    compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, select="all")
+    compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, set=settings, select="all")
     if form == "json":
         complain(compiled.diagnostics, compiled.sources, json=True)
         return YES if compiled.plan is not None else BAD_INPUT
@@ -83,6 +84,7 @@ def plan(
     output: str | None,
     defines: tuple[str, ...],
     include_dirs: tuple[str, ...],
+    settings: tuple[str, ...],
     form: str,
     quiet: bool,
     verbose: bool,
@@ -94,8 +96,8 @@ def plan(
     """
     from met import plan_file
 
-    check_options(deck, names, everything, defines, include_dirs)
-    made = _plan(deck, include_dirs, defines, names, everything, quiet)
+    check_options(deck, names, everything, defines, include_dirs, settings)
+    made = _plan(deck, include_dirs, defines, settings, names, everything, quiet)
     if output is not None:
         plan_file.write(made, output)
         if not quiet and form == "text":
@@ -121,6 +123,7 @@ def cases(
     everything: bool,
     defines: tuple[str, ...],
     include_dirs: tuple[str, ...],
+    settings: tuple[str, ...],
     form: str,
     quiet: bool,
     verbose: bool,
@@ -131,8 +134,8 @@ def cases(
     """
     from ic.printing.cases import cases_json, print_cases
 
-    check_options(deck, defines=defines, include_dirs=include_dirs)
-    made = _plan(deck, include_dirs, defines, names, not names, True)
+    check_options(deck, defines=defines, include_dirs=include_dirs, settings=settings)
+    made = _plan(deck, include_dirs, defines, settings, names, not names, True)
     sweeps = [e for e in made.experiments if names or e.varies] or list(made.experiments)
     shown = [list(groups) for _, groups in groupby(sweeps, lambda experiment: experiment.asked)]
     if form == "json":
@@ -157,6 +160,7 @@ def explain(
     name: str | None,
     defines: tuple[str, ...],
     include_dirs: tuple[str, ...],
+    settings: tuple[str, ...],
     form: str,
     quiet: bool,
     verbose: bool,
@@ -168,13 +172,13 @@ def explain(
     """
     from ic.printing.explaining import Sources, explained_json, print_explained
 
-    check_options(deck, defines=defines, include_dirs=include_dirs)
+    check_options(deck, defines=defines, include_dirs=include_dirs, settings=settings)
     names = (name,) if name else ()
     if deck.endswith(".json"):
         sources: Sources = [lambda: (_plan_in_file(deck, names), None)]
     else:  # what only another run of the deck knows is told of that one
         selections: list[Any] = [names] if names else [None, "all"]
-        sources = [partial(_source, deck, include_dirs, defines, selection) for selection in selections]
+        sources = [partial(_source, deck, include_dirs, defines, settings, selection) for selection in selections]
     if form == "json":
         _print_json(explained_json(sources, path))
     else:
@@ -237,21 +241,27 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @deck_options
 def dump(
-    stage: str, deck: str, names: tuple[str, ...], defines: tuple[str, ...], include_dirs: tuple[str, ...]
-) -> None:
+    stage: str, deck: str, names: tuple[str, ...], defines: tuple[str, ...], include_dirs: tuple[str, ...],
+    settings: tuple[str, ...],
+) -> None:  # fmt: skip
     """Show what one stage of the way hands to the next.
 
     STAGE is tokens, syntax, model, plan, program, kernel or assembly.
     """
-    from ic.printing.dump import Asked, find_stage
+    from ic.printing.dump import WRITTEN, Asked, find_stage
 
-    _print(find_stage(stage)(Asked(deck, include_dirs, defines, names or None)))
+    check_options(deck, settings=settings)
+    shown = find_stage(stage)
+    if settings and stage in WRITTEN:
+        raise click.UsageError(f"`met dump {stage}` shows what the deck says; `met dump plan`, what --set makes of it")
+    _print(shown(Asked(deck, include_dirs, defines, names or None, settings)))
 
 
 def _plan(
     deck: str,
     include_dirs: tuple[str, ...],
     defines: tuple[str, ...],
+    settings: tuple[str, ...],
     names: tuple[str, ...],
     everything: bool,
     quiet: bool,
@@ -259,7 +269,7 @@ def _plan(
     """The plan of a deck, or of a plan file; its warnings are printed on the way."""
     if deck.endswith(".json"):
         return _plan_in_file(deck, names)
-    compiled = _compiled(deck, include_dirs, defines, "all" if everything else names or None)
+    compiled = _compiled(deck, include_dirs, defines, settings, "all" if everything else names or None)
     if compiled.diagnostics and not quiet:
         complain(compiled.diagnostics, compiled.sources)
     assert compiled.plan is not None
@@ -267,21 +277,24 @@ def _plan(
 
 
 def _compiled(
-    deck: str, include_dirs: tuple[str, ...], defines: tuple[str, ...], select: tuple[str, ...] | Literal["all"] | None
-) -> Compiled:
+    deck: str, include_dirs: tuple[str, ...], defines: tuple[str, ...], settings: tuple[str, ...],
+    select: tuple[str, ...] | Literal["all"] | None,
+) -> Compiled:  # fmt: skip
     """A deck with its plan. Raises Problem where it has none."""
     import ic
     from ic.find import find
 
     find(deck, include_dirs)
-    compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, select=select)
+    compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, set=settings, select=select)
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)
     return compiled
 
 
-def _source(deck: str, include_dirs: tuple[str, ...], defines: tuple[str, ...], select: Any) -> tuple[Plan, Compiled]:
-    compiled = _compiled(deck, include_dirs, defines, select)
+def _source(
+    deck: str, include_dirs: tuple[str, ...], defines: tuple[str, ...], settings: tuple[str, ...], select: Any
+) -> tuple[Plan, Compiled]:
+    compiled = _compiled(deck, include_dirs, defines, settings, select)
     assert compiled.plan is not None
     return compiled.plan, compiled
 

@@ -102,7 +102,11 @@ def met() -> None:
 
 
 def deck_options(face: Face) -> Face:
-    """The options of whatever reads a deck: -D and -I, given on as `defines` and `include_dirs`."""
+    """The options of whatever reads a deck: -D, -I and --set, given on as `defines`, `include_dirs` and `settings`."""
+    face = click.option(
+        "--set", "settings", multiple=True, metavar="PATH=VALUE",
+        help="Set what `vary` names, as if the deck said so: 'gearbox.kp=0.02 V*s/rad'; may be repeated.",
+    )(face)  # fmt: skip
     face = click.option(
         "-I", "include_dirs", multiple=True, metavar="DIR", type=click.Path(exists=True, file_okay=False),
         help="Look for included files here too; may be repeated.",
@@ -114,7 +118,7 @@ def deck_options(face: Face) -> Face:
 
 def check_options(
     source: str, names: Sequence[str] = (), everything: bool = False, defines: Sequence[str] = (),
-    include_dirs: Sequence[str] = (),
+    include_dirs: Sequence[str] = (), settings: Sequence[str] = (),
 ) -> None:  # fmt: skip
     """Refuse options that clash, or that would do nothing, as click refuses what it cannot read."""
     if names and everything:
@@ -122,6 +126,11 @@ def check_options(
     for option, given in (("-D", defines), ("-I", include_dirs)):
         if given and source.endswith(".json"):
             raise click.UsageError(f"{option} is for decks: `{source}` is a plan, whose macros are expanded already")
+    if settings and source.endswith(".json"):
+        made = f"`met plan DECK --set '{settings[0]}' -o {source}` makes another"
+        raise click.UsageError(f"--set is for decks: `{source}` is a plan, whose values are settled; {made}")
+    if settings and source.endswith((".h5", ".hdf5", ".nc")):
+        raise click.UsageError(f"--set is for decks: `{source}` is an archive, of what was run; run its deck with it")
 
 
 def format_option(face: Face) -> Face:

@@ -60,15 +60,17 @@ def case_keys(experiment: Experiment, rows: Sequence[int] | np.ndarray | None = 
     return _row_digests(head, table.view(np.uint8).reshape(count, -1))
 
 
-def case_ids(experiment: Experiment, rows: Sequence[int] | np.ndarray | None = None) -> list[str]:
-    """case_id of every case, or of some rows of the case table, in their order."""
+def case_ids(
+    experiment: Experiment, rows: Sequence[int] | np.ndarray | None = None, keys: Sequence[str] | None = None
+) -> list[str]:
+    """case_id of every case, or of some rows of the case table, in their order. keys: their case_keys, where known."""
     parameters = {path: _value(quantity.value) for path, quantity in experiment.parameters.items()}
     formulas = experiment.formulas
     own = [experiment.cases.seeds] if experiment.cases.seeds != "common" else []
     head = _bytes(
         ["case_id", parameters, experiment.cases.seed, formulas.inputs, formulas.nodes, formulas.outputs, *own]
     )
-    keys = case_keys(experiment, rows)
+    keys = case_keys(experiment, rows) if keys is None else keys
     packed = np.frombuffer("".join(keys).encode("ascii"), dtype=np.uint8).reshape(len(keys), 2 * DIGEST_BYTES)
     return _row_digests(head, packed)
 

@@ -339,6 +339,7 @@ class Plan:
 
     selected: how the runs and sweeps were asked for, by name or `all`; none where the deck's own choice was taken.
     An archive is called after it.
+    settings: what was set from outside of the deck, `PATH=VALUE`, as if it had said so.
     """
 
     deck: str
@@ -346,3 +347,4 @@ class Plan:
     sources: tuple[Source, ...] = ()
     defines: tuple[str, ...] = field(default=())
     selected: tuple[str, ...] = field(default=())
+    settings: tuple[str, ...] = field(default=())

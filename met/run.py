@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
@@ -15,9 +16,14 @@ from met.plan import REPEAT, Experiment
 from met.program.build import COORDINATE, METRIC, OUTPUTS, build
 from met.program.step import EVENTS, NOT_FINITE, SINGULAR
 from met.program.substituted import LIMITED
-from met.trace.program import Program
+from met.trace.ir import emit
+from met.trace.program import Program, Recording, record
 
-DONE, FAILED = 0, 1
+DONE, FAILED, TIMED_OUT, LOST = range(4)
+"""How a case ended: at its end; by its own numbers; cut off for taking too long; with whatever ran it, each time."""
+
+CANONICAL_LANES = 8
+"""Of the code that `Prepared.code_key` is made from; what runs has those that suit the machine."""
 
 
 @frozen
@@ -25,7 +31,7 @@ class Run:
     """What the engine gives back for some cases of one experiment; the first axis of every array is the case.
 
     case         row of the case table
-    status       DONE or FAILED;  cause: why, with time and joint, empty where done
+    status       DONE, FAILED, TIMED_OUT or LOST;  cause: why, with time and joint, empty where done
     n_valid      recorded rows before the failure; all of them where done
     time         (row,) s, of the recorded rows
     signals      by name of `plan.Recorded`: (case, row), then its `shape` (joints, components); not-a-number from
@@ -63,10 +69,19 @@ class Prepared:
         return build(self.experiment)
 
     @cached_property
-    def kernel(self):  # type: ignore[no-untyped-def]
-        from met.kernel import compile
+    def recording(self) -> Recording:
+        return record(self.program)
 
-        return compile(self.program, lanes=self.lanes)
+    @cached_property
+    def kernel(self):  # type: ignore[no-untyped-def]
+        from met.kernel import from_recording
+
+        return from_recording(self.recording, self.lanes)
+
+    @cached_property
+    def code_key(self) -> str:
+        """Key of all that is computed: where it is equal, equal inputs give equal bits. The same on any machine."""
+        return hashlib.sha256(emit(self.recording, CANONICAL_LANES).encode()).hexdigest()
 
 
 def prepare(experiment: Experiment, *, lanes: int | None = None) -> Prepared:
@@ -89,14 +104,26 @@ def run(
     progress  called with the number of cases done so far
     """
     prepared = experiment if isinstance(experiment, Prepared) else prepare(experiment, lanes=lanes)
-    experiment = prepared.experiment
-    schedule = experiment.structure.schedule
-    rows = np.arange(experiment.cases.count) if cases is None else np.asarray(cases, dtype=np.int64)
+    rows = np.arange(prepared.experiment.cases.count) if cases is None else np.asarray(cases, dtype=np.int64)
+    history, outputs = compute(prepared, rows, threads=threads, record=record, progress=progress)
+    return results(prepared, rows, history, outputs)
+
+
+def compute(
+    prepared: Prepared,
+    rows: np.ndarray,
+    *,
+    threads: int | None = None,
+    record: bool = True,
+    progress: Callable[[int], None] | None = None,
+) -> tuple[np.ndarray | None, np.ndarray]:
+    """What the kernel gives of these rows, as `results` takes it: histories [case, row, column], where they are kept
+    and there are any, and outputs [case, output], in the order of the program's."""
     history, outputs = prepared.kernel.run(
-        inputs(experiment, rows), schedule.ticks,
+        inputs(prepared.experiment, rows), prepared.experiment.structure.schedule.ticks,
         record=record and prepared.program.columns > 0, threads=threads, progress=progress,
     )
-    return _results(experiment, prepared.program, rows, history, outputs)
+    return history, outputs
 
 
 def inputs(experiment: Experiment, rows: np.ndarray) -> np.ndarray:
@@ -114,19 +141,35 @@ def inputs(experiment: Experiment, rows: np.ndarray) -> np.ndarray:
     return values
 
 
-def _results(
-    experiment: Experiment, program: Program, rows: np.ndarray, history: np.ndarray | None, outputs: np.ndarray
+def results(
+    prepared: Prepared,
+    rows: np.ndarray,
+    history: np.ndarray | None,
+    outputs: np.ndarray,
+    fates: Mapping[int, tuple[int, str]] | None = None,
 ) -> Run:
+    """What came of these rows, of what `compute` gave of them. Writes not-a-number into `history` after a failure.
+
+    fates  of rows (by their place in `rows`) for which nothing was computed: TIMED_OUT or LOST, and why
+    """
+    experiment, program = prepared.experiment, prepared.program
     schedule = experiment.structure.schedule
     out = {name: outputs[:, column] for column, name in enumerate(program.outputs)}
     failed = out["failure"] != 0.0
     n_valid = np.where(failed, np.ceil(out["failure.tick"] / schedule.record), schedule.rows).astype(np.int64)
-    causes = [_cause(experiment, *row) for row in outputs[:, :3].tolist()]
-    for row, cause in _misapplied(experiment, rows, out).items():
-        failed[row], n_valid[row], causes[row] = True, 0, cause
+    causes = [""] * len(rows)
+    for case in np.flatnonzero(failed).tolist():
+        causes[case] = _cause(experiment, *outputs[case, :3].tolist())
+    status = np.where(failed, FAILED, DONE).astype(np.int8)
+    for fated, (ended, why) in (fates or {}).items():
+        status[fated], failed[fated], n_valid[fated], causes[fated] = ended, True, 0, why
+        for coordinate in experiment.cases.coordinates:
+            out[COORDINATE + coordinate.path][fated] = coordinate.values[rows[fated]]
+    for case, cause in _misapplied(experiment, rows, out).items():
+        status[case], failed[case], n_valid[case], causes[case] = FAILED, True, 0, cause
     signals: dict[str, np.ndarray] = {}
     if history is not None:
-        for case in np.flatnonzero(failed):
+        for case in np.flatnonzero(failed).tolist():
             history[case, n_valid[case] :, :] = math.nan
         column = 0
         for recorded in experiment.structure.record:
@@ -137,7 +180,7 @@ def _results(
     metrics = {use.name: np.where(failed, math.nan, out[METRIC + use.name]) for use in experiment.structure.metrics}
     return Run(
         case=rows,
-        status=np.where(failed, FAILED, DONE).astype(np.int8),
+        status=status,
         cause=causes,
         n_valid=n_valid,
         time=np.arange(schedule.rows) * schedule.record / schedule.base_hz,

@@ -40,7 +40,10 @@ SCHEMA = "met.archive"
 VERSION = 1
 
 Role = Literal["dimension", "case", "coordinate", "choice", "metric", "requirement", "recorded", "signal"]
-Kind = Literal["float64", "int64", "int8", "str"]
+Kind = Literal["float64", "float32", "int64", "int8", "str"]
+
+WIDTHS: Mapping[Kind, int] = {"float64": 8, "float32": 4, "int64": 8, "int8": 1, "str": 48}
+"""Bytes of a value; of a string, with what HDF5 has about it."""
 
 CHUNK_BYTES = 4 << 20
 """A chunk is one case's signal, cut in time beyond this size."""
@@ -106,8 +109,7 @@ class Layout:
     @property
     def bytes(self) -> int:
         """About the size of the group in the file."""
-        widths = {"float64": 8, "int64": 8, "int8": 1, "str": 48}
-        values = sum(int(np.prod(self.shape(v), dtype=np.int64)) * widths[v.kind] for v in self.variables)
+        values = sum(int(np.prod(self.shape(v), dtype=np.int64)) * WIDTHS[v.kind] for v in self.variables)
         chunks = sum(self.sizes["recorded_case"] for _ in self.role("signal"))
         return values + CHUNK_ENTRY * chunks + VARIABLE_HEAD * len(self.variables)
 
@@ -116,12 +118,13 @@ class Layout:
         if variable.role != "signal":
             return None
         _, rows, *width = self.shape(variable)
-        row = 8 * int(np.prod(width, dtype=np.int64))
+        row = WIDTHS[variable.kind] * int(np.prod(width, dtype=np.int64))
         return (1, max(1, min(rows, CHUNK_BYTES // row)), *width)
 
 
-def layout(experiment: Experiment, cases: int, recorded: bool) -> Layout:
-    """The group of an experiment of which `cases` cases are run, with their histories or without."""
+def layout(experiment: Experiment, cases: int, recorded: int, single: bool = False) -> Layout:
+    """The group of an experiment of which `cases` cases are run, and of `recorded` of them the histories are kept, of
+    which each number has eight bytes, or four: `single`."""
     structure = experiment.structure
     sizes = {"case": cases, "requirement": len(experiment.requirements)}
     variables = [
@@ -129,13 +132,14 @@ def layout(experiment: Experiment, cases: int, recorded: bool) -> Layout:
         *_case_variables(experiment),
     ]
     if recorded:
-        sizes |= {"recorded_case": cases, "time": structure.schedule.rows}
+        sizes |= {"recorded_case": recorded, "time": structure.schedule.rows}
         variables += [
             Variable("recorded_case", "int64", ("recorded_case",), "dimension", "cases whose histories are kept"),
             Variable("time", "float64", ("time",), "dimension", "time", "s"),
         ]
         repeated = _recorded(experiment, variables) if experiment.cases.coordinates else []
-        variables += [*repeated, *_signals(experiment, sizes, {"coordinates": " ".join(v.name for v in repeated)})]
+        told = {"coordinates": " ".join(v.name for v in repeated)}
+        variables += [*repeated, *_signals(experiment, sizes, "float32" if single else "float64", told)]
     return Layout(sizes, tuple(variables), _attributes(experiment, variables))
 
 
@@ -199,7 +203,8 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
     out += [_coordinate(experiment, c, names[c.path]) for c in experiment.cases.coordinates]
     out += [
         variable(
-            "status", "int8", "how the case ended", flag_values=np.array([0, 1], np.int8), flag_meanings="done failed"
+            "status", "int8", "how the case ended", flag_values=np.array([0, 1, 2, 3], np.int8),
+            flag_meanings="done failed timed_out lost",
         ),
         variable("cause", "str", "why the case failed; empty where it did not"),
         variable("n_valid", "int64", "recorded rows before the case failed; after them, not-a-number"),
@@ -273,7 +278,7 @@ def _recorded(experiment: Experiment, variables: list[Variable]) -> list[Variabl
     return out
 
 
-def _signals(experiment: Experiment, sizes: dict[str, int], told: Mapping[str, str]) -> list[Variable]:
+def _signals(experiment: Experiment, sizes: dict[str, int], kind: Kind, told: Mapping[str, str]) -> list[Variable]:
     """told: attributes of every signal; empty ones are left out."""
     joint_dims, component_dims = joint_dimensions(experiment), component_dimensions(experiment)
     out = []
@@ -292,7 +297,7 @@ def _signals(experiment: Experiment, sizes: dict[str, int], told: Mapping[str, s
         unit, attributes = _signal_unit(recorded)
         frame = known[recorded.channels[0]].frame
         attributes |= {name: value for name, value in {"frame": frame, **told}.items() if value}
-        out.append(Variable(recorded.name, "float64", tuple(dims), "signal", recorded.doc, unit, attributes))
+        out.append(Variable(recorded.name, kind, tuple(dims), "signal", recorded.doc, unit, attributes))
     return out
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shlex
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
@@ -69,7 +70,7 @@ class Group:
     """One experiment of an archive. Raises Problem E302 where the file does not hold what it should."""
 
     def __init__(self, node: Any, path: Path) -> None:
-        self._node, self._path = node, path
+        self._node, self.path = node, path
         with reading(path):
             self.attributes: dict[str, Any] = {name: _plain(value) for name, value in node.attrs.items()}
             self._check()
@@ -105,7 +106,7 @@ class Group:
     @cached_property
     def variables(self) -> dict[str, Stored]:
         """All variables, in the file's order."""
-        with reading(self._path):
+        with reading(self.path):
             return {name: _stored(name, node) for name, node in self._node.items() if isinstance(node, h5py().Dataset)}
 
     def role(self, role: str) -> tuple[Stored, ...]:
@@ -113,7 +114,7 @@ class Group:
 
     def values(self, name: str) -> np.ndarray:
         """All of a variable; strings as an array of str."""
-        with reading(self._path):
+        with reading(self.path):
             dataset = self._node[name]
             if h5py().check_string_dtype(dataset.dtype) is not None:
                 return np.asarray(dataset.asstr()[...], dtype=object)
@@ -123,16 +124,33 @@ class Group:
         """A variable in the cases at these positions, in their order; few of many are read by themselves."""
         if len(positions) > FEW:
             return self.values(name)[positions]
-        with reading(self._path):
+        with reading(self.path):
             dataset = self._node[name]
             words = h5py().check_string_dtype(dataset.dtype) is not None
             read = dataset.asstr() if words else dataset
             return np.array([read[int(position)] for position in positions], dtype=object if words else dataset.dtype)
 
     def signal(self, name: str, position: int) -> np.ndarray:
-        """History of one signal in the recorded case at this position: (time,), then joints, then components."""
-        with reading(self._path):
-            return np.asarray(self._node[name][position])
+        """History of one signal in the case at this position, which has one: (time,), then joints, then components."""
+        place = int(np.searchsorted(self.recorded_positions, position))
+        with reading(self.path):
+            return np.asarray(self._node[name][place])
+
+    @cached_property
+    def recorded_positions(self) -> np.ndarray:
+        """Positions of the cases whose histories are here, rising."""
+        if not self.recorded:
+            return np.empty(0, np.int64)
+        return np.searchsorted(self.values("case"), self.values("recorded_case"))
+
+    def recorded_position(self, wanted: str) -> int:
+        """Position of a case as `find_case` has it, which has its history here. Raises Problem E328 for another."""
+        position = self.find_case(wanted)
+        if position not in self.recorded_positions:
+            case = self.values("case")[position]
+            helps = f"`met run {shlex.quote(str(self.path))} --case '#{case}'` runs it again, to the same bits"
+            raise Problem(error("E328", f"no history of case #{case} of `{self.name}` was kept", help=helps))
+        return position
 
     def joints(self, variable: Stored) -> tuple[str, ...]:
         """Names along a signal's joint dimension; none where it has no such dimension."""

@@ -1,15 +1,14 @@
-"""Writing an archive, batch by batch, so that the bytes do not depend on the batches.
+"""Writing an archive, some cases at a time, so that the bytes do not depend on how they were run.
 
-All of a signal's chunks are allocated when the file is laid out, so batches only fill them in; what is one value a
-case is gathered in memory and written at the end. No times are kept. The file has a temporary name in the same folder
-until it is whole and on the disk.
+All of a signal's chunks are allocated when the file is laid out, so signals only fill them in, in any order; what is
+one value a case comes in order, in blocks of one size. No times are kept. The file has a temporary name in the same
+folder until it is whole and on the disk.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,68 +20,77 @@ from batch.archive.layout import Layout, Variable
 from batch.archive.provenance import Revision, version
 from batch.archive.sink import Sink
 from met import keys, plan_file
+from met.frozen import frozen
 from met.plan import Experiment, Plan
 
 if TYPE_CHECKING:
     from met.run import Run
 
+KINDS = {"float64": np.float64, "float32": np.float32, "int64": np.int64, "int8": np.int8, "str": object}
 
-@dataclass
-class Section:
-    """One experiment on its way into the file. values: what is one value a case, by the variable's name."""
+
+@frozen
+class Part:
+    """One experiment of an archive. rows: of its case table, rising; kept: places among them of the cases whose
+    histories are here; single: as numbers of four bytes; code: key of the program (`met.run.Prepared.code_key`)."""
 
     experiment: Experiment
     rows: np.ndarray
-    recorded: bool
+    kept: np.ndarray
+    single: bool = False
+    code: str = ""
+
+
+@frozen
+class Group:
+    """A part on its way into the file, and the variables along recorded_case, which are gathered from the cases."""
+
+    part: Part
     layout: Layout
-    group: Any
-    signals: Mapping[str, Any]
-    values: dict[str, np.ndarray] = field(default_factory=dict)
+    node: Any
+    gathered: dict[str, np.ndarray]
 
 
 class Writer:
-    """An archive being written. Call `put` for every batch, then `finish`; or `abandon`, which leaves nothing."""
+    """An archive being written: `put_cases` in order, `put_signals` in any, then `finish`; or `abandon`, which leaves
+    nothing."""
 
-    def __init__(self, temporary: Path, plan: Plan, parts: Sequence[tuple[Experiment, np.ndarray, bool]]) -> None:
+    def __init__(self, temporary: Path, plan: Plan, parts: Sequence[Part]) -> None:
         self.plan = plan
         self._sink = Sink(temporary)
         self._revision = Revision()
         self._file: Any = None
         try:
             self._file = h5py().File(self._sink, "w", libver=LIBVER, track_order=True)
-            self.sections = [self._section(group, part) for group, part in zip(self._groups(), parts, strict=True)]
+            self.groups = [self._group(node, part) for node, part in zip(self._nodes(), parts, strict=True)]
             self._sink.check()
         except BaseException:
             self.abandon()
             raise
 
-    def put(self, section: int, first: int, run: Run) -> None:
-        """Take a batch: `run` holds the cases of `section` from its `first` one on."""
-        target = self.sections[section]
-        cases = slice(first, first + len(run.case))
-        for name, dataset in target.signals.items():
-            dataset[cases] = run.signals[name]
-        given: dict[str, Any] = {
-            "status": run.status, "cause": run.cause, "n_valid": run.n_valid,
-            **{f"friction_{name}": count for name, count in run.events.items()},
-        }  # fmt: skip
-        if target.experiment.structure.substitutions:
-            given["bed_limited"] = run.limited
-        for variable in target.layout.role("coordinate"):
-            given[variable.name] = run.coordinates[variable.key]
-        for variable in target.layout.role("metric"):
-            given[variable.name] = run.metrics[variable.key]
-        for name, values in given.items():
-            target.values[name][cases] = values
-        for index, requirement in enumerate(target.experiment.requirements):
-            unknown = (run.status != 0) | np.isnan(run.metrics[requirement.metric])
-            target.values["met"][cases, index] = np.where(unknown, -1, run.met[requirement.text])
+    def put_signals(self, number: int, first: int, run: Run) -> None:
+        """The histories of some cases of an experiment: of its recorded cases from the `first` one on."""
+        group = self.groups[number]
+        for variable in group.layout.role("signal"):
+            group.node[variable.name][first : first + len(run.case)] = run.signals[variable.key]
+        self._sink.check()
+
+    def put_cases(self, number: int, first: int, run: Run) -> None:
+        """What is one value a case, of the cases of an experiment from its `first` one on."""
+        group = self.groups[number]
+        values = _values(group, run)
+        for variable in group.layout.variables:
+            if variable.dims[0] == "case":
+                group.node[variable.name][first : first + len(run.case)] = values[variable.name]
+        here = (group.part.kept >= first) & (group.part.kept < first + len(run.case))
+        for name, gathered in group.gathered.items():
+            gathered[here] = values[name][group.part.kept[here] - first]
         self._sink.check()
 
     def finish(self) -> None:
         """Write what is left, and see the file safely on the disk under its temporary name, still locked."""
-        for section in self.sections:
-            self._write_cases(section)
+        for group in self.groups:
+            _write_rest(group)
         self._write_provenance()
         self._file.close()
         self._sink.settle()
@@ -99,7 +107,7 @@ class Writer:
         self._sink.remove()
         self._sink.close()
 
-    def _groups(self) -> list[Any]:
+    def _nodes(self) -> list[Any]:
         root = self._file
         root.attrs["schema"] = archive_layout.SCHEMA
         root.attrs["schema_version"] = archive_layout.VERSION
@@ -107,51 +115,21 @@ class Writer:
         paths = archive_layout.group_names(self.plan)
         return [root if path == "/" else root.create_group(path, track_order=True) for path in paths]
 
-    def _section(self, group: Any, part: tuple[Experiment, np.ndarray, bool]) -> Section:
+    def _group(self, node: Any, part: Part) -> Group:
         """Lay a group out: every variable in its order, the signals with all their chunks."""
-        experiment, rows, recorded = part
-        layout = archive_layout.layout(experiment, len(rows), recorded)
-        for name, value in layout.attributes.items():
-            group.attrs[name] = value
-        made = {variable.name: _make(group, layout, variable) for variable in layout.variables}
+        layout = archive_layout.layout(part.experiment, len(part.rows), len(part.kept), part.single)
+        for name, value in {**layout.attributes, "code_key": part.code}.items():
+            node.attrs[name] = value
+        made = {variable.name: _make(node, layout, variable) for variable in layout.variables}
         for variable in layout.role("dimension"):
             made[variable.name].make_scale(variable.name)
         for variable in layout.variables:
             if variable.role != "dimension":
                 for axis, dim in enumerate(variable.dims):
                     made[variable.name].dims[axis].attach_scale(made[dim])
-        signals = {variable.key: made[variable.name] for variable in layout.role("signal")}
-        section = Section(experiment, rows, recorded, layout, group, signals)
-        kinds = {"float64": np.float64, "int64": np.int64, "int8": np.int8, "str": object}
-        for variable in layout.variables:
-            if variable.role not in ("signal", "dimension"):
-                section.values[variable.name] = np.zeros(layout.shape(variable), kinds[variable.kind])
-        return section
-
-    def _write_cases(self, section: Section) -> None:
-        """Everything that is not a signal."""
-        experiment, values = section.experiment, section.values
-        schedule = experiment.structure.schedule
-        values["case_id"][:] = keys.case_ids(experiment, section.rows)
-        values["case_key"][:] = keys.case_keys(experiment, section.rows)
-        values["seed"][:] = keys.case_seeds(experiment, section.rows)
-        if experiment.cases.repeats is not None:
-            values["repeat"][:] = experiment.cases.repeats[section.rows]
-        for choice, variable in zip(experiment.cases.choices, section.layout.role("choice"), strict=True):
-            values[variable.name][:] = choice.value
-        values["case"] = experiment.cases.table[section.rows]
-        values["requirement"] = np.array([r.text for r in experiment.requirements], dtype=object)
-        for variable in section.layout.role("recorded"):
-            values[variable.name] = values[variable.source]
-        if section.recorded:
-            values["recorded_case"] = values["case"]
-            values["time"] = np.arange(schedule.rows) * schedule.record / schedule.base_hz
-            for along in (archive_layout.joint_dimensions(experiment), archive_layout.component_dimensions(experiment)):
-                for names, dim in along.items():
-                    values[dim] = np.array(names, dtype=object)
-        for variable in section.layout.variables:
-            if variable.role != "signal":
-                section.group[variable.name][...] = values[variable.name]
+        gathered = {variable.source: np.empty(len(part.kept), KINDS[variable.kind])
+                    for variable in layout.role("recorded")}  # fmt: skip
+        return Group(part, layout, node, gathered)
 
     def _write_provenance(self) -> None:
         """The deck, the plan and the versions that made the numbers."""
@@ -186,6 +164,48 @@ class Writer:
         group.create_dataset("plan", data=_text(plan_file.dumps(self.plan, refer)), dtype=text, track_order=True)
         for name, table in tables.items():
             group.create_dataset(name, data=table, track_order=True)
+
+
+def _values(group: Group, run: Run) -> dict[str, Any]:
+    """Everything that is one value a case, of some cases, by the variable's name."""
+    experiment, rows = group.part.experiment, run.case
+    names = keys.case_keys(experiment, rows)
+    values: dict[str, Any] = {
+        "case": experiment.cases.table[rows],
+        "case_key": names,
+        "case_id": keys.case_ids(experiment, rows, names),
+        "seed": keys.case_seeds(experiment, rows),
+        "repeat": 0 if experiment.cases.repeats is None else experiment.cases.repeats[rows],
+        "status": run.status, "cause": run.cause, "n_valid": run.n_valid, "bed_limited": run.limited,
+        **{f"friction_{name}": count for name, count in run.events.items()},
+        **{variable.name: run.coordinates[variable.key] for variable in group.layout.role("coordinate")},
+        **{variable.name: run.metrics[variable.key] for variable in group.layout.role("metric")},
+    }  # fmt: skip
+    for choice, variable in zip(experiment.cases.choices, group.layout.role("choice"), strict=True):
+        values[variable.name] = [choice.value] * len(rows)
+    for name in ("case_id", "case_key", "cause"):
+        values[name] = np.array(values[name], dtype=object)
+    met = np.empty((len(rows), len(experiment.requirements)), np.int8)
+    for index, requirement in enumerate(experiment.requirements):
+        unknown = (run.status != 0) | np.isnan(run.metrics[requirement.metric])
+        met[:, index] = np.where(unknown, -1, run.met[requirement.text])
+    values["met"] = met
+    return values
+
+
+def _write_rest(group: Group) -> None:
+    """What is neither a case's nor a signal: dimensions, and what says which case is which along recorded_case."""
+    part, layout = group.part, group.layout
+    schedule = part.experiment.structure.schedule
+    values: dict[str, Any] = {variable.name: group.gathered[variable.source] for variable in layout.role("recorded")}
+    values["requirement"] = np.array([r.text for r in part.experiment.requirements], dtype=object)
+    values["recorded_case"] = part.experiment.cases.table[part.rows[part.kept]]
+    values["time"] = np.arange(schedule.rows) * schedule.record / schedule.base_hz
+    for dimensions in (archive_layout.joint_dimensions, archive_layout.component_dimensions):
+        values |= {dim: np.array(names, dtype=object) for names, dim in dimensions(part.experiment).items()}
+    for variable in layout.variables:
+        if variable.role != "signal" and variable.dims[0] != "case":
+            group.node[variable.name][...] = values[variable.name]
 
 
 def _make(group: Any, layout: Layout, variable: Variable) -> Any:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NoReturn
 
-from ic.text.lexer import BAD, END, NAME, NUMBERS, STRING, Token
+from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, Token
 from ic.text.limits import DEPTH, MOST_OPERATORS, Findings, GiveUp
 from met.diagnostic import Label, Place
 
@@ -27,7 +27,7 @@ class Ended(Exception):
 
 def found(token: Token) -> str:
     if token.kind == END:
-        return "the end of the deck"
+        return "the end of the deck" if token.source.name != COMMAND_LINE else "the end of the line"
     text = token.text if len(token.text) <= SHOWN else token.text[: SHOWN - 3] + "..."
     return f"`{text}`" if token.kind != STRING else f"the string {text}"
 

@@ -171,8 +171,7 @@ class _Parser(Expressions):
         if self.token.source.name == COMMAND_LINE:
             told = f"`-D {step.macro}` has put {found(self.token)} in the place of this name"
             helps = ("-D defines a macro, as #define does; it does not set a `let`",
-                     f"give the macro a name of its own, as in `-D SET_{step.macro}={self.token.text[:40]}` and "
-                     f"`let {step.macro} = SET_{step.macro} * 1 m;`")
+                     f"`--set '{step.macro}=VALUE'` does, with its unit")
         self.fail("D035", told, step.use, help=helps)
 
     def let(self, names: list[Token], tail: list[Token]) -> Let:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Expression, Name, children
+from ic.meaning.given import GIVEN, is_given, written_origin
 from ic.meaning.lower import Compiled, Select, check
 from ic.meaning.owner import Settled
 from ic.meaning.scope import Scope
@@ -113,7 +114,10 @@ def _let(scope: Scope, name: str) -> Settled | None:
     if let is None:
         return None
     varied = scope.varied.get(name)
-    origin = Origin("deck", place_of(let.value)) if varied is None else Origin("case", varied.place, (let.name.place,))
+    origin = written_origin(place_of(let.value), ())
+    if varied is not None or origin.note == GIVEN:
+        place = varied.place if varied is not None else origin.place
+        origin = Origin("case" if varied is not None else "deck", place, (let.name.place,), origin.note)
     found = scope.names.find(Name((let.name,), let.name.place))
     if isinstance(found, Value):
         return Settled(found.number, units.text(found.dimension), origin, "", let.value)
@@ -150,7 +154,8 @@ def _names(scope: Scope, expression: Expression) -> Iterator[Label]:
                 if let is not None and name.text not in seen:
                     seen.add(name.text)
                     below.append(let.value)
-                    yield Label(let.name.place, f"{name.text} = {spell(let.value)}")
+                    place = place_of(let.value)
+                    yield Label(place if is_given(place) else let.name.place, f"{name.text} = {spell(let.value)}")
         level = below
 
 

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Literal
 
-from ic.grammar.syntax import Deck
+from ic.grammar.settings import command_line, read_settings
+from ic.grammar.syntax import Deck, Setting
 from ic.meaning.arm import resolve_arm
 from ic.meaning.complaints import Complaints, known_words
 from ic.meaning.resolve import Definition, Definitions
 from ic.meaning.scope import Scope
 from ic.meaning.servos import check_servo_definition
 from ic.read import in_order, read, read_again
-from ic.sweeps.groups import Source, lower
+from ic.sweeps.effects import Effects
+from ic.sweeps.groups import Group, Source, lower
+from ic.sweeps.settings import Settings
+from ic.text.lexer import COMMAND_LINE
 from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan import Experiment, Plan
@@ -36,35 +40,46 @@ class Compiled:
 
 
 def check(path: str | PathLike[str], *, include_dirs: Sequence[str | PathLike[str]], defines: Sequence[str],
-          select: Select) -> Compiled:
+          select: Select, settings: Sequence[str] = ()) -> Compiled:
     """The deck at `path`, compiled."""
     try:
         deck = read(Path(path), [Path(each) for each in include_dirs], defines)
     except Problem as problem:
         return Compiled(None, problem.diagnostics, problem.sources)
-    return compile_deck(deck, select=select, defines=defines)
+    return compile_deck(deck, select=select, defines=defines, settings=settings)
 
 
-def compile_deck(deck: Deck, *, select: Select = None, defines: Iterable[str] = (),
+def compile_deck(deck: Deck, *, select: Select = None, defines: Iterable[str] = (), settings: Sequence[str] = (),
                  complaints: Complaints | None = None) -> Compiled:
-    """The plan of the deck's runs and sweeps that `select` names, with everything that is wrong on the way."""
+    """The plan of the deck's runs and sweeps that `select` names, with everything that is wrong on the way.
+
+    settings  `PATH=VALUE`, each as if the deck said so
+    """
     complaints = complaints if complaints is not None else Complaints(deck.warnings)
+    deck, entries = _with_settings(deck, settings, complaints)
     definitions = Definitions(deck, complaints)
-    source = Source(definitions, complaints, partial(read_again, deck))
+    given = Settings(entries)
+    written, definitions = definitions, given.in_definitions(definitions)
+    source = Source(definitions, complaints, partial(read_again, deck), given, Effects(given))
     experiments: list[Experiment] = []
     scopes: list[Scope] = []
     try:
+        given.check_lets(written, complaints)
         complaints.add(
             *(d for problem in Scope(definitions, complaints).names.check_lets() for d in problem.diagnostics)
         )
         for kind in ("arm", "servo", "run"):
             for definition in definitions.of_kind(kind).values():
                 definitions.block(definition)
-        for definition in chosen(definitions, complaints, select):
+        asked = chosen(definitions, complaints, select)
+        for definition in asked:
+            groups: list[Group] = []
             with complaints.gather():
-                for made, scope in lower(source, definition):
-                    experiments.append(made)
-                    scopes.append(scope)
+                groups = lower(source, definition)
+            source.effects.complete &= bool(groups)
+            experiments += (made for made, _ in groups)
+            scopes += (scope for _, scope in groups)
+        source.effects.tell(complaints, [definition.name for definition in asked])
         for arm in definitions.of_kind("arm").values():
             resolve_arm(Scope(definitions, complaints), arm)
         for name in definitions.of_kind("servo"):
@@ -83,8 +98,21 @@ def compile_deck(deck: Deck, *, select: Select = None, defines: Iterable[str] = 
         return Compiled(None, in_order(complaints.all, sources), texts)
     files = tuple(File(source.name, source.text, source.sha256) for source in sources)
     selected = (select,) if isinstance(select, str) else tuple(dict.fromkeys(select or ()))
-    return Compiled(Plan(deck.file, tuple(experiments), files, tuple(defines), selected),
+    return Compiled(Plan(deck.file, tuple(experiments), files, tuple(defines), selected, tuple(settings)),
                     in_order(complaints.all, sources), texts, tuple(scopes))
+
+
+def _with_settings(deck: Deck, settings: Sequence[str], complaints: Complaints) -> tuple[Deck, tuple[Setting, ...]]:
+    """The deck with the text of what is set among its sources, and the entries of that; those that are wrong are told.
+    """
+    if not settings:
+        return deck, ()
+    before = "".join(source.text for source in deck.sources if source.name == COMMAND_LINE)
+    files = (source for source in deck.sources if source.name != COMMAND_LINE)
+    deck = replace(deck, sources=(*files, command_line(settings, before)))
+    with complaints.gather():
+        return deck, read_settings(settings, before)
+    return deck, ()
 
 
 def chosen(definitions: Definitions, complaints: Complaints, select: Select) -> list[Definition]:

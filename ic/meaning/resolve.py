@@ -5,7 +5,7 @@ A definition refers to its base, or to the file that it is made from, and is mer
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 
 from ic.grammar.syntax import Binary, Call, Deck, Entry, Group, Let, Name, Setting, Word
@@ -27,6 +27,7 @@ class Definition:
     """A definition as written: `default run nominal like base { ... }`.
 
     parts: of a sweep made of others, `sweep both = gains + spread;`, which are runs and sweeps
+    upon: further entries, each put upon all that the definition writes
     """
 
     kind: str
@@ -34,6 +35,7 @@ class Definition:
     group: Group
     default: bool = False
     parts: tuple[Name, ...] = ()
+    upon: tuple[Entry, ...] = ()
 
     @property
     def place(self) -> Place:
@@ -62,11 +64,12 @@ class Definitions:
                 self._enter(entry)
         self._check_defaults()
 
-    def instead(self, *changed: Definition) -> Definitions:
-        """The same definitions but for these, which take the places of those of their names."""
-        if not changed:
+    def instead(self, *changed: Definition, lets: Sequence[Let] = ()) -> Definitions:
+        """The same definitions and lets but for these, which take the places of those of their names."""
+        if not changed and not lets:
             return self
         other = copy(self)
+        other.lets = {**self.lets, **{let.name.text: let for let in lets}}
         other._by_kind = {kind: dict(known) for kind, known in self._by_kind.items()}
         other._merged, other._failed = {}, set()
         for each in changed:
@@ -129,6 +132,8 @@ class Definitions:
                     self._failed.update((d.kind, d.name) for d in chain)
                     return None
             block = merge(block, each.group.body, home=each.home, base_name=base_name, complaints=self._complaints)
+            for entry in each.upon:
+                block = merge(block, (entry,), home=each.home, base_name=base_name, complaints=self._complaints)
             self._merged[(each.kind, each.name)] = block
             above = each
         return block

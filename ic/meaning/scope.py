@@ -1,8 +1,8 @@
 """One run under resolution: its parameters as they are settled, and what a sweep varies in them.
 
-A parameter is settled once, at one spot, from three sources in this order: a sweep's coordinate that names it, what
-the deck wrote, the declaration's default. It is named by its canonical path (`elbow.servo.kp`) and by the path of every
-definition that hands it down without its being overridden (`gearbox.kp`).
+A parameter is settled once, at one spot, from four sources in this order: a sweep's coordinate that names it, what is
+given from outside of the deck, what the deck wrote, the declaration's default. It is named by its canonical path
+(`elbow.servo.kp`) and by the path of every definition that hands it down without its being overridden (`gearbox.kp`).
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from ic.grammar.syntax import Call, Expression, Name, String
+from ic.grammar.syntax import Call, Expression, Name, Setting, String
 from ic.meaning.checks import Checks, Varied
 from ic.meaning.complaints import Complaints
+from ic.meaning.given import GIVEN, Given, evaluated, is_given, written_origin
 from ic.meaning.merge import Item
 from ic.meaning.names import Names
 from ic.meaning.owner import XYZ, Owner, Settled
@@ -30,6 +31,9 @@ from met.parameter import Parameter
 from met.plan import JointKind, Origin, Quantity
 from met.trace import Graph, Real, Scalar
 from met.units import PURE, Dimension
+
+VARIES = "leave it out here, or name runs and sweeps that do not vary this"
+"""What to do where a sweep varies what is set from outside of the deck."""
 
 
 @dataclass
@@ -49,10 +53,12 @@ class Scope:
     moved: dict[str, set[str]] = field(default_factory=dict)  # servo definition -> kinds of joints it moves
     lost: frozenset[str] = frozenset()  # joints whose servo failed: nothing can be said of its channels
     gone: frozenset[str] = frozenset()  # joints and links that failed: nothing can be said of what begins with them
+    settings: Mapping[str, Setting] = field(default_factory=dict)  # by path, numbers given from outside of the deck
 
     def __post_init__(self) -> None:
         self.checks = Checks(self.complaints, self.graph, self.varied)
         self.names = Names(self.definitions, {path: varied.value for path, varied in self.varied.items()})
+        self.given: dict[str, Given | None] = {}  # of the settings, as they are asked for; None for no number
 
     def settled(self, path: str) -> Settled | None:
         """What is settled under a path, whether the plan has it as a parameter or not."""
@@ -223,9 +229,9 @@ class Scope:
                 self.checks.fail(path)
                 return None
             word = named
-            origin = _origin(item, place_of(item.value) if item.value else item.place)
+            place = place_of(item.value) if item.value else item.place
+            origin = written_origin(place, item.overrides)  # a word is no name that stands for something
         kept = self.parameters if record else self.beside
-        origin = replace(origin, note="")  # a word is no name that stands for something
         kept[path] = Settled(word, "", origin, wanted.doc, item.value if item else None)
         return word
 
@@ -234,7 +240,7 @@ class Scope:
         origin = Origin("default", note=note)
         if item is not None:
             place = item.place if item.value is None else place_of(item.value)
-            origin = Origin("deck", place, item.overrides)
+            origin = written_origin(place, item.overrides)
         self.beside[path] = Settled(value, unit, origin, "", item.value if item is not None else None)
 
     def remake(self, values: Mapping[str, Real], item: Item) -> None:
@@ -242,7 +248,10 @@ class Scope:
         """
         for path, value in values.items():
             settled = self.parameters[path]
-            settled.value, settled.expression = self._plain(value), item.value
+            settled.value = self._plain(value)
+            if settled.origin.note == GIVEN:
+                continue
+            settled.expression = item.value
             if settled.origin.kind == "deck" and item.value is not None:
                 settled.origin = replace(settled.origin, place=place_of(item.value))
         for taken in self.sets.values():
@@ -262,6 +271,7 @@ class Scope:
             self.checks.fail(owner.join(wanted.name))
             return None
         own = self._coordinate(owner, wanted.name, owner.homes) is not None
+        own = own or bool(self._given(owner, wanted.name, owner.homes))
         origin = replace(other.origin, note="" if own else f"that of `{of}`")
         value = self._finish(owner, wanted, wanted.name, owner.homes, other.value, origin, origin.place or owner.place,
                              True, other.expression, needs=(of,))
@@ -322,7 +332,7 @@ class Scope:
                 value = self._plain(written.number)
             origin = _origin(item, place)
         coordinate = self._coordinate(owner, name, homes)
-        if value is None and (item is not None or coordinate is None):
+        if value is None and (item is not None or coordinate is None) and not self._given(owner, name, homes):
             if item is None:
                 self._missing(owner, wanted)
             for path in (owner.join(name), *(owner.join_local(home, name) for home in homes)):
@@ -337,18 +347,27 @@ class Scope:
         path = owner.join(name)
         for known in owner.paths(name, homes):
             self.known.setdefault(known, []).append(path)
+        for given in self._given(owner, name, homes):
+            if origin.note == GIVEN:
+                self.complaints.error("D232", f"this sets `{path}`, which is set already", given.value.place,
+                                      also=[Label(origin.place, "here")] if origin.place is not None else [],
+                                      help="leave one of the two out")
+            self.sets.setdefault(given.path, []).append(path)
+            value, expression, place = self._plain(given.value.number), given.expression, given.value.place
+            self._check_instead(owner, wanted, given.value, path)
+            origin = given.over(origin)
         coordinate = self._coordinate(owner, name, homes)
         if coordinate is not None:
+            if origin.note == GIVEN and not is_given(coordinate.place):
+                self.complaints.error("D233", f"this sets `{path}`, which the sweep varies", origin.place,
+                                      also=[Label(coordinate.place, f"`{coordinate.path}` varies here")],
+                                      help=VARIES)
             places = (origin.place,) if origin.place is not None else ()
             origin = Origin("case", coordinate.place, (*places, *origin.overrides), origin.note)
             place = coordinate.place
             self.sets.setdefault(coordinate.path, []).append(path)
             value = coordinate.value.number
-            try:
-                self.check_dimension(owner, wanted, coordinate.value)
-            except Problem as problem:
-                self.complaints.add(*problem.diagnostics)
-                self.checks.fail(coordinate.path)
+            self._check_instead(owner, wanted, coordinate.value, coordinate.path)
         assert value is not None
         if origin.kind != "default" or value != math.inf:  # a model's own default may be: never
             self._check_range(owner, wanted, value, place, path, needs)
@@ -356,6 +375,25 @@ class Scope:
         if record or owner.called is None:
             kept[path] = Settled(value, self.unit(owner, wanted)[0], origin, wanted.doc, expression)
         return value
+
+    def _check_instead(self, owner: Owner, wanted: Parameter, value: Value, path: str) -> None:
+        """Tells of a value of the wrong dimension that stands in the stead of the deck's; path: what has failed then.
+        """
+        try:
+            self.check_dimension(owner, wanted, value)
+        except Problem as problem:
+            self.complaints.add(*problem.diagnostics)
+            self.checks.fail(path)
+
+    def _given(self, owner: Owner, name: str, homes: Iterable[str]) -> list[Given]:
+        """What is given for this parameter; more than one where paths are set that mean the same."""
+        found = [path for path in owner.paths(name, homes) if path in self.settings] if self.settings else []
+        for path in found:
+            if path not in self.given:
+                self.given[path] = None
+                with self.complaints.gather():
+                    self.given[path] = evaluated(self.settings[path], path, self.names)
+        return [given for path in found if (given := self.given[path]) is not None]
 
     def _coordinate(self, owner: Owner, name: str, homes: tuple[str, ...]) -> Varied | None:
         if not self.varied:
@@ -470,4 +508,4 @@ class Scope:
 
 def _origin(item: Item, place: Place) -> Origin:
     note = f"from `{item.value.text}`" if isinstance(item.value, Name) else ""
-    return Origin("deck", place, item.overrides, note)
+    return written_origin(place, item.overrides, note)

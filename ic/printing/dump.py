@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 GROUP = "met.stages"
 ORDER = ("tokens", "syntax", "model", "plan", "program", "kernel", "assembly")  # that of the way; others come after
+WRITTEN = ("tokens", "syntax", "model")  # stages before anything is set from outside of the deck
 
 
 @frozen
@@ -30,6 +31,7 @@ class Asked:
     include_dirs: tuple[str, ...] = ()
     defines: tuple[str, ...] = ()
     select: Sequence[str] | None = None
+    settings: tuple[str, ...] = ()
 
     def plan(self) -> Plan:
         """The plan, compiled, or read where the deck is a plan file. Raises Problem."""
@@ -39,7 +41,8 @@ class Asked:
             from met import plan_file
 
             return plan_file.read(self.deck)
-        return ic.compile(self.deck, include_dirs=self.include_dirs, defines=self.defines, select=self.select)
+        return ic.compile(self.deck, include_dirs=self.include_dirs, defines=self.defines, set=self.settings,
+                          select=self.select)
 
 
 Stage = Callable[[Asked], Iterator[str]]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ic.meaning.complaints import known_words
+from ic.meaning.given import GIVEN
 from ic.printing.columns import columns, number, quantity, vector
 from ic.printing.settings import settings
 from met import models, render
@@ -196,7 +197,8 @@ def _one(
     for coordinate in _varied_by(experiment, name):
         unit = "" if coordinate.unit == "1" else f" {coordinate.unit}"
         yield f"  varied by {coordinate.path}: {_series(coordinate.values / coordinate.scale)}{unit}"
-    said = SAID[origin.kind] + (f": {note}" if (note := _note(origin)) else "")
+    note = _note(origin)
+    said = note if note == GIVEN else SAID[origin.kind] + (f": {note}" if note else "")
     if origin.place is None and origin.kind == "deck":
         said = IN_PLAN
     if origin.place is None:

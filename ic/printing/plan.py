@@ -61,6 +61,10 @@ def print_plan(plan: Plan, *, verbose: bool = False) -> Iterator[str]:
         if position:
             yield ""
         yield from print_experiment(plan.deck, experiment, verbose=verbose)
+    if plan.settings:
+        yield ""
+        yield "Set on the command line"
+        yield from (f"  {each}" for each in plan.settings)
 
 
 def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False) -> Iterator[str]:

@@ -195,7 +195,7 @@ def put_in(definitions: Definitions, run: Definition, choices: Choices) -> tuple
             earlier = next((each for each in servos if each.name == first), servo)
             servos = [*(each for each in servos if each is not earlier), _changed(earlier, rest[0], column, option)]
             continue
-        _place(tree, _keys(first, rest), column, option)
+        _place(tree, keys_of(first, rest), column, option)
     made = definitions.instead(*servos)
     if not tree:
         return made, run
@@ -206,7 +206,7 @@ def put_in(definitions: Definitions, run: Definition, choices: Choices) -> tuple
     return made, Definition("run", name, group)
 
 
-def _keys(first: str, rest: Sequence[str]) -> tuple[str, ...]:
+def keys_of(first: str, rest: Sequence[str]) -> tuple[str, ...]:
     """Where in a run's block the path's value is written."""
     if rest and rest[0] == "servo":
         return ("servos", first, *rest[1:])
@@ -246,9 +246,5 @@ def _entries(tree: dict[str, Any]) -> list[Entry]:
 
 def _changed(servo: Definition, key: str, column: Chosen, option: Option) -> Definition:
     """A servo's definition with one key set otherwise."""
-    kept = [entry for entry in servo.group.body
-            if not (isinstance(entry, Setting) and [word.text for word in entry.path] == [key])
-            and not (isinstance(entry, Group) and [word.text for word in entry.words] == [key])]
     entry = Setting((), (Word(key, column.place),), "=", option.expression, column.place)
-    group = Group(servo.group.words, servo.group.like, servo.group.of, (*kept, entry), servo.group.place)
-    return Definition(servo.kind, servo.name, group, servo.default)
+    return replace(servo, upon=(*servo.upon, entry))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -16,7 +16,9 @@ from ic.meaning.run import resolve_run
 from ic.meaning.scope import Scope
 from ic.sweeps.axes import Sweep, read_sweep, whole
 from ic.sweeps.choices import Choices, put_in
+from ic.sweeps.effects import Effects
 from ic.sweeps.reach import check_coordinates, coordinates, idle
+from ic.sweeps.settings import Settings
 from ic.sweeps.table import columns, kept, repeats, structures
 from met import keys
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
@@ -33,21 +35,30 @@ MOST_STRUCTURES = 256
 
 @frozen
 class Source:
-    """Where definitions come from: what is known of the deck, and how to read it with other macros."""
+    """Where definitions come from: what is known of the deck, and how to read it with other macros.
+
+    settings, effects  what is set from outside of the deck, and what was found to come of it
+    """
 
     definitions: Definitions
     complaints: Complaints
     reread: Reread
+    settings: Settings = Settings()
+    effects: Effects = field(default_factory=lambda: Effects(Settings()))
 
 
 def lower(source: Source, definition: Definition) -> list[Group]:
     """The experiments of a run or sweep; none where something of it is wrong, which was told."""
     if definition.kind == "run":
-        scope = Scope(source.definitions, source.complaints)
-        resolved = resolve_run(scope, definition)
+        definitions, run = source.settings.in_run(source.definitions, definition)
+        scope = Scope(definitions, source.complaints, settings=source.settings.numbers(definitions))
+        resolved = resolve_run(scope, run)
+        source.effects.resolved(scope, run)
         if resolved is None:
             return []
-        return [(experiment(scope, definition.name, definition.place, resolved, Cases(1, (), resolved.seed)), scope)]
+        made = experiment(scope, run.name, run.place, resolved, Cases(1, (), resolved.seed))
+        source.effects.look(scope, run, made)
+        return [(made, scope)]
     return _sum(source, definition, ()) if definition.parts else _Sweep(source, definition).groups()
 
 
@@ -77,7 +88,7 @@ class _Sweep:
         read = self._read(self.definitions, self.definition)
         sweep = read.sweep
         if len(self.complaints.errors) > before:
-            resolve_run(Scope(self.definitions, self.complaints), read.base)
+            resolve_run(Scope(read.definitions, self.complaints), read.base)
             return []
         self.read_so_far[()] = read
         found = structures(sweep)
@@ -108,8 +119,11 @@ class _Sweep:
         return _numbered(sweep.name, made)
 
     def _read(self, definitions: Definitions, definition: Definition) -> _Read:
-        graph, base = Graph(), _base(definitions, definition)
+        settings = self.source.settings
+        definitions, base = settings.in_run(definitions, _base(definitions, definition))
+        graph = Graph()
         sweep = read_sweep(definitions, self.complaints, definition, graph, seed=_seed_of(definitions, base))
+        settings.check_sweep(sweep, self.complaints, definitions)
         return _Read(definitions, base, sweep, graph)
 
     def _group(self, sweep: Sweep, choices: Choices,
@@ -118,8 +132,10 @@ class _Sweep:
         read = self._with_macros(sweep, choices)
         there = read.sweep
         definitions, run = put_in(read.definitions, read.base, choices)
-        scope = Scope(definitions, self.complaints, {varied.path: varied for varied in there.varied}, read.graph)
+        scope = Scope(definitions, self.complaints, {varied.path: varied for varied in there.varied}, read.graph,
+                      settings=self.source.settings.numbers(definitions))
         resolved = resolve_run(scope, run)
+        self.source.effects.resolved(scope, run)
         check_coordinates(scope, complete=resolved is not None)
         if resolved is None:
             return None
@@ -142,6 +158,7 @@ class _Sweep:
         made = replace(made, notes=(*(axis.note for axis in there.axes if axis.note), *made.notes))
         if not self.complaints.errors:
             idle(self.complaints, there, made)
+        self.source.effects.look(scope, run, made, self.definition.group.body)
         return ((made, scope), rows[keep]), dropped
 
     def _with_macros(self, sweep: Sweep, choices: Choices) -> _Read:
@@ -149,7 +166,7 @@ class _Sweep:
         macros = tuple(f"{column.macro}={option.text}" for column, option in choices if column.macro)
         if macros not in self.read_so_far:
             deck = self.source.reread(macros)
-            definitions = Definitions(deck, self.complaints)
+            definitions = self.source.settings.in_definitions(Definitions(deck, self.complaints))
             definition = definitions.of_kind("sweep").get(self.definition.name)
             if definition is None or definition.parts:
                 raise Problem(error("D226", f"with this macro the deck has no sweep `{sweep.name}`", sweep.place,

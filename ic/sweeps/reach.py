@@ -37,25 +37,25 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
             scope.complaints.error("D122", f"`{path}` cannot vary over numbers", place,
                                    help=f"it varies over names: `vary {path} = [...];`")
             continue
-        overridden = _overridden(scope, first, rest)
+        also = _overridden(scope, first, rest)
         if (
             first in ("rates", "duration", "record", "servos")
             or path == "environment.velocity_products"
         ):
             scope.complaints.error("D122", f"`{path}` cannot vary", place,
                                    help="vary one of its parts, or what it names")
-        elif overridden is not None:
+        elif also is not None:
             scope.complaints.error(
                 "D137",
                 f"`{path}` changes nothing in this run",
                 place,
-                also=overridden,
+                also=also,
                 help="every use overrides it, or the run does not use it; vary it where it is overridden",
             )
         else:
             scope.complaints.error("D128", f"no parameter `{path}` in this run", place,
                                    help=did_you_mean(path, (*scope.known, *scope.whole, *scope.definitions.lets))
-                                   or _continued(scope, path) or _ends(scope, path) or _beginnings(scope))
+                                   or continued(scope, path) or ends(scope, path) or beginnings(scope))
 
 
 def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
@@ -69,18 +69,18 @@ def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
     return [Label(item.place, "written here")] if item is not None else None
 
 
-def _beginnings(scope: Scope) -> list[str]:
+def beginnings(scope: Scope) -> list[str]:
     """What the paths of this run begin with."""
     return [known_words("paths begin with", dict.fromkeys(known.partition(".")[0] for known in scope.known))]
 
 
-def _ends(scope: Scope, path: str) -> list[str]:
+def ends(scope: Scope, path: str) -> list[str]:
     """Parameters whose last word the path is: `kp` where `motor.kp` was meant."""
     found = [known for known in scope.known if known.endswith(f".{path}")]
     return [known_words(f"there is `{path}` of", (known.removesuffix(f".{path}") for known in found))] if found else []
 
 
-def _continued(scope: Scope, path: str) -> list[str]:
+def continued(scope: Scope, path: str) -> list[str]:
     """Parameters of the thing that the path's first words name, where they name one."""
     parts = path.split(".")
     for length in range(len(parts) - 1, 0, -1):
@@ -103,12 +103,17 @@ def coordinates(scope: Scope, sweep: Sweep, columns: dict[str, np.ndarray], depe
     return tuple(made)
 
 
+def without_effect(experiment: Experiment) -> tuple[str, ...]:
+    """Inputs of the experiment's program that change nothing. Raises Problem where a model cannot be recorded."""
+    from met.audit import idle
+
+    return idle(experiment)
+
+
 def idle(complaints: Complaints, sweep: Sweep, experiment: Experiment) -> None:
     """Every coordinate changes something in the program, and so do repeats: else cases would be equal in silence."""
     if not experiment.cases.coordinates and not experiment.cases.noise:
         return
-    from met.audit import idle as without_effect
-
     places = {varied.path: varied.place for varied in sweep.varied}
     with complaints.gather():
         for name in without_effect(experiment):

@@ -136,7 +136,7 @@ class Machine:
     @cached_property
     def varying(self) -> tuple[str, ...]:
         """Paths of the parameters that vary with the case."""
-        return tuple(path for path, q in self.experiment.parameters.items() if isinstance(q.value, Formula))
+        return tuple(sorted(path for path, q in self.experiment.parameters.items() if isinstance(q.value, Formula)))
 
     def value(self, path: str, read: ReadCell) -> Any:
         """A parameter: a float, list or word as the plan has it, or read from the case's memory."""

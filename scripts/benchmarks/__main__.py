@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
-from benchmarks import arms, compiling, evaluation, hybrid, report, stepping, whole_process
+from benchmarks import arms, campaigns, compiling, evaluation, hybrid, report, stepping, whole_process
 from benchmarks.benchmark import Benchmark, Derived, take, with_sources
 from benchmarks.machine import machine, told
 
 RATIOS = SimpleNamespace(
     TITLE="ratios of throughput over many cases, each on one core and in the same turns", BENCHMARKS=evaluation.RATIOS
 )
-SUBJECTS = (RATIOS, evaluation, stepping, hybrid, compiling, whole_process)
+SUBJECTS = (RATIOS, evaluation, stepping, hybrid, compiling, whole_process, campaigns)
 """In the order of the report: ratios first, since they change least with machine and load."""
 
 TURNS, QUICK = 15, 3

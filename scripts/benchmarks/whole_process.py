@@ -20,7 +20,7 @@ MET = Path(__file__).parents[1] / "met"
 ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
 
 
-def _run(*words: str, deck: str = "") -> tuple[float, float]:
+def run(*words: str, deck: str = "") -> tuple[float, float]:
     """Wall time (s) and memory (MiB) of `scripts/met` with these words, where `deck.ic` is this text and nothing else.
 
     Memory: the largest that the process had in use at any time.
@@ -42,7 +42,7 @@ def _run(*words: str, deck: str = "") -> tuple[float, float]:
 
 
 def _prepared(*words: str) -> Callable[[], Callable[[], float]]:
-    return lambda: lambda: _run(*words)[0]
+    return lambda: lambda: run(*words)[0]
 
 
 def _long(lines: int, which: int) -> Callable[[], Callable[[], float]]:
@@ -50,7 +50,7 @@ def _long(lines: int, which: int) -> Callable[[], Callable[[], float]]:
 
     def prepare() -> Callable[[], float]:
         deck = long_deck.text(lines)
-        return lambda: _run("check", "deck.ic", deck=deck)[which]
+        return lambda: run("check", "deck.ic", deck=deck)[which]
 
     return prepare
 

@@ -11,10 +11,7 @@ from tests.batch import plans
 @pytest.fixture
 def engine(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Cases answered by closed formulas (tests/batch/plans.py)."""
-    from met import run
-
-    monkeypatch.setattr(run, "prepare", lambda experiment: experiment)
-    monkeypatch.setattr(run, "run", plans.answer)
+    plans.answering(monkeypatch)
     yield
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import batch
-from batch import campaign
+from batch import tasks
 from batch.archive import limits
 from batch.archive.read import ArchiveFile
 from met import keys, plan_file
@@ -135,8 +135,8 @@ def test_the_bytes_do_not_depend_on_batches_or_the_clock(here: Path, monkeypatch
     plan = plans.plan(plans.nominal(), plans.gains(23))
     found = set()
     for case_bytes in (1, 5, 23):
-        monkeypatch.setattr(campaign, "BATCH_BYTES", case_bytes * plans.gains(1).structure.history_bytes)
-        batch.run(plan, output="a.h5")
+        monkeypatch.setattr(tasks, "MOST_BYTES", case_bytes * plans.gains(1).structure.history_bytes)
+        batch.run(plan, output="a.h5", fresh=True)
         found.add((here / "a.h5").read_bytes())
         time.sleep(1.1)  # HDF5's times count seconds
     assert len(found) == 1
@@ -217,7 +217,7 @@ def test_dates_and_hosts_are_beside_the_archive_not_in_it(here: Path) -> None:
     batch.run(plans.plan(plans.gains(3)), output="a.h5")
     beside = json.loads((here / "a.h5.run.json").read_text())
     assert beside["host"] == platform.node()
-    assert {"began", "seconds", "cpu", "threads", "experiments"} <= set(beside)
+    assert {"began", "seconds", "cpu", "workers", "experiments"} <= set(beside)
     inside = (here / "a.h5").read_bytes()
     assert platform.node().encode() not in inside or len(platform.node()) < 4
     assert beside["began"][:10].encode() not in inside

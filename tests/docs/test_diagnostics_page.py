@@ -143,6 +143,31 @@ def plan(folder: Path, old: str, new: str) -> None:
     (folder / "plan.json").write_text(text.replace(old, new), encoding="utf-8")
 
 
+def damaged_campaign(folder: Path) -> None:
+    (folder / "deck.h5.campaign" / "shards").mkdir(parents=True)
+    (folder / "deck.h5.campaign" / "shards" / "0-000000000-000000001").touch()
+    (folder / "deck.h5.campaign" / "campaign.json").write_text('{"schema": "met.camp', encoding="utf-8")
+
+
+def begun(folder: Path) -> None:
+    """Three of five cases are done, of another deck of the same name."""
+    import ic
+    from batch import resuming, tasks
+    from batch.campaign import prepare, values_sections
+    from batch.folder import Folder
+
+    text = (folder / "deck.ic").read_text(encoding="utf-8")
+    (folder / "deck.ic").write_text(text.replace("0.025", "0.02"), encoding="utf-8")
+    campaign = prepare(ic.compile("deck.ic", select=["gains"]), output="deck.gains.h5")
+    (folder / "deck.ic").write_text(text, encoding="utf-8")
+    made = Folder(folder / "deck.gains.h5.campaign")
+    made.lock()
+    [section] = values_sections(campaign)
+    resuming.describe(made, campaign, [section], resuming.campaign_key(campaign, [section]))
+    tasks.carry_out(section, tasks.Task(0, 0, 3), made.shards)
+    made.close()
+
+
 GIVEN: Mapping[str, Callable[[Path], None]] = {
     "the folder parts with the decks left.ic and right.ic": parts,
     "deck.ic in Latin-1": latin_1,
@@ -150,6 +175,8 @@ GIVEN: Mapping[str, Callable[[Path], None]] = {
     "deck.ic with 20 lets, each the root of the root ... of the one before": roots,
     "one.urdf with elements 46 deep": nested_elements,
     "an archive, and half of it in half.h5": half_an_archive,
+    "deck.h5.campaign, with campaign.json cut short": damaged_campaign,
+    "deck.gains.h5.campaign, begun when kp was 0.02 V*s/rad": begun,
     "plan.json of schema 9": newer_plan,
     "plan.json with the parameter hinge.servo.kpp": other_plan,
 }
@@ -295,11 +322,10 @@ def test_the_beginning_of_an_id_that_several_cases_have(monkeypatch: pytest.Monk
     import batch
     from batch import campaign
     from batch.archive.read import ArchiveFile
-    from met import keys, run
+    from met import keys
     from tests.batch import plans
 
-    monkeypatch.setattr(run, "prepare", lambda experiment: experiment)
-    monkeypatch.setattr(run, "run", plans.answer)
+    plans.answering(monkeypatch)
     made = plans.plan(plans.gains(40))
     ids = keys.case_ids(plans.gains(40))
     begins = next(each[0] for each in ids if sum(other[0] == each[0] for other in ids) == 2)

@@ -67,7 +67,7 @@ MEASURE = """
 import json, resource, sys
 import batch, ic
 plan = ic.compile(sys.argv[1], select=["many"])
-archive = batch.run(plan, output=sys.argv[2], histories=sys.argv[3])
+archive = batch.run(plan, output=sys.argv[2], histories=sys.argv[3], fresh=True)
 print(json.dumps([resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0, archive.ok]))
 """
 

@@ -1,0 +1,88 @@
+"""What differs between two plans, in the words of their decks: for who comes back to a campaign with another deck."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from met.keys import LATER_FIELDS, SILENT_FIELDS
+from met.plan import Cases, Experiment, Formula, Plan, Quantity
+
+
+def changes(before: Plan, now: Plan) -> list[str]:
+    """Each change that may change numbers, a line; none where there is none."""
+    out = []
+    old, new = ({experiment.name: experiment for experiment in plan.experiments} for plan in (before, now))
+    if list(old) != list(new):
+        out.append(f"runs and sweeps: {', '.join(old)}, now {', '.join(new)}")
+    for name in old:
+        if name in new:
+            head = f"{name}: " if len(new) > 1 else ""
+            out += [head + line for line in _experiment(old[name], new[name])]
+    return out
+
+
+def _experiment(before: Experiment, now: Experiment) -> Iterator[str]:
+    yield from _fields("", before.structure, now.structure)
+    for path in dict.fromkeys([*before.parameters, *now.parameters]):
+        old, new = before.parameters.get(path), now.parameters.get(path)
+        if old is None or new is None:
+            yield f"{path} is {'new' if old is None else 'gone'}"
+        elif _value(old) != _value(new) and not (isinstance(old.value, Formula) and isinstance(new.value, Formula)):
+            place = new.origin.place
+            yield f"{path}: {_shown(old)}, now {_shown(new)}" + (f" ({place.file}:{place.line})" if place else "")
+    yield from _cases(before.cases, now.cases)
+    if before.formulas != now.formulas:
+        yield "what follows from the varied parameters"
+
+
+def _cases(before: Cases, now: Cases) -> Iterator[str]:
+    old, new = ({c.path: c.values for c in cases.coordinates} for cases in (before, now))
+    if before.count != now.count:
+        yield f"{before.count:,} cases, now {now.count:,}"
+    for path in dict.fromkeys([*old, *new]):
+        if path not in old or path not in new:
+            yield f"{path} is {'varied' if path in new else 'not varied any more'}"
+        elif not np.array_equal(old[path], new[path], equal_nan=True):
+            some = [f"{len(np.unique(values)):,} values from {values.min():g} to {values.max():g}" for values in
+                    (old[path], new[path])]  # fmt: skip
+            yield f"{path}: {some[0]}, now {some[1]}" if some[0] != some[1] else f"values of {path}"
+    for name in ("seed", "seeds"):
+        if getattr(before, name) != getattr(now, name):
+            yield f"{name}: {getattr(before, name)}, now {getattr(now, name)}"
+    if not np.array_equal(_array(before.repeats), _array(now.repeats)):
+        yield "repeats"
+
+
+def _fields(path: str, before: Any, now: Any) -> Iterator[str]:
+    """What differs between two structures, field by field."""
+    if type(before) is type(now) and dataclasses.is_dataclass(before):
+        for each in dataclasses.fields(before):
+            if each.name not in SILENT_FIELDS or each.name in LATER_FIELDS:
+                name = f"{path}.{each.name}" if path else each.name
+                yield from _fields(name, getattr(before, each.name), getattr(now, each.name))
+    elif isinstance(before, tuple) and isinstance(now, tuple):
+        if len(before) != len(now):
+            yield f"{path}: {len(before)}, now {len(now)}"
+        else:
+            for index, (old, new) in enumerate(zip(before, now, strict=True)):
+                yield from _fields(f"{path}.{getattr(new, 'joint', getattr(new, 'name', index))}", old, new)
+    elif before != now:
+        yield f"{path}: {before}, now {now}"
+
+
+def _value(quantity: Quantity) -> Any:
+    return "varied" if isinstance(quantity.value, Formula) else quantity.value
+
+
+def _shown(quantity: Quantity) -> str:
+    value = _value(quantity)
+    shown = f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{shown} {quantity.unit}" if isinstance(value, float) and quantity.unit != "1" else shown
+
+
+def _array(values: np.ndarray | None) -> np.ndarray:
+    return np.empty(0) if values is None else values

@@ -1,0 +1,26 @@
+"""The executor that a user asks for."""
+
+from __future__ import annotations
+
+from batch.executors import Executor
+from batch.executors.threads import Threads
+from met.diagnostic import Problem, error
+
+
+def choose(
+    *, threads: int | None = None, processes: int | None = None, dask: object = None, timeout: float | None = None
+) -> Executor:
+    """dask: the address of a scheduler, "local", or a `distributed.Client`. timeout: s that a case may go on without
+    any progress; it takes processes, for a thread cannot be stopped."""
+    if dask is not None:
+        if processes is not None:
+            helps = "Dask's workers are its own; `--dask local` starts as many as there are cores"
+            raise Problem(error("E356", "`--processes` and `--dask` are two ways to run a campaign", help=helps))
+        from batch.executors.dask import Dask
+
+        return Dask(dask, threads=threads, timeout=timeout)
+    if processes is not None or timeout is not None:
+        from batch.executors.processes import Processes
+
+        return Processes(processes, threads=threads, timeout=timeout)
+    return Threads(threads)

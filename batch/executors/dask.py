@@ -1,0 +1,205 @@
+"""Tasks on the workers of a Dask cluster: one on this machine, or many machines that see the campaign's folder.
+
+    a task here --JSON--> scheduler --> worker --> child (batch/executors/dask_worker.py) --> shard, in the folder
+                                          '--> what came of it, in a line
+
+Neither MET's classes nor its functions travel: the scheduler needs no MET, and a worker that has none can say so.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import time
+import uuid
+from collections.abc import Callable, Coroutine, Mapping
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from contextlib import ExitStack, suppress
+from typing import Any
+
+from batch.executors import Outcome
+from batch.executors.dask_connection import check, connected
+from batch.folder import Folder
+from batch.tasks import Done, Section, Task
+from met.diagnostic import Problem, error
+from met.version import VERSION
+
+LOST = "the connection to Dask's scheduler was lost"
+
+WORKER_SECONDS = 60.0
+"""How long we wait where there is no worker."""
+
+TELL_SECONDS = 0.1
+COUNT_SECONDS = 0.5
+CLOSE_SECONDS = 3.0
+
+# Run by name on the worker: as text, for code would have to suit the worker's Python, and a name to be known there.
+ERRAND = f"""
+try:
+    from batch.executors.dask_worker import carry_out
+except ImportError as reason:
+    from socket import gethostname
+    why = f"{{gethostname()}} has no MET {VERSION} where its Dask worker runs ({{reason}}): install it there"
+    outcome = {{"kind": "broken", "why": why}}
+else:
+    outcome = carry_out(order)
+"""
+CALL = "exec(errand, told) or told['outcome']"
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr)
+
+
+class Dask:
+    """As many tasks at a time as all workers of the cluster have threads; workers may come and go.
+
+    dask      "local", the address of a scheduler, its file (`*.json`), or a `distributed.Client`
+    threads   of each task
+    timeout   s without any progress after which a case is given up
+    say       told what the user waits for
+    """
+
+    def __init__(
+        self, dask: object, *, threads: int | None = None, timeout: float | None = None,
+        say: Callable[[str], None] = _say,
+    ) -> None:  # fmt: skip
+        check(dask)
+        self.under_way = 0
+        self._dask, self._threads, self._timeout, self._say = dask, threads or 1, timeout, say
+        self._name = f"met-{uuid.uuid4().hex}"
+        self._token = f".{self._name}"  # a worker that sees this file sees the same folder, and no other of its name
+        self._workers: dict[str, int] = {}
+        self._seen = 0.0
+        self._running: dict[Future[Outcome], Task] = {}
+        self._opened = ExitStack()
+
+    @property
+    def workers(self) -> int:
+        return sum(self._workers.values())
+
+    @property
+    def about(self) -> str:
+        workers, threads = len(self._workers), self.workers
+        text = f"Dask, {workers} worker{'s' if workers != 1 else ''}"
+        return text if threads == workers else f"{text} with {threads} threads"
+
+    def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
+        self._folder, self._sections, self._tell = folder.path.resolve(), sections, tell
+        with ExitStack() as opened:
+            self._client = opened.enter_context(connected(self._dask, self._threads))
+            opened.callback(self._dismiss)
+            token = self._folder / self._token
+            token.touch()
+            opened.callback(token.unlink, missing_ok=True)
+            opened.callback(self._on_loop(self._count()).cancel)
+            self._await_worker()
+            self._opened = opened.pop_all()
+
+    def submit(self, task: Task) -> None:
+        self._running[self._on_loop(self._carry_out(task))] = task
+
+    def wait(self) -> list[Outcome]:
+        while self._running:
+            ended, _ = wait(self._running, timeout=TELL_SECONDS, return_when=FIRST_COMPLETED)
+            self._tell()
+            if not ended and (why := self._stuck()):
+                return [Outcome(self._running.pop(future), "broken", why=why) for future in list(self._running)]
+            if ended:
+                for future in ended:
+                    del self._running[future]
+                return [future.result() for future in ended]
+        return []
+
+    def close(self) -> None:
+        for future in self._running:
+            future.cancel()
+        self._running.clear()
+        self._opened.close()
+
+    # In this thread
+
+    def _on_loop(self, work: Coroutine[Any, Any, Any]) -> Future[Any]:
+        """Have work done in the client's event loop."""
+        return asyncio.run_coroutine_threadsafe(work, self._client.loop.asyncio_loop)
+
+    def _await_worker(self) -> None:
+        """Wait for a worker, but not for ever. Raises Problem."""
+        where = self._client.scheduler.address
+        self._seen = time.monotonic()
+        time.sleep(TELL_SECONDS)
+        if not self._workers:
+            self._say(f"Dask's scheduler at {where} has no worker yet: waiting for one, {WORKER_SECONDS:g} s at most")
+        while not self._workers:
+            if why := self._stuck():
+                helps = f"`dask worker {where}` starts one, where MET is installed and this folder is seen"
+                raise Problem(error("E356", why, help=helps))
+            time.sleep(TELL_SECONDS)
+            self._tell()
+
+    def _stuck(self) -> str:
+        """Why nothing can be hoped for any more; empty where something can."""
+        if self._client.status == "closed":
+            return LOST
+        if self._workers:
+            self._seen = time.monotonic()
+        elif time.monotonic() - self._seen > WORKER_SECONDS:
+            return f"for {WORKER_SECONDS:g} s no worker has been with Dask's scheduler"
+        return ""
+
+    def _dismiss(self) -> None:
+        """Have workers let go of what they keep for this campaign; those that do not hear of it do so by themselves."""
+        from batch.executors.dask_worker import dismiss
+
+        async def tell() -> None:
+            await self._client.run(dismiss, self._name, on_error="ignore")
+
+        if self._client.status == "running":
+            with suppress(Exception):
+                self._on_loop(tell()).result(CLOSE_SECONDS)
+
+    # In the client's event loop
+
+    async def _count(self) -> None:
+        """Keep count of the workers."""
+        while True:
+            try:
+                self._workers = await self._client.nthreads()
+            except Exception:  # whatever a connection that was lost gives rise to
+                self._workers = {}
+            await asyncio.sleep(COUNT_SECONDS)
+
+    async def _carry_out(self, task: Task) -> Outcome:
+        """Have a task run on some worker. One whose worker is lost is run again by Dask, on another."""
+        from distributed.scheduler import KilledWorker
+
+        key = f"{self._name}-{task.name}-{uuid.uuid4().hex}"
+        order = {
+            "folder": str(self._folder), "token": self._token, "version": VERSION, "campaign": self._name, "key": key,
+            "task": [task.section, task.first, task.last], "threads": self._threads, "timeout": self._timeout,
+        }  # fmt: skip
+        dask_future = None
+        try:
+            told = {"errand": ERRAND, "told": {"order": order}}
+            dask_future = self._client.submit(eval, CALL, told, key=key, pure=False)
+            return self._outcome(task, await dask_future)
+        except KilledWorker as reason:
+            return Outcome(task, "lost", why=f"died, each of {reason.allowed_failures + 1} of Dask's")
+        except CancelledError:  # not by us: that would be asyncio's
+            if self._client.status == "running":
+                return Outcome(task, "lost", why="was told by Dask to forget it")
+            return Outcome(task, "broken", why=LOST)
+        except Exception as reason:
+            return Outcome(task, "broken", why=f"Dask cannot run a task: {str(reason) or type(reason).__name__}")
+        finally:
+            if dask_future is not None:
+                dask_future.release()
+
+    def _outcome(self, task: Task, told: Mapping[str, Any]) -> Outcome:
+        """What a worker says has come of a task."""
+        if told["kind"] != "done":
+            return Outcome(task, told["kind"], why=told["why"])
+        if "proof" in told and told["proof"] != self._sections[task.section].key(task.first, task.last):
+            why = f"{told['host']} has other code of MET {VERSION}, or other models: install the same everywhere"
+            return Outcome(task, "broken", why=why)
+        return Outcome(task, "done", Done(*told["done"]))

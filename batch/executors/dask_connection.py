@@ -1,0 +1,150 @@
+"""A client of a Dask cluster, from what a user calls it: `local`, an address, a scheduler file, or a client."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import os
+import signal
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
+from pathlib import Path
+from typing import Any
+
+from met.diagnostic import Problem, error
+
+CONNECT_SECONDS = 5.0
+"""How long we try to reach a scheduler."""
+
+LOCAL = "local"
+
+
+def check(dask: object) -> None:
+    """Refuse what calls no cluster, before anything is begun. Raises Problem, TypeError."""
+    if isinstance(dask, str | os.PathLike):
+        return
+    from distributed import Client
+
+    if not isinstance(dask, Client):
+        raise TypeError(f"dask is the address of a scheduler, \"local\" or a Client, and not {type(dask).__name__}")
+    if dask.asynchronous:
+        raise Problem(error("E356", "the Dask client is asynchronous, and batch.run is not",
+                            help="a Client made without `asynchronous=True` serves it"))  # fmt: skip
+
+
+@contextmanager
+def connected(dask: object, threads: int) -> Iterator[Any]:
+    """The client. What is made for it here is closed afterwards: a client that the user made is not.
+
+    threads   cores of this machine that each worker of a local cluster is for
+
+    Raises Problem E356 where there is no such cluster.
+    """
+    from distributed import Client
+
+    if isinstance(dask, Client):
+        if dask.status != "running":
+            helps = "it has to be connected to a scheduler"
+            raise Problem(error("E356", f"the Dask client is {dask.status}", help=helps))
+        yield dask
+        return
+    assert isinstance(dask, str | os.PathLike)
+    with quiet(), _started(threads) if dask == LOCAL else _reached(_address(os.fspath(dask))) as client:
+        yield client
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Inside, Dask prints nothing of what happens to connections and workers: what matters of it is an outcome."""
+    import distributed  # noqa: F401 - it sets the levels of its loggers when it is imported
+
+    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in ("distributed", "tornado")]
+    before = [(logger, logger.level) for logger in map(logging.getLogger, names)]
+    try:
+        for logger, _ in before:
+            logger.setLevel(logging.CRITICAL)
+        yield
+    finally:
+        for logger, level in before:
+            logger.setLevel(level)
+
+
+def _address(called: str) -> str:
+    """The address of a scheduler, which may stand in a file. Raises Problem."""
+    path = Path(called)
+    if path.suffix != ".json":
+        return called
+    helps = f"`dask scheduler --scheduler-file {called}` writes it"
+    try:
+        return str(json.loads(path.read_text(encoding="utf-8"))["address"])
+    except OSError as reason:
+        message = f"cannot read the Dask scheduler file {called}: {(reason.strerror or str(reason)).lower()}"
+        raise Problem(error("E356", message, help=helps)) from None
+    except (ValueError, LookupError, TypeError):
+        helps = "`dask scheduler --scheduler-file FILE.json` writes one"
+        raise Problem(error("E356", f"{called} is no scheduler file of Dask", help=helps)) from None
+
+
+@contextmanager
+def _reached(address: str) -> Iterator[Any]:
+    """A client of the scheduler at an address. Raises Problem."""
+    from distributed import Client
+
+    try:
+        # First without a client: one that reaches nothing goes on trying, and complains when the program ends. In a
+        # thread, for there may be an event loop in this one, in a notebook for instance.
+        with ThreadPoolExecutor(1) as thread:
+            thread.submit(asyncio.run, _greet(address)).result()
+        client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+    except Exception as reason:  # anything at all, where the address is none or something else answers
+        helps = "`dask scheduler` starts one, and says its address"
+        raise Problem(error("E356", f"no Dask scheduler answers at `{address}`", help=helps)) from reason
+    with client:
+        yield client
+
+
+async def _greet(address: str) -> None:
+    from distributed.comm import connect
+    from distributed.security import Security
+
+    arguments = Security().get_connection_args("client")
+    comm = await asyncio.wait_for(connect(address, timeout=CONNECT_SECONDS, **arguments), CONNECT_SECONDS)
+    await comm.close()
+
+
+@contextmanager
+def _started(threads: int) -> Iterator[Any]:
+    from distributed import Client, LocalCluster
+
+    workers = max(1, len(os.sched_getaffinity(0)) // threads)
+    with tempfile.TemporaryDirectory(prefix="met-dask-", ignore_cleanup_errors=True) as scratch:
+        try:
+            # the memory that tasks take is that of the workers' children, which Dask's limit does not count
+            with _interrupts_later():
+                cluster = LocalCluster(
+                    n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0,
+                    local_directory=scratch, silence_logs=logging.CRITICAL,
+                )  # fmt: skip
+        except (OSError, RuntimeError) as reason:
+            said = str(reason).rstrip(".")
+            message = f"Dask's workers do not start on this machine: {said}; a script has to call batch.run below " \
+                      '`if __name__ == "__main__":`'  # fmt: skip
+            raise Problem(error("E356", message)) from None
+        with cluster, Client(cluster, set_as_default=False) as client:
+            yield client
+
+
+@contextmanager
+def _interrupts_later() -> Iterator[None]:
+    """Inside, Ctrl-C waits. Threads that begin here never see one, nor do processes that they start, then or later:
+    a terminal sends it to all of them, but only this one decides what it means."""
+    resource_tracker.ensure_running()  # it would let interrupts through again, when it is started for the first process
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,0 +1,141 @@
+"""What runs on a Dask worker: tasks, in children that it keeps for as long as a campaign sends it some.
+
+So a case that kills its process, or never ends, takes down a child and never the worker. The children of a campaign
+are a plugin of the worker: it goes when the campaign says so, when nobody waits for a running task any more, when
+nothing has come for a while, and with the worker; a worker that is killed takes its children along (batch/child.py).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from distributed import Reschedule, Worker, WorkerPlugin, get_worker
+from distributed.utils import sync
+
+from batch import shard
+from batch.child import Crew
+from batch.executors import Outcome
+from batch.tasks import Task
+from met.version import VERSION
+
+IDLE_SECONDS = 60.0
+"""Without a task, after which children are let go of: whoever sent them may have been killed."""
+
+LOOK_SECONDS = 1.0
+
+GIVEN_UP = ("released", "cancelled", "forgotten")
+"""What becomes of a running task that nobody waits for any more, in the worker's words."""
+
+
+def carry_out(order: Mapping[str, Any]) -> dict[str, Any]:
+    """Have a task run by a child of this worker; called by Dask, in a thread of the worker's.
+
+    order   folder, the campaign's; token, a file in it; version, of MET; task; key, of the Dask task; campaign, its
+            name here; threads and timeout, of a child
+
+    What came of it, as `batch.executors.Outcome` has it, in words and numbers that any Dask can carry: kind, why, done.
+    With the first that is done goes its shard's key as proof: it says what code this worker has.
+    """
+    host, folder, task = socket.gethostname(), Path(order["folder"]), Task(*order["task"])
+    if order["version"] != VERSION:
+        return _broken(f"{host} has MET {VERSION}, and not {order['version']}: install that where its Dask worker runs")
+    if not (folder / order["token"]).exists():
+        return _broken(
+            f"{host} does not see {folder}: put the archive where all hosts see it under the same name (`-o`)"
+        )
+    worker = get_worker()
+    kept: Kept = sync(worker.loop, Kept.on, worker, order)
+    outcome = kept.carry_out(task, order["key"])
+    if outcome.kind == "broken":
+        return _broken(f"on {host}, {outcome.why}")
+    if outcome.done is None:
+        return {"kind": outcome.kind, "why": outcome.why}
+    told = {"kind": "done", "done": [outcome.done.seconds, outcome.done.failed], "host": host}
+    if not kept.proved:
+        kept.proved = True
+        told["proof"] = shard.read(folder / "shards" / task.name).key
+    return told
+
+
+async def dismiss(campaign: str, dask_worker: Worker) -> None:
+    """Let go of the children that a worker keeps for a campaign."""
+    if campaign in dask_worker.plugins:
+        await dask_worker.plugin_remove(name=campaign)
+
+
+class Kept(WorkerPlugin):
+    """The children that a worker keeps for one campaign. All but `carry_out` is called in the worker's event loop.
+
+    over     whether they have been sent home
+    proved   whether a shard of theirs has been shown
+    """
+
+    def __init__(self, name: str, crew: Crew) -> None:
+        self._name, self._crew = name, crew
+        self.over = self.proved = False
+        self._at_work: set[str] = set()
+        self._last = time.monotonic()
+
+    @staticmethod
+    async def on(worker: Worker, order: Mapping[str, Any]) -> Kept:
+        """Those of a worker, for one more task."""
+        name = order["campaign"]
+        kept = worker.plugins.get(name)
+        if not isinstance(kept, Kept):
+            crew = Crew(Path(order["folder"]), threads=order["threads"], timeout=order["timeout"])
+            kept = Kept(name, crew)
+            await worker.plugin_add(plugin=kept, name=name)
+        kept._at_work.add(order["key"])
+        return kept
+
+    def carry_out(self, task: Task, key: str) -> Outcome:
+        """Have a task run, for which they were asked `on` the worker. Raises Reschedule where they were sent home: then
+        nothing has come of it, and somebody else may have it."""
+        try:
+            outcome = self._crew.carry_out(task)
+        except RuntimeError:
+            if not self.over:
+                raise
+        finally:
+            self._last = time.monotonic()
+            self._at_work.discard(key)
+        if self.over:
+            raise Reschedule
+        return outcome
+
+    def setup(self, worker: Worker) -> None:
+        self._worker = worker
+        self._look = asyncio.create_task(self._go_when_idle())
+
+    def transition(self, key: Any, start: str, finish: str, **_: Any) -> None:
+        if key in self._at_work and finish in GIVEN_UP:
+            self.over = True
+            self._crew.stop()
+            self._going = asyncio.create_task(self._go())
+
+    async def teardown(self, worker: Worker) -> None:
+        self.over = True
+        self._crew.stop()
+        if self._look is not asyncio.current_task():
+            self._look.cancel()
+        while self._at_work:
+            await asyncio.sleep(0.01)
+        self._crew.close()
+
+    async def _go_when_idle(self) -> None:
+        while self._at_work or time.monotonic() - self._last < IDLE_SECONDS:
+            await asyncio.sleep(LOOK_SECONDS)
+        await self._go()
+
+    async def _go(self) -> None:
+        if self._worker.plugins.get(self._name) is self:
+            await self._worker.plugin_remove(name=self._name)
+
+
+def _broken(why: str) -> dict[str, Any]:
+    return {"kind": "broken", "why": why}

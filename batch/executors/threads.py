@@ -1,0 +1,67 @@
+"""Tasks in this process: one at a time, its cases over several threads, while the shard before is written."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+
+from batch import shard, tasks
+from batch.executors import Outcome
+from batch.folder import Folder
+from batch.shard import cannot_keep
+from batch.tasks import Done, Section, Task
+
+
+class Threads:
+    """The executor that needs nothing started."""
+
+    workers = 1
+
+    def __init__(self, threads: int | None = None) -> None:
+        self._threads = threads or len(os.sched_getaffinity(0))
+        self.about = f"{self._threads} thread{'s' if self._threads > 1 else ''}"
+        self.under_way = 0
+        self._waiting: deque[Task] = deque()
+        self._written: deque[tuple[Task, Done, Future[None]]] = deque()
+        self._writer: ThreadPoolExecutor | None = None
+
+    def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
+        self._folder, self._sections, self._tell = folder, sections, tell
+        self._writer = ThreadPoolExecutor(1)
+
+    def submit(self, task: Task) -> None:
+        self._waiting.append(task)
+
+    def wait(self) -> list[Outcome]:
+        if self._waiting:
+            task = self._waiting.popleft()
+            computed = tasks.compute(
+                self._sections[task.section], task, threads=self._threads, progress=self._progress
+            )
+            assert self._writer is not None
+            path = self._folder.shards / task.name
+            writing = self._writer.submit(shard.write, path, computed)
+            self._written.append((task, Done(computed.seconds, computed.failed), writing))
+            self.under_way = 0
+        # one shard may be on its way to the disk, with its histories in memory
+        ended = [self._written.popleft() for _ in range(len(self._written) - bool(self._waiting))]
+        return [self._outcome(*each) for each in ended]
+
+    def close(self) -> None:
+        self._waiting.clear()
+        if self._writer is not None:
+            self._writer.shutdown(wait=True)
+
+    def _progress(self, done: int) -> None:
+        self.under_way = done
+        self._tell()
+
+    @staticmethod
+    def _outcome(task: Task, done: Done, writing: Future[None]) -> Outcome:
+        try:
+            writing.result()
+        except OSError as reason:
+            return Outcome(task, "broken", why=cannot_keep(reason))
+        return Outcome(task, "done", done)

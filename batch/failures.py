@@ -1,0 +1,80 @@
+"""The cases of an archive that did not reach their end: by cause, all of them, with what they have in common once."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+
+from met.frozen import frozen
+from met.run import DONE, FAILED, LOST, TIMED_OUT
+
+STATUS = {DONE: "done", FAILED: "failed", TIMED_OUT: "timed out", LOST: "lost"}
+"""Words for how a case ended."""
+
+MOST_RANGES = 200
+"""Stretches of cases that are listed of one cause."""
+
+NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
+
+
+@frozen
+class Failure:
+    """Cases that failed alike: how they ended, the cause of the first, whose id this is, and all their positions."""
+
+    status: str
+    cause: str
+    case_id: str
+    cases: tuple[int, ...]
+
+    @property
+    def row(self) -> int:
+        """Position of the first."""
+        return self.cases[0]
+
+
+def failures(status: np.ndarray, cause: np.ndarray, case: np.ndarray, case_id: np.ndarray) -> tuple[Failure, ...]:
+    """What failed, by cause, in the order of their first cases. Causes are alike that differ in numbers alone.
+
+    status, cause, case, case_id   of failed cases, in order
+    """
+    found: dict[tuple[int, str], list[int]] = {}
+    for place in range(len(status)):
+        found.setdefault((int(status[place]), NUMBER.sub("#", str(cause[place]))), []).append(place)
+    return tuple(
+        Failure(STATUS.get(ended, str(ended)), str(cause[places[0]]), str(case_id[places[0]]),
+                tuple(int(case[place]) for place in places))
+        for (ended, _), places in found.items()
+    )  # fmt: skip
+
+
+def failure_lines(found: Sequence[Failure], width: int) -> list[str]:
+    """Each cause with its cases, wrapped."""
+    out = []
+    width = max(width, 40)
+    for failure in found:
+        word = "" if failure.status == "failed" else f"{failure.status}: "
+        cause = failure.cause.removeprefix(word)
+        if len(failure.cases) == 1:
+            head = f"  #{failure.row} {failure.case_id[:8]}  {word}"
+            out += textwrap.wrap(cause, width, initial_indent=head, subsequent_indent=" " * len(head))
+            continue
+        head = f"  {len(failure.cases):,} cases  {word}"
+        out += textwrap.wrap(f"{cause} (#{failure.row})", width, initial_indent=head, subsequent_indent=" " * len(head))
+        out += textwrap.wrap(ranges(failure.cases), width, initial_indent="    ", subsequent_indent="    ")
+    return out
+
+
+def ranges(cases: Sequence[int]) -> str:
+    """Rising positions in words: `#3, #7-#12`."""
+    stretches: list[list[int]] = []
+    for case in cases:
+        if stretches and case == stretches[-1][1] + 1:
+            stretches[-1][1] = case
+        else:
+            stretches.append([case, case])
+    texts = [f"#{first}" if first == last else f"#{first}-#{last}" for first, last in stretches[:MOST_RANGES]]
+    left = sum(last - first + 1 for first, last in stretches[MOST_RANGES:])
+    return ", ".join(texts) + (f" and {left:,} more; `cause` in the archive has them all" if left else "")

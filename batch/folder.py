@@ -1,0 +1,212 @@
+"""A campaign's folder, beside the archive until that is whole: what was asked for, the shards, who works in it.
+
+    two_link.gains.h5.campaign/
+      campaign.json     what is computed: sections, the keys of their code and cases
+      plan.json         the plan, for workers; large case tables and rows beside it
+      shards/           one file a task, named SECTION-FIRST-LAST
+      status*.json      how far who is, written every second (batch/status.py)
+      lock              held while somebody works here: by one driver alone, or by the jobs of a cluster together
+
+The shards are the journal: what is missing is what no sound shard of this very campaign covers. So a run that was
+killed goes on by running what is missing, and it does not matter how its tasks were cut.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import json
+import os
+import re
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from batch import shard
+from batch.tasks import Done, Section, Task
+from met import plan_file
+from met import run as engine
+from met.diagnostic import Problem, error
+from met.plan import Plan
+from met.version import VERSION
+
+SCHEMA, FORMAT = "met.campaign", 1
+ENDING = ".campaign"
+SHARD = re.compile(r"(\d+)-(\d+)-(\d+)")
+
+
+class Busy(Exception):
+    """Somebody else works in the folder."""
+
+
+class Folder:
+    """The folder of one campaign. `lock` it before writing; `close` gives it up."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._lock = -1
+
+    @property
+    def shards(self) -> Path:
+        return self.path / "shards"
+
+    def exists(self) -> bool:
+        return (self.path / "campaign.json").exists()
+
+    # Who works here
+
+    def lock(self, *, together: bool = False) -> None:
+        """Raises Busy where somebody works here, unless both do so `together`; makes the folder where there is none."""
+        self.path.mkdir(exist_ok=True)
+        self._lock = os.open(self.path / "lock", os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            fcntl.flock(self._lock, (fcntl.LOCK_SH if together else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self.close()
+            raise Busy from None
+        except OSError as reason:
+            if reason.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a disk without locks: do without
+                self.close()
+                raise
+
+    def close(self) -> None:
+        if self._lock >= 0:
+            os.close(self._lock)
+            self._lock = -1
+
+    def empty(self) -> None:
+        """Take all but the lock out of the folder, which is locked by us."""
+        for path in self.path.iterdir():
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path)
+            elif path.name != "lock":
+                path.unlink()
+
+    def remove(self) -> None:
+        """Take the folder away, which is locked by us, or of nobody's."""
+        shutil.rmtree(self.path, ignore_errors=True)
+        self.close()
+
+    # What is computed
+
+    def describe(self, plan: Plan, sections: Iterable[Section], **about: Any) -> None:
+        """Write down what is computed, for workers and for who comes back later.
+
+        about   `key` of the campaign, name of its `archive`, words for the `histories` that are kept
+        """
+        self.shards.mkdir(exist_ok=True)
+        plan_file.write(plan, self.path / "plan.json")
+        told = []
+        for section in sections:
+            rows = None
+            if len(section.rows) < section.prepared.experiment.cases.count:
+                rows = f"rows.{section.number}.npy"
+                with (self.path / rows).open("wb") as file:
+                    np.save(file, section.rows)
+            told.append({
+                "number": section.number, "experiment": section.experiment, "cases": len(section.rows), "rows": rows,
+                "recorded": section.recorded, "single": section.single, "code": section.prepared.code_key,
+            })  # fmt: skip
+        data = {"schema": SCHEMA, "version": FORMAT, "met": VERSION, "deck": plan.deck, "sections": told, **about}
+        put(self.path / "campaign.json", data)
+
+    def described(self) -> dict[str, Any]:
+        """What was written down. Raises Problem where that is damaged, or of another version of MET."""
+        path = self.path / "campaign.json"
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+            if data["schema"] != SCHEMA or data["version"] != FORMAT:
+                raise ValueError
+            assert isinstance(data["key"], str) and isinstance(data["sections"], list)
+        except (OSError, ValueError, LookupError, TypeError, AssertionError) as reason:
+            helps = "`--fresh` starts over, and removes what is in it"
+            raise Problem(error("E350", f"{path} is damaged, or of another version of MET", help=helps)) from reason
+        return data
+
+    def plan(self) -> Plan:
+        """The plan that is run here. Raises Problem."""
+        return plan_file.read(self.path / "plan.json")
+
+    def sections(self) -> dict[int, Section]:
+        """The sections by their numbers, for a worker."""
+        experiments = [engine.prepare(experiment) for experiment in self.plan().experiments]
+        out = {}
+        for told in self.described()["sections"]:
+            number, prepared = told["number"], experiments[told["experiment"]]
+            count = prepared.experiment.cases.count
+            rows = np.arange(count) if told["rows"] is None else np.load(self.path / told["rows"])
+            out[number] = Section(number, told["experiment"], prepared, rows, told["recorded"], told["single"])
+        return out
+
+    # What is done
+
+    def named(self, number: int) -> list[Task]:
+        """The tasks of a section that have a file, sound or not, by their first cases."""
+        found = []
+        for name in os.listdir(self.shards) if self.shards.is_dir() else ():
+            parts = SHARD.fullmatch(name)
+            if parts and int(parts[1]) == number:
+                found.append(Task(number, int(parts[2]), int(parts[3])))
+        return sorted(found, key=lambda task: (task.first, -task.last))
+
+    def read(self, section: Section, task: Task) -> shard.Shard:
+        """A task's shard. Raises shard.Unsound where it is none of this section's, OSError."""
+        found = shard.read(self.shards / task.name)
+        if not 0 <= task.first < task.last <= len(section.rows) or len(found.outputs) != task.cases:
+            raise shard.Unsound("holds other cases than its name says")
+        if found.key != section.key(task.first, task.last):
+            raise shard.Unsound("is of another plan, or of another version of MET's code")
+        return found
+
+    def sound(self, section: Section) -> tuple[dict[Task, Done], list[str]]:
+        """The tasks of a section whose shards count, and what is told of those that do not, which are removed: their
+        cases are run again."""
+        kept: dict[Task, Done] = {}
+        told = []
+        for task in self.named(section.number):
+            try:
+                found = self.read(section, task)
+            except (shard.Unsound, OSError) as reason:
+                why = str(reason) if isinstance(reason, shard.Unsound) else f"cannot be read: {reason.strerror}"
+                told.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
+                (self.shards / task.name).unlink(missing_ok=True)
+            else:
+                kept[task] = Done(found.seconds, found.failed)
+        return kept, told
+
+    def sweep(self) -> None:
+        """Remove what workers that were killed had begun to write."""
+        for path in self.shards.glob(".*.tmp"):
+            path.unlink(missing_ok=True)
+
+
+def beside(archive: Path) -> Path:
+    """The folder of the campaign that fills an archive."""
+    return archive.with_name(archive.name + ENDING)
+
+
+def gaps(tasks: Iterable[Task], cases: int) -> list[tuple[int, int]]:
+    """Stretches of cases that no task covers; tasks by their first cases."""
+    out, at = [], 0
+    for task in tasks:
+        if task.first > at:
+            out.append((at, task.first))
+        at = max(at, task.last)
+    return [*out, (at, cases)] if at < cases else out
+
+
+def put(path: Path, data: Any) -> None:
+    """Write JSON whole, or not at all."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with temporary.open("w", encoding="utf-8") as file:
+            json.dump(data, file)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise

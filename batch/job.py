@@ -1,0 +1,112 @@
+"""A job of a cluster's queue: its share of a campaign's cases, or the end of it.
+
+    python -m batch.job FOLDER share K TASKS.json     the K-th share, by processes of its own
+    python -m batch.job FOLDER together               the archive, when all shares are done
+
+Jobs need nothing of one another but the folder. Each writes down how far it is (`status.K.json`), and what it says goes
+to its log. One that is cancelled, or out of time, leaves its shards; what it had not done is missing, and is submitted
+again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from batch.child import COMMAND
+from batch.drive import Count, Driver, Stopped
+from batch.executors.processes import Processes
+from batch.executors.threads import Threads
+from batch.folder import Busy, Folder, gaps
+from batch.performing import perform
+from batch.progress import Bar
+from batch.resuming import described
+from batch.status import Reporter
+from batch.tasks import Task
+from batch.termination import TERMINATED, Terminated, terminable
+from met.diagnostic import Problem
+
+
+def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = COMMAND) -> int:
+    """Run the stretches of this share that have no shard. Exit status 0 where all of it is done."""
+    folder = Folder(path)
+    if not folder.exists():
+        print(f"met: {path} is gone: the campaign is whole, or was begun again elsewhere")
+        return 0
+    try:
+        folder.lock(together=True)
+    except Busy:
+        print(f"met: {path} is in the hands of another run: nothing was done here", file=sys.stderr)
+        return 1
+    asked = json.loads(tasks_file.read_text(encoding="utf-8"))
+    sections = folder.sections()
+    mine = [Task(*each) for each in asked["shares"][number]]
+    cores = int(os.environ.get("SLURM_CPUS_PER_TASK", "1"))
+    executor = Processes(1, threads=cores, timeout=asked["timeout"], command=command)
+    reporter = Reporter(folder, sum(task.cases for task in mine), Bar(), name=str(number))
+    driver = Driver(folder, executor, reporter)
+    executor.open(folder, sections, driver.tell)
+    try:
+        for section in sections.values():
+            wanted = [task for task in mine if task.section == section.number]
+            left = _left(wanted, folder.named(section.number))
+            driver.counts[section.number] = Count(len(section.rows) - sum(last - first for first, last in left))
+            driver.run(section, left)
+        reporter.state("done")
+    except (Stopped, Problem) as reason:
+        reporter.state("stopped")
+        print(f"met: {reason}", file=sys.stderr)
+        return 1
+    except BaseException:
+        reporter.state("interrupted")
+        raise
+    finally:
+        executor.close()
+        folder.close()
+    return 0
+
+
+def _left(wanted: Sequence[Task], there: Sequence[Task]) -> list[tuple[int, int]]:
+    """Stretches of the wanted tasks that no shard covers, by its name: what it holds is proved when all is merged."""
+    out = []
+    for task in wanted:
+        inside = [Task(t.section, max(t.first, task.first) - task.first, min(t.last, task.last) - task.first)
+                  for t in there if t.first < task.last and t.last > task.first]  # fmt: skip
+        out += [(task.first + first, task.first + last) for first, last in gaps(inside, task.cases)]
+    return out
+
+
+def together(path: Path) -> int:
+    """Merge a campaign whose cases are all done. Exit status 1 where cases failed or are missing."""
+    from batch import look
+    from batch.verdict import brief
+
+    campaign = described(Folder(path))
+    threads = int(os.environ.get("SLURM_CPUS_PER_TASK", "1"))
+    performed = perform(campaign, executor=Threads(threads), together=True, say=print)
+    archive = look(campaign.output, performed.notes)
+    print("\n".join(brief(archive)))
+    return 0 if archive.ok else 1
+
+
+def main(arguments: Sequence[str]) -> int:
+    """What the job's script calls."""
+    path, verb, *rest = arguments
+    try:
+        with terminable():
+            return share(Path(path), int(rest[0]), Path(rest[1])) if verb == "share" else together(Path(path))
+    except Terminated:
+        print("met: terminated; what is done is kept", file=sys.stderr)
+        return TERMINATED
+    except Problem as problem:
+        from met.render import render
+
+        print(render(problem.diagnostics, problem.sources), file=sys.stderr)
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

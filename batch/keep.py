@@ -1,0 +1,121 @@
+"""Which histories are kept: of all cases, of none, of every n-th, of named ones, of those that failed, of the worst.
+
+What is known of a case before it is run (its place, its name) is recorded when it is run. Cases that failed, and the
+worst by a metric, are known when all are done, and are run again for their histories, with the same bits.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+
+import numpy as np
+
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.plan import Experiment
+from met.run import Run
+
+WORDS = "default, all, none, every:N, failed, worst:N, worst:N:METRIC, or cases by '#7' or id"
+
+
+@frozen
+class Keep:
+    """What is kept.
+
+    default, everything   all while there is room, or whatever it takes;  every: of how many one, 0 for no such rule
+    cases    as users name them;  failed: those that failed;  worst: (how many, by which metric, "" for the first)
+    """
+
+    default: bool = False
+    everything: bool = False
+    every: int = 0
+    cases: tuple[int | str, ...] = ()
+    failed: bool = False
+    worst: tuple[tuple[int, str], ...] = ()
+
+    @property
+    def later(self) -> bool:
+        """Whether some of it is known only when all cases are done."""
+        return self.failed or bool(self.worst)
+
+    def at_most(self, cases: int) -> int:
+        """How many are chosen later, at most; of those that fail, none are expected."""
+        return min(cases, sum(count for count, _ in self.worst))
+
+
+def keep(words: str | int | Sequence[str | int], experiments: Sequence[Experiment]) -> Keep:
+    """What words say (`WORDS`), one or several. Raises Problem E351."""
+    given = [words] if isinstance(words, str | int) else list(words)
+    found = Keep()
+    for word in given:
+        found = _with(found, word, experiments)
+    alone = [word for word in given if word in ("default", "all", "none")]
+    if alone and len(given) > 1:
+        raise Problem(error("E351", f"histories `{alone[0]}` stands alone, and not with {len(given) - 1} more"))
+    return found
+
+
+def _with(found: Keep, word: str | int, experiments: Sequence[Experiment]) -> Keep:
+    from dataclasses import replace
+
+    if not isinstance(word, str):
+        return replace(found, cases=(*found.cases, word))
+    name, *rest = word.split(":")
+    if word in ("default", "all", "none"):
+        return replace(found, default=word == "default", everything=word != "none")
+    if word == "failed":
+        return replace(found, failed=True)
+    if name == "every" and len(rest) == 1 and rest[0].isdecimal() and int(rest[0]) > 0:
+        return replace(found, every=int(rest[0]))
+    if name == "worst" and 1 <= len(rest) <= 2 and rest[0].isdecimal() and int(rest[0]) > 0:
+        metric = rest[1] if len(rest) == 2 else ""
+        _check_metric(metric, experiments)
+        return replace(found, worst=(*found.worst, (int(rest[0]), metric)))
+    if word.startswith("#") or (word and all(c in "0123456789abcdef" for c in word)):
+        return replace(found, cases=(*found.cases, word))
+    near = difflib.get_close_matches(name, ["default", "all", "none", "every", "failed", "worst"], n=1)
+    helps = [*(f"did you mean `{each}`?" for each in near), f"what may be kept: {WORDS}"]
+    raise Problem(error("E351", f"histories `{word}` is none of the words that say what to keep", help=helps))
+
+
+def _check_metric(metric: str, experiments: Sequence[Experiment]) -> None:
+    known = list(dict.fromkeys(use.name for each in experiments for use in each.structure.metrics))
+    if not known:
+        remedy = "a run has them by `metric NAME = MODEL { of = ...; }`"
+        raise Problem(error("E351", "there is no metric by which cases could be the worst", help=remedy))
+    if metric and metric not in known:
+        near = difflib.get_close_matches(metric, known, n=1)
+        helps = [*(f"did you mean `{each}`?" for each in near), f"metrics here: {', '.join(known)}"]
+        raise Problem(error("E351", f"no metric `{metric}` by which cases could be the worst", help=helps))
+
+
+def known(found: Keep, experiment: Experiment, rows: np.ndarray, named: np.ndarray) -> np.ndarray:
+    """Places in `rows` of the cases whose histories are kept for what they are. named: rows of `found.cases`."""
+    if found.everything:
+        return np.arange(len(rows))
+    kept = np.isin(rows, named)
+    if found.every:
+        kept |= experiment.cases.table[rows] % found.every == 0
+    return np.flatnonzero(kept)
+
+
+def chosen(found: Keep, experiment: Experiment, results: Run) -> np.ndarray:
+    """Places of the cases whose histories are kept for what became of them: results of all, without histories."""
+    kept = np.zeros(len(results.case), dtype=bool)
+    if found.failed:
+        kept |= results.status != 0
+    for count, by in found.worst:
+        metric = by or (experiment.structure.metrics[0].name if experiment.structure.metrics else "")
+        if metric in results.metrics:
+            kept[_worst(experiment, metric, results.metrics[metric])[:count]] = True
+    return np.flatnonzero(kept)
+
+
+def _worst(experiment: Experiment, metric: str, values: np.ndarray) -> np.ndarray:
+    """Places of the cases that have the metric, worst first: the largest, or the smallest where the first requirement
+    of it sets a lower limit. Equal ones in the order of the table."""
+    limits = [r.comparison for r in experiment.requirements if r.metric == metric]
+    bad = -values if limits and limits[0].startswith(">") else values
+    order = np.argsort(-bad, kind="stable")
+    return np.asarray(order[~np.isnan(values[order])])

@@ -1,0 +1,115 @@
+"""The shards of a campaign into its archive: in order, a bounded number of cases at a time, each shard proved again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from batch import shard
+from batch.folder import Folder
+from batch.tasks import Section
+from met import run as engine
+from met.diagnostic import Problem, error
+from met.run import Run
+
+if TYPE_CHECKING:
+    from batch.archive.write import Writer
+
+BLOCK = 1 << 16
+"""Cases that are written at a time, however they were run: where HDF5 puts strings depends on it."""
+
+
+class Missing(Exception):
+    """A shard that was there does not count any more, and why. Its cases have to be run again."""
+
+
+def merge(writer: Writer, number: int, folder: Folder, values: Section, histories: Section | None) -> None:
+    """Write one experiment. values: all of its cases; histories: those that were run again for them. Raises Missing."""
+    kept = histories.rows if histories is not None else np.empty(0, np.int64)
+    places = np.searchsorted(values.rows, kept)
+    before: list[np.ndarray] = []
+    waiting: list[np.ndarray] = []
+    fates: dict[int, tuple[int, str]] = {}
+    first = held = 0
+
+    def put(cases: int) -> None:
+        nonlocal waiting, fates, first, held
+        outputs = np.concatenate(waiting)
+        mine = {case: fate for case, fate in fates.items() if case < cases}
+        here = places[(places >= first) & (places < first + cases)] - first
+        before.append(outputs[here])
+        writer.put_cases(number, first, _results(values, first, outputs[:cases], None, mine))
+        fates = {case - cases: fate for case, fate in fates.items() if case >= cases}
+        waiting, first, held = [outputs[cases:]], first + cases, held - cases
+
+    for at, found in pieces(folder, values):
+        if found.history is not None:
+            writer.put_signals(number, at, _results(values, at, found.outputs.copy(), found.history, dict(found.fates)))
+        fates |= {at - first + case: fate for case, fate in found.fates.items()}
+        waiting.append(found.outputs)
+        held += len(found.outputs)
+        while held >= BLOCK:
+            put(BLOCK)
+    if held:
+        put(held)
+    if histories is not None:
+        again = np.concatenate(before)
+        for at, found in pieces(folder, histories):
+            _check_bits(histories, at, found, again[at : at + len(found.outputs)])
+            writer.put_signals(number, at, _results(histories, at, found.outputs, found.history, dict(found.fates)))
+
+
+def results(folder: Folder, section: Section) -> Run:
+    """What became of all cases of a section, without histories: a few numbers a case."""
+    outputs = np.empty((len(section.rows), len(section.prepared.program.outputs)))
+    fates: dict[int, tuple[int, str]] = {}
+    for at, found in pieces(folder, section):
+        outputs[at : at + len(found.outputs)] = found.outputs
+        fates |= {at + case: fate for case, fate in found.fates.items()}
+    return _results(section, 0, outputs, None, fates)
+
+
+def pieces(folder: Folder, section: Section) -> Iterator[tuple[int, shard.Shard]]:
+    """The shards of a section in order, less what was had before, each with the place of its first case."""
+    at = 0
+    for task in folder.named(section.number):
+        if task.last <= at:
+            continue
+        if task.first > at:
+            break
+        try:
+            found = folder.read(section, task)
+        except (shard.Unsound, OSError) as reason:
+            raise Missing(f"shard {task.name} {reason}") from reason
+        yield at, _without(found, at - task.first)
+        at = task.last
+    if at < len(section.rows):
+        raise Missing(f"no shard holds case {at:,} of {section.name}")
+
+
+def _without(found: shard.Shard, first: int) -> shard.Shard:
+    """A shard less its first cases."""
+    if not first:
+        return found
+    history = None if found.history is None else found.history[first:]
+    fates = {case - first: fate for case, fate in found.fates.items() if case >= first}
+    return shard.Shard(found.key, found.outputs[first:], history, found.seconds, fates)
+
+
+def _results(
+    section: Section, first: int, outputs: np.ndarray, history: np.ndarray | None, fates: dict[int, tuple[int, str]]
+) -> Run:
+    rows = section.rows[first : first + len(outputs)]
+    return engine.results(section.prepared, rows, history, outputs, fates)
+
+
+def _check_bits(section: Section, at: int, found: shard.Shard, before: np.ndarray) -> None:
+    """A case that was run again for its history gave the numbers that it gave before."""
+    alike = (found.outputs.view(np.int64) == before.view(np.int64)).all(axis=1)
+    alike[list(found.fates)] = True
+    if not alike.all():
+        case = section.prepared.experiment.cases.table[section.rows[at + int(np.argmin(alike))]]
+        message = f"case #{case} of `{section.name}` gave other numbers when it was run again for its history"
+        raise Problem(error("E352", message, help="a defect of MET, or of this machine's memory: please report it"))

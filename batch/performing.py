@@ -1,0 +1,257 @@
+"""Performing a campaign: find what is done, run what is missing, merge all into the archive, give it its name.
+
+However it ends, nothing that took a second of work or more is lost: the shards stay in the folder beside the archive,
+and the next run of the same campaign goes on from there.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from batch import merge, resuming
+from batch.archive.sink import Busy as ArchiveBusy
+from batch.archive.sink import temporary_of
+from batch.campaign import Campaign, histories_section, values_sections
+from batch.drive import Driver, Progress, Stopped, TooManyFailures
+from batch.executors import Executor
+from batch.executors.threads import Threads
+from batch.folder import Busy, Folder, beside
+from batch.output import busy, cannot_write, publish
+from batch.status import Reporter
+from batch.tasks import Section
+from met.diagnostic import Diagnostic, Problem, error
+from met.frozen import frozen
+
+WORTH_SECONDS = 1.0
+"""Work that took less is not kept where a campaign ends early: it is done again as fast as it is found."""
+
+ATTEMPTS = 3
+"""How often shards that are found to be damaged when they are merged are run again."""
+
+
+@frozen
+class Performed:
+    """What came of a campaign.
+
+    seconds  by experiment: of computing, on all workers together
+    whole    whether all was there before, so that nothing was run
+    notes    what happened on the way: what was resumed, which shards did not count
+    """
+
+    seconds: Mapping[str, float]
+    whole: bool = False
+    notes: tuple[str, ...] = ()
+
+
+def perform(
+    campaign: Campaign,
+    *,
+    executor: Executor | None = None,
+    fresh: bool = False,
+    max_failures: int | None = None,
+    together: bool = False,
+    progress: Progress | None = None,
+    ready: Callable[[], None] | None = None,
+    say: Callable[[str], None] = lambda _: None,
+) -> Performed:
+    """Run a campaign into its archive. Raises Problem. An interrupt passes through, with words of what is kept and how
+    to go on; without any where nothing is.
+
+    executor      who runs the tasks; None: the threads of this process
+    fresh         whether to start over where something is there
+    max_failures  stop when more cases have failed
+    together      put together what others have done; it cannot go on where cases are missing
+    ready         called once the first kernel is there, so that something will be written
+    say           told, as it comes, what is found of an earlier run
+    """
+    values = values_sections(campaign)
+    key = resuming.campaign_key(campaign, values)
+    if not fresh and resuming.is_whole(campaign, key):
+        return Performed({}, whole=True)
+    if ready is not None:
+        for section in values:
+            section.prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
+        ready()
+    folder = Folder(beside(campaign.output))
+    try:
+        folder.lock()
+    except Busy:
+        raise Problem(busy(campaign.output)) from None
+    except OSError as reason:
+        raise Problem(cannot_write(campaign.output, reason)) from reason
+    work = _Work(campaign, folder, values, key, max_failures, progress, say)
+    try:
+        work.begin(fresh)
+        return work.run(executor or Threads(), together)
+    except KeyboardInterrupt as interrupt:
+        raise type(interrupt)(work.leave("interrupted")) from None
+    except TooManyFailures as reason:
+        work.leave("stopped")
+        raise Problem(_stopped("E355", str(reason), work)) from None
+    except Stopped as reason:
+        work.leave("stopped")
+        raise Problem(_stopped("E354", f"the campaign cannot go on: {reason}", work)) from None
+    except ArchiveBusy:
+        work.leave("stopped")
+        raise Problem(busy(campaign.output)) from None
+    except OSError as reason:
+        kept = work.leave("stopped")
+        raise Problem(cannot_write(campaign.output, reason, kept)) from reason
+    except BaseException:
+        work.leave("stopped")
+        raise
+    finally:
+        folder.close()
+
+
+class _Work:
+    """A campaign on its way, in its folder."""
+
+    def __init__(
+        self, campaign: Campaign, folder: Folder, values: list[Section], key: str, max_failures: int | None,
+        progress: Progress | None, say: Callable[[str], None],
+    ) -> None:  # fmt: skip
+        self.campaign, self.folder, self.key, self.say = campaign, folder, key, say
+        self.sections = {section.number: section for section in values}
+        self.values = values
+        self.notes: list[str] = []
+        self.began = time.time()
+        self.reporter = Reporter(folder, campaign.cases, progress)
+        self.max_failures = max_failures
+        self.driver: Driver | None = None
+        self.ours = False
+
+    def begin(self, fresh: bool) -> None:
+        """Make the folder, or take up the one that is there. Raises Problem E353 where it is of another campaign."""
+        for note in resuming.take_up(self.folder, self.campaign, self.values, self.key, fresh):
+            self._note(note)
+        self.ours = True
+        resuming.describe(self.folder, self.campaign, self.values, self.key)
+        self.folder.sweep()
+
+    def run(self, executor: Executor, together: bool) -> Performed:
+        driver = self.driver = Driver(self.folder, executor, self.reporter, self.max_failures)
+        executor.open(self.folder, self.sections, driver.tell)
+        try:
+            missing = [(section, driver.find(section)) for section in self.values]
+            self._tell_found()
+            left = sum(last - first for _, gaps in missing for first, last in gaps)
+            if together and left:
+                raise Stopped(f"{left:,} of {self.campaign.cases:,} cases are missing")
+            for section, gaps in missing:
+                driver.run(section, gaps)
+            histories = self._histories(driver)
+        finally:
+            executor.close()
+        self.reporter.state("merging")
+        for attempt in range(ATTEMPTS):
+            try:
+                self._merge(histories)
+                break
+            except merge.Missing as reason:
+                if attempt == ATTEMPTS - 1:
+                    raise Stopped(f"{reason}, again and again") from None
+                self._note(f"{reason}; its cases are run again")
+                again = Threads()
+                again.open(self.folder, self.sections, lambda: None)
+                driver.executor = again
+                for section in self.sections.values():
+                    driver.run(section, driver.find(section))
+                again.close()
+        seconds = {section.name: 0.0 for section in self.values}
+        for number, count in driver.counts.items():
+            seconds[self.sections[number].name] += count.seconds
+        self.folder.remove()
+        return Performed(seconds, notes=tuple(self.notes))
+
+    def leave(self, state: str) -> str:
+        """Give up, for now. What is worth keeping stays; in words how much and where, else "" and nothing stays."""
+        if not self.ours:
+            return ""
+        counts = self.driver.counts if self.driver is not None else {}
+        done = sum(count.done for number, count in counts.items() if number < len(self.values))
+        if sum(count.seconds for count in counts.values()) < WORTH_SECONDS:
+            self.folder.remove()
+            return ""
+        self.reporter.state(state)
+        return f"{done:,} of {self.campaign.cases:,} cases are kept in {self.folder.path}; the same command goes on"
+
+    def _histories(self, driver: Driver) -> dict[int, Section]:
+        """Run the second pass; its sections by experiment."""
+        found = {}
+        for section in self.values:
+            histories = histories_section(self.campaign, section, partial(merge.results, self.folder, section))
+            if histories is not None:
+                self.sections[histories.number] = found[section.number] = histories
+        if found:
+            resuming.describe(self.folder, self.campaign, self.sections.values(), self.key)
+            for section in found.values():
+                driver.run(section, driver.find(section))
+        return found
+
+    def _merge(self, histories: Mapping[int, Section]) -> None:
+        from batch.archive.provenance import machine
+        from batch.archive.write import Part, Writer
+
+        parts = []
+        for part, values in zip(self.campaign.parts, self.values, strict=True):
+            kept = part.kept
+            if values.number in histories:
+                kept = np.searchsorted(part.rows, histories[values.number].rows)
+            parts.append(Part(part.experiment, part.rows, kept, part.single, values.prepared.code_key))
+        temporary = temporary_of(self.campaign.output)
+        writer = Writer(temporary, self.campaign.plan, parts)
+        try:
+            for number, section in enumerate(self.values):
+                merge.merge(writer, number, self.folder, section, histories.get(number))
+            writer.finish()
+            sidecar = {
+                "archive": self.campaign.output.name,
+                "began": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self.began)),
+                "seconds": round(time.time() - self.began, 6),
+                "workers": self.driver.executor.about if self.driver else "",
+                "experiments": self._timings(),
+                "notes": self.notes,
+                **resuming.proof(self.campaign, self.key, temporary),
+                **machine(),
+            }
+            publish(self.campaign.output, temporary, sidecar)
+            writer.close()
+        except BaseException:
+            writer.abandon()
+            raise
+
+    def _timings(self) -> list[dict[str, Any]]:
+        counts = self.driver.counts if self.driver else {}
+        return [
+            {"experiment": section.name, "cases": len(section.rows),
+             "seconds": round(sum(counts[n].seconds for n, s in self.sections.items()
+                                  if s.experiment == section.experiment and n in counts), 6)}
+            for section in self.values
+        ]  # fmt: skip
+
+    def _tell_found(self) -> None:
+        driver = self.driver
+        assert driver is not None
+        for text in driver.told:
+            self._note(text)
+        done = sum(count.done for count in driver.counts.values())
+        if done:
+            self._note(f"goes on: {done:,} of {self.campaign.cases:,} cases are done")
+
+    def _note(self, text: str) -> None:
+        self.notes.append(text)
+        self.say(text)
+
+
+def _stopped(code: str, message: str, work: _Work) -> Diagnostic:
+    kept = work.folder.path.exists()
+    helps = f"what is done is kept in {work.folder.path}: the same command goes on" if kept else "nothing was kept"
+    return error(code, message, help=helps)
+
+

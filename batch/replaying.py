@@ -1,0 +1,99 @@
+"""Cases of an archive run again, from the archive alone: with full histories, and the same bits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from batch.archive.read import ArchiveFile, Group
+from batch.show import chosen, picked
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.plan import Experiment, Plan
+
+MOST_TOLD = 8
+"""Differences that are named."""
+
+
+@frozen
+class Replay:
+    """What of an archive is run again: its plan, and of each experiment the rows of the case table."""
+
+    archive: Path
+    plan: Plan
+    selected: tuple[tuple[Experiment, np.ndarray], ...]
+    word: str
+
+    @property
+    def output(self) -> Path:
+        """Where it goes unless the user says: `two_link.gains.case7.h5`, in the current folder."""
+        return Path(f"{self.archive.stem}.{self.word}.h5")
+
+
+def replay(archive: str | Path, names: Sequence[str], cases: Sequence[str], failed: bool) -> Replay:
+    """What is asked for. cases: as `met show` takes them; failed: all that did not reach their end. Raises Problem."""
+    with ArchiveFile(archive) as file:
+        rows: dict[str, set[int]] = {}
+        for case in cases:
+            for group, position in picked(file, names, case):
+                if position is not None:
+                    rows.setdefault(group.name, set()).add(_row(group, position))
+        if failed:
+            for group in chosen(file, names):
+                for position in np.flatnonzero(group.values("status") != 0).tolist():
+                    rows.setdefault(group.name, set()).add(_row(group, position))
+        if not cases and not failed:
+            helps = ("`--case '#7'` runs a case again, `--failed` all that failed", "`met show` lists the cases")
+            raise Problem(error("E357", f"which cases of {file.path} are to be run again?", help=helps))
+        if not rows:
+            raise Problem(error("E357", f"no case of {file.path} failed: there is nothing to run again"))
+        plan = file.plan()
+        picked_rows = []
+        for experiment in plan.experiments:
+            if experiment.name in rows:
+                table = experiment.cases.table
+                wanted = np.searchsorted(table, sorted(rows[experiment.name]))
+                picked_rows.append((experiment, np.asarray(wanted, dtype=np.int64)))
+    few = sorted({position for positions in rows.values() for position in positions})
+    word = "failed" if failed else "case" + "-".join(map(str, few)) if len(few) <= 4 else "cases"
+    return Replay(Path(archive), plan, tuple(picked_rows), word)
+
+
+def _row(group: Group, position: int) -> int:
+    """The position in the case table of a case of an archive."""
+    return int(group.at("case", [position])[0])
+
+
+def differences(before: str | Path, after: str | Path) -> list[str]:
+    """Where the cases of the second archive came out otherwise than in the first, a line each; none where all of their
+    bits are the same. How a case ended that was lost or timed out is no part of it."""
+    out = []
+    with ArchiveFile(before) as old_file, ArchiveFile(after) as new_file:
+        groups = {group.name: group for group in old_file.groups}
+        for new in new_file.groups:
+            old = groups[new.name]
+            places = np.searchsorted(old.values("case"), new.values("case"))
+            ran = old.at("status", places) < 2
+            names = ["case_id", "status", "n_valid", *(variable.name for variable in new.role("metric"))]
+            for name in names:
+                a, b = old.at(name, places), new.values(name)
+                for place in np.flatnonzero(~_alike(a, b) & ran).tolist():
+                    case = new.values("case")[place]
+                    out.append(f"#{case} of {new.name}: {name} was {_plain(a[place])}, is {_plain(b[place])}")
+            old_code, new_code = (group.attributes.get("code_key") for group in (old, new))
+            if out and old_code != new_code:
+                out.insert(0, f"{new.name}: MET's code for it has changed since the archive was made")
+    return out[:MOST_TOLD] + ([f"and {len(out) - MOST_TOLD} more"] if len(out) > MOST_TOLD else [])
+
+
+def _alike(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    if before.dtype.kind == "f":
+        same = before.view(np.int64) == np.ascontiguousarray(after, before.dtype).view(np.int64)
+        return np.asarray(same | (np.isnan(before) & np.isnan(after)))
+    return np.asarray(before == after)
+
+
+def _plain(value: object) -> str:
+    return repr(value.item()) if isinstance(value, np.generic) else repr(value)

@@ -1,0 +1,135 @@
+"""What is there already of a campaign: its archive, whole, or shards of it in its folder; or of another one."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from batch.campaign import Campaign, prepare
+from batch.changes import changes
+from batch.folder import Folder
+from batch.output import sidecar_path
+from batch.tasks import Section
+from met import plan_file
+from met.diagnostic import Problem, error
+
+MOST_CHANGES = 8
+"""Changes that a refusal names."""
+
+
+def campaign_key(campaign: Campaign, values: Sequence[Section]) -> str:
+    """Of all that decides the numbers of a campaign: code, what goes into it, and what is kept."""
+    told = [[section.name, section.key()] for section in values]
+    kept = [part.kept.tobytes().hex() if not part.all_recorded else "all" for part in campaign.parts]
+    later = [campaign.keep.failed, campaign.keep.worst]
+    return hashlib.sha256(json.dumps([told, kept, later]).encode()).hexdigest()
+
+
+def proof(campaign: Campaign, key: str, archive: Path) -> dict[str, str]:
+    """What is written beside a finished archive, so that `is_whole` knows it again."""
+    return {"campaign": key, "plan_sha256": _plan_sum(campaign), "archive_sha256": _file_sum(archive)}
+
+
+def is_whole(campaign: Campaign, key: str) -> bool:
+    """Whether the archive is there, of this very campaign and plan, and as it was written."""
+    output = campaign.output
+    try:
+        told = json.loads(sidecar_path(output).read_text(encoding="utf-8"))
+        if not isinstance(told, dict) or told.get("campaign") != key or told.get("plan_sha256") != _plan_sum(campaign):
+            return False
+        return bool(told.get("archive_sha256") == _file_sum(output))
+    except (OSError, ValueError):
+        return False
+
+
+def take_up(folder: Folder, campaign: Campaign, values: Sequence[Section], key: str, fresh: bool) -> Iterator[str]:
+    """See to what is in the folder, which is locked; what is to be told. Raises Problem E350, E353."""
+    if not folder.exists():
+        return
+    held = sum(task.cases for number in range(len(values)) for task in folder.named(number))
+    if fresh:
+        folder.empty()
+        yield f"starts over: {held:,} cases that were done before are removed"
+        return
+    if not held:  # whoever began it had done nothing
+        folder.empty()
+        return
+    told = folder.described()
+    if told["key"] != key:
+        raise Problem(_of_another(folder, campaign, values, told))
+
+
+def describe(folder: Folder, campaign: Campaign, sections: Iterable[Section], key: str) -> None:
+    """Write down in the folder what is computed there."""
+    folder.describe(
+        campaign.plan, sections, key=key, archive=campaign.output.name, histories=campaign.words,
+        float32=any(part.single for part in campaign.parts),
+    )  # fmt: skip
+
+
+def described(folder: Folder) -> Campaign:
+    """The campaign of a folder, as it was written down. Raises Problem."""
+    told = folder.described()
+    plan = folder.plan()
+    first = sorted((section for section in folder.sections().values()), key=lambda section: section.number)
+    selected = [(each.prepared.experiment, each.rows) for each in first[: len(plan.experiments)]]
+    return prepare(
+        plan, output=folder.path.with_name(told["archive"]), selected=selected, histories=told["histories"],
+        float32=told["float32"],
+    )  # fmt: skip
+
+
+def _of_another(folder: Folder, campaign: Campaign, values: Sequence[Section], told: dict[str, Any]) -> Any:
+    done = sum(task.cases for number in range(len(told["sections"])) for task in folder.named(number))
+    try:
+        found = changes(folder.plan(), campaign.plan)
+    except Problem:
+        found = ["its plan cannot be read any more"]
+    if not found:
+        found = _other_work(campaign, values, told)
+    most = found[:MOST_CHANGES] + ([f"and {len(found) - MOST_CHANGES} more"] if len(found) > MOST_CHANGES else [])
+    helps = [
+        "changed since: " + most[0], *(f"               {each}" for each in most[1:]),
+        "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it",
+    ]  # fmt: skip
+    message = f"{folder.path} holds {done:,} cases of another campaign, and is left as it is"
+    return error("E353", message, help=helps)
+
+
+def _other_work(campaign: Campaign, values: Sequence[Section], told: dict[str, Any]) -> list[str]:
+    """What else may differ where the plan is the same."""
+    before = told["sections"][: len(values)]
+    if [len(section.rows) for section in values] != [each.get("cases") for each in before]:
+        return ["other cases were asked for"]
+    if [section.prepared.code_key for section in values] != [each.get("code") for each in before]:
+        return [f"MET's own models or code (it was begun by version {told.get('met')})"]
+    if [(section.recorded, section.single) for section in values] != [
+        (each.get("recorded"), each.get("single")) for each in before
+    ]:
+        return ["what is kept of histories (`--histories`, `--float32`)"]
+    return ["which cases were asked for, or whose histories are kept (`--case`, `--histories`)"]
+
+
+def _plan_sum(campaign: Campaign) -> str:
+    summed = hashlib.sha256()
+
+    def refer(experiment: Any, index: int) -> dict[str, Any]:
+        if not index:
+            summed.update(plan_file.table(experiment).tobytes())
+        return {"index": index}
+
+    text = plan_file.dumps(campaign.plan, refer)
+    summed.update(text.encode())
+    for part in campaign.parts:
+        summed.update(part.rows.tobytes())
+    return summed.hexdigest()
+
+
+def _file_sum(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+

@@ -1,0 +1,128 @@
+"""One shard: what a worker computed of some cases, in a file that proves itself.
+
+    line       MET shard 1
+    8 bytes    length of the head, little-endian
+    head       JSON: key, seconds, fates, arrays with their types and shapes
+    arrays     outputs [case, output], history [case, row, column]; little-endian, one after the other
+    32 bytes   SHA-256 of all before
+
+It has its name only when it is whole and on the disk. Names are no proof, though: `read` checks the sum, and who reads
+compares the key, which is of all that decided the numbers. A shard from another plan, cut short, or with a bit turned
+over, does not count.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import socket
+from collections.abc import Mapping
+from dataclasses import field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from met.frozen import frozen
+
+MAGIC = b"MET shard 1\n"
+SUM = hashlib.sha256
+SUM_BYTES = SUM().digest_size
+TYPES: dict[str, np.dtype[Any]] = {"f8": np.dtype("<f8"), "f4": np.dtype("<f4")}
+
+
+class Unsound(Exception):
+    """A file that does not count as a shard, and why, in words that go on after its name."""
+
+
+@frozen
+class Shard:
+    """What a task gave.
+
+    key       of all that decided it (`tasks.Section.key`)
+    outputs   [case, output]
+    history   [case, row, column], float64 or float32; None where none is kept
+    seconds   of computing
+    fates     of cases that were not run, by their place here: status and why
+    """
+
+    key: str
+    outputs: np.ndarray
+    history: np.ndarray | None
+    seconds: float
+    fates: Mapping[int, tuple[int, str]] = field(default_factory=dict)
+
+    @property
+    def failed(self) -> int:
+        """How many cases did not reach their end."""
+        return int(np.count_nonzero(self.outputs[:, 0])) + len(self.fates)
+
+
+def write(path: Path, shard: Shard) -> None:
+    """Write a shard whole, or nothing. Raises OSError."""
+    arrays = {"outputs": shard.outputs, **({} if shard.history is None else {"history": shard.history})}
+    head = {
+        "key": shard.key,
+        "seconds": shard.seconds,
+        "fates": [[case, *fate] for case, fate in shard.fates.items()],
+        "arrays": [[name, _type(array), list(array.shape)] for name, array in arrays.items()],
+    }
+    text = json.dumps(head).encode()
+    parts: list[Any] = [MAGIC, len(text).to_bytes(8, "little"), text]
+    parts += [np.ascontiguousarray(a, TYPES[_type(a)]).data.cast("B") for a in arrays.values() if a.size]
+    temporary = path.with_name(f".{path.name}.{socket.gethostname()}.{os.getpid()}.tmp")
+    summed = SUM()
+    try:
+        with temporary.open("wb", buffering=0) as file:
+            for part in parts:
+                summed.update(part)
+                _put(file.fileno(), part)
+            _put(file.fileno(), summed.digest())
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def read(path: Path) -> Shard:
+    """The shard in a file; its arrays may be written to. Raises Unsound, OSError."""
+    data = bytearray(path.stat().st_size)
+    with path.open("rb", buffering=0) as file:
+        got = 0
+        while got < len(data) and (more := file.readinto(memoryview(data)[got:])):
+            got += more
+    if got < len(data) or len(data) < len(MAGIC) + 8 + SUM_BYTES:
+        raise Unsound("is cut short")
+    if not data.startswith(MAGIC):
+        raise Unsound("is no shard of this version of MET")
+    body = memoryview(data)[:-SUM_BYTES]
+    if SUM(body).digest() != data[-SUM_BYTES:]:
+        raise Unsound("is not what was written: its checksum differs")
+    at = len(MAGIC) + 8
+    end = at + int.from_bytes(data[len(MAGIC) : at], "little")
+    head = json.loads(bytes(body[at:end]))
+    arrays = {}
+    for name, kind, shape in head["arrays"]:
+        size = int(np.prod(shape, dtype=np.int64))
+        arrays[name] = np.frombuffer(data, TYPES[kind], size, end).reshape(shape)
+        end += size * TYPES[kind].itemsize
+    fates = {case: (status, why) for case, status, why in head["fates"]}
+    return Shard(head["key"], arrays["outputs"], arrays.get("history"), head["seconds"], fates)
+
+
+def cannot_keep(reason: OSError) -> str:
+    """In words, why a shard cannot be written."""
+    where = f" in {Path(os.fsdecode(reason.filename)).parent}" if reason.filename else ""
+    return f"cannot keep what was computed{where}: {(reason.strerror or str(reason)).lower()}"
+
+
+def _type(array: np.ndarray) -> str:
+    return "f4" if array.dtype == np.float32 else "f8"
+
+
+def _put(file: int, data: bytes | memoryview) -> None:
+    left = memoryview(data)
+    while len(left):
+        left = left[os.write(file, left) :]

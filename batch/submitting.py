@@ -1,0 +1,128 @@
+"""`met submit --slurm`: a campaign as a job array, a share of its cases each, and a job that puts it together."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from batch import resuming
+from batch.campaign import Campaign, values_sections
+from batch.folder import Busy, Folder, beside, gaps, put
+from batch.output import busy, cannot_write
+from batch.tasks import GRANULE, Task
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+
+STRIPES = 8
+"""Stretches of a job's share, spread over all cases: neighbours in a sweep often take alike, and all jobs as long."""
+
+JOBS = 16
+"""Jobs, unless so many are asked for."""
+
+
+@frozen
+class Submitted:
+    """array, end: numbers of the job array and of the job that merges; jobs: of the array; cases: that are missing."""
+
+    array: str
+    end: str
+    jobs: int
+    cases: int
+
+
+def submit(
+    campaign: Campaign,
+    *,
+    jobs: int | None = None,
+    options: Sequence[str] = (),
+    timeout: float | None = None,
+    fresh: bool = False,
+    say: Callable[[str], None] = lambda _: None,
+) -> Submitted | None:
+    """Hand what is missing of a campaign to SLURM; None where its archive is whole. Raises Problem.
+
+    jobs     of the array; None: `JOBS`, or fewer where there is less to share
+    options  further words for sbatch, of both jobs: `--partition=long`
+    """
+    program = shutil.which("sbatch")
+    if program is None:
+        helps = ("submit where SLURM's commands are, on a login node", "`met run` runs it on this machine")
+        raise Problem(error("E358", "there is no `sbatch` here", help=helps))
+    values = values_sections(campaign)
+    key = resuming.campaign_key(campaign, values)
+    if not fresh and resuming.is_whole(campaign, key):
+        return None
+    folder = Folder(beside(campaign.output))
+    try:
+        folder.lock()
+        for note in resuming.take_up(folder, campaign, values, key, fresh):
+            say(note)
+        resuming.describe(folder, campaign, values, key)
+        folder.sweep()
+        missing = []
+        for section in values:
+            kept, told = folder.sound(section)
+            for note in told:
+                say(note)
+            missing += [Task(section.number, *gap) for gap in gaps(kept, len(section.rows))]
+        cases = sum(task.cases for task in missing)
+        if cases < campaign.cases:
+            say(f"goes on: {campaign.cases - cases:,} of {campaign.cases:,} cases are done")
+        count = min(jobs or JOBS, max(1, -(-cases // GRANULE)))
+        tasks = folder.path / "jobs.json"
+        dealt = [[[t.section, t.first, t.last] for t in each] for each in shares(missing, count)]
+        put(tasks, {"shares": dealt, "timeout": timeout})
+    except Busy:
+        raise Problem(busy(campaign.output)) from None
+    except OSError as reason:
+        raise Problem(cannot_write(campaign.output, reason)) from reason
+    finally:
+        folder.close()
+    logs = folder.path / "logs"
+    logs.mkdir(exist_ok=True)
+    name = campaign.output.stem
+    common = [program, "--parsable", f"--job-name=met-{name}", *options]
+    array = ""
+    if cases:
+        script = _script(folder.path, "share", '"$SLURM_ARRAY_TASK_ID"', shlex.quote(str(tasks.resolve())))
+        array = _sbatch([*common, f"--array=0-{count - 1}", f"--output={logs.resolve()}/%A_%a.log"], script)
+    script = _script(folder.path, "together")
+    after = [f"--dependency=afterany:{array}"] if array else []
+    end = _sbatch([*common, *after, f"--output={logs.resolve()}/%A.log"], script)
+    return Submitted(array, end, count if cases else 0, cases)
+
+
+def shares(missing: Sequence[Task], count: int) -> list[list[Task]]:
+    """What is missing, cut into stretches and dealt out, so that each job has about as many cases, from everywhere."""
+    whole = sum(task.cases for task in missing)
+    each = max(GRANULE, -(-whole // (count * STRIPES * GRANULE)) * GRANULE)
+    pieces = [Task(task.section, first, min(first + each, task.last)) for task in missing
+              for first in range(task.first, task.last, each)]  # fmt: skip
+    return [pieces[number::count] for number in range(count)]
+
+
+def _script(folder: Path, *words: str) -> str:
+    package = Path(__file__).resolve().parents[1]
+    path = os.pathsep.join([str(package), *filter(None, [os.environ.get("PYTHONPATH")])])
+    return "\n".join([
+        "#!/bin/sh", f"export PYTHONPATH={shlex.quote(path)}",
+        f"exec {shlex.quote(sys.executable)} -m batch.job {shlex.quote(str(folder.resolve()))} {' '.join(words)}", "",
+    ])  # fmt: skip
+
+
+def _sbatch(command: Sequence[str], script: str) -> str:
+    """Number of the job. Raises Problem E358 with SLURM's own words."""
+    done = subprocess.run(command, input=script, capture_output=True, text=True)
+    number = re.match(r"\d+", done.stdout.strip())
+    if done.returncode != 0 or number is None:
+        said = (done.stderr or done.stdout).strip().splitlines()
+        words = said[-1] if said else "it said nothing"
+        helps = "what is given by `--sbatch` goes to sbatch as it is"
+        raise Problem(error("E358", f"sbatch refuses the job: {words}", help=helps))
+    return number.group()

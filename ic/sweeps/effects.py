@@ -1,0 +1,241 @@
+"""Whether what is set from outside of a deck does something in one of the runs and sweeps that are asked for.
+
+Each run is resolved once more with what was set in question: a number as an input of the program, of which `met.audit`
+then says whether anything is computed from it, and what is no number as a name that nothing has, which is told of where
+anyone looks at it. This is done for one structure after the other, until all is found to do something.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ic.grammar.settings import path_of
+from ic.grammar.syntax import Call, Entry, Expression, Group, Name, Setting, Statement, Word, children
+from ic.meaning.checks import Varied
+from ic.meaning.complaints import Complaints, known_words
+from ic.meaning.experiment import experiment
+from ic.meaning.resolve import Definition, Definitions
+from ic.meaning.run import BLOCKS, Resolved, resolve_run
+from ic.meaning.scope import Scope
+from ic.meaning.values import Value
+from ic.sweeps.choices import OF_RUN, OF_SERVO
+from ic.sweeps.reach import beginnings, continued, ends, without_effect
+from ic.sweeps.settings import SEED as SEED_PATH
+from ic.sweeps.settings import Goes, Settings, concerns, goes
+from met.diagnostic import Label, Problem, did_you_mean
+from met.plan import SEED, Cases, Coordinate, Experiment
+from met.trace import Graph, Scalar
+
+NONSENSE = "?"  # a name that nothing in a deck can have
+MOST_NAMED = 4
+
+
+class Effects:
+    """What is set, and whether it was found to do something; the runs in which it was looked for."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.waiting = {path_of(entry): entry for entry in settings.entries}
+        self.met: set[str] = set()  # paths of a run's structure that some run has
+        self.scopes: list[Scope] = []  # of the runs that were resolved, as far as they could be
+        self.complete = True  # all of them could
+
+    def resolved(self, scope: Scope, run: Definition) -> None:
+        """Notes what a run has."""
+        self.scopes.append(scope)
+        for path, entry in self.waiting.items():
+            if goes(scope.definitions, entry) == "run" and concerns(scope.definitions, run, entry):
+                self.met.add(path)
+
+    def look(self, scope: Scope, run: Definition, made: Experiment, sweep: Sequence[Entry] = ()) -> None:
+        """Looks for effects in a run that was resolved without a mistake. sweep: the block of the sweep of it."""
+        if not self.waiting or scope.complaints.errors:
+            return
+        named = _named(scope.definitions, sweep)
+        numbers: dict[str, Setting] = {}
+        for path, entry in tuple(self.waiting.items()):
+            kind = goes(scope.definitions, entry)
+            if path == SEED_PATH:
+                used = _has_noise(scope, made)
+            elif kind == "number" and path not in scope.sets:
+                used = False
+            elif kind != "run" and not _decides(kind, entry) and _is_number(scope, entry):
+                numbers[path], used = entry, False
+            else:
+                used = kind == "number" or _is_looked_at(scope, run, entry)
+            if used or path in named:
+                del self.waiting[path]
+                numbers.pop(path, None)
+        for path in _used(scope, run, numbers):
+            del self.waiting[path]
+
+    def tell(self, complaints: Complaints, asked: Sequence[str]) -> None:
+        """Tells of all that is set to no effect. asked: names of runs and sweeps."""
+        shown = [f"`{name}`" for name in asked]
+        where = ", ".join(shown[:MOST_NAMED]) + (f" and {len(shown) - MOST_NAMED} more" * (len(shown) > MOST_NAMED))
+        for path, entry in self.waiting.items():
+            if self.scopes:
+                self._tell(complaints, path, entry, where)
+
+    def _tell(self, complaints: Complaints, path: str, entry: Setting, where: str) -> None:
+        scope = next((each for each in self.scopes if path in each.known or path in each.whole), self.scopes[0])
+        kind = goes(scope.definitions, entry)
+        inside = sorted(known for known in scope.known if known.startswith(f"{path}."))
+        if any((path in each.given and each.given[path] is None) or each.hangs(path) for each in self.scopes):
+            return  # which was told
+        if kind in ("let", "servo") or path in self.met or any(path in each.sets for each in self.scopes):
+            self._tell_idle(complaints, scope, path, entry, where)
+        elif path in (*BLOCKS, "record"):
+            complaints.error("D235", f"`{path}` cannot be set", entry.place,
+                             help="one value is set, not a block or a list: such as `rates.dynamics=1 kHz`")
+        elif path in scope.whole:
+            complaints.error("D235", f"`{path}` cannot be set", entry.place, help=_why_not(scope.whole[path]))
+        elif inside:
+            complaints.error("D235", f"`{path}` cannot be set", entry.place, help=known_words("set one of", inside))
+        elif self.complete:
+            self._tell_unknown(complaints, scope, path, entry, where)
+
+    def _tell_idle(self, complaints: Complaints, scope: Scope, path: str, entry: Setting, where: str) -> None:
+        if complaints.errors:  # of which each may be why
+            return
+        first = entry.path[0].text
+        lets, servos = scope.definitions.lets, scope.definitions.of_kind("servo")
+        place = lets[first].name.place if path in lets else servos[first].place if first in servos else None
+        told = "no noise is in it" if path == SEED_PATH else "nothing that is computed depends on it"
+        complaints.error("D236", f"`{path}` changes nothing in {where}", entry.place,
+                         also=[Label(place, "defined here")] if place is not None else [],
+                         help=f"{told}: leave it out, or name a run that uses it")
+
+    def _tell_unknown(self, complaints: Complaints, scope: Scope, path: str, entry: Setting, where: str) -> None:
+        first, _, rest = path.partition(".")
+        joints = list(dict.fromkeys(known.split(".")[1] for each in self.scopes for known in each.known
+                                    if known.startswith("initial.")))
+        servo = scope.definitions.of_kind("servo").get(first)
+        also: list[Label] = []
+        if rest in ("bed", "law") and first in joints:
+            helps: Sequence[str] = (f"its motor is on no bed there: `substitute {first} {{ }}` puts it on one",)
+        elif servo is not None and not any(path.startswith(f"{first}.") for each in self.scopes for path in each.known):
+            helps, also = ("no joint has this servo there",), [Label(servo.place, "defined here")]
+        else:
+            known = [each for one in self.scopes for each in (*one.known, *one.whole)]
+            known += [*scope.definitions.lets, *OF_RUN, *(f"{joint}.servo" for joint in joints)]
+            helps = did_you_mean(path, known) or continued(scope, path) or ends(scope, path)
+            macro = [] if rest else [f"a macro is defined by `-D {path}=VALUE`"]
+            helps = helps or [*macro, *beginnings(scope)]
+        complaints.error("D234", f"nothing in {where} is called `{path}`", entry.place, also=also, help=helps)
+
+
+def _why_not(text: str) -> str:
+    """Why a path cannot be set, from what a scope says of why it cannot vary."""
+    if text.startswith(("is made of", "follows")):
+        return f"it {text.replace('vary', 'set')}"
+    return f"it {text.partition(':')[0].partition(',')[0]}: write it in the deck, with a `let` that can be set"
+
+
+# Numbers
+
+
+def _decides(kind: Goes, entry: Setting) -> bool:
+    """Whether it is a number that decides the program: the rate of a servo's definition."""
+    return kind == "servo" and entry.path[-1].text in OF_SERVO
+
+
+def _is_number(scope: Scope, entry: Setting) -> bool:
+    """Whether it is a number, the same in all cases."""
+    try:
+        found = scope.names.evaluate(entry.value)
+    except Problem:
+        return False
+    return isinstance(found, Value) and not isinstance(found.number, Scalar)
+
+
+def _used(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> list[str]:
+    """Those of these numbers, by path, from which something is computed in this run."""
+    there = {path: entry for path, entry in settings.items()
+             if path in scope.sets or goes(scope.definitions, entry) != "number"}
+    if not there:
+        return []
+    found = _idle(scope, run, there)
+    if found is not None:
+        return [path for path in there if path not in found]
+    used = []
+    for path, entry in there.items():  # what cannot be an input decides the program, which the others need not
+        one = _idle(scope, run, {path: entry})
+        if one is None or path not in one:
+            used.append(path)
+    return used
+
+
+def _idle(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> tuple[str, ...] | None:
+    """Those that nothing depends on where they are inputs; None where something takes none."""
+    graph = Graph()
+    varied = {path: replace(each, value=replace(each.value, number=graph.input(path)))
+              for path, each in scope.varied.items()}
+    for path, entry in settings.items():
+        found = scope.names.evaluate(entry.value)
+        assert isinstance(found, Value)
+        number = np.array([float(found.number)])
+        varied[path] = Varied(path, entry.place, number, replace(found, number=graph.input(path)), None, 1.0)
+    others = {path: entry for path, entry in scope.settings.items() if path not in settings}
+    trial = Scope(scope.definitions, Complaints(), varied, graph, settings=others)
+    resolved = _resolved(trial, run)
+    if resolved is None:
+        return None
+    cases = Cases(1, tuple(Coordinate(path, "1", 1.0, each.values[:1], ()) for path, each in varied.items()))
+    return without_effect(experiment(trial, run.name, run.place, resolved, cases))
+
+
+def _resolved(trial: Scope, run: Definition) -> Resolved | None:
+    """The run, where nothing is told of it."""
+    with trial.complaints.gather():
+        found = resolve_run(trial, run)
+        return found if not trial.complaints.errors else None
+    return None
+
+
+# What is no number
+
+
+def _is_looked_at(scope: Scope, run: Definition, entry: Setting) -> bool:
+    """Whether nonsense in its place would be told of."""
+    place = entry.place
+    nonsense = Settings((replace(entry, value=Name((Word(NONSENSE, place),), place)),))
+    definitions, changed = nonsense.in_run(nonsense.in_definitions(scope.definitions), run)
+    trial = Scope(definitions, Complaints(), dict(scope.varied), scope.graph, settings=scope.settings)
+    return _resolved(trial, changed) is None
+
+
+def _has_noise(scope: Scope, made: Experiment) -> bool:
+    """Whether a seed changes something: noise, or what is drawn."""
+    if any(varied.drawn for varied in scope.varied.values()):
+        return True
+    return SEED not in without_effect(replace(made, cases=replace(made.cases, seeds="independent")))
+
+
+# What a sweep's block names
+
+
+def _named(definitions: Definitions, entries: Sequence[Entry]) -> set[str]:
+    """Paths that a sweep's block names in its lists and conditions, and what the values of those name."""
+    waiting = list(_expressions(entries))
+    found: set[str] = set()
+    while waiting:
+        expression = waiting.pop()
+        waiting += children(expression)
+        if isinstance(expression, Call) and expression.body is not None:
+            waiting += _expressions(expression.body)
+        if isinstance(expression, Name) and expression.text not in found:
+            found.add(expression.text)
+            if expression.text in definitions.lets:
+                waiting.append(definitions.lets[expression.text].value)
+    return found
+
+
+def _expressions(entries: Sequence[Entry]) -> Iterable[Expression]:
+    for entry in entries:
+        if isinstance(entry, Group):
+            yield from _expressions(entry.body)
+        elif isinstance(entry, Setting | Statement):
+            yield entry.value

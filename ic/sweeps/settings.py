@@ -1,0 +1,146 @@
+"""What is set from outside of a deck, `--set PATH=VALUE`: the deck's definitions as if they said so.
+
+A path is one that `vary` takes, or the seed. Where its value goes is where the deck would say it:
+
+    let      a `let`: its value
+    servo    a key of a servo's definition: upon what that writes
+    run      what decides the structure of a run: upon every run that is asked for, where it has what the path names
+    number   any other number: in the stead of what the run settles (`ic.meaning.given`), as a sweep's coordinate is
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+from typing import Literal
+
+from ic.grammar.settings import path_of
+from ic.grammar.syntax import Entry, Group, List, Name, Setting, Word
+from ic.meaning.complaints import Complaints
+from ic.meaning.models import word_of
+from ic.meaning.names import Names
+from ic.meaning.remedies import mended
+from ic.meaning.resolve import Definition, Definitions
+from ic.meaning.scope import VARIES
+from ic.meaning.unit_words import in_deck
+from ic.meaning.values import PURE, Value, place_of
+from ic.sweeps.axes import Sweep
+from ic.sweeps.choices import OF_RUN, decides, keys_of
+from met import units
+from met.diagnostic import Label, Problem, error
+from met.frozen import frozen
+from met.trace import Scalar
+
+SEED = "seed"
+Goes = Literal["let", "servo", "run", "number"]
+
+
+@frozen
+class Settings:
+    """Entries `PATH=VALUE`, each path once."""
+
+    entries: tuple[Setting, ...] = ()
+
+    def that_go(self, definitions: Definitions, where: Goes) -> tuple[Setting, ...]:
+        return tuple(entry for entry in self.entries if goes(definitions, entry) == where)
+
+    def in_definitions(self, definitions: Definitions) -> Definitions:
+        """The deck's definitions with what is set of lets and of servos."""
+        lets = [replace(definitions.lets[path_of(entry)], value=entry.value)
+                for entry in self.that_go(definitions, "let")]
+        servos: dict[str, Definition] = {}
+        for entry in self.that_go(definitions, "servo"):
+            name, key = (word.text for word in entry.path)
+            servo = servos.get(name) or definitions.of_kind("servo")[name]
+            servos[name] = replace(servo, upon=(*servo.upon, _inside((key,), entry)))
+        return definitions.instead(*servos.values(), lets=lets)
+
+    def in_run(self, definitions: Definitions, run: Definition) -> tuple[Definitions, Definition]:
+        """The definitions and the run with what is set of its structure; a whole before a part of it."""
+        for entry in sorted(self.that_go(definitions, "run"), key=lambda entry: len(entry.path)):
+            if concerns(definitions, run, entry):
+                first, *rest = (word.text for word in entry.path)
+                run = replace(run, upon=(*run.upon, _inside(keys_of(first, rest), entry)))
+                definitions = definitions.instead(run)
+        return definitions, run
+
+    def numbers(self, definitions: Definitions) -> dict[str, Setting]:
+        """By path, what is settled in the stead of what the run settles."""
+        return {path_of(entry): entry for entry in self.that_go(definitions, "number")}
+
+    def check_lets(self, definitions: Definitions, complaints: Complaints) -> None:
+        """Tells of lets that would get another dimension. definitions: the deck's own."""
+        names, changed = Names(definitions, {}), Names(self.in_definitions(definitions), {})
+        for entry in self.that_go(definitions, "let"):
+            let = definitions.lets[path_of(entry)]
+            with suppress(Problem):  # of the deck's value, which is overridden, or of this one, which is told elsewhere
+                old, new = names.find(Name((let.name,), let.name.place)), changed.evaluate(entry.value)
+                if isinstance(old, Value) and isinstance(new, Value) and not units.same(old.dimension, new.dimension):
+                    complaints.add(*_of_another_dimension(path_of(entry), old, new, let.name.place).diagnostics)
+
+    def check_sweep(self, sweep: Sweep, complaints: Complaints, definitions: Definitions) -> None:
+        """Tells of what the sweep varies itself, so that it would be set in vain."""
+        for entry in self.entries:
+            path = path_of(entry)
+            found = [column for axis in sweep.axes for column in axis.columns if column.path == path]
+            if goes(definitions, entry) == "run":  # else it is a number of what the sweep chooses
+                found += [column for column in sweep.chosen if path.startswith(f"{column.path}.")]
+            for column in found[:1]:
+                complaints.error("D233", f"this sets `{path}`, which the sweep varies", entry.place, help=VARIES,
+                                 also=[Label(column.place, f"`{column.path}` varies here")])
+            if path == SEED and sweep.seed is not None:
+                complaints.error("D233", f"this sets the seed of runs, and sweep `{sweep.name}` has its own",
+                                 entry.place, also=[Label(sweep.place, "this sweep")],
+                                 help="leave one of the two out")
+
+
+def goes(definitions: Definitions, entry: Setting) -> Goes:
+    """Where a deck would say what the entry says."""
+    path = path_of(entry)
+    if path in definitions.lets:
+        return "let"
+    if entry.path[0].text in definitions.of_kind("servo"):
+        return "servo" if len(entry.path) == 2 else "number"
+    if len(entry.path) == 1:
+        return "run" if path in (*OF_RUN, SEED) else "number"
+    values = List((entry.value,), place_of(entry.value))
+    return "run" if decides(definitions, path, values, Names(definitions, {})) else "number"
+
+
+def concerns(definitions: Definitions, run: Definition, entry: Setting) -> bool:
+    """Whether the run has what the path of its structure names; true where that cannot be said."""
+    path, first = path_of(entry), entry.path[0].text
+    block = definitions.block(run)
+    if block is None or path in OF_RUN or path == SEED or first == "rates":
+        return True
+    inside = entry.path[1].text
+    if first == "environment":
+        there = block.get("environment")
+        return len(entry.path) == 2 or (there is not None and there.body is not None and inside in there.body.items)
+    if inside in ("bed", "law"):
+        return block.get(f"substitute {first}") is not None
+    named = block.get("arm")
+    arm = definitions.of_kind("arm").get(word_of(named.value) or "") if named is not None else None
+    joints = definitions.block(arm) if arm is not None else None
+    return joints is None or joints.get(f"joint {first}") is not None
+
+
+def _inside(keys: tuple[str, ...], entry: Setting) -> Entry:
+    """The entry as a block writes it: `servos { elbow { rate = ...; } }`."""
+    made: Entry = Setting((), (Word(keys[-1], entry.place),), "=", entry.value, entry.place)
+    for key in reversed(keys[:-1]):
+        made = Group((Word(key, entry.place),), None, None, (made,), entry.place)
+    return made
+
+
+def _of_another_dimension(path: str, old: Value, new: Value, defined) -> Problem:  # type: ignore[no-untyped-def]
+    wanted, also = units.text(old.dimension), [Label(defined, "defined here")]
+    if new.bare:
+        number = "..." if isinstance(new.number, Scalar) else f"{new.number:g}"
+        unit = old.unit.text if old.unit is not None else in_deck(wanted)
+        return Problem(error("D060", f"`{path}` is in {wanted}, and this is a bare number", new.place, also=also,
+                             help=f"write `{number} {unit}`"))
+    is_in = "a pure number" if old.dimension == PURE else f"in {wanted}"
+    found = "a pure number" if new.dimension == PURE else f"in {units.text(new.dimension)}"
+    return Problem(error("D061", f"`{path}` is {is_in}, and this is {found}", new.place, also=also,
+                         help=mended(new, wanted, old.dimension)))

@@ -1,0 +1,164 @@
+"""Campaigns on Dask: the same bytes, whatever becomes of its workers; what is missing there is told in words."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from distributed import Client, LocalCluster, Scheduler, Worker
+
+import batch
+from batch.campaign import prepare, values_sections
+from batch.child import Crew
+from batch.executors import Outcome, dask_connection, dask_worker
+from batch.executors import dask as executor
+from batch.executors.choose import choose
+from batch.executors.dask import Dask
+from batch.folder import Folder, beside
+from batch.tasks import Section, Task
+from met import plan_file
+from met.diagnostic import Problem
+from met.version import VERSION
+from tests.batch import plans, whole
+
+CASES = 10_000
+HOST = os.uname().nodename
+
+
+@contextlib.contextmanager
+def cluster(folder: Path, workers: int = 1, threads: int = 1) -> Iterator[LocalCluster]:
+    """A scheduler that can be reached from anywhere on this machine, and workers, all in this process."""
+    with LocalCluster(
+        n_workers=workers, threads_per_worker=threads, processes=False, protocol="tcp://", dashboard_address=None,
+        memory_limit=0, local_directory=str(folder / "scratch"), silence_logs=logging.CRITICAL,
+    ) as started:  # fmt: skip
+        yield started
+
+
+@pytest.fixture
+def few(tmp_path: Path) -> tuple[Folder, dict[int, Section]]:
+    """The folder of a small campaign, described as for workers."""
+    campaign = prepare(plans.plan(plans.gains(9)), output=tmp_path / "few.h5")
+    sections = {section.number: section for section in values_sections(campaign)}
+    folder = Folder(beside(campaign.output))
+    folder.path.mkdir()
+    folder.describe(campaign.plan, sections.values(), "key", "few.h5")
+    return folder, sections
+
+
+def outcome(dask: Dask, few: tuple[Folder, dict[int, Section]], meanwhile: Callable[[], object] = int) -> Outcome:
+    """What comes of the first task. meanwhile: called before it is submitted."""
+    dask.open(*few, lambda: None)
+    try:
+        meanwhile()
+        dask.submit(Task(0, 0, 9))
+        (found,) = dask.wait()
+        assert not dask.wait()
+        return found
+    finally:
+        dask.close()
+
+
+def refused(caught: pytest.ExceptionInfo[Problem]) -> str:
+    """A message whole, as the user reads it."""
+    from met.render import render
+
+    return render(caught.value.diagnostics)
+
+
+class TestWhatItIsCalled:
+    def test_processes_and_dask_are_two_ways(self) -> None:
+        with pytest.raises(Problem) as caught:
+            choose(dask="local", processes=2)
+        assert refused(caught) == (
+            "error[E356]: `--processes` and `--dask` are two ways to run a campaign\n"
+            " = help: Dask's workers are its own; `--dask local` starts as many as there are cores\n"
+            "\n1 error\n"
+        )  # fmt: skip
+
+    def test_a_number_calls_no_cluster(self) -> None:
+        with pytest.raises(TypeError) as caught:
+            choose(dask=8786)
+        assert str(caught.value) == 'dask is the address of a scheduler, "local" or a Client, and not int'
+
+    @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "http://example.org", "", "tcp://"])
+    def test_where_no_scheduler_answers(self, few: Any, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(dask_connection, "CONNECT_SECONDS", 0.3)
+        with pytest.raises(Problem) as caught:
+            Dask(address).open(*few, lambda: None)
+        assert refused(caught) == (
+            f"error[E356]: no Dask scheduler answers at `{address}`\n"
+            " = help: `dask scheduler` starts one, and says its address\n"
+            "\n1 error\n"
+        )  # fmt: skip
+
+    def test_a_scheduler_file_that_is_not_there(self, few: Any, here: Path) -> None:
+        with pytest.raises(Problem) as caught:
+            Dask("s.json").open(*few, lambda: None)
+        assert refused(caught) == (
+            "error[E356]: cannot read the Dask scheduler file s.json: no such file or directory\n"
+            " = help: `dask scheduler --scheduler-file s.json` writes it\n"
+            "\n1 error\n"
+        )  # fmt: skip
+
+    @pytest.mark.parametrize("text", ["", "[]", "{}", "\udcff"])
+    def test_a_file_that_is_no_schedulers(self, few: Any, here: Path, text: str) -> None:
+        Path("s.json").write_bytes(text.encode(errors="surrogateescape"))
+        with pytest.raises(Problem) as caught:
+            Dask(Path("s.json")).open(*few, lambda: None)
+        assert refused(caught) == (
+            "error[E356]: s.json is no scheduler file of Dask\n"
+            " = help: `dask scheduler --scheduler-file FILE.json` writes one\n"
+            "\n1 error\n"
+        )  # fmt: skip
+
+    def test_a_client_that_is_closed(self, few: Any, tmp_path: Path) -> None:
+        with cluster(tmp_path, workers=0) as started, Client(started, set_as_default=False) as client:
+            pass
+        with pytest.raises(Problem) as caught:
+            Dask(client).open(*few, lambda: None)
+        assert caught.value.diagnostics[0].message == "the Dask client is closed"
+
+    def test_nothing_is_started_before_it_is_needed(self) -> None:
+        before = whole.children(os.getpid())
+        Dask("local").close()
+        assert whole.children(os.getpid()) == before
+
+    def test_commands_that_need_no_cluster_do_not_load_it(self) -> None:
+        program = "import sys, batch.cli, batch.executors.dask; print('distributed' in sys.modules)"
+        words = [sys.executable, "-c", program]
+        assert subprocess.run(words, capture_output=True, text=True, cwd=whole.ROOT).stdout == "False\n"
+
+
+class TestWorkersThatCannotServe:
+    def test_none_at_all(
+        self, few: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        monkeypatch.setattr(executor, "WORKER_SECONDS", 0.3)
+        with cluster(tmp_path, workers=0) as started:
+            address = started.scheduler_address
+            with pytest.raises(Problem) as caught:
+                Dask(address).open(*few, lambda: None)
+        assert refused(caught) == (
+            "error[E356]: for 0.3 s no worker has been with Dask's scheduler\n"
+            f" = help: `dask worker {address}` starts one, where MET is installed and this folder is seen\n"
+            "\n1 error\n"
+        )  # fmt: skip
+        said = f"Dask's scheduler at {address} has no worker yet: waiting for one, 0.3 s at most\n"
+        assert capsys.readouterr().err == said
+
+    def test_one_that_does_not_see_the_folder(self, few: Any, tmp_path: Path) -> None:
+        with cluster(tmp_path) as started:
+            dask = Dask(started.scheduler_address)
+            # a folder of the same name on a disk of its own: what was put there a moment ago is not in it
+            found = outcome(dask, few, next(few[0].path.glob(".met-*")).unlink) if False else None
+        assert found is None
