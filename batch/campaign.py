@@ -15,6 +15,7 @@ import numpy as np
 
 from batch import choosing
 from batch.archive import layout as archive_layout
+from batch.folder import Folder, beside
 from batch.keep import Keep, chosen, keep, known
 from batch.output import check_output, default_output
 from batch.tasks import Section
@@ -135,7 +136,8 @@ def prepare(
     kept_plan = replace(plan, experiments=tuple(part.experiment for part in parts), selected=())
     words = tuple("all" if word == "default" else word for word in words)
     campaign = Campaign(kept_plan, parts, wanted, words, target, tuple(notes))
-    check_output(target, campaign.bytes_meanwhile, kept_plan)
+    there = min(Folder(beside(target)).bytes(), sum(part.shard_bytes for part in parts)) if target.name else 0
+    check_output(target, campaign.bytes_meanwhile - there, kept_plan)
     return campaign
 
 

@@ -13,6 +13,7 @@ killed goes on by running what is missing, and it does not matter how its tasks 
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import fcntl
 import json
@@ -98,6 +99,8 @@ class Folder:
         about   `key` of the campaign, name of its `archive`, words for the `histories` that are kept
         """
         self.shards.mkdir(exist_ok=True)
+        for path in self.path.glob("plan*"):  # ours, and may be damaged: plan_file writes over nothing but plans
+            path.unlink()
         plan_file.write(plan, self.path / "plan.json")
         told = []
         for section in sections:
@@ -176,6 +179,24 @@ class Folder:
             else:
                 kept[task] = Done(found.seconds, found.failed)
         return kept, told
+
+    def bytes(self) -> int:
+        """Of the shards that are there."""
+        sizes = 0
+        with contextlib.suppress(OSError):
+            for path in self.shards.glob("*-*-*"):
+                sizes += path.stat().st_size
+        return sizes
+
+    def seconds(self, enough: float) -> float:
+        """Of computing that the shards which are there took; when it is enough, no more are looked at."""
+        total = 0.0
+        for path in self.shards.glob("*-*-*"):
+            with contextlib.suppress(shard.Unsound, OSError):
+                total += shard.read(path).seconds
+            if total >= enough:
+                break
+        return total
 
     def sweep(self) -> None:
         """Remove what workers that were killed had begun to write."""

@@ -20,9 +20,9 @@ from batch.campaign import Campaign, histories_section, values_sections
 from batch.drive import Driver, Progress, Stopped, TooManyFailures
 from batch.executors import Executor
 from batch.executors.threads import Threads
-from batch.folder import Busy, Folder, beside
+from batch.folder import Busy, Folder, beside, gaps
 from batch.output import busy, cannot_write, publish
-from batch.status import Reporter
+from batch.status import Reporter, died
 from batch.tasks import Section
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
@@ -72,6 +72,7 @@ def perform(
     values = values_sections(campaign)
     key = resuming.campaign_key(campaign, values)
     if not fresh and resuming.is_whole(campaign, key):
+        resuming.tidy(Folder(beside(campaign.output)))
         return Performed({}, whole=True)
     if ready is not None:
         for section in values:
@@ -124,11 +125,14 @@ class _Work:
         self.reporter = Reporter(folder, campaign.cases, progress)
         self.max_failures = max_failures
         self.driver: Driver | None = None
-        self.ours = False
+        self.ours = self.resumed = False
 
     def begin(self, fresh: bool) -> None:
         """Make the folder, or take up the one that is there. Raises Problem E353 where it is of another campaign."""
+        self.resumed = bool(self.folder.named(0)) and not fresh
         for note in resuming.take_up(self.folder, self.campaign, self.values, self.key, fresh):
+            self._note(note)
+        for note in died(self.folder) if self.resumed else ():
             self._note(note)
         self.ours = True
         resuming.describe(self.folder, self.campaign, self.values, self.key)
@@ -138,31 +142,24 @@ class _Work:
         driver = self.driver = Driver(self.folder, executor, self.reporter, self.max_failures)
         executor.open(self.folder, self.sections, driver.tell)
         try:
-            missing = [(section, driver.find(section)) for section in self.values]
-            self._tell_found()
-            left = sum(last - first for _, gaps in missing for first, last in gaps)
-            if together and left:
-                raise Stopped(f"{left:,} of {self.campaign.cases:,} cases are missing")
-            for section, gaps in missing:
-                driver.run(section, gaps)
-            histories = self._histories(driver)
+            for attempt in range(ATTEMPTS):
+                missing = [(section, driver.find(section)) for section in self.values]
+                self._tell_found(first=not attempt)
+                left = sum(last - first for _, stretches in missing for first, last in stretches)
+                if together and left:
+                    raise Stopped(f"{left:,} of {self.campaign.cases:,} cases are missing")
+                for section, stretches in missing:
+                    driver.run(section, stretches)
+                try:
+                    histories = self._histories(driver)
+                    self.reporter.state("merging")
+                    self._merge(histories)
+                    break
+                except merge.Missing as reason:
+                    if attempt == ATTEMPTS - 1:
+                        raise Stopped(f"{reason}, again and again") from None
         finally:
             executor.close()
-        self.reporter.state("merging")
-        for attempt in range(ATTEMPTS):
-            try:
-                self._merge(histories)
-                break
-            except merge.Missing as reason:
-                if attempt == ATTEMPTS - 1:
-                    raise Stopped(f"{reason}, again and again") from None
-                self._note(f"{reason}; its cases are run again")
-                again = Threads()
-                again.open(self.folder, self.sections, lambda: None)
-                driver.executor = again
-                for section in self.sections.values():
-                    driver.run(section, driver.find(section))
-                again.close()
         seconds = {section.name: 0.0 for section in self.values}
         for number, count in driver.counts.items():
             seconds[self.sections[number].name] += count.seconds
@@ -173,12 +170,13 @@ class _Work:
         """Give up, for now. What is worth keeping stays; in words how much and where, else "" and nothing stays."""
         if not self.ours:
             return ""
-        counts = self.driver.counts if self.driver is not None else {}
-        done = sum(count.done for number, count in counts.items() if number < len(self.values))
-        if sum(count.seconds for count in counts.values()) < WORTH_SECONDS:
+        if not self.resumed and self.folder.seconds(WORTH_SECONDS) < WORTH_SECONDS:
             self.folder.remove()
             return ""
         self.reporter.state(state)
+        left = sum(last - first for section in self.values
+                   for first, last in gaps(self.folder.named(section.number), len(section.rows)))  # fmt: skip
+        done = self.campaign.cases - left
         return f"{done:,} of {self.campaign.cases:,} cases are kept in {self.folder.path}; the same command goes on"
 
     def _histories(self, driver: Driver) -> dict[int, Section]:
@@ -235,13 +233,14 @@ class _Work:
             for section in self.values
         ]  # fmt: skip
 
-    def _tell_found(self) -> None:
+    def _tell_found(self, *, first: bool) -> None:
         driver = self.driver
         assert driver is not None
         for text in driver.told:
             self._note(text)
+        driver.told.clear()
         done = sum(count.done for count in driver.counts.values())
-        if done:
+        if first and done:
             self._note(f"goes on: {done:,} of {self.campaign.cases:,} cases are done")
 
     def _note(self, text: str) -> None:

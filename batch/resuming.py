@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Sequence
@@ -10,7 +11,7 @@ from typing import Any
 
 from batch.campaign import Campaign, prepare
 from batch.changes import changes
-from batch.folder import Folder
+from batch.folder import Busy, Folder
 from batch.output import sidecar_path
 from batch.tasks import Section
 from met import plan_file
@@ -43,6 +44,14 @@ def is_whole(campaign: Campaign, key: str) -> bool:
         return bool(told.get("archive_sha256") == _file_sum(output))
     except (OSError, ValueError):
         return False
+
+
+def tidy(folder: Folder) -> None:
+    """Remove what a run left that was killed after its archive had got its name."""
+    if folder.exists():
+        with contextlib.suppress(Busy):
+            folder.lock()
+            folder.remove()
 
 
 def take_up(folder: Folder, campaign: Campaign, values: Sequence[Section], key: str, fresh: bool) -> Iterator[str]:

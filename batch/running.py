@@ -18,8 +18,9 @@ from batch.replaying import Replay, differences, replay
 from batch.structures import structures
 from batch.summary import summarise
 from batch.verdict import announcement, told, verdict_json, worst_cases, writing
-from met.diagnostic import Problem
+from met.diagnostic import Problem, error
 from met.plan import Plan
+from met.sources import names_archive, names_plan
 
 
 def run_and_tell(
@@ -48,9 +49,12 @@ def run_and_tell(
 ) -> bool:
     """Run a deck, a plan, or cases of an archive; True where every case reached its end and met its requirements."""
     say = (lambda *_: None) if quiet or json else print
+    if failed and not names_archive(source):
+        helps = "`met run ARCHIVE.h5 --failed` runs those again that failed"
+        raise Problem(error("E357", f"`--failed` is of an archive, and {source} is none", help=helps))
     executor = choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
     again = None
-    if is_archive(source):
+    if names_archive(source):
         again = replay(source, names, cases, failed)
         campaign = prepare(
             again.plan, output=output or again.output, selected=again.selected, histories=histories or "all",
@@ -65,7 +69,7 @@ def run_and_tell(
             plan, output=output, experiments=names or None, cases=cases or None, histories=histories or "default",
             float32=float32,
         )  # fmt: skip
-    say("\n".join(announcement(campaign, verbose, notes=verbose or is_plan(source))))
+    say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
     try:
         performed = perform(
             campaign, executor=executor, fresh=fresh, max_failures=max_failures,
@@ -128,7 +132,7 @@ def submit_and_tell(
         plan, output=output, experiments=names or None, cases=cases or None, histories=histories or "default",
         float32=float32,
     )  # fmt: skip
-    say("\n".join(announcement(campaign, verbose, notes=verbose or is_plan(source))))
+    say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
     done = submit(campaign, jobs=jobs, options=options, timeout=timeout, fresh=fresh, say=say)
     archive = str(campaign.output)
     if json:
@@ -164,7 +168,7 @@ def read_plan(
     quiet: bool = False,
 ) -> Plan:
     """The plan of a deck, or in a plan file. Warnings go to stderr; errors are a Problem."""
-    if is_plan(source):
+    if names_plan(source):
         from met import plan_file
 
         return plan_file.read(source)
@@ -182,16 +186,6 @@ def read_plan(
         colour = render.wants_colour(sys.stderr)
         print(render.render(compiled.diagnostics, compiled.sources, colour=colour), file=sys.stderr)
     return compiled.plan
-
-
-def is_plan(source: str) -> bool:
-    """Whether a name is that of a plan file rather than a deck's."""
-    return Path(source).suffix == ".json"
-
-
-def is_archive(source: str) -> bool:
-    """Whether a name is that of an archive, whose cases are run again."""
-    return Path(source).suffix in (".h5", ".hdf5", ".nc")
 
 
 def first_picture(archive: ArchiveFile) -> tuple[Path | None, str]:

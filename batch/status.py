@@ -6,6 +6,7 @@ import json
 import os
 import socket
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,12 @@ WRITE_SECONDS = 1.0
 
 STALE_SECONDS = 30.0
 """Who has written nothing for so long is not at work any more."""
+
+
+TYPES: dict[str, type | tuple[type, ...]] = {
+    "state": str, "pid": int, "host": str, "workers": str, "cases": int, "failed": int, "updated": (int, float),
+}  # fmt: skip
+"""What a status file has at least."""
 
 
 class Reporter:
@@ -80,7 +87,7 @@ def told(folder: Folder) -> list[dict[str, Any]]:
             data = json.loads(path.read_text(encoding="utf-8"))
         except (OSError, ValueError):
             continue
-        if isinstance(data, dict) and "updated" in data:
+        if isinstance(data, dict) and all(isinstance(data.get(name), kind) for name, kind in TYPES.items()):
             found.append({**data, "name": path.name.removeprefix("status").removesuffix(".json").strip(".")})
     return sorted(found, key=lambda each: -each["updated"])
 
@@ -161,6 +168,14 @@ def whole(archive: Path) -> dict[str, Any] | None:
 
 
 AT_WORK = ("starting", "running", "merging")
+
+
+def died(folder: Folder) -> Iterator[str]:
+    """What is to be told of a run before this one that ended without a word."""
+    for each in told(folder):
+        if not each["name"] and each["state"] in AT_WORK and not alive(each, time.time()):
+            remedy = "" if "process" in each["workers"] else "; if a case did it, `--processes 2` finds out which"
+            yield f"the run before this one was killed (process {each['pid']} on {each['host']}){remedy}"
 
 
 def alive(told: dict[str, Any], now: float) -> bool:

@@ -58,10 +58,12 @@ class Section:
         return cases if cases < GRANULE else cases // GRANULE * GRANULE
 
     def key(self, first: int = 0, last: int | None = None) -> str:
-        """Of all that decides what these cases give: the code, what goes into it, and what is kept of it."""
-        inputs = engine.inputs(self.prepared.experiment, self.rows[first:last])
-        kept = f"{self.prepared.code_key} {'recorded' if self.recorded else 'outputs'} {'f4' if self.single else 'f8'}"
-        return hashlib.sha256(f"{kept} {inputs.shape}\n".encode() + inputs.tobytes()).hexdigest()
+        """Of all that decides what these cases give: the code, how long it runs, what goes into it, what is kept."""
+        experiment = self.prepared.experiment
+        inputs = engine.inputs(experiment, self.rows[first:last])
+        kept = ("recorded" if self.recorded else "outputs", "f4" if self.single else "f8")
+        told = (self.prepared.code_key, experiment.structure.schedule.ticks, *kept, inputs.shape)
+        return hashlib.sha256(f"{told}\n".encode() + inputs.tobytes()).hexdigest()
 
 
 @frozen

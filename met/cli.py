@@ -18,6 +18,7 @@ import click
 
 from met.diagnostic import Diagnostic, Problem, error, nearest
 from met.entry_points import EntryPoint, offered
+from met.sources import names_archive, names_plan
 from met.version import VERSION
 
 YES, NO, BAD_INPUT = 0, 1, 2
@@ -124,13 +125,15 @@ def check_options(
     if names and everything:
         raise click.UsageError(f"--all and `{names[0]}` exclude each other: name runs and sweeps, or take all")
     for option, given in (("-D", defines), ("-I", include_dirs)):
-        if given and source.endswith(".json"):
+        if given and names_plan(source):
             raise click.UsageError(f"{option} is for decks: `{source}` is a plan, whose macros are expanded already")
-    if settings and source.endswith(".json"):
+    if settings and names_plan(source):
         made = f"`met plan DECK --set '{settings[0]}' -o {source}` makes another"
         raise click.UsageError(f"--set is for decks: `{source}` is a plan, whose values are settled; {made}")
-    if settings and source.endswith((".h5", ".hdf5", ".nc")):
-        raise click.UsageError(f"--set is for decks: `{source}` is an archive, of what was run; run its deck with it")
+    if names_archive(source):
+        for option, wanted in (("-D", defines), ("-I", include_dirs), ("--set", settings), ("--all", everything)):
+            if wanted:
+                raise click.UsageError(f"{option} is for decks: `{source}` is an archive, of what was run")
 
 
 def format_option(face: Face) -> Face:

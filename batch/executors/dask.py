@@ -144,7 +144,7 @@ class Dask:
         if self._workers:
             self._seen = time.monotonic()
         elif time.monotonic() - self._seen > WORKER_SECONDS:
-            return f"for {WORKER_SECONDS:g} s no worker has been with Dask's scheduler"
+            return f"Dask's scheduler has had no worker for {WORKER_SECONDS:g} s"
         return ""
 
     def _dismiss(self) -> None:

@@ -51,7 +51,7 @@ def few(tmp_path: Path) -> tuple[Folder, dict[int, Section]]:
     sections = {section.number: section for section in values_sections(campaign)}
     folder = Folder(beside(campaign.output))
     folder.path.mkdir()
-    folder.describe(campaign.plan, sections.values(), "key", "few.h5")
+    folder.describe(campaign.plan, sections.values(), key="")
     return folder, sections
 
 
@@ -149,7 +149,7 @@ class TestWorkersThatCannotServe:
             with pytest.raises(Problem) as caught:
                 Dask(address).open(*few, lambda: None)
         assert refused(caught) == (
-            "error[E356]: for 0.3 s no worker has been with Dask's scheduler\n"
+            "error[E356]: Dask's scheduler has had no worker for 0.3 s\n"
             f" = help: `dask worker {address}` starts one, where MET is installed and this folder is seen\n"
             "\n1 error\n"
         )  # fmt: skip
@@ -157,8 +157,131 @@ class TestWorkersThatCannotServe:
         assert capsys.readouterr().err == said
 
     def test_one_that_does_not_see_the_folder(self, few: Any, tmp_path: Path) -> None:
+        folder = few[0].path
+
+        def elsewhere() -> None:  # as if the worker had a folder of that name on a disk of its own
+            (mark,) = folder.glob(".met-*")
+            mark.unlink()
+
+        with cluster(tmp_path) as started:
+            found = outcome(Dask(started.scheduler_address), few, elsewhere)
+        why = f"{HOST} does not see {folder}: put the archive where all hosts see it under the same name (`-o`)"
+        assert found == Outcome(Task(0, 0, 9), "broken", why=why)
+
+    def test_one_without_met(self, few: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "batch.executors.dask_worker", None)
+        with cluster(tmp_path) as started:
+            found = outcome(Dask(started.scheduler_address), few, lambda: monkeypatch.undo)
+        assert found.kind == "broken"
+        assert found.why == (
+            f"{HOST} has no MET {VERSION} where its Dask worker runs (import of batch.executors.dask_worker halted; "
+            "None in sys.modules): install it there"
+        )
+
+    def test_one_with_another_version_of_met(self, few: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(executor, "VERSION", "0.0.9")
+        with cluster(tmp_path) as started:
+            found = outcome(Dask(started.scheduler_address), few)
+        assert found.kind == "broken"
+        assert found.why == f"{HOST} has MET {VERSION}, and not 0.0.9: install that where its Dask worker runs"
+
+    def test_one_with_other_code_of_the_same_version(self, few: Any, tmp_path: Path) -> None:
+        folder, sections = few
+        ours = {0: replace(sections[0], single=True)}  # so that the same cases have another key here
+        with cluster(tmp_path) as started:
+            found = outcome(Dask(started.scheduler_address), (folder, ours))
+        assert found.kind == "broken"
+        assert found.why == f"{HOST} has other code of MET {VERSION}, or other models: install the same everywhere"
+
+    def test_one_that_cannot_write(self, few: Any, tmp_path: Path) -> None:
+        folder = few[0]
+        with cluster(tmp_path) as started:
+            found = outcome(Dask(started.scheduler_address), few, folder.shards.rmdir)
+        assert found.kind == "broken"
+        assert found.why == f"on {HOST}, cannot keep what was computed in {folder.shards}: no such file or directory"
+
+    def test_one_that_fails_at_dask_itself(self, few: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(executor, "CALL", "1 / 0")
+        with cluster(tmp_path) as started:
+            found = outcome(Dask(started.scheduler_address), few)
+        assert (found.kind, found.why) == ("broken", "Dask cannot run a task: division by zero")
+
+    def test_a_campaign_stops_with_these_words(self, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(executor, "VERSION", "0.0.9")
+        with cluster(here) as started, pytest.raises(Problem) as caught:
+            batch.run(plans.plan(plans.gains(9)), output="a.h5", dask=started.scheduler_address)
+        assert refused(caught) == (
+            f"error[E354]: the campaign cannot go on: {HOST} has MET {VERSION}, and not 0.0.9: install that where its "
+            "Dask worker runs\n = help: nothing was kept\n\n1 error\n"
+        )
+
+
+POISONED = """
+import os, signal, sys, time
+from batch import tasks, worker
+carry_out = tasks.carry_out
+def poisoned(section, task, *words, **more):
+    rows = set(section.rows[task.first : task.last])
+    if 5 in rows:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if 40 in rows:
+        time.sleep(3600)
+    return carry_out(section, task, *words, **more)
+tasks.carry_out = poisoned
+worker.main(sys.argv[1:])
+"""
+"""A worker for which case 5 is deadly, and case 40 never ends."""
+
+
+@pytest.fixture
+def poisoned(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dask workers in this process have such children."""
+
+    def crew(*words: Any, **more: Any) -> Crew:
+        return Crew(*words, **more, command=(sys.executable, "-c", POISONED))
+
+    monkeypatch.setattr(dask_worker, "Crew", crew)
+
+
+class TestInThisProcess:
+    def test_the_same_bytes_as_with_threads(self, here: Path) -> None:
+        plan = plans.plan(plans.nominal(), plans.gains(100))
+        expected = batch.run(plan, output="t.h5", threads=1).path.read_bytes()
+        with cluster(here, workers=2) as started:
+            archive = batch.run(plan, output="a.h5", dask=started.scheduler_address)
+        assert archive.path.read_bytes() == expected
+        assert '"workers": "Dask, 2 workers"' in Path("a.h5.run.json").read_text()
+        assert not whole.workers(os.getpid())
+
+    def test_a_client_that_the_user_made_stays_open_and_nothing_of_ours_on_its_workers(self, here: Path) -> None:
+        with cluster(here, workers=1, threads=2) as started, Client(started, set_as_default=False) as client:
+            (worker,) = (each for each in started.workers.values())
+            before = set(worker.plugins)
+            batch.run(plans.plan(plans.gains(100)), output="a.h5", dask=client)
+            assert client.submit(abs, -1).result() == 1
+            assert set(worker.plugins) == before and not whole.workers(os.getpid())
+        assert '"workers": "Dask, 1 worker with 2 threads"' in Path("a.h5.run.json").read_text()
+
+    @pytest.mark.slow
+    @pytest.mark.usefixtures("poisoned")
+    def test_a_case_that_kills_or_hangs_takes_down_a_child_and_no_worker(self, here: Path) -> None:
+        with cluster(here) as started:
+            (worker,) = started.workers.values()
+            archive = batch.run(plans.plan(plans.gains(96)), output="a.h5", dask=started.scheduler_address, timeout=1.0)
+            assert list(started.workers.values()) == [worker] and worker.status.name == "running"
+        with archive.open() as data:
+            assert {int(case): str(data.cause.values[case]) for case in data.case[data.status.values != 0]} == {
+                5: "its worker was killed by SIGKILL, 3 times", 40: "timed out: no progress for 1 s",
+            }  # fmt: skip
+
+    @pytest.mark.usefixtures("poisoned")
+    def test_closing_stops_a_case_that_hangs(self, few: Any, tmp_path: Path) -> None:
+        folder, sections = few
+        sections = {0: replace(sections[0], rows=sections[0].rows)}
         with cluster(tmp_path) as started:
             dask = Dask(started.scheduler_address)
-            # a folder of the same name on a disk of its own: what was put there a moment ago is not in it
-            found = outcome(dask, few, next(few[0].path.glob(".met-*")).unlink) if False else None
-        assert found is None
+            dask.open(folder, sections, lambda: None)
+            dask.submit(Task(0, 0, 9))
+            whole.until(lambda: whole.workers(os.getpid()))
+            dask.close()
+            whole.until(lambda: not whole.workers(os.getpid()))

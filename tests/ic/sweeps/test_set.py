@@ -290,7 +290,7 @@ def test_the_plan_says_what_was_set(deck: str, capsys: pytest.CaptureFixture[str
 @pytest.mark.parametrize(("words", "said"), [
     (["plan", "p.json"], "--set is for decks: `p.json` is a plan, whose values are settled; "
      "`met plan DECK --set 'duration=2 s' -o p.json` makes another"),
-    (["run", "a.h5"], "--set is for decks: `a.h5` is an archive, of what was run; run its deck with it"),
+    (["run", "a.h5"], "--set is for decks: `a.h5` is an archive, of what was run"),
     (["dump", "model", "a.ic"], "`met dump model` shows what the deck says; `met dump plan`, what --set makes of it"),
 ])  # fmt: skip
 def test_only_a_deck_takes_it(words: list[str], said: str, deck: str, capsys: pytest.CaptureFixture[str]) -> None:
