@@ -112,7 +112,7 @@ def told(
                 out += ["", f"{summary.name}: {lines[0]}", *failure_lines(summary.failures, 100)]
             continue
         name = f"{summary.name}: " if len(summaries) > 1 else ""
-        took = f", in {duration(seconds[summary.name])}" if summary.name in seconds else ""
+        took = f", {duration(seconds[summary.name])} of computing" if summary.name in seconds else ""
         out += ["", f"{name}{lines[0]}{took}", *lines[1:]]
         out += ["", *cases.lines] if cases.lines else []
     out += [line for table in tables for line in ("", *table)]

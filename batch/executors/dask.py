@@ -86,9 +86,11 @@ class Dask:
 
     def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
         self._folder, self._sections, self._tell = folder.path.resolve(), sections, tell
+        from batch.executors.dask_worker import dismiss
+
         with ExitStack() as opened:
             self._client = opened.enter_context(connected(self._dask, self._threads))
-            opened.callback(self._dismiss)
+            opened.callback(self._tell_all, dismiss)
             token = self._folder / self._token
             token.touch()
             opened.callback(token.unlink, missing_ok=True)
@@ -141,15 +143,12 @@ class Dask:
         """Why nothing can be hoped for any more; empty where something can."""
         if self._client.status == "closed":
             return LOST
-        if self._workers:
-            self._seen = time.monotonic()
-        elif time.monotonic() - self._seen > WORKER_SECONDS:
+        if time.monotonic() - self._seen > WORKER_SECONDS:
             return f"Dask's scheduler has had no worker for {WORKER_SECONDS:g} s"
         return ""
 
-    def _dismiss(self) -> None:
-        """Have workers let go of what they keep for this campaign; those that do not hear of it do so by themselves."""
-        from batch.executors.dask_worker import dismiss
+    def _tell_all(self, dismiss: Callable[..., Any]) -> None:
+        """Have all workers let go of what they keep for us; one that does not hear of it does so by itself, later."""
 
         async def tell() -> None:
             await self._client.run(dismiss, self._name, on_error="ignore")
@@ -167,6 +166,8 @@ class Dask:
                 self._workers = await self._client.nthreads()
             except Exception:  # whatever a connection that was lost gives rise to
                 self._workers = {}
+            if self._workers:
+                self._seen = time.monotonic()
             await asyncio.sleep(COUNT_SECONDS)
 
     async def _carry_out(self, task: Task) -> Outcome:

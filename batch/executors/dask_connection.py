@@ -126,8 +126,9 @@ def _started(threads: int) -> Iterator[Any]:
             # the memory that tasks take is that of the workers' children, which Dask's limit does not count
             with _interrupts_later():
                 cluster = LocalCluster(
-                    n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0,
-                    local_directory=scratch, silence_logs=logging.CRITICAL,
+                    n_workers=workers, threads_per_worker=1, processes=True, memory_limit=0, local_directory=scratch,
+                    dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False},
+                    silence_logs=logging.CRITICAL,
                 )  # fmt: skip
         except (OSError, RuntimeError) as reason:
             said = str(reason).rstrip(".")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -14,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from distributed import Client, LocalCluster, Scheduler, Worker
+from distributed import Client, LocalCluster
 
 import batch
 from batch.campaign import prepare, values_sections
@@ -25,7 +24,6 @@ from batch.executors.choose import choose
 from batch.executors.dask import Dask
 from batch.folder import Folder, beside
 from batch.tasks import Section, Task
-from met import plan_file
 from met.diagnostic import Problem
 from met.version import VERSION
 from tests.batch import plans, whole
@@ -38,16 +36,17 @@ HOST = os.uname().nodename
 def cluster(folder: Path, workers: int = 1, threads: int = 1) -> Iterator[LocalCluster]:
     """A scheduler that can be reached from anywhere on this machine, and workers, all in this process."""
     with LocalCluster(
-        n_workers=workers, threads_per_worker=threads, processes=False, protocol="tcp://", dashboard_address=None,
-        memory_limit=0, local_directory=str(folder / "scratch"), silence_logs=logging.CRITICAL,
+        n_workers=workers, threads_per_worker=threads, processes=False, protocol="tcp://", memory_limit=0,
+        dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False},
+        local_directory=str(folder / "scratch"), silence_logs=logging.CRITICAL,
     ) as started:  # fmt: skip
         yield started
 
 
 @pytest.fixture
-def few(tmp_path: Path) -> tuple[Folder, dict[int, Section]]:
+def many(tmp_path: Path) -> tuple[Folder, dict[int, Section]]:
     """The folder of a small campaign, described as for workers."""
-    campaign = prepare(plans.plan(plans.gains(9)), output=tmp_path / "few.h5")
+    campaign = prepare(plans.plan(plans.gains(96)), output=tmp_path / "a.h5")
     sections = {section.number: section for section in values_sections(campaign)}
     folder = Folder(beside(campaign.output))
     folder.path.mkdir()
@@ -55,12 +54,12 @@ def few(tmp_path: Path) -> tuple[Folder, dict[int, Section]]:
     return folder, sections
 
 
-def outcome(dask: Dask, few: tuple[Folder, dict[int, Section]], meanwhile: Callable[[], object] = int) -> Outcome:
+def outcome(dask: Dask, many: tuple[Folder, dict[int, Section]], meanwhile: Callable[[], object] = int) -> Outcome:
     """What comes of the first task. meanwhile: called before it is submitted."""
-    dask.open(*few, lambda: None)
+    dask.open(*many, lambda: None)
     try:
         meanwhile()
-        dask.submit(Task(0, 0, 9))
+        dask.submit(Task(0, 0, 32))
         (found,) = dask.wait()
         assert not dask.wait()
         return found
@@ -91,19 +90,19 @@ class TestWhatItIsCalled:
         assert str(caught.value) == 'dask is the address of a scheduler, "local" or a Client, and not int'
 
     @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "http://example.org", "", "tcp://"])
-    def test_where_no_scheduler_answers(self, few: Any, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_where_no_scheduler_answers(self, many: Any, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(dask_connection, "CONNECT_SECONDS", 0.3)
         with pytest.raises(Problem) as caught:
-            Dask(address).open(*few, lambda: None)
+            Dask(address).open(*many, lambda: None)
         assert refused(caught) == (
             f"error[E356]: no Dask scheduler answers at `{address}`\n"
             " = help: `dask scheduler` starts one, and says its address\n"
             "\n1 error\n"
         )  # fmt: skip
 
-    def test_a_scheduler_file_that_is_not_there(self, few: Any, here: Path) -> None:
+    def test_a_scheduler_file_that_is_not_there(self, many: Any, here: Path) -> None:
         with pytest.raises(Problem) as caught:
-            Dask("s.json").open(*few, lambda: None)
+            Dask("s.json").open(*many, lambda: None)
         assert refused(caught) == (
             "error[E356]: cannot read the Dask scheduler file s.json: no such file or directory\n"
             " = help: `dask scheduler --scheduler-file s.json` writes it\n"
@@ -111,21 +110,21 @@ class TestWhatItIsCalled:
         )  # fmt: skip
 
     @pytest.mark.parametrize("text", ["", "[]", "{}", "\udcff"])
-    def test_a_file_that_is_no_schedulers(self, few: Any, here: Path, text: str) -> None:
+    def test_a_file_that_is_no_schedulers(self, many: Any, here: Path, text: str) -> None:
         Path("s.json").write_bytes(text.encode(errors="surrogateescape"))
         with pytest.raises(Problem) as caught:
-            Dask(Path("s.json")).open(*few, lambda: None)
+            Dask(Path("s.json")).open(*many, lambda: None)
         assert refused(caught) == (
             "error[E356]: s.json is no scheduler file of Dask\n"
             " = help: `dask scheduler --scheduler-file FILE.json` writes one\n"
             "\n1 error\n"
         )  # fmt: skip
 
-    def test_a_client_that_is_closed(self, few: Any, tmp_path: Path) -> None:
+    def test_a_client_that_is_closed(self, many: Any, tmp_path: Path) -> None:
         with cluster(tmp_path, workers=0) as started, Client(started, set_as_default=False) as client:
             pass
         with pytest.raises(Problem) as caught:
-            Dask(client).open(*few, lambda: None)
+            Dask(client).open(*many, lambda: None)
         assert caught.value.diagnostics[0].message == "the Dask client is closed"
 
     def test_nothing_is_started_before_it_is_needed(self) -> None:
@@ -141,13 +140,13 @@ class TestWhatItIsCalled:
 
 class TestWorkersThatCannotServe:
     def test_none_at_all(
-        self, few: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+        self, many: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:
         monkeypatch.setattr(executor, "WORKER_SECONDS", 0.3)
         with cluster(tmp_path, workers=0) as started:
             address = started.scheduler_address
             with pytest.raises(Problem) as caught:
-                Dask(address).open(*few, lambda: None)
+                Dask(address).open(*many, lambda: None)
         assert refused(caught) == (
             "error[E356]: Dask's scheduler has had no worker for 0.3 s\n"
             f" = help: `dask worker {address}` starts one, where MET is installed and this folder is seen\n"
@@ -156,54 +155,56 @@ class TestWorkersThatCannotServe:
         said = f"Dask's scheduler at {address} has no worker yet: waiting for one, 0.3 s at most\n"
         assert capsys.readouterr().err == said
 
-    def test_one_that_does_not_see_the_folder(self, few: Any, tmp_path: Path) -> None:
-        folder = few[0].path
+    def test_one_that_does_not_see_the_folder(self, many: Any, tmp_path: Path) -> None:
+        folder = many[0].path
 
         def elsewhere() -> None:  # as if the worker had a folder of that name on a disk of its own
             (mark,) = folder.glob(".met-*")
             mark.unlink()
 
         with cluster(tmp_path) as started:
-            found = outcome(Dask(started.scheduler_address), few, elsewhere)
+            found = outcome(Dask(started.scheduler_address), many, elsewhere)
         why = f"{HOST} does not see {folder}: put the archive where all hosts see it under the same name (`-o`)"
-        assert found == Outcome(Task(0, 0, 9), "broken", why=why)
+        assert found == Outcome(Task(0, 0, 32), "broken", why=why)
 
-    def test_one_without_met(self, few: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setitem(sys.modules, "batch.executors.dask_worker", None)
+    def test_one_without_met(self, many: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        def lose() -> None:
+            monkeypatch.setitem(sys.modules, "batch.executors.dask_worker", None)
+
         with cluster(tmp_path) as started:
-            found = outcome(Dask(started.scheduler_address), few, lambda: monkeypatch.undo)
+            found = outcome(Dask(started.scheduler_address), many, lose)
         assert found.kind == "broken"
         assert found.why == (
             f"{HOST} has no MET {VERSION} where its Dask worker runs (import of batch.executors.dask_worker halted; "
             "None in sys.modules): install it there"
         )
 
-    def test_one_with_another_version_of_met(self, few: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_one_with_another_version_of_met(self, many: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(executor, "VERSION", "0.0.9")
         with cluster(tmp_path) as started:
-            found = outcome(Dask(started.scheduler_address), few)
+            found = outcome(Dask(started.scheduler_address), many)
         assert found.kind == "broken"
         assert found.why == f"{HOST} has MET {VERSION}, and not 0.0.9: install that where its Dask worker runs"
 
-    def test_one_with_other_code_of_the_same_version(self, few: Any, tmp_path: Path) -> None:
-        folder, sections = few
+    def test_one_with_other_code_of_the_same_version(self, many: Any, tmp_path: Path) -> None:
+        folder, sections = many
         ours = {0: replace(sections[0], single=True)}  # so that the same cases have another key here
         with cluster(tmp_path) as started:
             found = outcome(Dask(started.scheduler_address), (folder, ours))
         assert found.kind == "broken"
         assert found.why == f"{HOST} has other code of MET {VERSION}, or other models: install the same everywhere"
 
-    def test_one_that_cannot_write(self, few: Any, tmp_path: Path) -> None:
-        folder = few[0]
+    def test_one_that_cannot_write(self, many: Any, tmp_path: Path) -> None:
+        folder = many[0]
         with cluster(tmp_path) as started:
-            found = outcome(Dask(started.scheduler_address), few, folder.shards.rmdir)
+            found = outcome(Dask(started.scheduler_address), many, folder.shards.rmdir)
         assert found.kind == "broken"
         assert found.why == f"on {HOST}, cannot keep what was computed in {folder.shards}: no such file or directory"
 
-    def test_one_that_fails_at_dask_itself(self, few: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_one_that_fails_at_dask_itself(self, many: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(executor, "CALL", "1 / 0")
         with cluster(tmp_path) as started:
-            found = outcome(Dask(started.scheduler_address), few)
+            found = outcome(Dask(started.scheduler_address), many)
         assert (found.kind, found.why) == ("broken", "Dask cannot run a task: division by zero")
 
     def test_a_campaign_stops_with_these_words(self, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -275,13 +276,42 @@ class TestInThisProcess:
             }  # fmt: skip
 
     @pytest.mark.usefixtures("poisoned")
-    def test_closing_stops_a_case_that_hangs(self, few: Any, tmp_path: Path) -> None:
-        folder, sections = few
-        sections = {0: replace(sections[0], rows=sections[0].rows)}
+    def test_closing_stops_a_case_that_hangs(self, many: Any, tmp_path: Path) -> None:
+        before = set(whole.children(os.getpid()))
         with cluster(tmp_path) as started:
             dask = Dask(started.scheduler_address)
-            dask.open(folder, sections, lambda: None)
-            dask.submit(Task(0, 0, 9))
-            whole.until(lambda: whole.workers(os.getpid()))
+            dask.open(*many, lambda: None)
+            dask.submit(Task(0, 40, 41))
+            whole.until(lambda: len(set(whole.children(os.getpid())) - before) == 1)
             dask.close()
-            whole.until(lambda: not whole.workers(os.getpid()))
+            assert set(whole.children(os.getpid())) == before
+            assert not [name for worker in started.workers.values() for name in worker.plugins if "met" in name]
+
+    @pytest.mark.usefixtures("poisoned")
+    def test_a_driver_that_is_gone_leaves_no_child(
+        self, many: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(Dask, "_tell_all", lambda *_: None)  # one that is killed says nothing
+        before = set(whole.children(os.getpid()))
+        with cluster(tmp_path) as started:
+            dask = Dask(started.scheduler_address)
+            dask.open(*many, lambda: None)
+            dask.submit(Task(0, 40, 41))
+            whole.until(lambda: len(set(whole.children(os.getpid())) - before) == 1)
+            dask.close()
+            whole.until(lambda: set(whole.children(os.getpid())) == before)
+
+    def test_children_that_get_nothing_to_do_go_home(
+        self, many: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(dask_worker, "IDLE_SECONDS", 0.2)
+        monkeypatch.setattr(dask_worker, "LOOK_SECONDS", 0.05)
+        before = set(whole.children(os.getpid()))
+        with cluster(tmp_path) as started:
+            dask = Dask(started.scheduler_address)
+            dask.open(*many, lambda: None)
+            for first in (0, 32):  # others come, where there is something to do again
+                dask.submit(Task(0, first, first + 32))
+                assert [found.kind for found in dask.wait()] == ["done"]
+                whole.until(lambda: set(whole.children(os.getpid())) == before)
+            dask.close()
