@@ -16,6 +16,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import glob
 import json
 import os
 import re
@@ -27,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from batch import shard
+from batch.archive.sink import is_at
 from batch.tasks import Done, Section, Task
 from met import plan_file
 from met import run as engine
@@ -61,17 +63,20 @@ class Folder:
 
     def lock(self, *, together: bool = False) -> None:
         """Raises Busy where somebody works here, unless both do so `together`; makes the folder where there is none."""
-        self.path.mkdir(exist_ok=True)
-        self._lock = os.open(self.path / "lock", os.O_RDWR | os.O_CREAT, 0o666)
-        try:
-            fcntl.flock(self._lock, (fcntl.LOCK_SH if together else fcntl.LOCK_EX) | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self.close()
-            raise Busy from None
-        except OSError as reason:
-            if reason.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a disk without locks: do without
+        while self._lock < 0:
+            self.path.mkdir(exist_ok=True)
+            self._lock = os.open(self.path / "lock", os.O_RDWR | os.O_CREAT, 0o666)
+            try:
+                fcntl.flock(self._lock, (fcntl.LOCK_SH if together else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+            except BlockingIOError:
                 self.close()
-                raise
+                raise Busy from None
+            except OSError as reason:
+                if reason.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a disk without locks: do without
+                    self.close()
+                    raise
+            if not is_at(self._lock, self.path / "lock"):  # who had it has taken the folder away meanwhile
+                self.close()
 
     def close(self) -> None:
         if self._lock >= 0:
@@ -88,8 +93,15 @@ class Folder:
 
     def remove(self) -> None:
         """Take the folder away, which is locked by us, or of nobody's."""
-        shutil.rmtree(self.path, ignore_errors=True)
+        with contextlib.suppress(FileNotFoundError):
+            self.path.rename(self.path.with_name(f".{self.path.name}.{os.getpid()}.leaving"))
+        self.forget()
         self.close()
+
+    def forget(self) -> None:
+        """Take away what was on its way out, now or in a run that was killed over it."""
+        for leaving in self.path.parent.glob(f".{glob.escape(self.path.name)}.*.leaving"):
+            shutil.rmtree(leaving, ignore_errors=True)
 
     # What is computed
 

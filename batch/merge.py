@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,8 +25,15 @@ class Missing(Exception):
     """A shard that was there does not count any more, and why. Its cases have to be run again."""
 
 
-def merge(writer: Writer, number: int, folder: Folder, values: Section, histories: Section | None) -> None:
-    """Write one experiment. values: all of its cases; histories: those that were run again for them. Raises Missing."""
+def merge(
+    writer: Writer, number: int, folder: Folder, values: Section, histories: Section | None,
+    progress: Callable[[int], None] = lambda _: None,
+) -> None:  # fmt: skip
+    """Write one experiment. Raises Missing.
+
+    values     all of its cases;  histories: those that were run again for them
+    progress   told how many cases are written
+    """
     kept = histories.rows if histories is not None else np.empty(0, np.int64)
     places = np.searchsorted(values.rows, kept)
     before: list[np.ndarray] = []
@@ -43,6 +50,7 @@ def merge(writer: Writer, number: int, folder: Folder, values: Section, historie
         writer.put_cases(number, first, _results(values, first, outputs[:cases], None, mine))
         fates = {case - cases: fate for case, fate in fates.items() if case >= cases}
         waiting, first, held = [outputs[cases:]], first + cases, held - cases
+        progress(first)
 
     for at, found in pieces(folder, values):
         if found.history is not None:

@@ -48,6 +48,10 @@ class Performed:
     notes: tuple[str, ...] = ()
 
 
+class TooMany(Problem):
+    """More cases failed than were allowed: an answer, and no mistake of who asked."""
+
+
 def perform(
     campaign: Campaign,
     *,
@@ -75,8 +79,7 @@ def perform(
         resuming.tidy(Folder(beside(campaign.output)))
         return Performed({}, whole=True)
     if ready is not None:
-        for section in values:
-            section.prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
+        values[0].prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
         ready()
     folder = Folder(beside(campaign.output))
     try:
@@ -93,7 +96,7 @@ def perform(
         raise type(interrupt)(work.leave("interrupted")) from None
     except TooManyFailures as reason:
         work.leave("stopped")
-        raise Problem(_stopped("E355", str(reason), work)) from None
+        raise TooMany(_stopped("E355", str(reason), work)) from None
     except Stopped as reason:
         work.leave("stopped")
         raise Problem(_stopped("E354", f"the campaign cannot go on: {reason}", work)) from None
@@ -135,6 +138,7 @@ class _Work:
         for note in died(self.folder) if self.resumed else ():
             self._note(note)
         self.ours = True
+        self.folder.forget()
         resuming.describe(self.folder, self.campaign, self.values, self.key)
         self.folder.sweep()
 
@@ -206,7 +210,12 @@ class _Work:
         writer = Writer(temporary, self.campaign.plan, parts)
         try:
             for number, section in enumerate(self.values):
-                merge.merge(writer, number, self.folder, section, histories.get(number))
+                self.reporter.begin(f"{section.name}, merging", len(section.rows), 0, 0, "")
+                merge.merge(
+                    writer, number, self.folder, section, histories.get(number),
+                    lambda cases: self.reporter.advance(cases, 0),
+                )  # fmt: skip
+                self.reporter.end()
             writer.finish()
             sidecar = {
                 "archive": self.campaign.output.name,

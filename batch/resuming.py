@@ -48,6 +48,7 @@ def is_whole(campaign: Campaign, key: str) -> bool:
 
 def tidy(folder: Folder) -> None:
     """Remove what a run left that was killed after its archive had got its name."""
+    folder.forget()
     if folder.exists():
         with contextlib.suppress(Busy):
             folder.lock()

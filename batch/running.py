@@ -12,7 +12,7 @@ from batch.archive.read import ArchiveFile
 from batch.campaign import prepare
 from batch.executors.choose import choose
 from batch.output import quoted
-from batch.performing import perform
+from batch.performing import TooMany, perform
 from batch.progress import Bar
 from batch.replaying import Replay, differences, replay
 from batch.structures import structures
@@ -75,6 +75,9 @@ def run_and_tell(
             campaign, executor=executor, fresh=fresh, max_failures=max_failures,
             progress=None if quiet or json else Bar(), ready=lambda: say(writing(campaign)), say=say,
         )  # fmt: skip
+    except TooMany as problem:
+        _complain(problem, json)
+        return False
     except KeyboardInterrupt as interrupt:
         if str(interrupt) and not json:
             print(f"\n{interrupt}", file=sys.stderr)
@@ -146,6 +149,17 @@ def submit_and_tell(
             say(f"submitted  array {done.array}: {many} for {done.cases:,} cases")
         say(f"           job {done.end}: merges them into {archive}")
         say(f"next       met status {quoted(archive)}")
+
+
+def _complain(problem: Problem, json: bool) -> None:
+    """For people on stderr, for programs as JSON."""
+    from met import render
+
+    if json:
+        print(render.to_json(problem.diagnostics))
+    else:
+        colour = render.wants_colour(sys.stderr)
+        print(render.render(problem.diagnostics, problem.sources, colour=colour), end="", file=sys.stderr)
 
 
 def _compared(again: Replay | None, unlike: Sequence[str]) -> list[str]:

@@ -174,7 +174,8 @@ def died(folder: Folder) -> Iterator[str]:
     """What is to be told of a run before this one that ended without a word."""
     for each in told(folder):
         if not each["name"] and each["state"] in AT_WORK and not alive(each, time.time()):
-            remedy = "" if "process" in each["workers"] else "; if a case did it, `--processes 2` finds out which"
+            alone = "thread" in each["workers"] and not each["workers"].startswith("Dask")
+            remedy = "; if a case did it, `--processes 2` finds out which" if alone else ""
             yield f"the run before this one was killed (process {each['pid']} on {each['host']}){remedy}"
 
 

@@ -42,7 +42,8 @@ def announcement(campaign: Campaign, verbose: bool = False, *, notes: bool = Fal
 
 def writing(campaign: Campaign) -> str:
     """Where the archive will be, and how large: said once there is a kernel to fill it."""
-    return f"writing {campaign.output}, about {size_text(campaign.bytes)}"
+    instead = ", in place of the one that is there" if campaign.output.exists() else ""
+    return f"writing {campaign.output}, about {size_text(campaign.bytes)}{instead}"
 
 
 def _part_lines(part: Part, verbose: bool) -> list[str]:

@@ -101,7 +101,7 @@ class Sink:
 
     def remove(self) -> None:
         """Leave nothing under the temporary name, unless what is there is another's by now."""
-        if self._file >= 0 and _is_at(self._file, self._path):
+        if self._file >= 0 and is_at(self._file, self._path):
             self._path.unlink()
 
     def close(self) -> None:
@@ -124,12 +124,13 @@ def _locked(path: Path) -> int:
             if reason.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a disk without locks: do without
                 os.close(file)
                 raise
-        if _is_at(file, path):
+        if is_at(file, path):
             return file
         os.close(file)  # between its opening and its locking, it was given its name or removed
 
 
-def _is_at(file: int, path: Path) -> bool:
+def is_at(file: int, path: Path) -> bool:
+    """Whether an open file is the one that has this name now."""
     try:
         return os.path.samestat(os.fstat(file), os.stat(path, follow_symlinks=False))
     except FileNotFoundError:
