@@ -17,7 +17,7 @@ from batch import choosing
 from batch.archive import layout as archive_layout
 from batch.folder import Folder, beside
 from batch.keep import Keep, chosen, keep, known
-from batch.output import check_output, default_output
+from batch.output import check_output, check_room, default_output
 from batch.tasks import Section
 from ic.printing.columns import size as size_text
 from met import run as engine
@@ -93,9 +93,10 @@ class Campaign:
         return sum(part.bytes for part in self.parts)
 
     @property
-    def bytes_meanwhile(self) -> int:
-        """About the room on the disk until the archive is whole: its shards lie beside it."""
-        return self.bytes + sum(part.shard_bytes for part in self.parts)
+    def bytes_missing(self) -> int:
+        """About the room on the disk that is needed until the archive is whole, beside the shards that are there."""
+        shards = sum(part.shard_bytes for part in self.parts)
+        return self.bytes + shards - min(shards, Folder(beside(self.output)).bytes())
 
 
 def prepare(
@@ -136,8 +137,9 @@ def prepare(
     kept_plan = replace(plan, experiments=tuple(part.experiment for part in parts), selected=())
     words = tuple("all" if word == "default" else word for word in words)
     campaign = Campaign(kept_plan, parts, wanted, words, target, tuple(notes))
-    there = min(Folder(beside(target)).bytes(), sum(part.shard_bytes for part in parts)) if target.name else 0
-    check_output(target, campaign.bytes_meanwhile - there, kept_plan)
+    check_output(target, kept_plan)
+    if not target.exists():  # one that is there may be whole, and need nothing: then `perform` sees to it
+        check_room(target, campaign.bytes_missing)
     return campaign
 
 

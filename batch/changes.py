@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from met.keys import LATER_FIELDS, SILENT_FIELDS
-from met.plan import Cases, Experiment, Formula, Plan, Quantity
+from met.plan import Cases, Experiment, Formula, Plan, Quantity, Schedule
 
 
 def changes(before: Plan, now: Plan) -> list[str]:
@@ -26,7 +27,8 @@ def changes(before: Plan, now: Plan) -> list[str]:
 
 
 def _experiment(before: Experiment, now: Experiment) -> Iterator[str]:
-    yield from _fields("", before.structure, now.structure)
+    yield from _schedule(before.structure.schedule, now.structure.schedule)
+    yield from _fields("", replace(before.structure, schedule=now.structure.schedule), now.structure)
     for path in dict.fromkeys([*before.parameters, *now.parameters]):
         old, new = before.parameters.get(path), now.parameters.get(path)
         if old is None or new is None:
@@ -37,6 +39,17 @@ def _experiment(before: Experiment, now: Experiment) -> Iterator[str]:
     yield from _cases(before.cases, now.cases)
     if before.formulas != now.formulas:
         yield "what follows from the varied parameters"
+
+
+def _schedule(before: Schedule, now: Schedule) -> Iterator[str]:
+    for name, old, new in (
+        ("duration", f"{before.duration:g} s", f"{now.duration:g} s"),
+        ("base rate", f"{before.base_hz:g} Hz", f"{now.base_hz:g} Hz"),
+        ("rates.dynamics", f"{before.base_hz / before.dynamics:g} Hz", f"{now.base_hz / now.dynamics:g} Hz"),
+        ("rates.record", f"{before.base_hz / before.record:g} Hz", f"{now.base_hz / now.record:g} Hz"),
+    ):
+        if old != new:
+            yield f"{name}: {old}, now {new}"
 
 
 def _cases(before: Cases, now: Cases) -> Iterator[str]:
@@ -65,13 +78,19 @@ def _fields(path: str, before: Any, now: Any) -> Iterator[str]:
                 name = f"{path}.{each.name}" if path else each.name
                 yield from _fields(name, getattr(before, each.name), getattr(now, each.name))
     elif isinstance(before, tuple) and isinstance(now, tuple):
-        if len(before) != len(now):
-            yield f"{path}: {len(before)}, now {len(now)}"
-        else:
-            for index, (old, new) in enumerate(zip(before, now, strict=True)):
-                yield from _fields(f"{path}.{getattr(new, 'joint', getattr(new, 'name', index))}", old, new)
+        old, new = ({_name(each, index): each for index, each in enumerate(one)} for one in (before, now))
+        for name in dict.fromkeys([*old, *new]):
+            if name not in old or name not in new:
+                yield f"{path}: {name} is {'new' if name in new else 'gone'}"
+            else:
+                yield from _fields(f"{path}.{name}", old[name], new[name])
     elif before != now:
         yield f"{path}: {before}, now {now}"
+
+
+def _name(each: Any, index: int) -> str:
+    """What one of several is called: a servo by its joint, a link by its name, another by its place."""
+    return str(getattr(each, "joint", getattr(each, "name", index)))
 
 
 def _value(quantity: Quantity) -> Any:

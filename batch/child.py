@@ -25,6 +25,9 @@ from batch.tasks import Done, Task
 COMMAND = (sys.executable, "-m", "batch.worker")
 WATCH_SECONDS = 0.2
 
+STILLBORN = 3
+"""Workers in a row that are killed before they have begun, after which no more are started: it is no case's doing."""
+
 NO_MEMORY = 3
 """Exit status of a process that could not get the memory it needs; fewer cases at once may do."""
 
@@ -43,6 +46,7 @@ class Child:
         )  # fmt: skip
         self._read = b""
         self._ended = False
+        self.begun = False
 
     def carry_out(self, task: Task, timeout: float | None = None) -> Outcome:
         """Have a task run, and wait for what comes of it. timeout: s without any progress, once there is a kernel."""
@@ -64,7 +68,8 @@ class Child:
                     return Outcome(task, "stalled", why=f"no progress for {timeout:g} s")
                 continue
             last = now
-            begun = begun or "begun" in message
+            begun = (begun or "begun" in message) and "computed" not in message
+            self.begun = self.begun or begun
             self.under_way = message.get("progress", self.under_way)
             if "done" in message:
                 self.under_way = 0
@@ -126,6 +131,7 @@ class Crew:
         self._idle: list[Child] = []
         self._lock = threading.Lock()
         self._over = False
+        self._stillborn = 0
 
     @property
     def under_way(self) -> int:
@@ -143,8 +149,14 @@ class Crew:
         if outcome.kind == "done":
             with self._lock:
                 self._idle.append(child)
-        else:
-            self._discard(child)
+                self._stillborn = 0
+            return outcome
+        self._discard(child)
+        if outcome.kind == "lost" and not child.begun and not self._over:
+            self._stillborn += 1
+            if self._stillborn >= STILLBORN:
+                why = f"{STILLBORN} workers in a row died before they began; the last one {outcome.why}"
+                return Outcome(task, "broken", why=why)
         return outcome
 
     def stop(self) -> None:

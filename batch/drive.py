@@ -59,12 +59,14 @@ class Driver:
 
     counts   what is done, by section
     told     what is to be told of shards that did not count
+    sections of the first pass, whose failures count: those after them run the same cases again
     """
 
     folder: Folder
     executor: Executor
     progress: Progress | None = None
     max_failures: int | None = None
+    sections: int | None = None
     counts: dict[int, Count] = field(default_factory=dict)
     told: list[str] = field(default_factory=list)
     _at: int | None = None
@@ -76,12 +78,13 @@ class Driver:
         missing = gaps(kept, len(section.rows))
         count = self.counts[section.number] = Count(len(section.rows) - sum(last - first for first, last in missing))
         for done in kept.values():
-            count.failed += done.failed  # of cases that two shards hold, twice: for the progress alone
+            count.failed += done.failed
             count.seconds += done.seconds
         return missing
 
     def run(self, section: Section, missing: Sequence[tuple[int, int]]) -> None:
         """Run the cases that are missing. Raises Stopped."""
+        self.check()
         if not missing:
             return
         work = _Work(self, section, missing)
@@ -100,9 +103,13 @@ class Driver:
             count = self.counts[self._at]
             self.progress.advance(count.done + self.executor.under_way, count.failed)
 
-    @property
-    def failed(self) -> int:
-        return sum(count.failed for count in self.counts.values())
+    def check(self) -> None:
+        """Raises TooManyFailures."""
+        failed = sum(count.failed for number, count in self.counts.items()
+                     if self.sections is None or number < self.sections)  # fmt: skip
+        if self.max_failures is not None and failed > self.max_failures:
+            cases = f"{failed:,} case{'s' if failed != 1 else ''} failed"
+            raise TooManyFailures(f"{cases}, more than the {self.max_failures:,} allowed")
 
 
 class _Work:
@@ -128,8 +135,7 @@ class _Work:
                 self._open -= 1
                 self._take(outcome)
             driver.tell()
-            if driver.max_failures is not None and driver.failed > driver.max_failures:
-                raise TooManyFailures(f"{driver.failed:,} cases failed, more than the {driver.max_failures:,} allowed")
+            driver.check()
 
     def _next(self) -> Task | None:
         if self._again:

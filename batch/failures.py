@@ -17,7 +17,7 @@ STATUS = {DONE: "done", FAILED: "failed", TIMED_OUT: "timed out", LOST: "lost"}
 MOST_RANGES = 200
 """Stretches of cases that are listed of one cause."""
 
-NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(e[-+]?\d+)?")
 
 
 @frozen

@@ -163,8 +163,9 @@ class Folder:
         found = []
         for name in os.listdir(self.shards) if self.shards.is_dir() else ():
             parts = SHARD.fullmatch(name)
-            if parts and int(parts[1]) == number:
-                found.append(Task(number, int(parts[2]), int(parts[3])))
+            task = Task(*map(int, parts.groups())) if parts else None
+            if task is not None and task.section == number and task.name == name:
+                found.append(task)
         return sorted(found, key=lambda task: (task.first, -task.last))
 
     def read(self, section: Section, task: Task) -> shard.Shard:
@@ -181,6 +182,7 @@ class Folder:
         cases are run again."""
         kept: dict[Task, Done] = {}
         told = []
+        at = 0
         for task in self.named(section.number):
             try:
                 found = self.read(section, task)
@@ -189,7 +191,8 @@ class Folder:
                 told.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
                 (self.shards / task.name).unlink(missing_ok=True)
             else:
-                kept[task] = Done(found.seconds, found.failed)
+                kept[task] = Done(found.seconds, found.failed_from(at - task.first))  # a case counts once
+                at = max(at, task.last)
         return kept, told
 
     def bytes(self) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,14 +39,17 @@ def merge(
     before: list[np.ndarray] = []
     waiting: list[np.ndarray] = []
     fates: dict[int, tuple[int, str]] = {}
+    ended: dict[int, tuple[int, str]] = {}
     first = held = 0
 
     def put(cases: int) -> None:
         nonlocal waiting, fates, first, held
         outputs = np.concatenate(waiting)
         mine = {case: fate for case, fate in fates.items() if case < cases}
-        here = places[(places >= first) & (places < first + cases)] - first
+        again = np.flatnonzero((places >= first) & (places < first + cases))
+        here = places[again] - first
         before.append(outputs[here])
+        ended.update({int(k): mine[int(case)] for k, case in zip(again, here, strict=True) if int(case) in mine})
         writer.put_cases(number, first, _results(values, first, outputs[:cases], None, mine))
         fates = {case - cases: fate for case, fate in fates.items() if case >= cases}
         waiting, first, held = [outputs[cases:]], first + cases, held - cases
@@ -65,8 +68,11 @@ def merge(
     if histories is not None:
         again = np.concatenate(before)
         for at, found in pieces(folder, histories):
-            _check_bits(histories, at, found, again[at : at + len(found.outputs)])
-            writer.put_signals(number, at, _results(histories, at, found.outputs, found.history, dict(found.fates)))
+            # a case that gave nothing then has no history either: it is what was found of it first that counts
+            lost = {case - at: fate for case, fate in ended.items() if 0 <= case - at < len(found.outputs)}
+            known = {**found.fates, **lost}
+            _check_bits(histories, at, found.outputs, again[at : at + len(found.outputs)], known)
+            writer.put_signals(number, at, _results(histories, at, found.outputs, found.history, known))
 
 
 def results(folder: Folder, section: Section) -> Run:
@@ -113,10 +119,10 @@ def _results(
     return engine.results(section.prepared, rows, history, outputs, fates)
 
 
-def _check_bits(section: Section, at: int, found: shard.Shard, before: np.ndarray) -> None:
-    """A case that was run again for its history gave the numbers that it gave before."""
-    alike = (found.outputs.view(np.int64) == before.view(np.int64)).all(axis=1)
-    alike[list(found.fates)] = True
+def _check_bits(section: Section, at: int, now: np.ndarray, before: np.ndarray, fates: Iterable[int]) -> None:
+    """A case that was run again for its history gave the numbers that it gave before; those of `fates` gave none."""
+    alike = (now.view(np.int64) == before.view(np.int64)).all(axis=1)
+    alike[list(fates)] = True
     if not alike.all():
         case = section.prepared.experiment.cases.table[section.rows[at + int(np.argmin(alike))]]
         message = f"case #{case} of `{section.name}` gave other numbers when it was run again for its history"

@@ -55,17 +55,17 @@ def sidecar_path(output: Path) -> Path:
     return output.with_name(output.name + ".run.json")
 
 
-def check_output(output: Path, needed: int, plan: Plan) -> None:
-    """Refuse an output that could not be written in the end, before anything runs. needed: bytes, about."""
+def check_output(output: Path, plan: Plan) -> None:
+    """Refuse an output that could not be written in the end, before anything runs. Raises Problem E305, E307."""
     try:
-        _check_output(output, needed, plan)
+        _check_output(output, plan)
     except Busy:
         raise Problem(busy(output)) from None
     except OSError as reason:
         raise Problem(cannot_write(output, reason)) from reason
 
 
-def _check_output(output: Path, needed: int, plan: Plan) -> None:
+def _check_output(output: Path, plan: Plan) -> None:
     from batch.archive.read import is_archive
 
     for target in (output, sidecar_path(output)) if output.name else (output,):  # the name of . and / is empty
@@ -85,6 +85,10 @@ def _check_output(output: Path, needed: int, plan: Plan) -> None:
     probe = Sink(temporary_of(output))
     probe.remove()
     probe.close()
+
+
+def check_room(output: Path, needed: int) -> None:
+    """Refuse what the disk cannot hold. needed: bytes, about, until it is whole. Raises Problem E306."""
     free = shutil.disk_usage(output.parent).free
     if needed > free:
         needs, has = size_text(needed), size_text(free)

@@ -21,7 +21,7 @@ from batch.drive import Driver, Progress, Stopped, TooManyFailures
 from batch.executors import Executor
 from batch.executors.threads import Threads
 from batch.folder import Busy, Folder, beside, gaps
-from batch.output import busy, cannot_write, publish
+from batch.output import busy, cannot_write, check_room, publish
 from batch.status import Reporter, died
 from batch.tasks import Section
 from met.diagnostic import Diagnostic, Problem, error
@@ -75,9 +75,11 @@ def perform(
     """
     values = values_sections(campaign)
     key = resuming.campaign_key(campaign, values)
-    if not fresh and resuming.is_whole(campaign, key):
-        resuming.tidy(Folder(beside(campaign.output)))
+    there = resuming.there(campaign, key)
+    if there == resuming.WHOLE and not fresh:
+        resuming.tidy(Folder(beside(campaign.output)), key)
         return Performed({}, whole=True)
+    check_room(campaign.output, campaign.bytes_missing)
     if ready is not None:
         values[0].prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
         ready()
@@ -88,6 +90,8 @@ def perform(
         raise Problem(busy(campaign.output)) from None
     except OSError as reason:
         raise Problem(cannot_write(campaign.output, reason)) from reason
+    if there == resuming.DAMAGED and not fresh:
+        say(f"{campaign.output} is not as it was written: it is made again")
     work = _Work(campaign, folder, values, key, max_failures, progress, say)
     try:
         work.begin(fresh)
@@ -96,7 +100,7 @@ def perform(
         raise type(interrupt)(work.leave("interrupted")) from None
     except TooManyFailures as reason:
         work.leave("stopped")
-        raise TooMany(_stopped("E355", str(reason), work)) from None
+        raise TooMany(_stopped("E355", str(reason), work, ", with a larger `--max-failures`")) from None
     except Stopped as reason:
         work.leave("stopped")
         raise Problem(_stopped("E354", f"the campaign cannot go on: {reason}", work)) from None
@@ -143,7 +147,7 @@ class _Work:
         self.folder.sweep()
 
     def run(self, executor: Executor, together: bool) -> Performed:
-        driver = self.driver = Driver(self.folder, executor, self.reporter, self.max_failures)
+        driver = self.driver = Driver(self.folder, executor, self.reporter, self.max_failures, len(self.values))
         executor.open(self.folder, self.sections, driver.tell)
         try:
             for attempt in range(ATTEMPTS):
@@ -192,8 +196,10 @@ class _Work:
                 self.sections[histories.number] = found[section.number] = histories
         if found:
             resuming.describe(self.folder, self.campaign, self.sections.values(), self.key)
-            for section in found.values():
-                driver.run(section, driver.find(section))
+            missing = [(section, driver.find(section)) for section in found.values()]
+            self._tell_found(first=False)
+            for section, stretches in missing:
+                driver.run(section, stretches)
         return found
 
     def _merge(self, histories: Mapping[int, Section]) -> None:
@@ -257,9 +263,9 @@ class _Work:
         self.say(text)
 
 
-def _stopped(code: str, message: str, work: _Work) -> Diagnostic:
+def _stopped(code: str, message: str, work: _Work, how: str = "") -> Diagnostic:
     kept = work.folder.path.exists()
-    helps = f"what is done is kept in {work.folder.path}: the same command goes on" if kept else "nothing was kept"
+    helps = f"what is done is kept in {work.folder.path}: the same command goes on{how}" if kept else "nothing was kept"
     return error(code, message, help=helps)
 
 

@@ -76,6 +76,7 @@ def differences(before: str | Path, after: str | Path) -> list[str]:
             old = groups[new.name]
             places = np.searchsorted(old.values("case"), new.values("case"))
             ran = old.at("status", places) < 2
+            out += _signals(old, new, places, ran)
             names = ["case_id", "status", "n_valid", *(variable.name for variable in new.role("metric"))]
             for name in names:
                 a, b = old.at(name, places), new.values(name)
@@ -88,9 +89,26 @@ def differences(before: str | Path, after: str | Path) -> list[str]:
     return out[:MOST_TOLD] + ([f"and {len(out) - MOST_TOLD} more"] if len(out) > MOST_TOLD else [])
 
 
+def _signals(old: Group, new: Group, places: np.ndarray, ran: np.ndarray) -> list[str]:
+    """The same of signals, of the cases whose histories both archives have. places: of new's cases in old."""
+    out = []
+    for variable in new.role("signal"):
+        if variable.name not in old.variables or old.variables[variable.name].role != "signal":
+            continue
+        for place in np.flatnonzero(ran).tolist():
+            if places[place] in old.recorded_positions and place in new.recorded_positions:
+                a, b = old.signal(variable.name, int(places[place])), new.signal(variable.name, place)
+                if a.shape == b.shape and a.dtype == b.dtype and not _alike(a, b).all():
+                    row = int(np.argmin(_alike(a, b).reshape(len(a), -1).all(axis=1)))
+                    time = new.values("time")[row]
+                    out.append(f"#{new.values('case')[place]} of {new.name}: {variable.name} differs from {time:g} s on")
+    return out
+
+
 def _alike(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     if before.dtype.kind == "f":
-        same = before.view(np.int64) == np.ascontiguousarray(after, before.dtype).view(np.int64)
+        whole = np.dtype(f"i{before.dtype.itemsize}")
+        same = np.ascontiguousarray(before).view(whole) == np.ascontiguousarray(after, before.dtype).view(whole)
         return np.asarray(same | (np.isnan(before) & np.isnan(after)))
     return np.asarray(before == after)
 

@@ -17,6 +17,8 @@ from batch.tasks import Section
 from met import plan_file
 from met.diagnostic import Problem, error
 
+WHOLE, DAMAGED = "whole", "damaged"
+
 MOST_CHANGES = 8
 """Changes that a refusal names."""
 
@@ -30,29 +32,35 @@ def campaign_key(campaign: Campaign, values: Sequence[Section]) -> str:
 
 
 def proof(campaign: Campaign, key: str, archive: Path) -> dict[str, str]:
-    """What is written beside a finished archive, so that `is_whole` knows it again."""
+    """What is written beside a finished archive, so that `there` knows it again."""
     return {"campaign": key, "plan_sha256": _plan_sum(campaign), "archive_sha256": _file_sum(archive)}
 
 
-def is_whole(campaign: Campaign, key: str) -> bool:
-    """Whether the archive is there, of this very campaign and plan, and as it was written."""
+def there(campaign: Campaign, key: str) -> str:
+    """WHOLE where the archive is there, of this very campaign and plan, and as it was written; DAMAGED where it is not
+    as it was written; else ""."""
     output = campaign.output
     try:
         told = json.loads(sidecar_path(output).read_text(encoding="utf-8"))
         if not isinstance(told, dict) or told.get("campaign") != key or told.get("plan_sha256") != _plan_sum(campaign):
-            return False
-        return bool(told.get("archive_sha256") == _file_sum(output))
+            return ""
+        return WHOLE if told.get("archive_sha256") == _file_sum(output) else DAMAGED
     except (OSError, ValueError):
-        return False
+        return ""
 
 
-def tidy(folder: Folder) -> None:
-    """Remove what a run left that was killed after its archive had got its name."""
+def tidy(folder: Folder, key: str) -> None:
+    """Remove what a run left that was killed after its archive had got its name; not what another campaign began."""
     folder.forget()
-    if folder.exists():
-        with contextlib.suppress(Busy):
-            folder.lock()
-            folder.remove()
+    if not folder.exists():
+        return
+    with contextlib.suppress(Busy, Problem):
+        folder.lock()
+        try:
+            if folder.described()["key"] == key:
+                folder.remove()
+        finally:
+            folder.close()
 
 
 def take_up(folder: Folder, campaign: Campaign, values: Sequence[Section], key: str, fresh: bool) -> Iterator[str]:

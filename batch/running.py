@@ -56,6 +56,9 @@ def run_and_tell(
     again = None
     if names_archive(source):
         again = replay(source, names, cases, failed)
+        if Path(output or again.output).resolve() == Path(source).resolve():
+            helps = "`-o FILE` names another place"
+            raise Problem(error("E305", f"cannot write {output}: it is what is run again", help=helps))
         campaign = prepare(
             again.plan, output=output or again.output, selected=again.selected, histories=histories or "all",
             float32=float32,

@@ -56,7 +56,12 @@ class Shard:
     @property
     def failed(self) -> int:
         """How many cases did not reach their end."""
-        return int(np.count_nonzero(self.outputs[:, 0])) + len(self.fates)
+        return self.failed_from(0)
+
+    def failed_from(self, first: int) -> int:
+        """The same of its cases from the `first` one on."""
+        first = max(first, 0)
+        return int(np.count_nonzero(self.outputs[first:, 0])) + sum(case >= first for case in self.fates)
 
 
 def write(path: Path, shard: Shard) -> None:
@@ -112,10 +117,9 @@ def read(path: Path) -> Shard:
     return Shard(head["key"], arrays["outputs"], arrays.get("history"), head["seconds"], fates)
 
 
-def cannot_keep(reason: OSError) -> str:
+def cannot_keep(folder: Path, reason: OSError) -> str:
     """In words, why a shard cannot be written."""
-    where = f" in {Path(os.fsdecode(reason.filename)).parent}" if reason.filename else ""
-    return f"cannot keep what was computed{where}: {(reason.strerror or str(reason)).lower()}"
+    return f"cannot keep what was computed in {folder}: {(reason.strerror or str(reason)).lower()}"
 
 
 def _type(array: np.ndarray) -> str:

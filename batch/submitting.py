@@ -14,7 +14,7 @@ from pathlib import Path
 from batch import resuming
 from batch.campaign import Campaign, values_sections
 from batch.folder import Busy, Folder, beside, gaps, put
-from batch.output import busy, cannot_write
+from batch.output import busy, cannot_write, check_room
 from batch.tasks import GRANULE, Task
 from met.diagnostic import Problem, error
 from met.frozen import frozen
@@ -56,8 +56,9 @@ def submit(
         raise Problem(error("E358", "there is no `sbatch` here", help=helps))
     values = values_sections(campaign)
     key = resuming.campaign_key(campaign, values)
-    if not fresh and resuming.is_whole(campaign, key):
+    if not fresh and resuming.there(campaign, key) == resuming.WHOLE:
         return None
+    check_room(campaign.output, campaign.bytes_missing)
     folder = Folder(beside(campaign.output))
     try:
         folder.lock()

@@ -94,12 +94,13 @@ class Done:
 
 def carry_out(
     section: Section, task: Task, folder: Path, *, threads: int | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[int], None] | None = None, computed: Callable[[], None] = lambda: None,
 ) -> Done:  # fmt: skip
-    """Run a task's cases and write its shard into the folder."""
-    computed = compute(section, task, threads=threads, progress=progress)
-    shard.write(folder / task.name, computed)
-    return Done(computed.seconds, computed.failed)
+    """Run a task's cases and write its shard into the folder. computed: called in between."""
+    found = compute(section, task, threads=threads, progress=progress)
+    computed()
+    shard.write(folder / task.name, found)
+    return Done(found.seconds, found.failed)
 
 
 def compute(

@@ -60,14 +60,17 @@ def main(arguments: list[str]) -> None:
             section = sections[task.section]
             section.prepared.kernel  # noqa: B018 - compiled here, so that a case's time does not begin before
             parent.tell(begun=[])
-            done = tasks.carry_out(section, task, folder.shards, threads=threads, progress=_slowly(parent))
+            done = tasks.carry_out(
+                section, task, folder.shards, threads=threads, progress=_slowly(parent),
+                computed=lambda: parent.tell(computed=[]),  # a slow disk is no case without an end
+            )  # fmt: skip
             parent.tell(done=[done.seconds, done.failed])
         except MemoryError:
             os._exit(NO_MEMORY)
         except Problem as problem:
             parent.tell(broken="; ".join(each.message for each in problem.diagnostics))
         except OSError as reason:
-            parent.tell(broken=cannot_keep(reason))
+            parent.tell(broken=cannot_keep(folder.path, reason))
 
 
 def _slowly(parent: Parent) -> Any:

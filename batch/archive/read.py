@@ -130,9 +130,32 @@ class Group:
             read = dataset.asstr() if words else dataset
             return np.array([read[int(position)] for position in positions], dtype=object if words else dataset.dtype)
 
+    def stretch(self, name: str, first: int, last: int) -> np.ndarray:
+        """A variable in the cases at positions `first` to `last`, not itself; strings as an array of str."""
+        with reading(self.path):
+            dataset = self._node[name]
+            if h5py().check_string_dtype(dataset.dtype) is not None:
+                return np.asarray(dataset.asstr()[first:last], dtype=object)
+            return np.asarray(dataset[first:last])
+
+    def raw(self, name: str, place: int) -> list[bytes] | None:
+        """The bytes of a signal's chunks of the recorded case at this place, with their checksums; None where they are
+        not chunked by case."""
+        with reading(self.path):
+            dataset = self._node[name]
+            chunks = dataset.chunks
+            if chunks is None or chunks[0] != 1 or chunks[2:] != dataset.shape[2:]:
+                return None
+            rest = (0,) * (len(chunks) - 2)
+            starts = range(0, dataset.shape[1], chunks[1])
+            return [dataset.id.read_direct_chunk((place, start, *rest))[1] for start in starts]
+
     def signal(self, name: str, position: int) -> np.ndarray:
         """History of one signal in the case at this position, which has one: (time,), then joints, then components."""
-        place = int(np.searchsorted(self.recorded_positions, position))
+        return self.recorded_signal(name, int(np.searchsorted(self.recorded_positions, position)))
+
+    def recorded_signal(self, name: str, place: int) -> np.ndarray:
+        """The same of the recorded case at this place along recorded_case."""
         with reading(self.path):
             return np.asarray(self._node[name][place])
 

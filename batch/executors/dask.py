@@ -32,6 +32,7 @@ WORKER_SECONDS = 60.0
 TELL_SECONDS = 0.1
 COUNT_SECONDS = 0.5
 CLOSE_SECONDS = 3.0
+FETCHES = 50
 
 # Run by name on the worker: as text, for code would have to suit the worker's Python, and a name to be known there.
 ERRAND = f"""
@@ -49,6 +50,18 @@ CALL = "exec(errand, told) or told['outcome']"
 
 def _say(text: str) -> None:
     print(text, file=sys.stderr)
+
+
+async def _held(future: Any) -> Any:
+    """What a Dask future holds. That it cannot be fetched may be a worker's end: then it will be computed again; or the
+    scheduler's, for which the future is cancelled, a little later."""
+    from distributed.comm import CommClosedError
+
+    for _ in range(FETCHES):
+        with suppress(CommClosedError):
+            return await future
+        await asyncio.sleep(TELL_SECONDS)
+    return await future
 
 
 class Dask:
@@ -172,6 +185,7 @@ class Dask:
 
     async def _carry_out(self, task: Task) -> Outcome:
         """Have a task run on some worker. One whose worker is lost is run again by Dask, on another."""
+        from distributed.comm import CommClosedError
         from distributed.scheduler import KilledWorker
 
         key = f"{self._name}-{task.name}-{uuid.uuid4().hex}"
@@ -183,12 +197,14 @@ class Dask:
         try:
             told = {"errand": ERRAND, "told": {"order": order}}
             dask_future = self._client.submit(eval, CALL, told, key=key, pure=False)
-            return self._outcome(task, await dask_future)
+            return self._outcome(task, await _held(dask_future))
         except KilledWorker as reason:
             return Outcome(task, "lost", why=f"died, each of {reason.allowed_failures + 1} of Dask's")
         except CancelledError:  # not by us: that would be asyncio's
             if self._client.status == "running":
                 return Outcome(task, "lost", why="was told by Dask to forget it")
+            return Outcome(task, "broken", why=LOST)
+        except CommClosedError:
             return Outcome(task, "broken", why=LOST)
         except Exception as reason:
             return Outcome(task, "broken", why=f"Dask cannot run a task: {str(reason) or type(reason).__name__}")

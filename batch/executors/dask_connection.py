@@ -7,6 +7,7 @@ import json
 import logging
 import os
 import signal
+import sys
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -19,6 +20,9 @@ from met.diagnostic import Problem, error
 
 CONNECT_SECONDS = 5.0
 """How long we try to reach a scheduler."""
+
+START_SECONDS = 60.0
+"""How long workers of this machine may take to start."""
 
 LOCAL = "local"
 
@@ -118,25 +122,37 @@ async def _greet(address: str) -> None:
 
 @contextmanager
 def _started(threads: int) -> Iterator[Any]:
+    """A client of a cluster on this machine. Raises Problem."""
     from distributed import Client, LocalCluster
 
+    unguarded = 'a script has to call batch.run below `if __name__ == "__main__":`, for its processes read it again'
+    if not _guarded():
+        raise Problem(error("E356", f"Dask's workers cannot start on this machine: {unguarded}"))
     workers = max(1, len(os.sched_getaffinity(0)) // threads)
     with tempfile.TemporaryDirectory(prefix="met-dask-", ignore_cleanup_errors=True) as scratch:
-        try:
+        with _interrupts_later():
             # the memory that tasks take is that of the workers' children, which Dask's limit does not count
-            with _interrupts_later():
-                cluster = LocalCluster(
-                    n_workers=workers, threads_per_worker=1, processes=True, memory_limit=0, local_directory=scratch,
-                    dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False},
-                    silence_logs=logging.CRITICAL,
-                )  # fmt: skip
-        except (OSError, RuntimeError) as reason:
-            said = str(reason).rstrip(".")
-            message = f"Dask's workers do not start on this machine: {said}; a script has to call batch.run below " \
-                      '`if __name__ == "__main__":`'  # fmt: skip
-            raise Problem(error("E356", message)) from None
+            cluster = LocalCluster(
+                n_workers=0, threads_per_worker=1, processes=True, memory_limit=0, local_directory=scratch,
+                dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL,
+            )  # fmt: skip
         with cluster, Client(cluster, set_as_default=False) as client:
+            cluster.scale(workers)
+            try:
+                client.wait_for_workers(workers, timeout=START_SECONDS)
+            except TimeoutError:
+                message = f"Dask's workers do not start on this machine within {START_SECONDS:g} s"
+                raise Problem(error("E356", message, help=unguarded)) from None
             yield client
+
+
+def _guarded() -> bool:
+    """Whether the program that runs may be read again by the processes that it starts, as Python does it."""
+    path = getattr(sys.modules["__main__"], "__file__", None)
+    try:
+        return path is None or "__main__" in Path(path).read_text(encoding="utf-8")
+    except (OSError, ValueError):  # no text: then it is no script of a user's
+        return True
 
 
 @contextmanager

@@ -22,10 +22,14 @@ class Threads:
     def __init__(self, threads: int | None = None) -> None:
         self._threads = threads or len(os.sched_getaffinity(0))
         self.about = f"{self._threads} thread{'s' if self._threads > 1 else ''}"
-        self.under_way = 0
+        self._computed = 0
         self._waiting: deque[Task] = deque()
         self._written: deque[tuple[Task, Done, Future[None]]] = deque()
         self._writer: ThreadPoolExecutor | None = None
+
+    @property
+    def under_way(self) -> int:
+        return self._computed + sum(task.cases for task, _, _ in self._written)
 
     def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
         self._folder, self._sections, self._tell = folder, sections, tell
@@ -44,7 +48,7 @@ class Threads:
             path = self._folder.shards / task.name
             writing = self._writer.submit(shard.write, path, computed)
             self._written.append((task, Done(computed.seconds, computed.failed), writing))
-            self.under_way = 0
+            self._computed = 0
         # one shard may be on its way to the disk, with its histories in memory
         ended = [self._written.popleft() for _ in range(len(self._written) - bool(self._waiting))]
         return [self._outcome(*each) for each in ended]
@@ -55,13 +59,12 @@ class Threads:
             self._writer.shutdown(wait=True)
 
     def _progress(self, done: int) -> None:
-        self.under_way = done
+        self._computed = done
         self._tell()
 
-    @staticmethod
-    def _outcome(task: Task, done: Done, writing: Future[None]) -> Outcome:
+    def _outcome(self, task: Task, done: Done, writing: Future[None]) -> Outcome:
         try:
             writing.result()
         except OSError as reason:
-            return Outcome(task, "broken", why=cannot_keep(reason))
+            return Outcome(task, "broken", why=cannot_keep(self._folder.path, reason))
         return Outcome(task, "done", done)

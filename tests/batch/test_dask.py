@@ -28,7 +28,6 @@ from met.diagnostic import Problem
 from met.version import VERSION
 from tests.batch import plans, whole
 
-CASES = 10_000
 HOST = os.uname().nodename
 
 
