@@ -13,8 +13,8 @@ from met.keys import LATER_FIELDS, SILENT_FIELDS
 from met.plan import Cases, Experiment, Formula, Plan, Quantity, Schedule
 
 
-def changes(before: Plan, now: Plan) -> list[str]:
-    """Each change that may change numbers, a line; none where there is none."""
+def changes(before: Plan, now: Plan, *, ordered: bool = True) -> list[str]:
+    """Each change that may change numbers, a line; none where there is none. ordered: another order of cases is one."""
     out = []
     old, new = ({experiment.name: experiment for experiment in plan.experiments} for plan in (before, now))
     if list(old) != list(new):
@@ -22,11 +22,11 @@ def changes(before: Plan, now: Plan) -> list[str]:
     for name in old:
         if name in new:
             head = f"{name}: " if len(new) > 1 else ""
-            out += [head + line for line in _experiment(old[name], new[name])]
+            out += [head + line for line in _experiment(old[name], new[name], ordered)]
     return out
 
 
-def _experiment(before: Experiment, now: Experiment) -> Iterator[str]:
+def _experiment(before: Experiment, now: Experiment, ordered: bool) -> Iterator[str]:
     yield from _schedule(before.structure.schedule, now.structure.schedule)
     yield from _fields("", replace(before.structure, schedule=now.structure.schedule), now.structure)
     for path in dict.fromkeys([*before.parameters, *now.parameters]):
@@ -36,7 +36,7 @@ def _experiment(before: Experiment, now: Experiment) -> Iterator[str]:
         elif _value(old) != _value(new) and not (isinstance(old.value, Formula) and isinstance(new.value, Formula)):
             place = new.origin.place
             yield f"{path}: {_shown(old)}, now {_shown(new)}" + (f" ({place.file}:{place.line})" if place else "")
-    yield from _cases(before.cases, now.cases)
+    yield from _cases(before.cases, now.cases, ordered)
     if before.formulas != now.formulas:
         yield "what follows from the varied parameters"
 
@@ -52,8 +52,9 @@ def _schedule(before: Schedule, now: Schedule) -> Iterator[str]:
             yield f"{name}: {old}, now {new}"
 
 
-def _cases(before: Cases, now: Cases) -> Iterator[str]:
-    old, new = ({c.path: c.values for c in cases.coordinates} for cases in (before, now))
+def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
+    old, new = ({c.path: c.values if ordered else np.sort(c.values) for c in cases.coordinates}
+                for cases in (before, now))  # fmt: skip
     if before.count != now.count:
         yield f"{before.count:,} cases, now {now.count:,}"
     for path in dict.fromkeys([*old, *new]):

@@ -298,8 +298,8 @@ class ArchiveFile:
             names, texts = node["source"].asstr()[...], node["source_text"].asstr()[...]
             return dict(zip(names.tolist(), texts.tolist(), strict=True))
 
-    def plan(self) -> Plan:
-        """The plan that was run, whole."""
+    def plan(self, *, as_written: bool = False) -> Plan:
+        """The plan that was run, whole. as_written: to be looked at, not run (met.plan_file.loads)."""
         from met import plan_file
         from met.plan_codec import Damaged
 
@@ -311,7 +311,7 @@ class ArchiveFile:
 
         with reading(self.path):
             node = self._file["provenance"]
-            return plan_file.loads(node["plan"].asstr()[()], str(self.path), fetch)
+            return plan_file.loads(node["plan"].asstr()[()], str(self.path), fetch, as_written=as_written)
 
 
 def check_signature(path: Path) -> None:

@@ -1,0 +1,36 @@
+"""`met diff`: a face of batch.diff."""
+
+from __future__ import annotations
+
+import click
+
+from met.cli import NO, YES, format_option
+
+
+@click.command(short_help="Say what changed between two archives, case by case.")
+@click.argument("a", metavar="A.h5")
+@click.argument("b", metavar="B.h5")
+@click.option("--tol", "tolerances", multiple=True, metavar="LIST", help="How much may differ: qd=1e-6rad/s,rel=1e-9,"
+              "time=1ms; may be repeated. Nothing may, unless it is given.")  # fmt: skip
+@click.option("--require", type=click.Choice(["identical", "equivalent"]), default="equivalent", show_default=True,
+              help="What is asked for.")  # fmt: skip
+@click.option("--distributions", is_flag=True, help="Compare metrics as distributions too, as where seeds differ.")
+@format_option
+def diff(a: str, b: str, tolerances: tuple[str, ...], require: str, distributions: bool, form: str) -> int:
+    """Compare two campaigns: one case or a million, of two versions of a deck, of its models, or of MET.
+
+    Cases are matched by what is varied in them. First what made the two, then status, then signals and metrics:
+    identical to the bit, equivalent within a tolerance, different, or incomparable. Exit status: 0 they are as
+    required; 1 they differ, or cannot be compared; 2 the input is wrong.
+    """
+    import json
+
+    from batch.diff.campaigns import diff
+    from batch.diff.compare import VERDICTS
+    from batch.diff.data import as_data
+    from batch.diff.told import told
+    from batch.diff.tolerance import tolerances as read
+
+    found = diff(a, b, read(tolerances), distributions=distributions)
+    click.echo(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(told(found)))
+    return YES if VERDICTS.index(found.verdict) <= VERDICTS.index(require) else NO

@@ -1,0 +1,53 @@
+"""`met diff --format json`: the same for programs; `schema` says which version of this layout it is."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from batch.diff.campaigns import Diff, Experiment, Signal
+from batch.summary import finite
+
+SCHEMA, VERSION = "met.diff", 1
+
+
+def as_data(found: Diff) -> dict[str, Any]:
+    """Plain data; a number that is not finite is null."""
+    data = {
+        "schema": SCHEMA, "version": VERSION, "a": str(found.a), "b": str(found.b), "verdict": found.verdict,
+        "tolerances": {
+            "relative": found.tolerances.relative, "time": found.tolerances.time,
+            "absolute": {name: size for name, (size, _) in found.tolerances.absolute.items()},
+        },
+        "changed": dataclasses.asdict(found.changed),
+        "only_a": list(found.only_a), "only_b": list(found.only_b),
+        "experiments": [_experiment(each) for each in found.experiments],
+    }  # fmt: skip
+    plain: dict[str, Any] = finite(data)
+    return plain
+
+
+def _experiment(found: Experiment) -> dict[str, Any]:
+    return {
+        "name_a": found.name_a, "name_b": found.name_b, "verdict": found.verdict, "cases": found.cases.count,
+        "cases_different": found.cases_different, "only_a": found.only_a, "only_b": found.only_b,
+        "ended": [dataclasses.asdict(each) for each in found.ended],
+        "requirements": [
+            {"text": text, "met_a": before, "met_b": after} for text, before, after in found.requirements
+        ],
+        "signals": [_signal(each) for each in found.signals],
+        "worst": [dataclasses.asdict(each) for each in found.worst],
+        "distributions": [{**dataclasses.asdict(each), "unlike": each.unlike} for each in found.samples],
+        "notes": found.notes,
+    }  # fmt: skip
+
+
+def _signal(found: Signal) -> dict[str, Any]:
+    kept = ("name", "unit", "metric", "compared", "identical", "equivalent", "different", "largest", "first",
+            "first_beyond", "used", "nan", "why")  # fmt: skip
+    return {
+        **{name: getattr(found, name) for name in kept}, "verdict": found.verdict, "rms": found.rms,
+        "share": found.share,
+        "place": None if found.place is None else dataclasses.asdict(found.place),
+        "tolerance": dataclasses.asdict(found.tolerance),
+    }  # fmt: skip

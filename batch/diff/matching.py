@@ -1,0 +1,98 @@
+"""Which experiment, case and signal of one archive is which of the other.
+
+Experiments are matched by name, or where each archive has one alone; cases by their case_key, which is made from what
+is varied alone; so the order of cases, and what else is in the archive, do not matter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from batch.archive.read import ArchiveFile, Group
+from met.frozen import frozen
+
+BLOCK = 1 << 16
+"""Names of cases that are read at a time."""
+
+
+@frozen
+class Cases:
+    """Matched cases, by their positions in the two groups; and positions of those that one of them has alone."""
+
+    a: np.ndarray
+    b: np.ndarray
+    only_a: np.ndarray
+    only_b: np.ndarray
+
+    @property
+    def count(self) -> int:
+        return len(self.a)
+
+
+def experiments(
+    a: ArchiveFile, b: ArchiveFile
+) -> tuple[list[tuple[Group, Group]], list[Group], list[Group]]:
+    """Matched groups, and those that one archive has alone."""
+    if len(a.groups) == len(b.groups) == 1:
+        return [(a.groups[0], b.groups[0])], [], []
+    theirs = {group.name: group for group in b.groups}
+    mine = {group.name for group in a.groups}
+    pairs = [(group, theirs[group.name]) for group in a.groups if group.name in theirs]
+    return (
+        pairs,
+        [group for group in a.groups if group.name not in theirs],
+        [group for group in b.groups if group.name not in mine],
+    )
+
+
+def cases(a: Group, b: Group) -> Cases:
+    """Match by case_key. Cases that share one are taken in order."""
+    keys_a, keys_b = _keys(a), _keys(b)
+    if np.array_equal(keys_a, keys_b):
+        both = np.arange(len(keys_a))
+        return Cases(both, both, both[:0], both[:0])
+    order_a, order_b = np.argsort(keys_a, kind="stable"), np.argsort(keys_b, kind="stable")
+    _, in_a, in_b = np.intersect1d(_nth(keys_a[order_a]), _nth(keys_b[order_b]), return_indices=True)
+    found_a, found_b = order_a[in_a], order_b[in_b]
+    by_a = np.argsort(found_a, kind="stable")
+    found_a, found_b = found_a[by_a], found_b[by_a]
+    only_a, only_b = (np.setdiff1d(np.arange(len(keys)), found) for keys, found in
+                      ((keys_a, found_a), (keys_b, found_b)))  # fmt: skip
+    return Cases(found_a, found_b, only_a, only_b)
+
+
+def _keys(group: Group) -> np.ndarray:
+    """The case_keys as whole numbers, [case]."""
+    out = np.empty(group.count, np.uint64)
+    for first in range(0, group.count, BLOCK):
+        texts = group.stretch("case_key", first, min(first + BLOCK, group.count))
+        out[first : first + len(texts)] = [int(text, 16) for text in texts]
+    return out
+
+
+def _nth(keys: np.ndarray) -> np.ndarray:
+    """Sorted keys, each with which of its equals it is."""
+    starts = np.concatenate([[True], keys[1:] != keys[:-1]]) if len(keys) else np.empty(0, bool)
+    place = np.arange(len(keys))
+    nth = place - np.maximum.accumulate(np.where(starts, place, 0))
+    out = np.empty(len(keys), dtype=[("key", np.uint64), ("nth", np.int64)])
+    out["key"], out["nth"] = keys, nth
+    return out
+
+
+def instants(a: np.ndarray, b: np.ndarray, early: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of two time axes that belong to the same instants, within `early` s."""
+    if len(a) == len(b) and np.array_equal(a, b):
+        return np.arange(len(a)), np.arange(len(b))
+    nearest = np.clip(np.searchsorted(b, a), 0, len(b) - 1)
+    before = np.clip(nearest - 1, 0, len(b) - 1)
+    nearest = np.where(np.abs(b[before] - a) < np.abs(b[nearest] - a), before, nearest)
+    close = np.abs(b[nearest] - a) <= np.maximum(early, 1e-9 * np.maximum(np.abs(a), 1e-3))
+    return np.flatnonzero(close), nearest[close]
+
+
+def names(a: Sequence[str], b: Sequence[str]) -> list[str]:
+    """Those of both, in the order of the first, then of the second."""
+    return list(dict.fromkeys([*a, *b]))

@@ -1,0 +1,75 @@
+"""Metrics as distributions: where seeds differ or motion is chaotic, single cases differ by chance, and only what they
+are like together can be compared.
+
+Each metric is compared by the two-sample test of Kolmogorov and Smirnov; as there are several, the probabilities are
+corrected by Holm's method, so that one false alarm among all of them has the stated probability at most.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from batch.archive.read import Group
+from met.frozen import frozen
+
+LEVEL = 0.01
+"""Probability of a false alarm among all metrics of an experiment."""
+
+
+@frozen
+class Sample:
+    """One metric in two archives.
+
+    cases        of a and b that have a finite value;  medians: of these;  failures: cases of a and b that have none
+    distance     the largest between the two distribution functions
+    probability  of such a distance by chance, corrected for the number of metrics
+    """
+
+    name: str
+    unit: str
+    cases: tuple[int, int]
+    medians: tuple[float, float]
+    failures: tuple[int, int]
+    distance: float
+    probability: float
+
+    @property
+    def unlike(self) -> bool:
+        return self.probability < LEVEL
+
+
+def samples(a: Group, b: Group) -> list[Sample]:
+    """Every metric that both have, in the order of the first."""
+    from scipy.stats import ks_2samp
+
+    found = []
+    for variable in a.role("metric"):
+        if variable.name not in b.variables or b.variables[variable.name].role != "metric":
+            continue
+        both = [group.values(variable.name) for group in (a, b)]
+        finite: Any = [values[np.isfinite(values)] for values in both]
+        sizes = len(finite[0]), len(finite[1])
+        lost = len(both[0]) - sizes[0], len(both[1]) - sizes[1]
+        medians = tuple(float(np.median(values)) if len(values) else float("nan") for values in finite)
+        distance, chance = 0.0, 1.0
+        if min(sizes) > 0:
+            result: Any = ks_2samp(finite[0], finite[1], method="auto" if max(sizes) <= 10_000 else "asymp")
+            distance, chance = float(result.statistic), float(result.pvalue)
+        found.append((variable, sizes, medians, lost, distance, chance))
+    corrected = holm([each[-1] for each in found])
+    return [
+        Sample(variable.name, variable.unit, sizes, (medians[0], medians[1]), lost, distance, chance)
+        for (variable, sizes, medians, lost, distance, _), chance in zip(found, corrected, strict=True)
+    ]
+
+
+def holm(chances: list[float]) -> list[float]:
+    """Probabilities of several tests, each as if it were the only one, corrected for their number."""
+    order = sorted(range(len(chances)), key=lambda i: chances[i])
+    out, largest = [1.0] * len(chances), 0.0
+    for rank, i in enumerate(order):
+        largest = max(largest, min(1.0, (len(chances) - rank) * chances[i]))
+        out[i] = largest
+    return out
