@@ -7,7 +7,7 @@ batch/performing.py runs what is missing, and puts it together.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -108,6 +108,7 @@ def prepare(
     histories: str | int | Sequence[str | int] = "default",
     float32: bool = False,
     selected: Sequence[tuple[Experiment, np.ndarray]] | None = None,
+    kept: Mapping[str, np.ndarray] | None = None,
 ) -> Campaign:
     """Settle what will be run; raises Problem for anything that would stop it later, and writes nothing.
 
@@ -117,6 +118,7 @@ def prepare(
     histories    what to keep (batch/keep.py), one word or several
     float32      keep histories as numbers of four bytes
     selected     experiments with rows of their case tables, in place of `experiments` and `cases`
+    kept         rows whose histories are kept, by the experiment's name, in place of `histories`
     """
     if selected is None:
         selected = choosing.selected(choosing.experiments_named(plan, experiments), cases)
@@ -125,6 +127,8 @@ def prepare(
     wanted = keep(histories, named)
     words = (histories,) if isinstance(histories, str | int) else tuple(histories)
     parts = _parts(selected, wanted, float32)
+    if kept is not None:
+        parts = tuple(replace(part, kept=np.searchsorted(part.rows, kept[part.experiment.name])) for part in parts)
     notes: list[str] = []
     whole = sum(part.bytes for part in parts)
     if wanted.default and whole > KEPT_BYTES:

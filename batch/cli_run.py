@@ -35,7 +35,8 @@ SECONDS = Seconds()
 @click.command(short_help="Run the cases of a deck or a plan into an archive.")
 @click.argument("source", metavar="DECK|PLAN.json|ARCHIVE.h5")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
-@click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck.")
+@click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck; all cases of "
+              "an archive.")  # fmt: skip
 @click.option("-o", "--output", metavar="FILE", help="The archive [DECK.h5, or DECK.NAME.h5, in this folder].")
 @click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'.")
 @click.option("--failed", is_flag=True, help="Of an archive: run the cases again that did not reach their end.")

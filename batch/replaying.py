@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +19,14 @@ MOST_TOLD = 8
 
 @frozen
 class Replay:
-    """What of an archive is run again: its plan, and of each experiment the rows of the case table."""
+    """What of an archive is run again: its plan, and of each experiment the rows of the case table; `kept`, by name,
+    those whose histories the archive has, where all of it is run again."""
 
     archive: Path
     plan: Plan
     selected: tuple[tuple[Experiment, np.ndarray], ...]
     word: str
+    kept: Mapping[str, np.ndarray] | None = None
 
     @property
     def output(self) -> Path:
@@ -32,8 +34,11 @@ class Replay:
         return Path(f"{self.archive.stem}.{self.word}.h5")
 
 
-def replay(archive: str | Path, names: Sequence[str], cases: Sequence[str], failed: bool) -> Replay:
-    """What is asked for. cases: as `met show` takes them; failed: all that did not reach their end. Raises Problem."""
+def replay(
+    archive: str | Path, names: Sequence[str], cases: Sequence[str], failed: bool = False, everything: bool = False
+) -> Replay:
+    """What is asked for. cases: as `met show` takes them; failed: all that did not reach their end; everything: all of
+    the archive, with the histories that it has. Raises Problem."""
     with ArchiveFile(archive) as file:
         rows: dict[str, set[int]] = {}
         for case in cases:
@@ -44,21 +49,32 @@ def replay(archive: str | Path, names: Sequence[str], cases: Sequence[str], fail
             for group in chosen(file, names):
                 for position in np.flatnonzero(group.values("status") != 0).tolist():
                     rows.setdefault(group.name, set()).add(_row(group, position))
-        if not cases and not failed:
-            helps = ("`--case '#7'` runs a case again, `--failed` all that failed", "`met show` lists the cases")
+        positions: dict[str, np.ndarray] = {}
+        for group in chosen(file, names) if everything else ():
+            rows[group.name] = set(group.values("case").tolist())
+            positions[group.name] = group.values("case")[group.recorded_positions]
+        if not cases and not failed and not everything:
+            helps = ("`--case '#7'` runs a case again, `--failed` all that failed, `--all` all",
+                     "`met show` lists the cases")  # fmt: skip
             raise Problem(error("E357", f"which cases of {file.path} are to be run again?", help=helps))
         if not rows:
             raise Problem(error("E357", f"no case of {file.path} failed: there is nothing to run again"))
         plan = file.plan()
         picked_rows = []
+        kept: dict[str, np.ndarray] = {}
         for experiment in plan.experiments:
             if experiment.name in rows:
                 table = experiment.cases.table
                 wanted = np.searchsorted(table, sorted(rows[experiment.name]))
                 picked_rows.append((experiment, np.asarray(wanted, dtype=np.int64)))
+                if everything:
+                    kept[experiment.name] = np.searchsorted(table, positions[experiment.name])
     few = sorted({position for positions in rows.values() for position in positions})
-    word = "failed" if failed else "case" + "-".join(map(str, few)) if len(few) <= 4 else "cases"
-    return Replay(Path(archive), plan, tuple(picked_rows), word)
+    if everything:
+        word = "again"
+    else:
+        word = "failed" if failed else "case" + "-".join(map(str, few)) if len(few) <= 4 else "cases"
+    return Replay(Path(archive), plan, tuple(picked_rows), word, kept if everything else None)
 
 
 def _row(group: Group, position: int) -> int:
@@ -100,15 +116,16 @@ def _signals(old: Group, new: Group, places: np.ndarray, ran: np.ndarray) -> lis
                 a, b = old.signal(variable.name, int(places[place])), new.signal(variable.name, place)
                 if a.shape == b.shape and a.dtype == b.dtype and not _alike(a, b).all():
                     row = int(np.argmin(_alike(a, b).reshape(len(a), -1).all(axis=1)))
-                    time = new.values("time")[row]
-                    out.append(f"#{new.values('case')[place]} of {new.name}: {variable.name} differs from {time:g} s on")
+                    case, time = new.values("case")[place], new.values("time")[row]
+                    out.append(f"#{case} of {new.name}: {variable.name} differs from {time:g} s on")
     return out
 
 
 def _alike(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     if before.dtype.kind == "f":
         whole = np.dtype(f"i{before.dtype.itemsize}")
-        same = np.ascontiguousarray(before).view(whole) == np.ascontiguousarray(after, before.dtype).view(whole)
+        bits = [np.ascontiguousarray(values, before.dtype).view(whole) for values in (before, after)]
+        same = bits[0] == bits[1]
         return np.asarray(same | (np.isnan(before) & np.isnan(after)))
     return np.asarray(before == after)
 

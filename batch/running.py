@@ -55,13 +55,14 @@ def run_and_tell(
     executor = choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
     again = None
     if names_archive(source):
-        again = replay(source, names, cases, failed)
+        again = replay(source, names, cases, failed, everything)
         if Path(output or again.output).resolve() == Path(source).resolve():
             helps = "`-o FILE` names another place"
             raise Problem(error("E305", f"cannot write {output}: it is what is run again", help=helps))
         campaign = prepare(
-            again.plan, output=output or again.output, selected=again.selected, histories=histories or "all",
-            float32=float32,
+            again.plan, output=output or again.output, selected=again.selected,
+            histories=histories or ("all" if again.kept is None else "none"),
+            kept=again.kept if not histories else None, float32=float32,
         )  # fmt: skip
     else:
         plan = read_plan(

@@ -131,7 +131,7 @@ def check_options(
         made = f"`met plan DECK --set '{settings[0]}' -o {source}` makes another"
         raise click.UsageError(f"--set is for decks: `{source}` is a plan, whose values are settled; {made}")
     if names_archive(source):
-        for option, wanted in (("-D", defines), ("-I", include_dirs), ("--set", settings), ("--all", everything)):
+        for option, wanted in (("-D", defines), ("-I", include_dirs), ("--set", settings)):
             if wanted:
                 raise click.UsageError(f"{option} is for decks: `{source}` is an archive, of what was run")
 

@@ -162,15 +162,17 @@ def component_dimensions(experiment: Experiment) -> dict[tuple[str, ...], str]:
 
 def coordinate_unit(experiment: Experiment, coordinate: Coordinate) -> str:
     """SI unit of a coordinate's values: that of the parameter it sets, else of the unit the deck wrote."""
-    for path in coordinate.sets:
-        if path in experiment.parameters:
-            return experiment.parameters[path].unit
     from met import units
 
     try:
-        return units.text(units.parse_unit(coordinate.unit).dimension)
+        written = units.parse_unit(coordinate.unit).dimension
     except ValueError:
         return coordinate.unit
+    for path in coordinate.sets:  # a `let` may set parameters of other dimensions too
+        unit = experiment.parameters[path].unit if path in experiment.parameters else ""
+        if unit and units.same(units.parse_unit(unit).dimension, written):
+            return unit
+    return units.text(written)
 
 
 def metric_unit(experiment: Experiment, use: MetricUse) -> str:

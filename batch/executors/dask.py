@@ -34,7 +34,8 @@ COUNT_SECONDS = 0.5
 CLOSE_SECONDS = 3.0
 FETCHES = 50
 
-# Run by name on the worker: as text, for code would have to suit the worker's Python, and a name to be known there.
+# What a worker runs, as text: code would have to suit its Python, and a name would have to be known to it, and to the
+# scheduler.
 ERRAND = f"""
 try:
     from batch.executors.dask_worker import carry_out
@@ -83,7 +84,7 @@ class Dask:
         self._name = f"met-{uuid.uuid4().hex}"
         self._token = f".{self._name}"  # a worker that sees this file sees the same folder, and no other of its name
         self._workers: dict[str, int] = {}
-        self._seen = 0.0
+        self._counted, self._seen = False, 0.0
         self._running: dict[Future[Outcome], Task] = {}
         self._opened = ExitStack()
 
@@ -98,9 +99,9 @@ class Dask:
         return text if threads == workers else f"{text} with {threads} threads"
 
     def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
-        self._folder, self._sections, self._tell = folder.path.resolve(), sections, tell
         from batch.executors.dask_worker import dismiss
 
+        self._folder, self._sections, self._tell = folder.path.resolve(), sections, tell
         with ExitStack() as opened:
             self._client = opened.enter_context(connected(self._dask, self._threads))
             opened.callback(self._tell_all, dismiss)
@@ -142,10 +143,12 @@ class Dask:
         """Wait for a worker, but not for ever. Raises Problem."""
         where = self._client.scheduler.address
         self._seen = time.monotonic()
-        time.sleep(TELL_SECONDS)
-        if not self._workers:
-            self._say(f"Dask's scheduler at {where} has no worker yet: waiting for one, {WORKER_SECONDS:g} s at most")
+        told = False
         while not self._workers:
+            if self._counted and not told:
+                told = True
+                until = f"waiting for one, {WORKER_SECONDS:g} s at most"
+                self._say(f"Dask's scheduler at {where} has no worker yet: {until}")
             if why := self._stuck():
                 helps = f"`dask worker {where}` starts one, where MET is installed and this folder is seen"
                 raise Problem(error("E356", why, help=helps))
@@ -181,6 +184,7 @@ class Dask:
                 self._workers = {}
             if self._workers:
                 self._seen = time.monotonic()
+            self._counted = True
             await asyncio.sleep(COUNT_SECONDS)
 
     async def _carry_out(self, task: Task) -> Outcome:
@@ -198,11 +202,11 @@ class Dask:
             told = {"errand": ERRAND, "told": {"order": order}}
             dask_future = self._client.submit(eval, CALL, told, key=key, pure=False)
             return self._outcome(task, await _held(dask_future))
-        except KilledWorker as reason:
-            return Outcome(task, "lost", why=f"died, each of {reason.allowed_failures + 1} of Dask's")
+        except KilledWorker:
+            return Outcome(task, "lost", why="died with its Dask worker")
         except CancelledError:  # not by us: that would be asyncio's
             if self._client.status == "running":
-                return Outcome(task, "lost", why="was told by Dask to forget it")
+                return Outcome(task, "lost", why="was told by Dask to stop")
             return Outcome(task, "broken", why=LOST)
         except CommClosedError:
             return Outcome(task, "broken", why=LOST)

@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 import tempfile
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -97,13 +98,16 @@ def _address(called: str) -> str:
 def _reached(address: str) -> Iterator[Any]:
     """A client of the scheduler at an address. Raises Problem."""
     from distributed import Client
+    from distributed.versions import VersionMismatchWarning
 
     try:
         # First without a client: one that reaches nothing goes on trying, and complains when the program ends. In a
         # thread, for there may be an event loop in this one, in a notebook for instance.
         with ThreadPoolExecutor(1) as thread:
             thread.submit(asyncio.run, _greet(address)).result()
-        client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", VersionMismatchWarning)  # what it is about does not travel
+            client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except Exception as reason:  # anything at all, where the address is none or something else answers
         helps = "`dask scheduler` starts one, and says its address"
         raise Problem(error("E356", f"no Dask scheduler answers at `{address}`", help=helps)) from reason

@@ -198,7 +198,8 @@ class TestWorkersThatCannotServe:
         with cluster(tmp_path) as started:
             found = outcome(Dask(started.scheduler_address), many, folder.shards.rmdir)
         assert found.kind == "broken"
-        assert found.why == f"on {HOST}, cannot keep what was computed in {folder.shards}: no such file or directory"
+        assert found.why.startswith(f"on {HOST}, cannot keep what was computed in {folder.path}")
+        assert found.why.endswith(": no such file or directory")
 
     def test_one_that_fails_at_dask_itself(self, many: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(executor, "CALL", "1 / 0")
