@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from met.frozen import frozen
 
 if TYPE_CHECKING:
+    from batch.differences.campaigns import Diff
     from batch.drive import Progress
     from batch.executors import Executor
     from batch.summary import Summary
@@ -87,6 +88,27 @@ def run(
     )
     performed = perform(campaign, executor=chosen, fresh=fresh, max_failures=max_failures, progress=progress)
     return look(campaign.output, (*campaign.notes, *performed.notes))
+
+
+def diff(
+    a: str | os.PathLike[str],
+    b: str | os.PathLike[str],
+    *,
+    tolerances: str | Sequence[str] = (),
+    distributions: bool = False,
+) -> Diff:
+    """What changed between two archives: `verdict` is identical, equivalent, different or incomparable.
+
+    tolerances     as `met diff --tol` has them: "qd=1e-6rad/s,rel=1e-9,time=1ms"; nothing may differ unless it is given
+    distributions  compare metrics as distributions too, as is done where seeds differ
+
+    Raises met.diagnostic.Problem.
+    """
+    from batch.differences.campaigns import diff as compared
+    from batch.differences.tolerance import tolerances as read
+
+    texts = [tolerances] if isinstance(tolerances, str) else tolerances
+    return compared(Path(a), Path(b), read(texts), distributions=distributions)
 
 
 def _plan(given: object) -> Plan:

@@ -1,4 +1,4 @@
-"""`met diff`: a face of batch.diff."""
+"""`met diff`: a face of batch.differences."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def diff(a: str, b: str, tolerances: tuple[str, ...], require: str, distribution
     """
     import json
 
-    from batch.diff.campaigns import diff
-    from batch.diff.compare import VERDICTS
-    from batch.diff.data import as_data
-    from batch.diff.told import told
-    from batch.diff.tolerance import tolerances as read
+    from batch.differences.campaigns import diff
+    from batch.differences.compare import VERDICTS
+    from batch.differences.data import as_data
+    from batch.differences.told import told
+    from batch.differences.tolerance import tolerances as read
 
     found = diff(a, b, read(tolerances), distributions=distributions)
     click.echo(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(told(found)))

@@ -21,6 +21,7 @@ from met.diagnostic import Place, Problem, did_you_mean, error
 from met.entry_points import offered
 from met.frozen import frozen
 from met.parameter import Parameter
+from met.plan import Structure
 
 Kind = Literal["servo", "environment", "command", "metric", "integrator", "bed", "law"]
 
@@ -168,6 +169,24 @@ def find(kind: Kind, name: str, place: Place | None = None) -> Any:
     near = did_you_mean(name, models)
     helps = [*near, f"{kind} models: {', '.join(sorted(models))}", *([] if near else [OF_ONES_OWN])]
     raise Problem(error("D140", f"no {kind} model `{name}`", place, help=helps))
+
+
+def packages(structures: Iterable[Structure]) -> tuple[str, ...]:
+    """The other packages whose models structures use, by name."""
+    used: dict[Kind, set[str]] = {kind: set() for kind in GROUPS}
+    for each in structures:
+        used["servo"] |= {servo.model for servo in each.servos}
+        used["command"] |= {servo.command.model for servo in each.servos if servo.command is not None}
+        used["environment"] |= {use.model for use in each.environment}
+        used["metric"] |= {use.model for use in each.metrics}
+        used["integrator"].add(each.integrator)
+        used["bed"] |= {use.bed for use in each.substitutions}
+        used["law"] |= {use.law for use in each.substitutions}
+    found = set()
+    for kind, names in used.items():
+        if theirs := names - find_own(kind).keys():
+            found |= {point.package for point in offered(GROUPS[kind].entry_points) if point.name in theirs}
+    return tuple(sorted(found))
 
 
 def find_own(kind: Kind) -> dict[str, Any]:

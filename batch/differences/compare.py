@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from batch.diff.tolerance import Tolerance
+from batch.differences.tolerance import Tolerance
 from met.frozen import frozen
 
 IDENTICAL, EQUIVALENT, DIFFERENT, INCOMPARABLE = "identical", "equivalent", "different", "incomparable"

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from batch.diff.campaigns import Diff, Signal, diff
-from batch.diff.tolerance import tolerances
+from batch.differences.campaigns import Diff, Signal, diff
+from batch.differences.tolerance import tolerances
 from met.plan import Experiment, Origin, Quantity
 from met.run import Run
-from tests.batch.diff.planted import CASES, order, two
+from tests.batch.differences.planted import CASES, order, two
 
 SIGNALS = {"q", "qd", "tau", "shoulder.servo.voltage", "settle", "volts"}
 
@@ -89,7 +89,7 @@ def test_not_a_number(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def test_a_case_that_fails_now_is_the_headline(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    from batch.diff.told import told
+    from batch.differences.told import told
 
     def plant(run: Run, place: dict[int, int]) -> None:
         if 123 in place:
@@ -186,7 +186,7 @@ def test_planted_changes_are_found_and_none_is_invented(
 def test_the_same_answer_for_programs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     import json
 
-    from batch.diff.data import as_data
+    from batch.differences.data import as_data
 
     def plant(run: Run, place: dict[int, int]) -> None:
         if 3 in place:

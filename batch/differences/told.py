@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from batch.diff.campaigns import Diff, Ended, Experiment, Ranked, Signal
-from batch.diff.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE
-from batch.diff.samples import LEVEL
+from batch.differences.campaigns import Diff, Ended, Experiment, Ranked, Signal
+from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE
+from batch.differences.samples import LEVEL
 from batch.failures import STATUS, ranges
 from batch.output import quoted
 from batch.signals import number_text, pretty_unit
@@ -34,7 +34,7 @@ def _changed(found: Diff) -> Iterator[str]:
     changed = found.changed
     said = [
         *(f"versions   {line}" for line in changed.versions),
-        *(f"code       MET's program of `{name}` is another" for name in changed.code),
+        *(f"code       the program of `{name}` is another" for name in changed.code),
         *(f"structure  of `{name}` is another: bits cannot be expected to agree" for name in changed.structure),
         *_few("deck      ", changed.decks),
         *_few("changed   ", changed.meaning),
@@ -126,7 +126,7 @@ def _row(signal: Signal) -> list[str]:
     if begins < float("inf"):
         first = f"{begins:g} s"
     largest = number_text(signal.largest) if signal.largest or not signal.nan else ""
-    share = f"{100 * signal.share:.2g} %" if 0.0 < signal.share < float("inf") else ""
+    share = f"{number_text(float(f'{100 * signal.share:.2g}'))} %" if 0.0 < signal.share < float("inf") else ""
     if signal.nan:
         where = f"{signal.nan:,} not-a-number on one side" + (f", {where}" if where else "")
     unit = unit if largest else ""

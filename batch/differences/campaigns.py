@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group, Stored
-from batch.diff import matching
-from batch.diff.changed import Changed, changed
-from batch.diff.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE, VERDICTS, Difference, compare
-from batch.diff.matching import Cases
-from batch.diff.samples import Sample, samples
-from batch.diff.tolerance import Tolerance, Tolerances, check
+from batch.differences import matching
+from batch.differences.changed import Changed, changed
+from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE, VERDICTS, Difference, compare
+from batch.differences.matching import Cases
+from batch.differences.samples import Sample, samples
+from batch.differences.tolerance import Tolerance, Tolerances, check
 from met.frozen import frozen
 
 WORST = 20
