@@ -28,6 +28,13 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return batch.run(plans.plan(whole.long(CASES)), output=path, threads=1).path.read_bytes()
 
 
+@pytest.fixture(autouse=True)
+def scratch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a driver that is killed leaves of a local cluster is left where tests leave things."""
+    (tmp_path / "tmp").mkdir()
+    monkeypatch.setenv("TMPDIR", f"{tmp_path / 'tmp'}")
+
+
 @pytest.fixture
 def archive(tmp_path: Path) -> Path:
     """Where a campaign goes that takes seconds; its plan is `p.json` in the folder above."""
@@ -192,4 +199,4 @@ def test_a_script_that_lets_its_processes_run_it_again_is_told_so(tmp_path: Path
         "met.diagnostic.Problem: E356: Dask's workers cannot start on this machine: a script has to call batch.run "
         'below `if __name__ == "__main__":`, for its processes read it again\n'
     )
-    assert whole.beside_it(tmp_path / "a.h5") == ["p.json", "script.py"]
+    assert whole.beside_it(tmp_path / "a.h5") == ["p.json", "script.py", "tmp"]
