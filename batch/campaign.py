@@ -92,6 +92,11 @@ class Campaign:
         """About the size of the archive."""
         return sum(part.bytes for part in self.parts)
 
+    def bytes_of(self, histories: Sequence[tuple[Part, int]]) -> int:
+        """About the room for the histories of so many cases of each part, in shards and in the archive."""
+        whole = sum(part.experiment.structure.history_bytes // (2 if part.single else 1) * n for part, n in histories)
+        return self.bytes + 2 * whole
+
     @property
     def bytes_missing(self) -> int:
         """About the room on the disk that is needed until the archive is whole, beside the shards that are there."""

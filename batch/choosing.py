@@ -49,7 +49,9 @@ def selected(
             for e in experiments:
                 last[e.asked] = max(last.get(e.asked, 0), int(e.cases.table[-1]))
             counts = ", ".join(f"`{name}` has #0 {f'to #{row}' if row else 'alone'}" for name, row in last.items())
-            raise Problem(error("E311", f"no case `{_case_text(case)}`", help=[counts, "`met cases DECK` lists them"]))
+            meant = [f"a position is written `'#{case}'`"] if isinstance(case, str) and case.isdecimal() else []
+            helps = [*meant, counts, "`met cases DECK` lists them"]
+            raise Problem(error("E311", f"no case `{_case_text(case)}`", help=helps))
         if len(matches) > 1 and not _is_row(case):
             some = ", ".join(f"#{e.cases.table[row]} of `{e.asked}`" for e, row in matches[:4])
             message = f"case `{case}` may be any of {len(matches)}: {some}"

@@ -16,9 +16,12 @@ class Seconds(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """In seconds."""
+        import re
+
         from met import units
 
-        number, _, unit = str(value).strip().partition(" ")
+        split = re.fullmatch(r"([-+.\deE]*\d\.?)\s*(\D*)", str(value).strip())
+        number, unit = split.groups() if split else ("", "")
         try:
             seconds = float(number) * (units.parse_unit(unit).scale if unit else 1.0)
             if unit and not units.same(units.parse_unit(unit).dimension, units.parse_unit("s").dimension):
@@ -121,15 +124,18 @@ def status(where: str, form: str) -> int:
     import time
     from pathlib import Path
 
-    from batch.status import found, lines, report, whole
+    from batch.status import found, here, lines, report, whole
     from met.diagnostic import Problem, error
 
     folder = found(where)
     if folder is None:
-        if (data := whole(Path(where))) is None:
-            helps = "`met run DECK -o ARCHIVE` begins one; its folder is beside the archive until that is whole"
+        if (data := whole(Path(where.removesuffix(".campaign")))) is None:
+            others = here(Path(where).parent)
+            helps = ["campaigns here: " + ", ".join(others)] if others else []
+            helps.append("`met run DECK -o ARCHIVE` begins one; its folder is beside the archive until that is whole")
             raise Problem(error("E359", f"no campaign fills {where}", help=helps))
-        said = f"{where} is whole: {data['cases']:,} cases, begun at {data['began']}"
+        since = f", begun at {data['began']}" if data["began"] != "unknown" else ""
+        said = f"{data['archive']} is whole: {data['cases']:,} cases{since}"
         click.echo(json.dumps(data, indent=1) if form == "json" else said)
         return YES
     data = report(folder, time.time())

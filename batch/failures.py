@@ -14,8 +14,8 @@ from met.run import DONE, FAILED, LOST, TIMED_OUT
 STATUS = {DONE: "done", FAILED: "failed", TIMED_OUT: "timed out", LOST: "lost"}
 """Words for how a case ended."""
 
-MOST_RANGES = 200
-"""Stretches of cases that are listed of one cause."""
+MOST_RANGES, FEW = 120, 20
+"""Stretches of cases that are listed of one cause; of more, so few."""
 
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(e[-+]?\d+)?")
 
@@ -75,6 +75,7 @@ def ranges(cases: Sequence[int]) -> str:
             stretches[-1][1] = case
         else:
             stretches.append([case, case])
-    texts = [f"#{first}" if first == last else f"#{first}-#{last}" for first, last in stretches[:MOST_RANGES]]
-    left = sum(last - first + 1 for first, last in stretches[MOST_RANGES:])
+    most = MOST_RANGES if len(stretches) <= MOST_RANGES else FEW
+    texts = [f"#{first}" if first == last else f"#{first}-#{last}" for first, last in stretches[:most]]
+    left = sum(last - first + 1 for first, last in stretches[most:])
     return ", ".join(texts) + (f" and {left:,} more; `cause` in the archive has them all" if left else "")

@@ -16,6 +16,7 @@ from met.frozen import frozen
 from met.plan import Experiment
 from met.run import Run
 
+SINGLE = ("default", "all", "none", "every", "failed", "worst")
 WORDS = "default, all, none, every:N, failed, worst:N, worst:N:METRIC, or cases by '#7' or id"
 
 
@@ -74,8 +75,11 @@ def _with(found: Keep, word: str | int, experiments: Sequence[Experiment]) -> Ke
         return replace(found, worst=(*found.worst, (int(rest[0]), metric)))
     if word.startswith("#") or (word and all(c in "0123456789abcdef" for c in word)):
         return replace(found, cases=(*found.cases, word))
-    near = difflib.get_close_matches(name, ["default", "all", "none", "every", "failed", "worst"], n=1)
+    near = [each for each in difflib.get_close_matches(name, SINGLE, n=1) if each != name]
     helps = [*(f"did you mean `{each}`?" for each in near), f"what may be kept: {WORDS}"]
+    if "," in word:
+        helps.insert(0, "several words are given one by one: `" + " ".join(
+            f"--histories {each.strip()}" for each in word.split(",")) + "`")  # fmt: skip
     raise Problem(error("E351", f"histories `{word}` is none of the words that say what to keep", help=helps))
 
 

@@ -68,6 +68,11 @@ def check_output(output: Path, plan: Plan) -> None:
 def _check_output(output: Path, plan: Plan) -> None:
     from batch.archive.read import is_archive
 
+    for folder in (output, *output.parents):
+        if (folder / "campaign.json").exists() and folder.name.endswith(".campaign"):
+            archive = quoted(folder.with_name(folder.name.removesuffix(".campaign")))
+            remedy = f"what it fills is called {archive}: `-o {archive}`"
+            raise Problem(error("E305", f"cannot write {output}: {folder} is a campaign's folder", help=remedy))
     for target in (output, sidecar_path(output)) if output.name else (output,):  # the name of . and / is empty
         if target.is_dir():
             inside = quoted(target / default_output(plan))
@@ -108,7 +113,9 @@ def cannot_write(output: Path, reason: OSError, kept: str = "") -> Any:
 
 
 def busy(output: Path) -> Any:
-    helps = "wait until it is done, or give another name with `-o`"
+    helps = [
+        f"`met status {quoted(output)}` says how far it is", "wait until it is done, or give another name with `-o`",
+    ]  # fmt: skip
     return error("E307", f"cannot write {output}: another run is writing it now", help=helps)
 
 

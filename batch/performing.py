@@ -74,15 +74,15 @@ def perform(
     say           told, as it comes, what is found of an earlier run
     """
     values = values_sections(campaign)
-    key = resuming.campaign_key(campaign, values)
+    key = resuming.campaign_key(values)
     there = resuming.there(campaign, key)
     if there == resuming.WHOLE and not fresh:
         resuming.tidy(Folder(beside(campaign.output)), key)
         return Performed({}, whole=True)
+    if not there and not fresh:
+        resuming.guard(campaign)
     check_room(campaign.output, campaign.bytes_missing)
-    if ready is not None:
-        values[0].prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
-        ready()
+    values[0].prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
     folder = Folder(beside(campaign.output))
     try:
         folder.lock()
@@ -95,6 +95,8 @@ def perform(
     work = _Work(campaign, folder, values, key, max_failures, progress, say)
     try:
         work.begin(fresh)
+        if ready is not None:
+            ready()
         return work.run(executor or Threads(), together)
     except KeyboardInterrupt as interrupt:
         raise type(interrupt)(work.leave("interrupted")) from None
@@ -195,6 +197,8 @@ class _Work:
             if histories is not None:
                 self.sections[histories.number] = found[section.number] = histories
         if found:
+            parts = [(self.campaign.parts[section.experiment], len(section.rows)) for section in found.values()]
+            check_room(self.campaign.output, self.campaign.bytes_of(parts))
             resuming.describe(self.folder, self.campaign, self.sections.values(), self.key)
             missing = [(section, driver.find(section)) for section in found.values()]
             self._tell_found(first=False)
@@ -235,8 +239,10 @@ class _Work:
             }
             publish(self.campaign.output, temporary, sidecar)
             writer.close()
-        except BaseException:
+        except BaseException as reason:
             writer.abandon()
+            if writer.failure is not None and isinstance(reason, Exception):
+                raise writer.failure from reason
             raise
 
     def _timings(self) -> list[dict[str, Any]]:

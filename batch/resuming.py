@@ -9,31 +9,34 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from batch.archive.read import ArchiveFile
 from batch.campaign import Campaign, prepare
 from batch.changes import changes
 from batch.folder import Busy, Folder
 from batch.output import sidecar_path
+from batch.progress import duration
 from batch.tasks import Section
 from met import plan_file
 from met.diagnostic import Problem, error
 
 WHOLE, DAMAGED = "whole", "damaged"
 
+GUARDED_SECONDS = 60.0
+"""Of computing: a finished archive that took as long is not replaced by another campaign's unless it is asked for."""
+
 MOST_CHANGES = 8
 """Changes that a refusal names."""
 
 
-def campaign_key(campaign: Campaign, values: Sequence[Section]) -> str:
-    """Of all that decides the numbers of a campaign: code, what goes into it, and what is kept."""
-    told = [[section.name, section.key()] for section in values]
-    kept = [part.kept.tobytes().hex() if not part.all_recorded else "all" for part in campaign.parts]
-    later = [campaign.keep.failed, campaign.keep.worst]
-    return hashlib.sha256(json.dumps([told, kept, later]).encode()).hexdigest()
+def campaign_key(values: Sequence[Section]) -> str:
+    """Of all that decides the numbers of a campaign: code, and what goes into it. Which cases are run again for
+    their histories may change on the way."""
+    return hashlib.sha256(json.dumps([[section.name, section.key()] for section in values]).encode()).hexdigest()
 
 
 def proof(campaign: Campaign, key: str, archive: Path) -> dict[str, str]:
     """What is written beside a finished archive, so that `there` knows it again."""
-    return {"campaign": key, "plan_sha256": _plan_sum(campaign), "archive_sha256": _file_sum(archive)}
+    return {"campaign": key, "asked_sha256": _asked_sum(campaign), "archive_sha256": _file_sum(archive)}
 
 
 def there(campaign: Campaign, key: str) -> str:
@@ -42,11 +45,39 @@ def there(campaign: Campaign, key: str) -> str:
     output = campaign.output
     try:
         told = json.loads(sidecar_path(output).read_text(encoding="utf-8"))
-        if not isinstance(told, dict) or told.get("campaign") != key or told.get("plan_sha256") != _plan_sum(campaign):
+        asked = {"campaign": key, "asked_sha256": _asked_sum(campaign)}
+        if not isinstance(told, dict) or any(told.get(name) != value for name, value in asked.items()):
             return ""
         return WHOLE if told.get("archive_sha256") == _file_sum(output) else DAMAGED
     except (OSError, ValueError):
         return ""
+
+
+def guard(campaign: Campaign) -> None:
+    """Refuse to replace a finished archive of another campaign that took long. Raises Problem E353."""
+    try:
+        told = json.loads(sidecar_path(campaign.output).read_text(encoding="utf-8"))
+        seconds = sum(float(each["seconds"]) for each in told["experiments"])
+    except (OSError, ValueError, LookupError, TypeError):
+        return
+    if seconds < GUARDED_SECONDS or not campaign.output.exists():
+        return
+    try:
+        with ArchiveFile(campaign.output) as file:
+            found = changes(file.plan(as_written=True), campaign.plan)
+    except Problem:
+        found = ["it cannot be read any more"]
+    message = f"{campaign.output} holds another campaign, {duration(seconds)} of computing, and is left as it is"
+    raise Problem(error("E353", message, help=_what(found or ["what is asked for (`--case`, `--histories`)"])))
+
+
+def _what(found: Sequence[str]) -> list[str]:
+    """What has changed, and what to do."""
+    most = [*found[:MOST_CHANGES], *([f"and {len(found) - MOST_CHANGES} more"] if len(found) > MOST_CHANGES else [])]
+    return [
+        "changed since: " + most[0], *(f"               {each}" for each in most[1:]),
+        "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it",
+    ]  # fmt: skip
 
 
 def tidy(folder: Folder, key: str) -> None:
@@ -108,13 +139,8 @@ def _of_another(folder: Folder, campaign: Campaign, values: Sequence[Section], t
         found = ["its plan cannot be read any more"]
     if not found:
         found = _other_work(campaign, values, told)
-    most = found[:MOST_CHANGES] + ([f"and {len(found) - MOST_CHANGES} more"] if len(found) > MOST_CHANGES else [])
-    helps = [
-        "changed since: " + most[0], *(f"               {each}" for each in most[1:]),
-        "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it",
-    ]  # fmt: skip
     message = f"{folder.path} holds {done:,} cases of another campaign, and is left as it is"
-    return error("E353", message, help=helps)
+    return error("E353", message, help=_what(found))
 
 
 def _other_work(campaign: Campaign, values: Sequence[Section], told: dict[str, Any]) -> list[str]:
@@ -131,8 +157,9 @@ def _other_work(campaign: Campaign, values: Sequence[Section], told: dict[str, A
     return ["which cases were asked for, or whose histories are kept (`--case`, `--histories`)"]
 
 
-def _plan_sum(campaign: Campaign) -> str:
-    summed = hashlib.sha256()
+def _asked_sum(campaign: Campaign) -> str:
+    """Of the plan, the cases, and what is kept of them."""
+    summed = hashlib.sha256(json.dumps([campaign.keep.failed, campaign.keep.worst]).encode())
 
     def refer(experiment: Any, index: int) -> dict[str, Any]:
         if not index:
@@ -142,7 +169,7 @@ def _plan_sum(campaign: Campaign) -> str:
     text = plan_file.dumps(campaign.plan, refer)
     summed.update(text.encode())
     for part in campaign.parts:
-        summed.update(part.rows.tobytes())
+        summed.update(part.rows.tobytes() + b"kept" + part.kept.tobytes())
     return summed.hexdigest()
 
 

@@ -92,7 +92,11 @@ def run_and_tell(
         summaries = summarise(file)
         worst = worst_cases(file)
         tables = list(structures(file))
-        picture, excuse = (None, "") if no_picture else first_picture(file)
+        try:
+            picture, excuse = (None, "") if no_picture else first_picture(file)
+        except KeyboardInterrupt as interrupt:
+            say(f"{campaign.output} is whole; its picture is missing: `met plot {quoted(campaign.output)}`")
+            raise type(interrupt) from None
     ok = all(summary.ok for summary in summaries)
     unlike = differences(again.archive, campaign.output) if again is not None else []
     notes = [*performed.notes, *_compared(again, unlike)]

@@ -206,7 +206,9 @@ def _metric_numbers(metric: MetricSummary, single: bool) -> tuple[str, ...]:
     if single:
         return ("inf" if metric.infinite else "-" if metric.unknown else number_text(metric.median / scale),)
     values = (metric.minimum, metric.median, metric.maximum)
-    return tuple("-" if math.isnan(value) else number_text(value / scale) for value in values)
+    return tuple(
+        "-" if math.isnan(value) else "inf" if math.isinf(value) else number_text(value / scale) for value in values
+    )
 
 
 def _metric_words(metric: MetricSummary, single: bool) -> str:

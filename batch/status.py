@@ -10,10 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from batch.archive.read import ArchiveFile
 from batch.drive import Progress
-from batch.folder import Folder, beside, gaps, put
+from batch.folder import ENDING, Folder, beside, gaps, put
 from batch.output import sidecar_path
 from batch.progress import duration
+from met.diagnostic import Problem
 
 WRITE_SECONDS = 1.0
 
@@ -133,7 +135,8 @@ def lines(data: dict[str, Any]) -> list[str]:
     """The same for people."""
     from ic.printing.columns import columns
 
-    cases, done = (sum(each[name] for each in data["sections"]) for name in ("cases", "done"))
+    first = [each for each in data["sections"] if not each["again"]]
+    cases, done = (sum(each[name] for each in first) for name in ("cases", "done"))
     out = [f"{data['folder']}: {done:,} of {cases:,} cases are done"]
     rows = [[each["name"] + (", again for histories" if each["again"] else ""), f"{each['done']:,}",
              f"of {each['cases']:,}"] for each in data["sections"]]  # fmt: skip
@@ -164,7 +167,17 @@ def whole(archive: Path) -> dict[str, Any] | None:
         cases = sum(each["cases"] for each in told["experiments"])
         return {"archive": str(archive), "cases": cases, "began": str(told["began"])} if archive.is_file() else None
     except (OSError, ValueError, LookupError, TypeError):
+        pass
+    try:
+        with ArchiveFile(archive) as file:
+            return {"archive": str(archive), "cases": sum(group.count for group in file.groups), "began": "unknown"}
+    except Problem:
         return None
+
+
+def here(folder: Path) -> list[str]:
+    """Campaigns in a folder that are not finished."""
+    return sorted(path.name for path in folder.glob(f"*{ENDING}") if Folder(path).exists())
 
 
 AT_WORK = ("starting", "running", "merging")

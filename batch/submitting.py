@@ -55,7 +55,7 @@ def submit(
         helps = ("submit where SLURM's commands are, on a login node", "`met run` runs it on this machine")
         raise Problem(error("E358", "there is no `sbatch` here", help=helps))
     values = values_sections(campaign)
-    key = resuming.campaign_key(campaign, values)
+    key = resuming.campaign_key(values)
     if not fresh and resuming.there(campaign, key) == resuming.WHOLE:
         return None
     check_room(campaign.output, campaign.bytes_missing)
@@ -85,6 +85,17 @@ def submit(
         raise Problem(cannot_write(campaign.output, reason)) from reason
     finally:
         folder.close()
+    try:
+        return _hand_over(campaign, folder, count if cases else 0, cases, options)
+    except Problem:
+        if cases == campaign.cases:  # nothing is done that would be lost
+            folder.remove()
+        raise
+
+
+def _hand_over(campaign: Campaign, folder: Folder, count: int, cases: int, options: Sequence[str]) -> Submitted:
+    """Have sbatch take the array, of so many jobs, and the job that merges."""
+    program, tasks = str(shutil.which("sbatch")), folder.path / "jobs.json"
     logs = folder.path / "logs"
     logs.mkdir(exist_ok=True)
     name = campaign.output.stem
@@ -92,11 +103,12 @@ def submit(
     array = ""
     if cases:
         script = _script(folder.path, "share", '"$SLURM_ARRAY_TASK_ID"', shlex.quote(str(tasks.resolve())))
-        array = _sbatch([*common, f"--array=0-{count - 1}", f"--output={logs.resolve()}/%A_%a.log"], script)
+        words = [*common, f"--array=0-{count - 1}", f"--output={logs.resolve()}/%A_%a.log"]
+        array = _sbatch(words, script, bool(options))
     script = _script(folder.path, "together")
     after = [f"--dependency=afterany:{array}"] if array else []
-    end = _sbatch([*common, *after, f"--output={logs.resolve()}/%A.log"], script)
-    return Submitted(array, end, count if cases else 0, cases)
+    end = _sbatch([*common, *after, f"--output={logs.resolve()}/%A.log"], script, bool(options))
+    return Submitted(array, end, count, cases)
 
 
 def shares(missing: Sequence[Task], count: int) -> list[list[Task]]:
@@ -117,13 +129,14 @@ def _script(folder: Path, *words: str) -> str:
     ])  # fmt: skip
 
 
-def _sbatch(command: Sequence[str], script: str) -> str:
+def _sbatch(command: Sequence[str], script: str, more: bool) -> str:
     """Number of the job. Raises Problem E358 with SLURM's own words."""
     done = subprocess.run(command, input=script, capture_output=True, text=True)
     number = re.match(r"\d+", done.stdout.strip())
     if done.returncode != 0 or number is None:
         said = (done.stderr or done.stdout).strip().splitlines()
         words = said[-1] if said else "it said nothing"
-        helps = "what is given by `--sbatch` goes to sbatch as it is"
+        given = ["what is given by `--sbatch` goes to sbatch as it is"] if more else []
+        helps = [*given, "`met run` runs it on this machine"]
         raise Problem(error("E358", f"sbatch refuses the job: {words}", help=helps))
     return number.group()

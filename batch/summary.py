@@ -14,7 +14,8 @@ from met.frozen import frozen
 
 @frozen
 class MetricSummary:
-    """A metric over the cases that have one: how many, and the spread of the finite ones (SI).
+    """A metric over the cases that have one (SI): the smallest and largest finite values, and the median of all, of
+    which infinite ones are part: what half of the cases keep within.
 
     infinite    cases where it is infinite (a settling time that never comes);  unknown  where it is not a number
     deck_unit   the unit its requirement is written in, else that of its values; shown = value / deck_scale
@@ -112,8 +113,9 @@ def summary_of(group: Group, position: int | None = None) -> Summary:
 
 
 def _metric(variable: Stored, values: np.ndarray) -> MetricSummary:
-    finite = np.sort(values[np.isfinite(values)])
-    low, middle, high = (finite[0], median(finite), finite[-1]) if len(finite) else (np.nan,) * 3
+    finite, known = np.sort(values[np.isfinite(values)]), np.sort(values[~np.isnan(values)])
+    low, high = (finite[0], finite[-1]) if len(finite) else (np.nan, np.nan)
+    middle = median(known) if len(known) else np.nan
     infinite, unknown = int(np.isinf(values).sum()), int(np.isnan(values).sum())
     told = variable.attributes
     return MetricSummary(
@@ -125,7 +127,9 @@ def _metric(variable: Stored, values: np.ndarray) -> MetricSummary:
 def median(rising: np.ndarray) -> float:
     """The median of sorted numbers; numpy's own takes 60 ms to import."""
     half = len(rising) // 2
-    return float(rising[half] if len(rising) % 2 else 0.5 * (rising[half - 1] + rising[half]))
+    if len(rising) % 2 or rising[half - 1] == rising[half]:  # two infinite ones have no mean of another kind
+        return float(rising[half])
+    return float(0.5 * (rising[half - 1] + rising[half]))
 
 
 def as_json(summary: Summary) -> dict[str, Any]:

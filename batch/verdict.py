@@ -36,6 +36,9 @@ def announcement(campaign: Campaign, verbose: bool = False, *, notes: bool = Fal
     for part in campaign.parts:
         out += _part_lines(part, verbose)
         out += [f"  note: {note}" for note in part.experiment.notes] if notes else []
+    if campaign.keep.failed:
+        each = max(part.experiment.structure.history_bytes // (2 if part.single else 1) for part in campaign.parts)
+        out.append(f"and those of cases that fail: {size_text(each)} a case more")
     out += [f"note: {note}" for note in campaign.notes]
     return out
 

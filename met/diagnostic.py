@@ -85,7 +85,8 @@ class Problem(Exception):
         So the traceback in a notebook ends in the deck's line with its caret.
         """
         if not self.sources:
-            return super().__str__()
+            helps = (f"\n  {text}" for each in self.diagnostics for text in each.help)
+            return super().__str__() + "".join(helps)
         from met.render import render
 
         return "\n" + render(self.diagnostics, self.sources).rstrip("\n")

@@ -221,6 +221,12 @@ def _cause(experiment: Experiment, failure: float, number: float, tick: float) -
     unit = "kg" if prismatic else "kg m^2"
     head = f"t = {tick / experiment.structure.schedule.base_hz:g} s: joint {joint.name}: "
     where = f" ({joint.place.file}:{joint.place.line})" if joint.place else ""
+    if failure == SINGULAR and tick > 0.0:
+        return (
+            f"{head}D is not above 0 {unit} any more, so qdd is undefined{where}. At the start it was: usually the "
+            f"motion has diverged, and a step is too long for the servo, the arm or what acts on it (try a faster rate "
+            f"for the dynamics); or what is outboard has no inertia about this joint in this position."
+        )
     if failure == SINGULAR:
         return (
             f"{head}D is not above 0 {unit}, so qdd is undefined. Nothing outboard has inertia about this "

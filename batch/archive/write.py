@@ -95,6 +95,11 @@ class Writer:
         self._file.close()
         self._sink.settle()
 
+    @property
+    def failure(self) -> OSError | None:
+        """What the disk refused first, whatever HDF5 made of it."""
+        return self._sink.failure
+
     def close(self) -> None:
         """Let go of the file, which has its name by now."""
         self._sink.close()

@@ -12,6 +12,9 @@ def choose(
 ) -> Executor:
     """dask: the address of a scheduler, "local", or a `distributed.Client`. timeout: s that a case may go on without
     any progress; it takes processes, for a thread cannot be stopped."""
+    for name, count in (("threads", threads), ("processes", processes)):
+        if count is not None and count < 1:
+            raise ValueError(f"{name}={count}: at least 1")
     if dask is not None:
         if processes is not None:
             helps = "Dask's workers are its own; `--dask local` starts as many as there are cores"

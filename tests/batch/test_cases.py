@@ -85,7 +85,7 @@ def test_the_table_is_in_the_decks_units_and_marks_what_is_missed(here: Path) ->
         f"  #2  {ids[2][:8]}        0.03             20200    3333    5.334  met",
         f"  #3  {ids[3][:8]}        0.04             20000    2500    5.156  met",
     ]
-    assert "  settle   2500    3333   5000 ms  settling_time of shoulder.qd; infinite in 1" in lines
+    assert "  settle   2500    4167   5000 ms  settling_time of shoulder.qd; infinite in 1" in lines
 
 
 def test_a_pure_number_has_no_unit_and_may_be_in_per_cent(here: Path) -> None:

@@ -258,7 +258,8 @@ class TestSoManyMayFail:
         plan, path = small(here), here / "out" / "a.h5"
         assert stopped(plan, path, threads=1, max_failures=1) == (
             "error[E355]: 2 cases failed, more than the 1 allowed\n"
-            f" = help: what is done is kept in {path}.campaign: the same command goes on, with a larger `--max-failures`\n"
+            f" = help: what is done is kept in {path}.campaign: the same command goes on, with a larger "
+            "`--max-failures`\n"
             "\n1 error\n"
         )
         held = whole.shards(path)

@@ -16,7 +16,6 @@ import pytest
 import batch
 from batch import performing, shard, tasks
 from met import cli, plan_file
-from met.diagnostic import Problem
 from tests.batch import plans, whole
 from tests.batch.begun import CASES, OF_TASK, begin, flip, go_on, plan, refused, short_tasks
 
@@ -266,8 +265,8 @@ def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Disk]:
 def test_a_disk_that_fills_up_while_cases_are_run(disk: Disk, undisturbed: bytes) -> None:
     archive = disk.folder / "a.h5"
     assert refused(archive, executor=whole.Watched(after=2, then=disk.fill)) == (
-        f"error[E354]: the campaign cannot go on: cannot keep what was computed in {archive}.campaign: no space left on "
-        "device\n"
+        f"error[E354]: the campaign cannot go on: cannot keep what was computed in {archive}.campaign: no space left "
+        "on device\n"
         f" = help: what is done is kept in {archive}.campaign: the same command goes on\n"
         "\n1 error\n"
     )

@@ -150,6 +150,7 @@ class TestRefusedBeforeAnythingRuns:
         other = Sink(temporary_of(Path("a.h5")))
         assert self.run("a.h5") == (
             "error[E307]: cannot write a.h5: another run is writing it now\n"
+            " = help: `met status a.h5` says how far it is\n"
             " = help: wait until it is done, or give another name with `-o`\n"
             "\n1 error\n"
         )  # fmt: skip
@@ -383,7 +384,7 @@ class TestWhatIsSaid:
     def test_a_sweep_that_misses_says_why_it_ends_with_1(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert not run_and_tell(self.plan(here, plans.gains(20)), no_picture=True)
         said = capsys.readouterr().out.splitlines()
-        assert "  settle    2.5   3.878  8.636 s  settling_time of shoulder.qd; infinite in 1" in said
+        assert "  settle    2.5   4.004  8.636 s  settling_time of shoulder.qd; infinite in 1" in said
         assert "  require settle < 10 s  met by 19 of 20 (95 %)" in said
         assert said[-1] == "exit 1: not met everywhere: settle < 10 s, volts < 5 V"
 

@@ -163,7 +163,7 @@ def begun(folder: Path) -> None:
     made = Folder(folder / "deck.gains.h5.campaign")
     made.lock()
     [section] = values_sections(campaign)
-    resuming.describe(made, campaign, [section], resuming.campaign_key(campaign, [section]))
+    resuming.describe(made, campaign, [section], resuming.campaign_key([section]))
     tasks.carry_out(section, tasks.Task(0, 0, 3), made.shards)
     made.close()
 

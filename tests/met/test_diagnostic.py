@@ -8,9 +8,9 @@ import ic
 from met.diagnostic import Place, Problem, error
 
 
-def test_without_sources_a_problem_is_one_line() -> None:
+def test_without_sources_a_problem_is_its_messages_and_helps() -> None:
     problem = Problem([error("E301", "cannot read it", help="why not"), error("E310", "no such run")])
-    assert str(problem) == "E301: cannot read it; E310: no such run"
+    assert str(problem) == "E301: cannot read it; E310: no such run\n  why not"
 
 
 def test_with_sources_a_problem_shows_the_line() -> None:
