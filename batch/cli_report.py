@@ -1,0 +1,31 @@
+"""`met report`: face of batch.report."""
+
+from __future__ import annotations
+
+import click
+
+from met.cli import YES, loudness_options
+
+
+@click.command(short_help="Make one HTML page of an archive, to open anywhere and to send.")
+@click.argument("archive", metavar="ARCHIVE")
+@click.option("-o", "--output", metavar="FILE", help="The page [ARCHIVE.html].")
+@click.option("--run", "experiments", multiple=True, metavar="NAME", help="Only this run or sweep of the archive.")
+@click.option("--title", default="", metavar="TEXT", help="What stands above it [names of deck, runs and sweeps].")
+@loudness_options
+def report(
+    archive: str, output: str | None, experiments: tuple[str, ...], title: str, quiet: bool, verbose: bool
+) -> int:
+    """Write what an archive holds as one page: verdict, cases, worst cases, signals, parameters and where they come
+    from.
+
+    The page is whole in one file, opens without a network, and prints. Nothing is written over but a report of MET.
+    """
+    from batch.report import report as make
+    from ic.printing.columns import size
+
+    told = (lambda done: click.echo(f"stability of {done} cases is known", err=True)) if verbose else None
+    target = make(archive, output, experiments=experiments, title=title, progress=told)
+    if not quiet:
+        click.echo(f"{target}  ({size(target.stat().st_size)})")
+    return YES

@@ -1,0 +1,273 @@
+"""MCAP files for Foxglove and Lichtblick: https://mcap.dev. Their clock is the simulated time, from 0.
+
+    metadata     met.export: what made the file; met.case, one a case: what case it is
+    attachments  the deck's files, as they were read
+    /tf          foxglove.FrameTransforms: each link's frame in that of the link that carries it, at each row
+    /scene       foxglove.SceneUpdate: what the links look like, once
+    /log         foxglove.Log: how the cases went; one topic for all of them
+    /result      met.result: metrics, requirements, status, once at the end
+    /<signal>    of a signal, a field for each joint and component: `/qd.elbow`, `/reaction/force.elbow.x`
+
+Of several cases each has frames and topics of its own, under its prefix, as `/case7/qd`; all but the first are ghosts.
+The case of a link `world` aside, frames hang on `world`, which is the base.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from batch.archive.read import ArchiveFile
+from batch.export import scene, wire
+from batch.export.output import whole
+from batch.export.picking import Case, Column
+from batch.export.poses import Arm, arm_of
+from batch.export.said import Line, lines, result, varied
+from batch.export.wire import plain
+from batch.output import quoted
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.version import VERSION
+
+if TYPE_CHECKING:
+    from mcap.writer import Writer
+
+MAGIC = b"\x89MCAP0\r\n"
+ABOUT = "met.export"
+"""The record that an export of MET's begins with."""
+
+HEAD_BYTES = 1000
+OVERLAID = 8
+"""Cases that are shown together unless they are asked for by name."""
+
+BLOCK_ROWS = 1000
+"""Rows whose messages are made at once."""
+
+SECOND = 1_000_000_000
+
+Message = tuple[int, int, int, bytes]
+"""Time, ns; the case and channel, by which messages of one time are ordered; content."""
+
+
+def own(path: Path) -> bool:
+    """Whether a file is an export of MET's, whole or in part."""
+    with path.open("rb") as file:
+        head = file.read(HEAD_BYTES)
+    return head.startswith(MAGIC) and ABOUT.encode() in head
+
+
+def arms(file: ArchiveFile, cases: Sequence[Case], *, named: bool) -> list[Arm]:
+    """The arms of the cases. named: whether the cases were asked for one by one. Raises Problem E370, E372."""
+    if len(cases) > OVERLAID and not named:
+        helps = (f"`--case '#{cases[0].number}' --case '#{cases[1].number}'` shows these over one another",
+                 f"`met show {quoted(file.path)}` lists the cases, the worst first")  # fmt: skip
+        message = f"{len(cases):,} cases of `{cases[0].asked}` are too many to show over one another"
+        raise Problem(error("E372", message, help=helps))
+    plan = file.plan(as_written=True)
+    one_run = len({case.asked for case in cases}) == 1
+    prefixes = [f"case{case.number}/" if one_run else f"{case.asked}/case{case.number}/" for case in cases]
+    return [
+        arm_of(plan, case, prefix if len(cases) > 1 else "") for case, prefix in zip(cases, prefixes, strict=True)
+    ]
+
+
+def root(arms: Sequence[Arm]) -> str:
+    """The frame of the base."""
+    taken = any(arm.prefix + name == "world" for arm in arms for name in arm.poses)
+    return "base" if taken else "world"  # no link may be called `base`
+
+
+def topic(arm: Arm, name: str) -> str:
+    """The topic of a signal, in which dots would be taken for fields: `/case7/elbow/servo/voltage`."""
+    return f"/{arm.prefix}{name.replace('.', '/')}"
+
+
+def fields(columns: Sequence[Column]) -> tuple[wire.Field, ...]:
+    """The fields of a signal's messages: joints, components, or `value`."""
+    return wire.tree([column.parts or ("value",) for column in columns])
+
+
+def signals(case: Case) -> dict[str, list[Column]]:
+    """The columns of a case, by signal."""
+    out: dict[str, list[Column]] = {}
+    for column in case.columns:
+        out.setdefault(column.variable, []).append(column)
+    return out
+
+
+def write(file: ArchiveFile, arms: Sequence[Arm], output: Path) -> int:
+    """Write the cases of these arms; the number of their rows. Raises Problem E305."""
+    from mcap.writer import Writer
+
+    with whole(output) as sink:
+        writer = Writer(sink)  # type: ignore[arg-type]  # which writes, and tells where it is
+        writer.start(library=f"MET {VERSION}")
+        _about(writer, file, arms)
+        channels = Channels(writer)
+        streams = [_messages(channels, arms, number) for number in range(len(arms))]
+        for time, _, channel, data in heapq.merge(*streams):
+            writer.add_message(channel, time, data, time)
+            sink.check()
+        writer.finish()
+    return sum(len(arm.case.time) for arm in arms)
+
+
+def _about(writer: Writer, file: ArchiveFile, arms: Sequence[Arm]) -> None:
+    """What made the file, before all else: by it a later export knows that it may write over it."""
+    told = {"archive": file.path.name, "deck": file.deck, "arm": arms[0].experiment.structure.arm,
+            "base_frame": root(arms), "met": VERSION, **{name: str(value) for name, value in file.provenance.items()}}
+    writer.add_metadata(ABOUT, {plain(name): plain(value) for name, value in told.items()})
+    for arm in arms:
+        case, group = arm.case, arm.case.group
+        keys = {name: str(group.at(name, [case.position])[0]) for name in ("case_id", "case_key")
+                if name in group.variables}  # fmt: skip
+        data = {"prefix": arm.prefix, "run": case.asked, "case": str(case.number), **keys,
+                **{f"varied.{path}": value for path, value in varied(case).items()}}  # fmt: skip
+        writer.add_metadata("met.case", {plain(name): plain(value) for name, value in data.items()})
+    for name, text in file.sources().items():
+        writer.add_attachment(0, 0, plain(name), "text/plain", plain(text).encode())
+
+
+class Channels:
+    """The channels of a file. A schema that several have is in it once; schemas of one name are alike."""
+
+    def __init__(self, writer: Writer) -> None:
+        self._writer = writer
+        self._schemas: dict[tuple[str, bytes], int] = {}
+        self._described: dict[tuple[str, tuple[wire.Field, ...]], tuple[str, bytes]] = {}
+        self._topics: dict[str, int] = {}
+
+    def foxglove(self, topic: str, kind: Any) -> int:
+        """The channel of one of foxglove's messages."""
+        from mcap_protobuf.schema import build_file_descriptor_set
+
+        data = build_file_descriptor_set(kind).SerializeToString(deterministic=True)
+        return self._channel(topic, kind.DESCRIPTOR.full_name, data, {})
+
+    def own(self, topic: str, name: str, fields: tuple[wire.Field, ...], told: dict[str, str]) -> int:
+        """The channel of messages of our own. told: of the channel, such as units."""
+        if (name, fields) not in self._described:
+            used = {known.removeprefix(f"{wire.PACKAGE}.") for known, _ in self._described.values()}
+            numbered = (f"{name}_{number}" for number in itertools.count(2))  # of another structure of the sweep
+            unlike = next(each for each in itertools.chain([name], numbered) if each not in used)
+            self._described[name, fields] = f"{wire.PACKAGE}.{unlike}", wire.schema(unlike, fields)
+        return self._channel(topic, *self._described[name, fields], told)
+
+    def _channel(self, topic: str, name: str, data: bytes, told: dict[str, str]) -> int:
+        if topic in self._topics:
+            return self._topics[topic]
+        if (name, data) not in self._schemas:
+            self._schemas[name, data] = self._writer.register_schema(name, "protobuf", data)
+        schema = self._schemas[name, data]
+        self._topics[topic] = self._writer.register_channel(topic, "protobuf", schema, told)
+        return self._topics[topic]
+
+
+@frozen
+class Stream:
+    """A signal's messages to be made. values: its numbers, (row, column)."""
+
+    channel: int
+    fields: tuple[wire.Field, ...]
+    values: np.ndarray
+
+
+def _messages(channels: Channels, arms: Sequence[Arm], number: int) -> Iterator[Message]:
+    """The messages of a case, in the order of their times."""
+    from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+    from foxglove_schemas_protobuf.Log_pb2 import Log
+    from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+
+    arm, base = arms[number], root(arms)
+    case = arm.case
+    frames = channels.foxglove(topic(arm, "tf"), FrameTransforms)
+    drawn = channels.foxglove(topic(arm, "scene"), SceneUpdate)
+    log = channels.foxglove("/log", Log)
+    streams = [_stream(channels, arm, name, columns) for name, columns in signals(case).items()]
+    said = lines(case)
+    update = scene.scene(arm, base, number > 0, scene.size(arms))
+    yield 0, number, drawn, update.SerializeToString(deterministic=True)
+    yield from ((0, number, log, _log(case, arm, line)) for line in said if line.time == 0.0)
+    times = nanoseconds(case.time)
+    for first in range(0, len(times), BLOCK_ROWS):
+        here = slice(first, first + BLOCK_ROWS)
+        made = [(frames, _transforms(arm, base, times, here))]
+        made += [(stream.channel, wire.rows(stream.fields, stream.values[here])) for stream in streams]
+        for row, time in enumerate(times[here]):
+            for channel, messages in made:
+                yield time, number, channel, messages[row]
+    yield from ((_ns(line.time), number, log, _log(case, arm, line)) for line in said if line.time > 0.0)
+    parts, data = result(case)
+    units = {v.name.rpartition(".")[2]: v.unit for v in case.group.role("metric")}
+    told = {f"unit.{name}": unit for name, unit in units.items()}
+    channel = channels.own(topic(arm, "result"), "result", parts, told)
+    yield _ns(said[-1].time), number, channel, wire.message(parts, data)
+
+
+def _stream(channels: Channels, arm: Arm, name: str, columns: Sequence[Column]) -> Stream:
+    values = arm.case.signal(name)[:, [column.place for column in columns]]
+    parts = fields(columns)
+    units = {".".join(column.parts or ("value",)): column.unit for column in columns}
+    one = len(set(units.values())) == 1
+    told = {"unit": columns[0].unit} if one else {f"unit.{path}": unit for path, unit in units.items()}
+    channel = channels.own(topic(arm, name), name.replace(".", "_"), parts, {**told, "about": columns[0].about})
+    return Stream(channel, parts, values)
+
+
+def _transforms(arm: Arm, base: str, times: Sequence[int], here: slice) -> list[bytes]:
+    """The frames of all links at some rows."""
+    from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+    from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+    from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
+    from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
+
+    moved = []
+    for link, pose in arm.poses.items():
+        parent = arm.parents[link]
+        names = (base if parent == "base" else arm.prefix + parent, arm.prefix + link)
+        moved.append((*names, pose.position[here].tolist(), pose.orientation[here].tolist()))
+    out = []
+    for row, time in enumerate(times[here]):
+        stamp = _stamp(time)
+        message = FrameTransforms()
+        for parent, child, position, orientation in moved:
+            (px, py, pz), (w, x, y, z) = position[row], orientation[row]
+            place, turn = Vector3(x=px, y=py, z=pz), Quaternion(x=x, y=y, z=z, w=w)
+            message.transforms.append(
+                FrameTransform(
+                    timestamp=stamp, parent_frame_id=parent, child_frame_id=child, translation=place, rotation=turn
+                )
+            )
+        out.append(message.SerializeToString())
+    return out
+
+
+def _log(case: Case, arm: Arm, line: Line) -> bytes:
+    from foxglove_schemas_protobuf.Log_pb2 import Log
+
+    name = arm.prefix.rstrip("/") or case.asked
+    level = Log.Level.Value(line.level)
+    text = Log(timestamp=_stamp(_ns(line.time)), level=level, message=plain(line.text), name=name)
+    data: bytes = text.SerializeToString()
+    return data
+
+
+def nanoseconds(seconds: np.ndarray) -> list[int]:
+    """Simulated times as a clock has them."""
+    whole: list[int] = np.rint(seconds * SECOND).astype(np.int64).tolist()
+    return whole
+
+
+def _ns(seconds: float) -> int:
+    return nanoseconds(np.array([seconds]))[0]
+
+
+def _stamp(time: int) -> Any:
+    from google.protobuf.timestamp_pb2 import Timestamp
+
+    return Timestamp(seconds=time // SECOND, nanos=time % SECOND)

@@ -1,0 +1,75 @@
+"""A file that has its name only when it is whole, and what is not written over."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from batch.archive.sink import Busy, Sink, temporary_of
+from batch.output import quoted
+from met.diagnostic import Problem, error
+
+
+def check(output: Path, archive: Path, own: Callable[[Path], bool], *, force: bool) -> None:
+    """Refuse a place before anything is written. own: whether a file that is there is an export of MET's, and may go.
+    Raises Problem E305 where nothing can be written, E374 where something is there."""
+    try:
+        _check(output, archive, own, force)
+    except OSError as reason:
+        raise _cannot_write(output, reason) from reason
+
+
+def _check(output: Path, archive: Path, own: Callable[[Path], bool], force: bool) -> None:
+    if output.is_dir():
+        helps = f"name a file in it: `-o {quoted(output / archive.with_suffix('.mcap').name)}`"
+        raise Problem(error("E305", f"cannot write {output}: it is a folder", help=helps))
+    if not output.parent.is_dir():
+        what = "is a file, not a folder" if output.parent.exists() else "does not exist"
+        helps = "" if output.parent.exists() else f"make it first: `mkdir -p {quoted(output.parent)}`"
+        raise Problem(error("E305", f"cannot write {output}: {output.parent} {what}", help=helps or ()))
+    if not output.exists():
+        return
+    if not output.is_file():
+        raise Problem(error("E305", f"cannot write {output}: it is not a regular file"))
+    if output.samefile(archive):
+        message = f"{output} is the archive itself: it is not written over"
+        raise Problem(error("E374", message, help="give another name with `-o`"))
+    if not force and output.stat().st_size > 0 and not own(output):
+        message = f"{output} exists, and may hold work that is not in the archive: it is not written over"
+        raise Problem(error("E374", message, help="give another name with `-o`, or say `--force`"))
+
+
+@contextlib.contextmanager
+def whole(output: Path) -> Iterator[Sink]:
+    """A new file, which gets its name, in the stead of what had it, when the block has ended and all is on the disk.
+    What the block raises leaves nothing; what is killed leaves a file under a temporary name, which the next one takes
+    over. Raises Problem E305, E307."""
+    temporary = temporary_of(output)
+    try:
+        sink = Sink(temporary)
+        try:
+            yield sink
+            sink.settle()
+            temporary.replace(output)
+        except BaseException:
+            sink.remove()
+            raise
+        finally:
+            sink.close()
+        folder = os.open(output.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    except Busy:
+        helps = "wait until it is done, or give another name with `-o`"
+        raise Problem(error("E307", f"cannot write {output}: another export is writing it now", help=helps)) from None
+    except OSError as reason:
+        raise _cannot_write(output, reason) from reason
+
+
+def _cannot_write(output: Path, reason: OSError) -> Problem:
+    why = (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
+    return Problem(error("E305", f"cannot write {output}: {why}", help="`-o FILE` names another place"))

@@ -1,0 +1,134 @@
+"""What is exported: cases that have histories, and of their signals the numbers that are asked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from batch.archive.read import ArchiveFile, Group, Stored
+from batch.show import chosen, picked
+from batch.signals import panels
+from met.channel import channel_paths
+from met.diagnostic import Problem
+from met.frozen import frozen
+
+
+@frozen
+class Column:
+    """One number that changes in time.
+
+    path       of its channel, `elbow.qd`, `links.tip.position.x`
+    variable   the signal that has it;  place  among that signal's joints and components, counted as one
+    parts      its names within the signal: joint, component, each where there are some
+    """
+
+    path: str
+    unit: str
+    about: str
+    variable: str
+    place: int
+    parts: tuple[str, ...]
+
+
+@frozen
+class Case:
+    """A case that is exported.
+
+    position  in its group;  number  in the case table, as `--case '#7'` names it
+    time      of its rows, s: those before it failed, if it did
+    columns   of its signals, those of one signal side by side
+    """
+
+    group: Group
+    position: int
+    number: int
+    time: np.ndarray
+    columns: tuple[Column, ...]
+
+    @property
+    def asked(self) -> str:
+        """The run or sweep that it is of."""
+        return self.group.sweep or self.group.name
+
+    def signal(self, variable: str) -> np.ndarray:
+        """A signal's numbers, (row, place), as they lie in the archive."""
+        values = self.group.signal(variable, self.position)[: len(self.time)]
+        return values.reshape(len(values), math.prod(values.shape[1:]))
+
+
+def pick(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: Sequence[str]) -> list[Case]:
+    """The cases of these runs and sweeps (none: of the first), in the order they are asked for (none: all that have
+    histories, by their positions), with these signals. Raises Problem E321-E325, E328."""
+    names = tuple(runs) or (file.groups[0].sweep or file.groups[0].name,)
+    groups = chosen(file, names)
+    columns = _columns(groups, signals)
+    wanted = dict.fromkeys(
+        (group, group.recorded_position(case)) for case in cases for group, _ in picked(file, names, case)
+    )
+    for group, _ in wanted:
+        if group.name not in columns:
+            panels(group, signals)  # says which of them this structure of the sweep does not have
+    found = []
+    for group in groups:
+        if group.name in columns:
+            numbers, valid, time = (group.values(name) for name in ("case", "n_valid", "time"))
+            places = [place for other, place in wanted if other is group] if cases else group.recorded_positions
+            for place in map(int, places):
+                rows = time[: valid[place]]
+                found.append(Case(group, place, int(numbers[place]), rows, columns[group.name]))
+    if cases:
+        order = {key: at for at, key in enumerate(wanted)}
+        return sorted(found, key=lambda case: order[case.group, case.position])
+    ranks = {group.name: _rank(names, group) for group in groups}
+    return sorted(found, key=lambda case: (ranks[case.group.name], case.number))
+
+
+def _rank(names: Sequence[str], group: Group) -> int:
+    """The first of the names by which a group is asked for."""
+    return min(at for at, name in enumerate(names) if name in (group.name, group.sweep))
+
+
+def _columns(groups: Sequence[Group], signals: Sequence[str]) -> dict[str, tuple[Column, ...]]:
+    """The columns by group. A signal that only some structures of a sweep have is theirs; one that none has is a
+    Problem, and so are groups without histories."""
+    out: dict[str, list[Column]] = {}
+    known: dict[tuple[str, str], list[Column]] = {}
+    for name in signals or ("",):
+        problems = []
+        for group in groups:
+            try:
+                found = panels(group, [name] if name else [])
+            except Problem as problem:
+                problems.append(problem)
+                continue
+            for panel in found:
+                key = (group.name, panel.variable)
+                known[key] = known.get(key) or _columns_of(group, group.variables[panel.variable])
+                out.setdefault(group.name, []).extend(known[key][place] for place in panel.columns)
+        if len(problems) == len(groups):
+            raise problems[0]
+    return {name: _ordered(columns) for name, columns in out.items()}
+
+
+def _columns_of(group: Group, variable: Stored) -> list[Column]:
+    """All numbers of a signal."""
+    joints, components = group.joints(variable), group.components(variable)
+    owners: list[tuple[str, ...]] = [(joint,) for joint in joints] or [()]
+    inner: list[tuple[str, ...]] = [(component,) for component in components] or [()]
+    parts = [(*owner, *each) for owner in owners for each in inner]
+    units = [variable.units_by_joint[place // len(inner)] if variable.units_by_joint else variable.unit
+             for place in range(len(parts))]  # fmt: skip
+    paths = channel_paths(variable.name, joints, components)
+    return [
+        Column(path, unit, variable.long_name, variable.name, place, part)
+        for place, (path, unit, part) in enumerate(zip(paths, units, parts, strict=True))
+    ]
+
+
+def _ordered(columns: Sequence[Column]) -> tuple[Column, ...]:
+    """Each once: signals as they were asked for, and the numbers of each as they lie in it."""
+    signals = list(dict.fromkeys(column.variable for column in columns))
+    once = {column.path: column for column in columns}
+    return tuple(sorted(once.values(), key=lambda column: (signals.index(column.variable), column.place)))

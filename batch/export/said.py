@@ -1,0 +1,124 @@
+"""What a case says of itself: lines of a log at their times, and its result as one message."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+
+from batch.archive.read import Group, Stored
+from batch.export.picking import Case
+from batch.export.wire import Field
+from batch.failures import STATUS
+from batch.signals import case_text, value_text
+from met.frozen import frozen
+from met.run import DONE, FAILED
+
+Level = Literal["INFO", "WARNING", "ERROR"]
+
+FAILED_AT = re.compile(r"t = (\S+) s: ")
+"""How the cause of a case that failed begins."""
+
+OUTCOMES = {1: "met", 0: "missed", -1: "unknown"}
+
+
+@frozen
+class Line:
+    """A line of a log. time: s, simulated."""
+
+    time: float
+    level: Level
+    text: str
+
+
+def lines(case: Case) -> list[Line]:
+    """What case it is, how it ended and when, and what it met; in the order of their times."""
+    group, position = case.group, case.position
+    status, cause = int(_at(group, "status", position)), str(_at(group, "cause", position))
+    end = ends(case)
+    out = [Line(0.0, "INFO", case_text(group, position))]
+    if status == DONE:
+        out.append(Line(end, "INFO", "reached its end"))
+    else:
+        word = STATUS.get(status, "failed")
+        out.append(Line(end, "ERROR", f"{word}: {cause.removeprefix(f'{word}: ')}"))
+    if "bed_limited" in group.variables and (ticks := int(_at(group, "bed_limited", position))):
+        text = f"the load motor of a bed was at its limit for {ticks:,} ticks: the run is not what the joint would do"
+        out.append(Line(end, "WARNING", text))
+    metrics = {variable.name: variable for variable in group.role("metric")}
+    for text, outcome, name in _requirements(group, position):
+        has = f" ({name} = {_value(group, metrics[name], position)})" if name in metrics else ""
+        out.append(Line(end, "INFO" if outcome == "met" else "WARNING", f"require {text}: {outcome}{has}"))
+    return out
+
+
+def ends(case: Case) -> float:
+    """When a case ended, s: after its last row, at the instant when it failed if it says so."""
+    last = float(case.time[-1]) if len(case.time) else 0.0
+    group, position = case.group, case.position
+    if int(_at(group, "status", position)) == FAILED:
+        told = FAILED_AT.match(str(_at(group, "cause", position)))
+        try:
+            return max(last, float(told[1])) if told else last
+        except ValueError:
+            return last
+    return last
+
+
+def result(case: Case) -> tuple[tuple[Field, ...], dict[str, Any]]:
+    """The result of a case as a message: its fields and what is in them, in SI."""
+    group, position = case.group, case.position
+    metrics = group.role("metric")
+    numbers = (Field("name", "string"), Field("value"), Field("unit", "string"))
+    fields = [
+        Field("case", "int64"), Field("case_id", "string"), Field("status", "string"), Field("cause", "string"),
+        Field("valid_rows", "int64"), Field("varied", within=numbers, many=True),
+        Field("requirements", within=(Field("text", "string"), Field("outcome", "string")), many=True),
+    ]  # fmt: skip
+    data: dict[str, Any] = {
+        "case": case.number,
+        "case_id": str(_at(group, "case_id", position)),
+        "status": STATUS.get(int(_at(group, "status", position)), "failed"),
+        "cause": str(_at(group, "cause", position)),
+        "valid_rows": len(case.time),
+        "varied": [
+            {"name": v.path, "value": float(_at(group, v.name, position)), "unit": v.unit}
+            for v in group.role("coordinate")
+        ],
+        "requirements": [{"text": text, "outcome": outcome} for text, outcome, _ in _requirements(group, position)],
+    }
+    if metrics:
+        names = {variable.name: variable.name.rpartition(".")[2] for variable in metrics}  # `metrics.q` is `q` here
+        fields.append(Field("metrics", within=tuple(Field(name) for name in names.values())))
+        data["metrics"] = {field: float(_at(group, name, position)) for name, field in names.items()}
+    return tuple(fields), data
+
+
+def varied(case: Case) -> dict[str, str]:
+    """What is varied in a case, in the deck's units, by path; choices of structure in words."""
+    group, position = case.group, case.position
+    numbers = {v.path: _value(group, v, position) for v in group.role("coordinate")}
+    return {**{v.path: str(_at(group, v.name, position)) for v in group.role("choice")}, **numbers}
+
+
+def _requirements(group: Group, position: int) -> list[tuple[str, str, str]]:
+    """Text, outcome and metric of each requirement."""
+    if "met" not in group.variables:
+        return []
+    texts = [str(text) for text in group.values("requirement")]
+    told = group.variables["requirement"].attributes.get("metric", [])
+    metrics: Sequence[str] = told if isinstance(told, list) else [str(told)]
+    metrics = metrics if len(metrics) == len(texts) else [""] * len(texts)
+    outcomes = np.atleast_1d(group.at("met", [position])[0]).tolist()
+    return [(text, OUTCOMES.get(outcome, "unknown"), metric)
+            for text, outcome, metric in zip(texts, outcomes, metrics, strict=True)]  # fmt: skip
+
+
+def _value(group: Group, variable: Stored, position: int) -> str:
+    return value_text(float(_at(group, variable.name, position)), variable)
+
+
+def _at(group: Group, name: str, position: int) -> Any:
+    return group.at(name, [position])[0]

@@ -1,0 +1,133 @@
+// The cases as points: a metric against a parameter, in the colours of another; and about the one that is chosen.
+"use strict";
+
+MET.overview = (() => {
+  const { node, number, quantity, titled } = MET;
+  const FEW = 8;
+  const BAD = ["missed", "unknown", "failed", "timed out", "lost"];
+
+  function chooser(name, columns, start, changed, none) {
+    const options = columns.map((c) => node("option", { value: c.key, selected: c.key === start }, titled(c)));
+    if (none) options.push(node("option", { value: "", selected: start === "" }, none));
+    const select = node("select", { change: () => changed(select.value) }, options);
+    return node("label", null, name, select);
+  }
+
+  function make(root, model) {
+    const metrics = model.columns.filter((c) => c.role === "metric");
+    const against = model.columns.filter((c) => c.role !== "metric");
+    let [x, y, by] = model.data.overview.start;
+    const frame = node("div", { class: "frame" });
+    const scale = node("div", { class: "scale" });
+    const controls = node("div", { class: "controls" },
+      chooser("Metric", metrics, y, (key) => { y = key; draw(); }),
+      chooser("against", [...against, ...metrics], x, (key) => { x = key; draw(); }),
+      chooser("coloured by", [...against, ...metrics], by, (key) => { by = key; draw(); }, "nothing"));
+    root.append(controls, frame, scale);
+    let plot = null;
+
+    function draw() {
+      if (plot) plot.destroy();
+      const [cx, cy, cb] = [model.column(x), model.column(y), by ? model.column(by) : null];
+      const colour = cb ? colours(cb) : null;
+      const size = model.cases.length < 400 ? 4.2 : model.cases.length < 4000 ? 2.8 : 1.8;
+      const rings = model.cases.length < 4000;
+      plot = MET.points.make(frame, {
+        x: cx, y: cy, height: 380, name: `${titled(cy)} against ${titled(cx)}, ${model.cases.length} cases`,
+        style: (place, palette) => ({
+          fill: colour ? colour.of(cb.values[place], palette) : palette.accent,
+          ring: rings && BAD.includes(model.outcome[place]), size,
+        }),
+        told: (place) => note(model, place, [cx, cy, cb]),
+        choose: (place) => model.choose(model.cases[place]),
+        chosen: () => (model.places.has(model.chosen) ? model.places.get(model.chosen) : -1),
+      });
+      model.plot = plot;
+      legend(scale, colour, cb, rings && model.outcome.some((each) => BAD.includes(each)), model);
+    }
+
+    draw();
+    MET.drawn.push(draw);
+    model.watch(() => plot.redraw());
+    new ResizeObserver(() => {
+      const wide = MET.width(frame);
+      if (wide !== plot.u.width) plot.u.setSize({ width: wide, height: plot.u.height });
+    }).observe(root);
+  }
+
+  // Colours of a column's values: of few a step each, of many a ramp.
+  function colours(column) {
+    const levels = [...new Set(Array.from(column.values).filter(Number.isFinite))].sort((a, b) => a - b);
+    const discrete = levels.length <= FEW;
+    const place = new Map(levels.map((level, n) => [level, n]));
+    const [low, high] = [levels[0], levels[levels.length - 1]];
+    const share = (value) => (discrete ? place.get(value) / Math.max(1, levels.length - 1) : (value - low) / (high - low || 1));
+    return { levels, discrete, share, of: (value, palette) => (Number.isFinite(value) ? MET.ramp(share(value)) : palette.muted) };
+  }
+
+  function legend(box, colour, column, rings, model) {
+    const items = [];
+    if (colour) {
+      items.push(node("span", null, `${titled(column)}:`));
+      if (colour.discrete) {
+        for (const level of colour.levels) {
+          const dot = node("span", { class: "dot", style: { background: MET.ramp(colour.share(level)) } });
+          items.push(node("span", { class: "item tight" }, dot, column.words.length ? column.words[level] : number(level)));
+        }
+      } else items.push(gradient(colour.levels[0], colour.levels[colour.levels.length - 1]));
+    }
+    if (rings) {
+      const filled = node("span", { class: "dot", style: { background: "currentColor" } });
+      const ring = node("span", { class: "dot", style: { border: "1.5px solid currentColor" } });
+      const good = model.outcome.includes("done") ? "reached its end" : "meets all";
+      items.push(node("span", { class: "item" }, node("span", null, filled, good), node("span", null, ring, good === "meets all" ? "does not" : "did not")));
+    }
+    box.replaceChildren(...items, node("span", { class: "hint" }, "drag to zoom, double click for all, click to choose a case"));
+  }
+
+  function gradient(low, high) {
+    const stops = [...Array(9).keys()].map((n) => MET.ramp(n / 8)).join(",");
+    return node("span", { class: "item" }, number(low), node("span", { class: "ramp", style: { background: `linear-gradient(90deg,${stops})` } }), number(high));
+  }
+
+  function note(model, place, shown) {
+    const columns = [...new Set([...shown.filter(Boolean), ...model.columns])].slice(0, 9);
+    const outcome = model.outcome[place];
+    return [
+      node("p", null, node("b", null, `#${model.cases[place]} `), node("code", null, model.data.overview.ids[place]), "  ",
+        node("span", { class: BAD.includes(outcome) ? "bad-text" : "" }, outcome === "done" ? "" : outcome)),
+      MET.pairs(columns.filter((c) => c.role !== "case").map((c) => [c.label, quantity(c.values[place], c)])),
+    ];
+  }
+
+  // All about the chosen case.
+  function card(box, model) {
+    model.watch((chosen) => {
+      const place = model.places.get(chosen);
+      const command = model.command(chosen);
+      if (place === undefined) {
+        box.replaceChildren(node("div", { class: "top" }, node("b", null, `Case #${chosen}`), "is not among those that are drawn."), run(command));
+        return;
+      }
+      const outcome = model.outcome[place];
+      const cause = model.data.overview.causes[place];
+      const values = model.columns.filter((c) => c.role !== "case").map((c) => {
+        const missed = (c.limits || []).some((l) => (l.sense === "<" ? c.values[place] > l.value : c.values[place] < l.value));
+        return node("div", null, node("dt", null, c.label), node("dd", { class: missed ? "bad" : "" }, quantity(c.values[place], c)));
+      });
+      const history = model.data.signals && model.data.signals.histories.some((each) => each.case === chosen);
+      box.replaceChildren(
+        node("div", { class: "top" }, node("b", null, `Case #${chosen}`), node("code", null, model.data.overview.ids[place]),
+          outcome === "done" ? null : node("span", { class: BAD.includes(outcome) ? "bad" : "good" }, outcome),
+          cause ? node("span", null, cause) : null,
+          history ? node("a", { href: `#${model.id}-signals`, class: "hint" }, "its signals are below") : null),
+        node("dl", { class: "values" }, values), run(command));
+    });
+    box.setAttribute("aria-live", "polite");
+  }
+
+  const run = (command) => node("div", { class: "command" },
+    node("button", { type: "button", class: "copy", "data-copy": command, "aria-label": `Copy ${command}` }, "copy"), " ", node("code", null, command));
+
+  return { make, card, chooser, gradient, colours };
+})();

@@ -1,0 +1,94 @@
+// Puts the plots into the page, and what else is pressed, searched and printed.
+"use strict";
+
+(() => {
+  const models = [];
+
+  document.querySelectorAll("[data-section]").forEach((root) => {
+    const number = root.dataset.section;
+    const model = MET.model(JSON.parse(document.getElementById(`d${number}`).textContent));
+    model.id = `s${number}`;
+    model.root = root;
+    models.push(model);
+    const place = (name) => root.querySelector(`[data-plot="${name}"]`);
+    if (model.data.overview) {
+      MET.overview.make(place("points"), model);
+      MET.overview.card(place("card"), model);
+      if (place("map")) MET.map.make(place("map"), model);
+    }
+    if (place("signals")) MET.signals.make(place("signals"), model);
+    if (place("stability")) MET.stability.make(place("stability"), model);
+    model.watch((chosen) => root.querySelectorAll("tr[data-case]").forEach((row) => row.classList.toggle("chosen", row.dataset.case === String(chosen))));
+    root.addEventListener("click", (event) => {
+      const pressed = event.target.closest("button[data-case]");
+      if (pressed) model.choose(+pressed.dataset.case);
+    });
+  });
+
+  // In the verdict a case is of the section that the verdict is about: they come in the same order.
+  document.querySelectorAll("#verdict .verdict").forEach((box, n) => {
+    box.addEventListener("click", (event) => {
+      const pressed = event.target.closest("button[data-case]");
+      if (pressed && models[n]) models[n].choose(+pressed.dataset.case);
+    });
+  });
+
+  document.addEventListener("click", async (event) => {
+    const button = event.target.closest("button[data-copy]");
+    if (!button) return;
+    let said = "copied";
+    try {
+      await navigator.clipboard.writeText(button.dataset.copy);
+    } catch {
+      const words = button.parentElement.querySelector("code");
+      getSelection().selectAllChildren(words);
+      said = document.execCommand("copy") ? "copied" : "selected";
+    }
+    button.textContent = said;
+    setTimeout(() => { button.textContent = "copy"; }, 1500);
+  });
+
+  // Rows that have all the words.
+  document.querySelectorAll("details.all").forEach((box) => {
+    const [input, said] = [box.querySelector("input.search"), box.querySelector(".found")];
+    const rows = [...box.querySelectorAll("tbody tr")];
+    const texts = rows.map((row) => row.textContent.toLowerCase());
+    input.addEventListener("input", () => {
+      const words = input.value.toLowerCase().split(/[\s,]+/).filter(Boolean);
+      let found = 0;
+      rows.forEach((row, n) => {
+        row.hidden = !words.every((word) => texts[n].includes(word));
+        found += !row.hidden;
+      });
+      said.textContent = words.length ? `${found} of ${rows.length}` : "";
+    });
+  });
+
+  // A line of the deck is shown where it is led to.
+  function lead() {
+    const target = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const closed = target && target.closest("details:not([open])");
+    if (closed) {
+      closed.open = true;
+      target.scrollIntoView();
+    }
+  }
+  addEventListener("hashchange", lead);
+  lead();
+
+  // On paper everything is open, light and as wide as the paper.
+  let opened = [];
+  addEventListener("beforeprint", () => {
+    opened = [...document.querySelectorAll("details:not([open])")];
+    opened.forEach((details) => { details.open = true; });
+    MET.print(true);
+  });
+  addEventListener("afterprint", () => {
+    opened.forEach((details) => { details.open = false; });
+    MET.print(false);
+  });
+
+  addEventListener("scroll", MET.tip.hide, { passive: true });
+  MET.models = models;
+  document.documentElement.dataset.ready = "yes";
+})();

@@ -1,0 +1,233 @@
+// Recorded signals: a plot a quantity, a colour a joint, a dash a case; time is common to all.
+"use strict";
+
+MET.signals = (() => {
+  const { node, number, palette, ticks, unpack } = MET;
+  const DASHES = [[], [7, 4], [2, 3], [10, 3, 2, 3]];
+  const MOST = DASHES.length;
+  const READ = 8;
+
+  function make(root, model) {
+    const data = model.data.signals;
+    const histories = new Map(data.histories.map((each) => [each.case, each]));
+    const clocks = data.clocks.map(unpack);
+    const lines = new Map();
+    const sync = uPlot.sync(`${model.id}-time`);
+    let shown = data.shown.slice(0, MOST);
+    const hidden = new Set();
+    let [plots, range] = [[], null];
+    const caseChips = node("div", { class: "chips" });
+    const jointChips = node("div", { class: "chips" });
+    const controls = node("div", { class: "controls kept" }, caseChips, jointChips,
+      node("span", { class: "hint" }, "drag to zoom, double click for all"));
+    const panels = node("div");
+    root.append(controls, panels);
+
+    // The lines of a panel in a case, unpacked once.
+    function values(history, panel) {
+      const key = `${history.case}/${panel}`;
+      if (!lines.has(key)) lines.set(key, (history.panels[panel] || []).map((packed) => Array.from(unpack(packed), (v) => (Number.isNaN(v) ? null : v))));
+      return lines.get(key);
+    }
+
+    const colourOf = (joint, at, colours) => {
+      const place = data.joints.indexOf(joint);
+      return colours.lines[(place < 0 ? at : place) % colours.lines.length];
+    };
+
+    // Series of a panel: of each case that is shown each line whose joint is not hidden.
+    function series(panel, number_) {
+      const alone = (joint) => panel.lines.filter((line) => line.joint === joint && !line.command).length === 1;
+      const out = [];
+      shown.forEach((which, nth) => {
+        const history = histories.get(which);
+        values(history, number_).forEach((points, at) => {
+          const line = panel.lines[at];
+          if (hidden.has(line.joint) || points.every((v) => v === null)) return;
+          out.push({ line, which, nth, points, clock: history.clock, own: alone(line.joint), at });
+        });
+      });
+      return out;
+    }
+
+    function joined(found) {
+      if (new Set(found.map((each) => each.clock)).size <= 1) {
+        return [Array.from(clocks[found.length ? found[0].clock : 0]), ...found.map((each) => each.points)];
+      }
+      return uPlot.join(found.map((each) => [Array.from(clocks[each.clock]), each.points]), found.map(() => [1, 1]));
+    }
+
+    function draw() {
+      plots.forEach((plot) => plot.u.destroy());
+      plots = [];
+      panels.replaceChildren();
+      chips();
+      const filled = data.panels.map((panel, n) => [panel, series(panel, n)]).filter(([, found]) => found.length);
+      plots = filled.map(([panel, found], n) => draws(panel, found, n === filled.length - 1));
+      if (range) zoom(range);
+    }
+
+    function draws(panel, found, last) {
+      const colours = palette();
+      const frame = node("div", { class: "frame", tabindex: 0, role: "application" });
+      const reading = node("div", { class: "reading" });
+      const unit = panel.unit ? ` (${panel.unit})` : "";
+      const box = node("div", { class: "panel" }, node("div", { class: "head" }, node("b", null, node("code", null, panel.name), unit),
+        node("span", { class: "about" }, panel.about), reading), frame);
+      panels.append(box);
+      frame.setAttribute("aria-label", `${panel.name}${unit} against time, cases ${shown.map((c) => `#${c}`).join(", ")}. Arrow keys move the reading, plus and minus zoom, Escape shows all.`);
+      const flat = found.every((each) => each.points.every((v) => v === null || v === 0));
+      const font = "12px " + getComputedStyle(document.body).fontFamily;
+      const axis = { stroke: colours.muted, font, labelFont: font, labelSize: 18, labelGap: 2,
+        grid: { stroke: colours.line, width: 1 }, ticks: { stroke: colours.faint, width: 1, size: 4 } };
+      const colour = (each) => (each.line.command ? colours.ink : colourOf(each.own ? each.line.joint : "", each.at, colours));
+      const u = new uPlot({
+        width: MET.width(frame), height: (flat ? 90 : 178) + (last ? 18 : 0), padding: [8, 14, 0, 0], legend: { show: false },
+        cursor: { y: false, points: { size: 6 }, drag: { x: true, y: false }, focus: { prox: -1 },
+          sync: { key: sync.key, setSeries: false, filters: { pub: moves, sub: moves } } },
+        scales: { x: { time: false }, y: { range: (self, low, high) => (low === null ? [-1, 1] : room(low, high)) } },
+        series: [{}, ...found.map((each) => ({
+          stroke: colour(each), width: each.line.command ? 1 : each.nth ? 1.25 : wide(each.at, panel.lines.length), dash: each.line.command ? [3, 3] : DASHES[each.nth],
+          points: { show: false }, spanGaps: false, pxAlign: 0,
+        }))],
+        axes: [{ ...axis, label: last ? "time (s)" : null, size: 26, values: (self, v) => ticks(v) },
+          { ...axis, label: `${panel.name.split(".").slice(-1)[0]}${unit}`, size: 62, space: 32, values: (self, v) => ticks(v), splits: flat ? () => [0] : undefined }],
+        hooks: {
+          setCursor: [(self) => read(self, reading, found, colour)],
+          setScale: [(self, key) => { if (key === "x") follow(self); }],
+          draw: [(self) => ends(self, found, colour)],
+        },
+      }, joined(found), frame);
+      frame.addEventListener("keydown", (event) => keys(event, u));
+      return { u, panel, frame };
+    }
+
+    // A plot was zoomed: the others go with it.
+    function follow(self) {
+      if (!plots.some((plot) => plot.u === self)) return;
+      const { min, max } = self.scales.x;
+      const all = self.data[0];
+      range = min <= all[0] && max >= all[all.length - 1] ? null : [min, max];
+      zoom([min, max]);
+    }
+
+    function zoom([min, max]) {
+      plots.forEach(({ u }) => {
+        if (u.scales.x.min !== min || u.scales.x.max !== max) u.setScale("x", { min, max });
+      });
+    }
+
+    function keys(event, u) {
+      const { min, max } = u.scales.x;
+      const all = u.data[0];
+      const [first, last] = [all[0], all[all.length - 1]];
+      const held = u.cursor.idx ?? Math.floor(all.length / 2);
+      const middle = all[held] >= min && all[held] <= max ? all[held] : (min + max) / 2;
+      const to = (low, high) => u.setScale("x", { min: Math.max(first, low), max: Math.min(last, high) });
+      if (event.key === "+" || event.key === "=") to(middle - (middle - min) / 2, middle + (max - middle) / 2);
+      else if (event.key === "-") to(middle - (middle - min) * 2, middle + (max - middle) * 2);
+      else if (event.key === "Escape") to(first, last);
+      else if (event.key === "ArrowRight" || event.key === "ArrowLeft") {
+        const step = Math.max(1, Math.round((max - min) / (last - first) * all.length / 100)) * (event.key === "ArrowLeft" ? -1 : 1);
+        const next = Math.min(Math.max(held + step, 0), all.length - 1);
+        u.setCursor({ left: u.valToPos(all[next], "x"), top: u.over.clientHeight / 2 });
+      } else return;
+      event.preventDefault();
+    }
+
+    // What stands at the pointer, of the first lines.
+    function read(self, box, found, colour) {
+      const at = self.cursor.idx;
+      if (at === null || at === undefined || self.cursor.left < 0) return box.replaceChildren();
+      const several = shown.length > 1 && found.length <= READ;
+      const listed = found.filter((each) => several || each.nth === 0).slice(0, READ);
+      box.replaceChildren(node("span", null, "t ", node("b", null, `${number(self.data[0][at])} s`)), ...listed.map((each) => {
+        const value = self.data[found.indexOf(each) + 1][at];
+        const label = shown.length > 1 && several ? `#${each.which}` : each.line.label;  // the colour says which joint
+        const words = [label, each.line.command ? "command" : ""].filter(Boolean).join(" ");
+        return node("span", null, swatch(colour(each), each.line.command ? [3, 3] : DASHES[each.nth]), words,
+          node("b", null, value === null || value === undefined ? "–" : number(value)));
+      }));
+    }
+
+    // A cross where a case came to its end too early.
+    function ends(self, found, colour) {
+      const px = devicePixelRatio;
+      const { ctx, bbox } = self;
+      found.forEach((each, n) => {
+        const points = self.data[n + 1];
+        let last = points.length - 1;
+        while (last >= 0 && (points[last] === null || points[last] === undefined)) last--;
+        const end = clocks[each.clock][clocks[each.clock].length - 1];
+        if (last < 0 || self.data[0][last] >= end) return;
+        const [x, y] = [self.valToPos(self.data[0][last], "x", true), self.valToPos(points[last], "y", true)];
+        if (x < bbox.left || x > bbox.left + bbox.width) return;
+        ctx.save();
+        ctx.strokeStyle = colour(each);
+        ctx.lineWidth = 2 * px;
+        ctx.beginPath();
+        for (const sign of [1, -1]) {
+          ctx.moveTo(x - 4 * px, y - 4 * sign * px);
+          ctx.lineTo(x + 4 * px, y + 4 * sign * px);
+        }
+        ctx.stroke();
+        ctx.restore();
+      });
+    }
+
+    function chips() {
+      const colours = palette();
+      const several = histories.size > 1;
+      const offered = [...histories.keys()].filter((each) => !shown.includes(each));
+      const add = node("select", { "aria-label": "Add a case", change: () => { show(+add.value); } },
+        node("option", { value: "" }, "add a case"), offered.map((each) => node("option", { value: each }, `#${each}`)));
+      caseChips.replaceChildren(...(several ? [...shown.map((each, nth) => node("button", { type: "button", class: "chip", title: `Case #${each}: take it out`,
+        click: () => { if (shown.length > 1) { shown = shown.filter((other) => other !== each); draw(); } } },
+        swatch(colours.ink, DASHES[nth]), each === data.middle ? `#${each}, the middle one` : `#${each}`, shown.length > 1 ? node("span", { class: "drop", "aria-hidden": "true" }, "×") : null)),
+      offered.length ? add : null].filter(Boolean) : []));
+      jointChips.replaceChildren(...(data.joints.length > 1 ? data.joints.map((joint, n) => node("button", { type: "button", class: "chip",
+        "aria-pressed": String(!hidden.has(joint)), title: `${joint}: show or hide`,
+        click: () => { if (!hidden.delete(joint)) hidden.add(joint); if (hidden.size === data.joints.length) hidden.clear(); draw(); } },
+        swatch(colourOf(joint, n, colours), []), joint)) : []));
+    }
+
+    // A case is drawn first, the others after it.
+    function show(number_) {
+      if (!histories.has(number_)) return;
+      const others = shown.filter((each) => each !== number_);
+      while (others.length >= MOST || (others.length > 1 && others.length >= data.shown.length)) {
+        const last = others.length - 1;
+        others.splice(others[last] === data.middle && last ? last - 1 : last, 1);
+      }
+      shown = [number_, ...others];
+      draw();
+    }
+
+    draw();
+    MET.drawn.push(draw);
+    model.watch(show);
+    new ResizeObserver(() => plots.forEach(({ u, frame }) => {
+      const wide = MET.width(frame);
+      if (wide !== u.width) u.setSize({ width: wide, height: u.height });
+    })).observe(root);
+    model.signalPlots = () => plots.map((plot) => plot.u);
+  }
+
+  // The first lines are wider, so that they are seen under those that run over them.
+  const wide = (at, count) => (count === 1 ? 1.75 : 2.2 - (0.8 * at) / (count - 1));
+
+  function room(low, high) {
+    const span = high - low || Math.abs(high) * 0.1 || 1;
+    return [low - 0.07 * span, high + 0.07 * span];
+  }
+
+  // Of what happens to the pointer, only that it moves is told to the other plots: zooms are handed on by `follow`.
+  const moves = (type) => type === "mousemove" || type === "mouseleave" || type === "mouseenter";
+
+  function swatch(colour, dash) {
+    return node("svg", { viewBox: "0 0 22 8", "aria-hidden": "true" }, node("line", { x1: 0, x2: 22, y1: 4, y2: 4, stroke: colour, "stroke-width": 2,
+      "stroke-dasharray": dash.length ? dash.join(" ") : null }));
+  }
+
+  return { make };
+})();

@@ -1,0 +1,214 @@
+"""Parts of a page that are text: the verdict, what was run, metrics, where it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from batch.report.content import Demand, Fact, Failing, MetricRow, Section, Spot, Varied, Verdict
+from batch.report.markup import Child, Html, el, join, lines
+
+Anchors = Mapping[str, tuple[int, int]]
+"""Of each file whose text is in the page: its number, and how many of its lines are there."""
+
+WORDS = {"met": "meet all", "missed": "miss a requirement", "unknown": "not known", "done": "reached their end"}
+
+STRONG = {"requirements": ("Requirements met", "Requirements not met")}
+NOTHING_ASKED = ("All ran to the end", "Not all ran to the end")
+
+
+def share(part: int, of: int) -> str:
+    """A share in per cent that says 100 and 0 only where it is all and none."""
+    if part in (0, of) or of == 0:
+        return "100 %" if part and part == of else "0 %"
+    text = f"{100 * part / of:.3g}"
+    return "> 99.9 %" if text == "100" else f"{text} %" if 100 * part / of >= 0.1 else "< 0.1 %"
+
+
+def bar(parts: Sequence[tuple[str, int]], label: str) -> Html:
+    """Shares as a bar: class and count of each part, from left to right."""
+    total = sum(count for _, count in parts) or 1
+    rects, at = [], 0.0
+    for cls, count in parts:
+        width = 100.0 * count / total
+        if count:
+            rects.append(el("rect", x=f"{at:.3f}", y=0, width=f"{width:.3f}", height=8, cls=cls))
+        at += width
+    return el("svg", rects, cls="bar", viewBox="0 0 100 8", preserveAspectRatio="none", role="img", aria_label=label)
+
+
+def spot_link(spot: Spot | None, anchors: Anchors) -> Html | None:
+    """A line of the deck, as a link where its text is in the page."""
+    if spot is None:
+        return None
+    words = f"{spot.file}:{spot.line}"
+    known = anchors.get(spot.file)
+    if known is None or not 1 <= spot.line <= known[1]:
+        return el("code", words)
+    return el("a", el("code", words), href=f"#f{known[0]}-{spot.line}")
+
+
+# The verdict
+
+
+def verdict(found: Verdict) -> Html:
+    """The answer, large; beside it what it rests on."""
+    yes, no = STRONG.get(found.kind, STRONG["requirements"]) if found.demands else NOTHING_ASKED
+    answer = el(
+        "div",
+        el("p", found.about, cls="about") if found.about else None,
+        el("p", mark(found.ok), yes if found.ok else no, cls="word"),
+        el("p", share(found.good, found.cases), cls="share") if found.cases > 1 else None,
+        el("p", found.headline, ".", cls="headline"),
+        cls="answer",
+    )
+    evidence = [_parts(found) if found.cases > 1 else None, _demands(found)]
+    if found.failing:
+        evidence.append(_failing(found.failing, found.cases))
+    evidence += [el("p", note, cls="note") for note in found.notes]
+    return el("div", answer, el("div", evidence, cls="evidence"), cls=f"verdict {'yes' if found.ok else 'no'}")
+
+
+def mark(ok: bool) -> Html:
+    """A tick or a cross before the word that says the same."""
+    path = "M3 8.5l3.2 3.2L13 4.6" if ok else "M4 4l8 8M12 4l-8 8"
+    return el("svg", el("path", d=path), cls="mark", viewBox="0 0 16 16", aria_hidden="true")
+
+
+def _parts(found: Verdict) -> Html:
+    order = {"met": "good", "done": "good", "missed": "bad", "unknown": "open"}
+    parts = [(order.get(part.word, "lost"), part.count) for part in found.parts]
+    words = [
+        (order.get(part.word, "lost"), f"{part.count:,} {WORDS.get(part.word, part.word)}") for part in found.parts
+    ]
+    legend = el("ul", [el("li", el("span", cls=f"key {cls}"), text) for cls, text in words], cls="legend")
+    return join([bar(parts, "; ".join(text for _, text in words)), legend])
+
+
+def _demands(found: Verdict) -> Html | None:
+    if not found.demands:
+        return None
+    single = found.cases == 1
+    missed = not single and any(each.missed for each in found.demands)
+    unknown = not single and any(each.unknown for each in found.demands)
+    heads = ["requirement", *(["outcome"] if single else ["met by", "yield"]), *(["missed"] if missed else []),
+             *(["not known"] if unknown else []), "value" if single else "worst value"]  # fmt: skip
+    right = [False, not single, *[True] * (len(heads) - 2)]
+    rows = [el("tr", _demand(each, single, missed, unknown)) for each in found.demands]
+    head = el("tr", [el("th", name, scope="col", cls="right" if flush else None)
+                     for name, flush in zip(heads, right, strict=True)])  # fmt: skip
+    return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "Requirements")
+
+
+def _demand(each: Demand, single: bool, missed: bool, unknown: bool) -> list[Html | None]:
+    name = el("th", el("code", each.text), scope="row")
+    if single:
+        word = "met" if each.met else "missed" if each.missed else "not known"
+        return [name, el("td", mark(word == "met") if word != "not known" else None, word,
+                         cls="good" if each.met else "bad"), el("td", each.furthest, cls="right")]  # fmt: skip
+    far: Child = each.furthest
+    if each.case is not None:
+        far = [each.furthest, " ", case_link(each.case)]
+    return [
+        name,
+        el("td", f"{each.met:,} of {each.of:,}", cls="right"),
+        el("td", share(each.met, each.of), cls="right strong"),
+        el("td", f"{each.missed:,}" if each.missed else "–", cls="right bad" if each.missed else "right")
+        if missed else None,
+        el("td", f"{each.unknown:,}" if each.unknown else "–", cls="right") if unknown else None,
+        el("td", far, cls="right"),
+    ]
+
+
+def case_link(case: int) -> Html:
+    """A case by its number: chosen where there are scripts."""
+    return el("button", f"#{case}", type="button", cls="case", data_case=case, title=f"Choose case #{case}")
+
+
+def _failing(found: Sequence[Failing], of: int) -> Html:
+    """The causes, the cases of each, and what they have in common once."""
+    rows = []
+    for each in found:
+        who: Child = f"case #{each.first}" if each.count == 1 else f"{each.count:,} cases"
+        rows.append(el(
+            "li",
+            el("p", el("strong", who if of > 1 else "The case", " ", each.status), " ", el("span", each.cause)),
+            el("p", each.cases, cls="cases") if each.count > 1 else None,
+        ))  # fmt: skip
+    return join([el("h4", "Did not reach their end" if of > 1 else "Why"), el("ul", rows, cls="failing")])
+
+
+# What was run
+
+
+def facts(found: Sequence[Fact]) -> Html:
+    return el("dl", [
+        el("div", el("dt", fact.name), el("dd", el("code", fact.text) if fact.code else fact.text)) for fact in found
+    ], cls="facts")  # fmt: skip
+
+
+def varied(found: Sequence[Varied], anchors: Anchors) -> Html | None:
+    if not found:
+        return None
+    decides = any(each.sets for each in found)
+    rows = [
+        el("tr", el("th", el("code", each.path), scope="row"), el("td", each.text, cls="words"), el("td", each.unit),
+           el("td", _sets(each.sets)) if decides else None, el("td", spot_link(each.spot, anchors)))
+        for each in found
+    ]  # fmt: skip
+    heads = ("varied", "values", "unit", *(["decides"] if decides else []), "written in")
+    head = el("tr", [el("th", name, scope="col") for name in heads])
+    return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "What was varied")
+
+
+def _sets(paths: Sequence[str]) -> list[Child]:
+    shown = [part for path in paths[:3] for part in (", ", el("code", path))][1:]
+    return [*shown, f" and {len(paths) - 3} more" if len(paths) > 3 else None]
+
+
+def metrics(section: Section) -> Html | None:
+    """Each metric with its spread, and the shape of it."""
+    if not section.metrics:
+        return None
+    heads = ["metric", *(["value"] if section.single else ["smallest", "median", "largest"]), "unit"]
+    heads += [] if section.single else ["how often"]
+    shown = any(each.remark for each in section.metrics)
+    rows = [el("tr", _metric(each, section.single, shown)) for each in section.metrics]
+    numbers = range(1, 2 if section.single else 4)
+    head = el("tr", [el("th", name, scope="col", cls="right" if n in numbers else None)
+                     for n, name in enumerate([*heads, *([""] if shown else [])])])  # fmt: skip
+    made = el("table", el("thead", head), el("tbody", lines(rows)), cls="few" if section.single else None)
+    return scrolling(made, "Metrics")
+
+
+def _metric(each: MetricRow, single: bool, remarks: bool) -> list[Html]:
+    values = [each.median] if single else [each.minimum, each.median, each.maximum]
+    cells = [el("th", el("code", each.name), el("span", each.about, cls="under"), scope="row")]
+    cells += [el("td", value, cls="right") for value in values]
+    cells.append(el("td", each.unit))
+    if not single:
+        cells.append(el("td", histogram(each)))
+    return [*cells, el("td", each.remark)] if remarks else cells
+
+
+def histogram(each: MetricRow) -> Html | None:
+    """Counts as bars, limits as lines."""
+    if not each.bars:
+        return None
+    top, wide = max(each.bars), 160 / len(each.bars)
+    bars = [
+        el("rect", x=f"{n * wide:.2f}", y=f"{26 - 24 * count / top:.2f}", width=f"{wide - 0.6:.2f}",
+           height=f"{24 * count / top:.2f}", cls="count")
+        for n, count in enumerate(each.bars) if count
+    ]  # fmt: skip
+    limits = []
+    for limit in each.limits:
+        at = f"{160 * (limit - each.low) / (each.high - each.low):.2f}"
+        limits.append(el("line", x1=at, x2=at, y1=0, y2=28, cls="limit"))
+    words = f"{each.name} from {each.minimum} to {each.maximum} {each.unit}, median {each.median}"
+    floor = el("line", x1=0, x2=160, y1=26.5, y2=26.5, cls="floor")
+    return el("svg", bars, floor, limits, cls="histogram", viewBox="-1 0 162 28", role="img", aria_label=words)
+
+
+def scrolling(table: Html, label: str) -> Html:
+    """A table that scrolls by itself where the page is narrower, also by the keyboard."""
+    return el("div", table, cls="wide", tabindex=0, role="region", aria_label=label)

@@ -1,0 +1,369 @@
+"""What a report holds, as plain data: texts and numbers, without HTML. Values are in the deck's units.
+
+A report has a section for each run or sweep that is asked for. A sweep of several structures is one section: its cases
+are numbered through, and what decides the structure is a column of words.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from met.frozen import frozen
+
+Role = Literal["case", "choice", "parameter", "repeat", "metric"]
+Ended = Literal["met", "missed", "unknown", "done", "failed", "timed out", "lost"]
+
+ENDED: tuple[Ended, ...] = ("met", "missed", "unknown", "done", "failed", "timed out", "lost")
+"""How a case came out; its number stands in `Overview.ended`. `done`: it reached its end and nothing was required."""
+
+
+@frozen
+class Fact:
+    """Something about what was run: its name and its value; `code`: to be set as a program's text."""
+
+    name: str
+    text: str
+    code: bool = False
+
+
+@frozen
+class Spot:
+    """A line of a deck file: where a value was written. `file` as `Source.name`."""
+
+    file: str
+    line: int
+
+
+# The verdict
+
+
+@frozen
+class Part:
+    """So many of all cases came out so."""
+
+    word: str
+    count: int
+
+
+@frozen
+class Demand:
+    """A requirement: by how many of the cases it is met and missed, of how many that is not known, and the value that
+    is furthest beyond the limit, or nearest to it, with its case."""
+
+    text: str
+    met: int
+    missed: int
+    unknown: int
+    of: int
+    furthest: str = ""
+    case: int | None = None
+
+
+@frozen
+class Failing:
+    """Cases that failed alike: how they ended, why, how many, which, and the first."""
+
+    status: str
+    cause: str
+    count: int
+    cases: str
+    first: int
+
+
+@frozen
+class Verdict:
+    """An answer: yes or no, in one sentence, and what it rests on.
+
+    kind    what was asked: "requirements". A comparison with another archive will be another kind, beside this one
+    about   the run or sweep
+    parts   how the cases came out; they add up to all of them
+    """
+
+    kind: str
+    about: str
+    ok: bool
+    headline: str
+    parts: tuple[Part, ...]
+    demands: tuple[Demand, ...] = ()
+    failing: tuple[Failing, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def cases(self) -> int:
+        return sum(part.count for part in self.parts)
+
+    @property
+    def good(self) -> int:
+        """Cases with nothing against them."""
+        return sum(part.count for part in self.parts if part.word in ("met", "done"))
+
+
+# Tables
+
+
+@frozen
+class Varied:
+    """A parameter that differs between cases, or a choice: its values in words, and where the deck says so."""
+
+    path: str
+    text: str
+    unit: str
+    spot: Spot | None = None
+    sets: tuple[str, ...] = ()
+
+
+@frozen
+class MetricRow:
+    """A metric over the cases: spread, histogram of the finite values, limits in the histogram's range.
+
+    bars    counts of equal stretches from `low` to `high`; none where there are too few values to show a shape
+    limits  of requirements, in the metric's unit
+    """
+
+    name: str
+    about: str
+    unit: str
+    minimum: str
+    median: str
+    maximum: str
+    remark: str
+    bars: tuple[int, ...] = ()
+    low: float = 0.0
+    high: float = 0.0
+    limits: tuple[float, ...] = ()
+
+
+@frozen
+class Table:
+    """A table of texts. right: the columns that are set flush right; marked: (row, column) that miss a requirement."""
+
+    heads: tuple[str, ...]
+    units: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    right: frozenset[int] = frozenset()
+    marked: frozenset[tuple[int, int]] = frozenset()
+
+
+@frozen
+class Worst:
+    """The worst cases: a table whose rows are these cases, the command that runs each again, and what is left out."""
+
+    title: str
+    table: Table
+    cases: tuple[int, ...]
+    commands: tuple[str, ...]
+    left: int
+
+
+@frozen
+class ParameterRow:
+    """A resolved parameter: value, unit, where it comes from. among: the structures that have it so, where not all."""
+
+    path: str
+    value: str
+    unit: str
+    origin: str
+    spot: Spot | None = None
+    overrides: tuple[Spot, ...] = ()
+    among: tuple[str, ...] = ()
+
+
+# Plots
+
+
+@frozen
+class Limit:
+    """A requirement as a line in a plot: its text, its limit in the metric's unit, `<` or `>`."""
+
+    text: str
+    value: float
+    sense: str
+
+
+@frozen
+class Column:
+    """A number a case: a metric, or what it may be drawn against. words: of a choice, what its numbers stand for."""
+
+    key: str
+    label: str
+    unit: str
+    role: Role
+    values: np.ndarray
+    words: tuple[str, ...] = ()
+    limits: tuple[Limit, ...] = ()
+    about: str = ""
+
+
+@frozen
+class Map:
+    """Two parameters that make a grid, and of each metric what its cells hold.
+
+    x_levels, y_levels   values, or stretches of them where there are many
+    values   by metric's key: (y, x), the worst case of the cell by the metric's first limit, or its middle one
+    cases    by metric's key: (y, x), which case that is; -1 where there is none
+    counts   (y, x): cases in the cell
+    missed   by metric's key: (y, x), cases of the cell that miss a requirement of this metric
+    """
+
+    x: str
+    y: str
+    x_levels: tuple[str, ...]
+    y_levels: tuple[str, ...]
+    counts: np.ndarray
+    values: dict[str, np.ndarray]
+    cases: dict[str, np.ndarray]
+    missed: dict[str, np.ndarray]
+
+
+@frozen
+class Overview:
+    """The cases as points. Not all of many: those left out lie on a dot with one that is here.
+
+    cases, ids   number in the case table, and first letters of the id, of each point
+    ended        how it came out: place in `ENDED`
+    causes       by place among the points: why a case failed; of the first ones
+    start        keys of what is drawn first: against, metric, colour ("" for none)
+    """
+
+    cases: np.ndarray
+    ids: tuple[str, ...]
+    ended: np.ndarray
+    columns: tuple[Column, ...]
+    causes: dict[int, str]
+    total: int
+    start: tuple[str, str, str]
+    maps: tuple[Map, ...] = ()
+    said: str = ""
+
+
+@frozen
+class Line:
+    """One line of a panel: its label, its joint, and whether it is the command that the line should follow."""
+
+    label: str
+    joint: str
+    command: bool = False
+
+
+@frozen
+class SignalPanel:
+    """Lines that share an axis: of one signal in one unit."""
+
+    name: str
+    about: str
+    unit: str
+    lines: tuple[Line, ...]
+
+
+@frozen
+class History:
+    """What was recorded of a case: for each panel (by place in `Signals.panels`) its lines, (time, line), at the times
+    numbered `clock`."""
+
+    case: int
+    clock: int
+    values: dict[int, np.ndarray]
+
+
+@frozen
+class Signals:
+    """Recorded signals of the worst cases, worst first.
+
+    clocks  the times of histories, s
+    shown   cases that are drawn first
+    middle  the case in the middle of the order, to compare the worst with; None where there are few
+    said    what was left out, and how lines were thinned
+    """
+
+    panels: tuple[SignalPanel, ...]
+    joints: tuple[str, ...]
+    clocks: tuple[np.ndarray, ...]
+    histories: tuple[History, ...]
+    shown: tuple[int, ...]
+    middle: int | None = None
+    said: tuple[str, ...] = ()
+
+
+@frozen
+class Bed:
+    """A joint whose motor is on a bed: how heavy the arm is against the rotor, r, and how heavy it might be.
+
+    r       of each case, the heaviest motion of all substituted joints together
+    limit   of each case, the smallest r at which the loop is unstable; not a number where none was found
+    """
+
+    joint: str
+    law: str
+    servo: str
+    delay: str
+    r: np.ndarray
+    limit: np.ndarray
+    spread: str
+    stable_to: str
+    margin: str
+    ok: bool
+
+
+@frozen
+class Stability:
+    """Of some cases, whether their beds are stable. columns: what r may be drawn against."""
+
+    cases: np.ndarray
+    columns: tuple[Column, ...]
+    beds: tuple[Bed, ...]
+    unstable: tuple[str, ...]
+    said: str = ""
+
+
+# The whole
+
+
+@frozen
+class SourceText:
+    """A file of the deck. text: the beginning of it, where it is long; `left`: lines that are not here."""
+
+    name: str
+    text: str
+    sha256: str
+    left: int = 0
+
+
+@frozen
+class Section:
+    """A run or sweep.
+
+    name        as it is asked for;  lede  what it is, in a sentence
+    trouble     why parameters and stability are missing; "" where they are not
+    """
+
+    name: str
+    lede: str
+    facts: tuple[Fact, ...]
+    varied: tuple[Varied, ...]
+    metrics: tuple[MetricRow, ...]
+    structures: Table | None
+    worst: Worst | None
+    overview: Overview | None
+    signals: Signals | None
+    no_signals: str
+    stability: Stability | None
+    parameters: tuple[ParameterRow, ...]
+    trouble: str = ""
+    notes: tuple[str, ...] = ()
+    single: bool = False
+
+
+@frozen
+class Report:
+    """All of a page. verdicts: one a section, in their order; of other kinds, such as a comparison, after them."""
+
+    title: str
+    archive: str
+    deck: str
+    replay: str
+    verdicts: tuple[Verdict, ...]
+    sections: tuple[Section, ...]
+    sources: tuple[SourceText, ...]
+    provenance: tuple[Fact, ...]

@@ -1,0 +1,196 @@
+"""What goes into a report: an archive's contents, gathered as plain data."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path, PurePath
+from typing import Any
+
+from batch.archive.read import ArchiveFile, Group
+from batch.report.content import Fact, Report, Section, SourceText, Stability
+from batch.report.histories import MOST_VALUES, no_signals, signals
+from batch.report.overview import overview
+from batch.report.parameters import parameters, varied
+from batch.report.pool import Pool, pools
+from batch.report.stability import stability
+from batch.report.tables import replay, structures, worst
+from batch.report.verdicts import metric_rows, verdict
+from batch.show import chosen
+from ic.printing.columns import size as size_text
+from met.diagnostic import Problem
+from met.plan import Experiment
+
+MOST_LINES, MOST_LETTERS = 2000, 200_000
+"""Of a file of the deck that are in a page."""
+
+MOST_HASHED = 4 << 30
+"""Bytes of an archive whose digest is looked for."""
+
+BEGINS = 200
+"""Letters of a title that is written by whoever makes the report: more are cut off."""
+
+
+def gather(
+    archive: ArchiveFile, names: Sequence[str] = (), title: str = "", progress: Callable[[int], None] | None = None
+) -> Report:
+    """All that a page says of an archive, or of these runs and sweeps of it. Raises Problem E325 for another name.
+
+    progress  called with the number of cases whose margin is known, where motors are on beds
+    """
+    groups = chosen(archive, names)
+    found = pools(groups)
+    several = len({group.sweep or group.name for group in archive.groups}) > 1
+    experiments, trouble = _experiments(archive)
+    name = archive.path.name
+    share = MOST_VALUES // max(1, len(found))
+    sections = tuple(
+        _section(name, pool, pool.name if several else "", experiments, trouble, share, progress) for pool in found
+    )
+    return Report(
+        title=title[:BEGINS] or f"{_stem(archive.deck)} · {', '.join(pool.name for pool in found)}",
+        archive=name,
+        deck=archive.deck,
+        replay=replay(name, found[0].name if several else "", int(found[0].cases[0]) if found[0].count else 0),
+        verdicts=tuple(verdict(pool, named=len(found) > 1) for pool in found),
+        sections=sections,
+        sources=_sources(archive),
+        provenance=_provenance(archive, groups),
+    )
+
+
+def _stem(deck: str) -> str:
+    return PurePath(deck.strip("<>")).stem or deck
+
+
+def _experiments(archive: ArchiveFile) -> tuple[dict[str, Experiment], str]:
+    """The plan's experiments by name; or none, and why."""
+    try:
+        return {experiment.name: experiment for experiment in archive.plan().experiments}, ""
+    except Problem as problem:  # such as: a model of the plan's is not installed here
+        return {}, "; ".join(diagnostic.message for diagnostic in problem.diagnostics)
+
+
+def _section(
+    archive: str, pool: Pool, only: str, experiments: Mapping[str, Experiment], trouble: str, values: int,
+    progress: Callable[[int], None] | None,
+) -> Section:  # fmt: skip
+    own = {group.name: experiments[group.name] for group in pool.groups if group.name in experiments}
+    beds: Stability | None = None
+    rows: tuple[Any, ...] = ()
+    try:
+        rows = parameters(pool, own)
+        beds = stability(pool, own, progress)
+    except Problem as problem:
+        trouble = trouble or "; ".join(diagnostic.message for diagnostic in problem.diagnostics)
+    drawn = signals(pool, values)
+    return Section(
+        name=pool.name,
+        lede=_lede(pool),
+        facts=_facts(pool, own),
+        varied=varied(pool, own),
+        metrics=metric_rows(pool),
+        structures=structures(pool),
+        worst=worst(pool, archive, only),
+        overview=overview(pool),
+        signals=drawn,
+        no_signals="" if drawn else no_signals(pool),
+        stability=beds,
+        parameters=rows,
+        trouble=trouble,
+        notes=tuple(dict.fromkeys(note for experiment in own.values() for note in experiment.notes)),
+        single=pool.count == 1,
+    )
+
+
+# What was run
+
+
+def _all(pool: Pool, attribute: str, form: str = "{}") -> str:
+    """An attribute of all groups, each value once."""
+    return ", ".join(dict.fromkeys(form.format(group.attributes[attribute]) for group in pool.groups))
+
+
+def _lede(pool: Pool) -> str:
+    """`37 cases of 20 s each: arm two_link, modified_euler at 25 Hz`."""
+    table = sum(group.attributes["cases_in_table"] for group in pool.groups)
+    cases = f"{pool.count:,} case{'s' if pool.count != 1 else ''}"
+    if pool.count < table:
+        cases += f" of {table:,}"
+    each = f"{_all(pool, 'duration_s', '{:g} s')}{' each' if pool.count > 1 else ''}"
+    kinds = f" in {len(pool.groups)} structures" if len(pool.groups) > 1 else ""
+    how = f"{_all(pool, 'integrator')} at {_all(pool, 'dynamics_hz', '{:g} Hz')}"
+    return f"{cases}{kinds}, {each}. Arm {_all(pool, 'arm')}, {how}, recorded at {_all(pool, 'record_hz', '{:g} Hz')}."
+
+
+def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Fact, ...]:
+    recorded = sum(group.recorded for group in pool.groups)
+    facts = [
+        Fact("arm", _all(pool, "arm")),
+        Fact("duration", _all(pool, "duration_s", "{:g} s")),
+        Fact("integrator", _all(pool, "integrator")),
+        Fact("rate of the dynamics", _all(pool, "dynamics_hz", "{:g} Hz")),
+        Fact("rate of the record", _all(pool, "record_hz", "{:g} Hz")),
+        Fact("velocity products", _all(pool, "velocity_products")),
+    ]
+    servos: dict[str, dict[str, None]] = {}  # joints by what moves them
+    others: dict[str, dict[str, None]] = {}
+    for experiment in experiments.values():
+        structure, base = experiment.structure, experiment.structure.schedule.base_hz
+        for use in structure.servos:
+            command = f", told a {use.command.kind} ({use.command.model})" if use.command is not None else ""
+            servos.setdefault(f"{use.model} at {base / use.divisor:g} Hz{command}", {})[use.joint] = None
+        for on_bed in structure.substitutions:
+            others.setdefault(f"bed of {on_bed.joint}", {})[f"{on_bed.bed}, law {on_bed.law}"] = None
+        for environment in structure.environment:
+            others.setdefault(f"environment {environment.name}", {})[environment.model] = None
+    for text, joints in servos.items():
+        names = list(joints)
+        few = ", ".join(names) if len(names) <= 3 else f"{names[0]}, {names[1]} … {names[-1]}"
+        facts.append(Fact(f"servo of {few}", text))
+    facts += [Fact(name, "; ".join(texts)) for name, texts in others.items()]
+    facts.append(Fact("histories kept", f"{recorded:,} of {pool.count:,} cases"))
+    return tuple(facts)
+
+
+# Where it comes from
+
+
+def _sources(archive: ArchiveFile) -> tuple[SourceText, ...]:
+    out = []
+    for name, text in archive.sources().items():
+        lines = text.split("\n")
+        if lines and not lines[-1]:
+            lines.pop()
+        kept = lines[:MOST_LINES]
+        while sum(map(len, kept)) > MOST_LETTERS and kept:
+            kept = kept[: len(kept) // 2]
+        digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+        out.append(SourceText(name, "\n".join(kept), digest, len(lines) - len(kept)))
+    return tuple(out)
+
+
+def _provenance(archive: ArchiveFile, groups: Sequence[Group]) -> tuple[Fact, ...]:
+    told = archive.provenance
+    size = archive.path.stat().st_size
+    changed = {"yes": ", with changes that were not committed", "unknown": ""}.get(str(told.get("git_dirty")), "")
+    facts = [
+        Fact("archive", f"{archive.path.name} ({size_text(size)})"),
+        Fact("SHA-256 of it", _digest(archive.path) if size <= MOST_HASHED else "not computed: it is large", True),
+        Fact("deck", archive.deck),
+        Fact("commit of MET", f"{told.get('git_commit', 'unknown')}{changed}", True),
+    ]
+    versions = {name[8:]: str(value) for name, value in told.items() if name.startswith("version_")}
+    facts += [Fact(f"version of {'MET' if name == 'met' else name}", versions[name]) for name in sorted(versions)]
+    facts.append(Fact("defines", str(told.get("defines") or "none"), True))
+    for group in groups:
+        of = f" of {group.name}" if len(groups) > 1 else ""
+        for name, about in (("structure_key", "key of the structure"), ("code_key", "key of the program")):
+            if name in group.attributes:
+                facts.append(Fact(f"{about}{of}", str(group.attributes[name]), True))
+    return tuple(facts)
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,108 @@
+"""The cases as points of a plot: which of many are drawn, and against what at first."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from batch.report.content import ENDED, Column, Overview
+from batch.report.maps import maps
+from batch.report.pool import Pool
+
+MOST_POINTS = 12_000
+"""Cases that a page holds. Of more, those go that lie on a dot with another one."""
+
+DOTS = (1600, 500)
+"""Dots of a plot, across and up, that are told apart where there is room for it (as batch/plot.py has it)."""
+
+MOST_CAUSES = 300
+KEPT = 200
+"""So many of the worst cases are always drawn."""
+
+BAD_CASE = "case"
+
+
+def overview(pool: Pool) -> Overview | None:
+    """Of a sweep; none where there is one case, or no metric."""
+    metrics, varied = pool.metrics(), pool.varied()
+    if pool.count < 2 or not metrics:
+        return None
+    table = Column(BAD_CASE, "case", "", "case", pool.cases.astype(float))
+    against = (*varied, *(() if len(varied) > 1 else (table,)))
+    places, dots = _drawn(pool, against, metrics)
+    shown = tuple(_at(column, places) for column in (*against, *metrics))
+    said = ""
+    if len(places) < pool.count:
+        where = f"one of {dots[0]} × {dots[1]} dots of the plot" if dots else "the same dot of the plot"
+        said = (
+            f"{len(places):,} of {pool.count:,} cases are drawn. Where several lie on {where}, one stands for them; "
+            f"a case that lies alone is always drawn, and so are the {KEPT} worst."
+        )
+    failed = [n for n, place in enumerate(places) if ENDED[pool.ended[place]] in ("failed", "timed out", "lost")]
+    causes = pool.texts("cause", places[failed[:MOST_CAUSES]])
+    judged = max(metrics, key=lambda column: _interest(pool, column))
+    return Overview(
+        cases=pool.cases[places],
+        ids=tuple(each[:8] for each in pool.texts("case_id", places)),
+        ended=pool.ended[places],
+        columns=shown,
+        causes=dict(zip(failed, causes, strict=False)),
+        total=pool.count,
+        start=(against[0].key, judged.key, varied[1].key if len(varied) > 1 else ""),
+        maps=maps(pool, varied, metrics),
+        said=said,
+    )
+
+
+def _interest(pool: Pool, column: Column) -> tuple[bool, int]:
+    """By which a metric is drawn first: that it has a requirement, and that cases do not meet it."""
+    outcomes = [pool.outcomes[:, pool.requirements.index(limit.text)] for limit in column.limits]
+    return bool(outcomes), max((int((each == 0).sum()) for each in outcomes), default=0)
+
+
+def _at(column: Column, places: np.ndarray) -> Column:
+    return Column(
+        column.key, column.label, column.unit, column.role, column.values[places], column.words, column.limits,
+        column.about,
+    )  # fmt: skip
+
+
+def _drawn(pool: Pool, against: tuple[Column, ...], metrics: tuple[Column, ...]) -> tuple[np.ndarray, tuple[int, ...]]:
+    """Places of the cases to draw, and the dots that were told apart to choose them.
+
+    Of every metric against every parameter each dot that any case lies on has a case, the worst of those on it; and the
+    extremes of each metric are there. Where that makes too many, dots are made larger.
+    """
+    if pool.count <= MOST_POINTS:
+        return np.arange(pool.count), ()
+    rank = np.empty(pool.count, np.int64)
+    rank[pool.worst_first] = np.arange(pool.count)
+    always = [pool.worst_first[:KEPT]]
+    for column in metrics:
+        numbers = np.flatnonzero(np.isfinite(column.values))
+        if len(numbers):
+            always.append(numbers[[column.values[numbers].argmin(), column.values[numbers].argmax()]])
+    across, up = DOTS
+    while True:
+        found = [_on_dots(x.values, y.values, rank, across, up) for x in against for y in metrics]
+        places = np.unique(np.concatenate([*always, *found]))
+        if len(places) <= MOST_POINTS or (across, up) == (1, 1):
+            return places, (across, up)
+        across, up = max(1, across * 4 // 5), max(1, up * 4 // 5)
+
+
+def _on_dots(x: np.ndarray, y: np.ndarray, rank: np.ndarray, across: int, up: int) -> np.ndarray:
+    """Of the cases on each dot the one of lowest rank. What is not finite has dots of its own, beside the others."""
+    dots = _strips(x, across) * (up + 4) + _strips(y, up)
+    order = np.argsort(rank, kind="stable")
+    return order[np.unique(dots[order], return_index=True)[1]]
+
+
+def _strips(values: np.ndarray, count: int) -> np.ndarray:
+    """Of each value which of `count` equal stretches it lies in; then one each for inf, -inf and not a number."""
+    finite = np.isfinite(values)
+    out = np.full(len(values), count + 3)
+    low, high = values[finite].min(initial=np.inf), values[finite].max(initial=-np.inf)
+    span = high - low if np.isfinite(high - low) and high > low else 1.0
+    out[finite] = np.minimum((count * ((values[finite] - low) / span)).astype(np.int64), count)
+    out[np.isposinf(values)], out[np.isneginf(values)] = count + 1, count + 2
+    return out

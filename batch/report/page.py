@@ -1,0 +1,180 @@
+"""A report as one HTML file. It asks for nothing: style, scripts and data are in it, and it forbids all else itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from batch.report import blocks, inlined, tabular
+from batch.report.content import Report, Section
+from batch.report.markup import Child, Html, el, join, lines
+from batch.report.payload import script_json, section_data
+
+GENERATOR = "MET report"
+"""By which a page is known as one of ours, which may be written over."""
+
+
+def page(report: Report) -> str:
+    """The whole file. The same report gives the same text."""
+    anchors = {file.name: (n, file.text.count("\n") + 1) for n, file in enumerate(report.sources)}
+    style, script = inlined.style(), inlined.script()
+    rules = (
+        f"default-src 'none'; script-src {inlined.digest(script)}; style-src {inlined.digest(style)}; img-src data:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    head = lines([
+        el("meta", charset="utf-8"),
+        el("meta", name="generator", content=GENERATOR),
+        Html(f'<meta http-equiv="Content-Security-Policy" content="{rules}">'),
+        el("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        el("meta", name="color-scheme", content="light dark"),
+        el("meta", name="referrer", content="no-referrer"),
+        el("link", rel="icon", href="data:,"),
+        el("title", report.title),
+        Html(f"<style>{style}</style>"),
+    ])  # fmt: skip
+    data = [
+        el("script", script_json(section_data(section, _replay(report, section))), type="application/json", id=f"d{n}")
+        for n, section in enumerate(report.sections)
+    ]
+    body = lines([
+        el("a", "To the report", href="#verdict", cls="skip"),
+        _header(report),
+        el("main", lines([*_main(report, anchors)])),
+        _footer(report),
+        el("div", id="tip", role="status", hidden=True),
+        *data,
+        Html(f"<script>{script}</script>"),
+    ])  # fmt: skip
+    return f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{head}\n</head>\n<body>\n{body}\n</body>\n</html>\n'
+
+
+def _replay(report: Report, section: Section) -> str:
+    """The command that runs a case of a section again, with `#CASE` where its number goes."""
+    if section.worst is None:
+        return report.replay.rpartition("#")[0] + "#CASE'"
+    return section.worst.commands[0].rpartition("#")[0] + "#CASE'"
+
+
+def _header(report: Report) -> Html:
+    lede = report.sections[0].lede if len(report.sections) == 1 else f"{len(report.sections)} runs and sweeps."
+    links = [("verdict", "Verdict")]
+    links += [link for n, section in enumerate(report.sections) for link in _links(n, section, report)]
+    links += [("parameters", "Parameters"), ("provenance", "Provenance")]
+    items = [el("li", el("a", name, href=f"#{where}")) for where, name in links]
+    return el(
+        "header",
+        el("p", "Simulation report · ", el("span", report.deck), cls="kicker"),
+        el("h1", report.title),
+        el("p", lede, cls="lede"),
+        el("nav", el("ul", items), aria_label="Contents"),
+    )
+
+
+def _links(number: int, section: Section, report: Report) -> list[tuple[str, str]]:
+    if len(report.sections) > 1:
+        return [(f"s{number}", section.name)]
+    found = [("run", "What was run", True), ("overview", "Cases", section.overview is not None),
+             ("worst", "Worst cases", section.worst is not None), ("signals", "Signals", section.signals is not None),
+             ("structures", "Structures", section.structures is not None),
+             ("stability", "Stability", section.stability is not None)]  # fmt: skip
+    return [(f"s{number}-{key}", name) for key, name, there in found if there]
+
+
+def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
+    several = len(report.sections) > 1
+    answers = [blocks.verdict(each) for each in report.verdicts]
+    out: list[Child] = [el("section", el("h2", "Verdict", cls="quiet"), answers, id="verdict")]
+    for number, section in enumerate(report.sections):
+        parts = lines(_section(number, section, anchors, "h3" if several else "h2"))
+        if several:
+            head = [el("h2", section.name), el("p", section.lede, cls="lede")]
+            out.append(el("section", head, parts, id=f"s{number}", cls="whole", data_section=number))
+        else:
+            out.append(el("div", parts, data_section=number))
+    out.append(_parameters(report, anchors))
+    out.append(el(
+        "section", el("h2", "Provenance"), blocks.facts(report.provenance),
+        [tabular.source(n, file) for n, file in enumerate(report.sources)], id="provenance",
+    ))  # fmt: skip
+    return out
+
+
+def _section(number: int, section: Section, anchors: blocks.Anchors, head: str) -> list[Child]:
+    def part(key: str, name: str, *children: Child, said: str = "") -> Html:
+        told = el("p", said, cls="said") if said else None
+        return el("section", el(head, name), told, *children, id=f"s{number}-{key}", cls=key)
+
+    out: list[Child] = [part(
+        "run", "What was run", blocks.facts(section.facts), blocks.varied(section.varied, anchors),
+        _notes(section.notes),
+    )]  # fmt: skip
+    table = blocks.metrics(section)
+    if section.overview is not None:
+        out.append(part(
+            "overview", "Cases at a glance", table, el("div", cls="points plot", data_plot="points"),
+            el("p", section.overview.said, cls="said") if section.overview.said else None,
+            el("div", cls="card", data_plot="card"),
+            el("div", cls="map plot", data_plot="map") if section.overview.maps else None,
+        ))  # fmt: skip
+    elif table is not None:
+        out.append(part("overview", "Metrics", table))
+    if section.structures is not None:
+        out.append(part("structures", "Structures side by side", tabular.table(section.structures, "Structures")))
+    if section.worst is not None:
+        out.append(part("worst", section.worst.title, tabular.worst(section.worst)))
+    if section.signals is not None:
+        said = [el("p", each, cls="said") for each in section.signals.said]
+        out.append(part("signals", "Signals", el("div", cls="signals plot", data_plot="signals"), said))
+    else:
+        out.append(part("signals", "Signals", said=section.no_signals))
+    if section.stability is not None:
+        found = section.stability
+        out.append(part(
+            "stability", "Stability of the beds", el("p", ABOUT_STABILITY, cls="said"), tabular.beds(found),
+            [el("p", each, cls="note") for each in found.unstable],
+            el("div", cls="stability plot", data_plot="stability"),
+            el("p", found.said, cls="said") if found.said else None,
+        ))  # fmt: skip
+    if section.trouble:
+        words = f"Parameters and stability are not shown, for the plan could not be read here: {section.trouble}."
+        out.append(el("p", words, cls="note"))
+    return out
+
+
+def _notes(notes: Sequence[str]) -> Html | None:
+    if not notes:
+        return None
+    summary = f"{len(notes)} note{'s' if len(notes) != 1 else ''} of the compiler"
+    return el("details", el("summary", summary), [el("p", note) for note in notes], cls="notes")
+
+
+ABOUT_STABILITY = (
+    "r is how heavy the arm is at the joint against the rotor of its motor, J_eff/(N² J_m), at the start of the run. "
+    "The loop of bed, servo and law is stable below the limit. Each row of the table is its tightest case."
+)
+
+
+def _parameters(report: Report, anchors: blocks.Anchors) -> Html:
+    out: list[Child] = [el("h2", "Parameters")]
+    for number, section in enumerate(report.sections):
+        if not section.parameters:
+            continue
+        count = f"{len(section.parameters):,} parameters and settings"
+        of = f" of {section.name}" if len(report.sections) > 1 else ""
+        search = el("label", "Search ", el("input", type="search", cls="search", placeholder="kp, links.upper, default",
+                                           spellcheck="false", autocomplete="off"), cls="controls")  # fmt: skip
+        out.append(el(
+            "details", el("summary", f"{count}{of}, each with the line of the deck that wrote it"), search,
+            tabular.parameters(section.parameters, anchors), el("p", role="status", cls="said found"), cls="all",
+            id=f"p{number}",
+        ))  # fmt: skip
+    if len(out) == 1:
+        out.append(el("p", "The plan could not be read here.", cls="said"))
+    return el("section", out, id="parameters")
+
+
+def _footer(report: Report) -> Html:
+    words = join(["Made by ", el("code", "met report"), " from ", el("code", report.archive),
+                  ". The page is whole in this file and asks nothing of any network."])  # fmt: skip
+    scripts = el("noscript", el("p", "The plots need JavaScript; all tables are here without.", cls="note"))
+    return el("footer", el("p", words), scripts)

@@ -1,0 +1,112 @@
+"""Every parameter of what was run: its value, and the line of the deck that wrote it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from batch.report.content import ParameterRow, Spot, Varied
+from batch.report.pool import Pool, levels, shown
+from batch.signals import pretty_unit
+from ic.printing.columns import number
+from ic.printing.settings import settings
+from met.diagnostic import Place
+from met.plan import Experiment, Formula, Origin, Quantity
+from met.render import shown_place
+
+SAID = {"deck": "deck", "case": "varied", "default": "default", "derived": "computed"}
+MOST_LISTED = 6
+"""Values that are listed; of more the ends."""
+
+MOST_ROWS = 10_000
+"""Cases, spread over all, from which the range of what follows from the varied parameters is taken."""
+
+
+def spot(place: Place | None) -> Spot | None:
+    """Where the deck's author should look."""
+    if place is None:
+        return None
+    shown = shown_place(place)
+    return Spot(shown.file, shown.line)
+
+
+def parameters(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[ParameterRow, ...]:
+    """Of all structures: settings of the run, then parameters, each once where all structures have it alike."""
+    found: dict[str, dict[ParameterRow, list[str]]] = {}
+    names = [group.name for group in pool.groups if group.name in experiments]
+    for name in names:
+        experiment = experiments[name]
+        given = {**settings(experiment), **experiment.parameters}
+        spans = _spans(experiment)
+        for path, quantity in given.items():
+            row = _row(path, quantity, spans)
+            found.setdefault(path, {}).setdefault(row, []).append(name)
+    out = []
+    for rows in found.values():
+        for row, among in rows.items():
+            alike = len(among) == len(names)
+            out.append(row if alike else replace(row, among=tuple(among)))
+    return tuple(out)
+
+
+def _spans(experiment: Experiment) -> dict[int, tuple[float, float]]:
+    """By output of the formulas: the smallest and the largest value, over as many cases as are looked at."""
+    count = experiment.cases.count
+    rows = np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(int))
+    inputs = {coordinate.path: coordinate.values[rows] for coordinate in experiment.cases.coordinates}
+    outputs = (np.asarray(values, dtype=float) for values in experiment.formulas.replay(inputs))
+    return {place: (float(values.min()), float(values.max())) for place, values in enumerate(outputs)}
+
+
+def _row(path: str, quantity: Quantity, spans: Mapping[int, tuple[float, float]]) -> ParameterRow:
+    unit = "" if quantity.unit == "1" else pretty_unit(quantity.unit)
+    origin = quantity.origin
+    return ParameterRow(
+        path, _value(quantity, spans), unit, _said(origin), spot(origin.place),
+        tuple(dict.fromkeys(place for place in map(spot, origin.overrides) if place is not None)),
+    )  # fmt: skip
+
+
+def _said(origin: Origin) -> str:
+    if origin.kind == "case":
+        return SAID["case"]
+    return f"{SAID[origin.kind]}: {origin.note}" if origin.note else SAID[origin.kind]
+
+
+def _value(quantity: Quantity, spans: Mapping[int, tuple[float, float]]) -> str:
+    match quantity.value:
+        case str() as text:
+            return text
+        case tuple() as values:
+            shown = [number(value) for value in values]
+            if len(shown) > MOST_LISTED:
+                shown = [*shown[:2], "…", shown[-1]]
+                return f"[{', '.join(shown)}] ({len(values)} values)"
+            return f"[{', '.join(shown)}]"
+        case Formula() as formula:
+            low, high = spans[formula.output]
+            return number(low) if low == high else f"{number(low)} … {number(high)}"
+        case value:
+            return number(float(value))
+
+
+def varied(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Varied, ...]:
+    """What tells the cases apart, with its values."""
+    places: dict[str, tuple[Spot | None, tuple[str, ...]]] = {}
+    for experiment in experiments.values():
+        for choice in experiment.cases.choices:
+            places.setdefault(choice.path, (spot(choice.place), ()))
+        for coordinate in experiment.cases.coordinates:
+            places.setdefault(coordinate.path, (spot(coordinate.place), coordinate.sets))
+    out = []
+    for column in pool.columns:
+        if column.role == "metric":
+            continue
+        where, sets = places.get(column.label, (None, ()))
+        texts: Sequence[str] = column.words or [shown(float(value)) for value in levels(column.values)]
+        few = ", ".join(texts) if len(texts) <= MOST_LISTED else ""
+        many = f"{len(texts):,} values from {texts[0]} to {texts[-1]}" if texts else ""
+        out.append(Varied(column.label, few or many, column.unit, where, tuple(s for s in sets if s != column.label)))
+    return tuple(out)

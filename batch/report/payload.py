@@ -1,0 +1,140 @@
+"""What the plots of a page are drawn from: JSON, and in it numbers as base64 of their bytes."""
+
+from __future__ import annotations
+
+import base64
+import json
+from typing import Any
+
+import numpy as np
+
+from batch.report.content import ENDED, Column, Map, Overview, Section, Signals, Stability
+from batch.report.markup import Html, visible
+from batch.signals import pretty_unit
+
+PRECISE = 1e-6
+"""Numbers are kept in four bytes where the error of that is smaller than this share of their range."""
+
+LEGIBLE = str.maketrans({c: f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"})
+"""What might end a script, or be markup in it, as JSON may write it too."""
+
+
+def script_json(data: Any) -> Html:
+    """Data as JSON that can stand in a script element, whatever its texts are."""
+    return Html(json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).translate(LEGIBLE))
+
+
+def section_data(section: Section, replay: str) -> dict[str, Any]:
+    """All that the plots of a section need. replay: the command that runs a case again, with `#CASE` for which."""
+    return {
+        "name": visible(section.name),
+        "replay": visible(replay),
+        "ended": list(ENDED),
+        "overview": None if section.overview is None else _overview(section.overview),
+        "signals": None if section.signals is None else _signals(section.signals),
+        "stability": None if section.stability is None else _stability(section.stability),
+    }
+
+
+def packed(values: np.ndarray) -> dict[str, Any]:
+    """Numbers as base64: of whole ones `i4`, of others `f4` with an offset, or `f8` where that is not exact enough.
+
+    Little-endian. Infinite ones and not-a-numbers are kept.
+    """
+    values = np.asarray(values).ravel()
+    if values.dtype.kind in "iu" and np.array_equal(values, values.astype("<i4")):
+        return {"t": "i4", "b": _base64(values.astype("<i4"))}
+    values = values.astype("<f8")
+    finite = values[np.isfinite(values)]
+    low, high = finite.min(initial=np.inf), finite.max(initial=-np.inf)
+    if len(values) > 2 and len(finite) == len(values) and low == high:
+        return {"t": "c", "v": float(low), "n": len(values)}
+    with np.errstate(all="ignore"):
+        offset = float(low + 0.5 * (high - low)) if len(finite) and np.isfinite(high - low) else 0.0
+        small = (values - offset).astype("<f4")
+        error = np.abs(small[np.isfinite(values)].astype("<f8") + offset - finite).max(initial=0.0)
+        if np.isfinite(error) and error <= PRECISE * (high - low):
+            return {"t": "f4", "o": offset, "b": _base64(small)}
+    return {"t": "f8", "b": _base64(values)}
+
+
+def _base64(values: np.ndarray) -> str:
+    return base64.b64encode(values.tobytes()).decode("ascii")
+
+
+def _column(column: Column) -> dict[str, Any]:
+    return {
+        "key": visible(column.key),
+        "label": visible(column.label),
+        "unit": visible(column.unit),
+        "role": column.role,
+        "about": visible(column.about),
+        "words": [visible(word) for word in column.words],
+        "values": packed(column.values),
+        "limits": [{"text": visible(e.text), "value": e.value, "sense": e.sense}
+                   for e in column.limits if np.isfinite(e.value)],
+    }  # fmt: skip
+
+
+def _overview(overview: Overview) -> dict[str, Any]:
+    return {
+        "cases": packed(overview.cases),
+        "ids": [visible(each) for each in overview.ids],
+        "ended": packed(overview.ended),
+        "columns": [_column(column) for column in overview.columns],
+        "causes": {str(place): visible(cause) for place, cause in overview.causes.items()},
+        "total": overview.total,
+        "start": [visible(key) for key in overview.start],
+        "maps": [_map(each) for each in overview.maps],
+    }
+
+
+def _map(each: Map) -> dict[str, Any]:
+    return {
+        "x": visible(each.x),
+        "y": visible(each.y),
+        "xLevels": [visible(level) for level in each.x_levels],
+        "yLevels": [visible(level) for level in each.y_levels],
+        "counts": packed(each.counts),
+        "of": {
+            visible(key): {
+                "values": packed(each.values[key]), "cases": packed(each.cases[key]), "missed": packed(each.missed[key])
+            }
+            for key in each.values
+        },
+    }  # fmt: skip
+
+
+def _signals(signals: Signals) -> dict[str, Any]:
+    return {
+        "joints": [visible(joint) for joint in signals.joints],
+        "clocks": [packed(clock) for clock in signals.clocks],
+        "panels": [
+            {
+                "name": visible(panel.name),
+                "about": visible(panel.about),
+                "unit": visible("" if panel.unit == "1" else pretty_unit(panel.unit)),
+                "lines": [{"label": visible(e.label), "joint": visible(e.joint), "command": e.command}
+                          for e in panel.lines],
+            }
+            for panel in signals.panels
+        ],
+        "histories": [
+            {
+                "case": each.case,
+                "clock": each.clock,
+                "panels": {str(place): [packed(line) for line in values.T] for place, values in each.values.items()},
+            }
+            for each in signals.histories
+        ],
+        "shown": list(signals.shown),
+        "middle": signals.middle,
+    }  # fmt: skip
+
+
+def _stability(found: Stability) -> dict[str, Any]:
+    return {
+        "cases": packed(found.cases),
+        "columns": [_column(column) for column in found.columns],
+        "beds": [{"joint": visible(e.joint), "r": packed(e.r), "limit": packed(e.limit)} for e in found.beds],
+    }

@@ -1,0 +1,121 @@
+"""Whether the motors on beds are stable, of the plan that was run: r of the cases, and where it would be too large."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import numpy as np
+
+from batch.failures import ranges
+from batch.report.content import Bed, Column, Stability
+from batch.report.pool import Pool
+from met.margin import Margin, margins
+from met.plan import Experiment
+
+MOST_CASES = 60
+"""Cases whose margin is computed, spread over all, the worst among them."""
+
+MOST_LOOPS = 6
+"""Different servos, beds and laws: each takes seconds."""
+
+
+def stability(
+    pool: Pool, experiments: Mapping[str, Experiment], progress: Callable[[int], None] | None = None
+) -> Stability | None:
+    """Of the structures that have a bed; None where none has."""
+    found: dict[int, tuple[Margin, ...]] = {}
+    left = 0
+    for number, group in enumerate(pool.groups):
+        experiment = experiments.get(group.name)
+        if experiment is None or not experiment.structure.substitutions:
+            continue
+        places = np.flatnonzero(pool.group_of == number)
+        chosen = _chosen(pool, experiment, places)
+        left += len(places) - len(chosen)
+        rows = np.searchsorted(experiment.cases.table, pool.cases[chosen]).tolist()
+        found |= dict(zip(chosen.tolist(), margins(experiment, rows, progress), strict=True))
+    if not found:
+        return None
+    places = np.array(sorted(found))
+    joints = list(dict.fromkeys(one.joint for place in places.tolist() for one in found[place]))
+    columns = [Column(c.key, c.label, c.unit, c.role, c.values[places], c.words) for c in pool.varied()]
+    columns.append(Column("case", "case", "", "case", pool.cases[places].astype(float)))
+    beds = tuple(_bed(joint, [_of(found[place], joint) for place in places.tolist()]) for joint in joints)
+    said = f"Computed for {len(places):,} of {len(places) + left:,} cases, spread over all." if left else ""
+    return Stability(pool.cases[places], tuple(columns), beds, _unstable(pool, places, found, joints), said)
+
+
+def _chosen(pool: Pool, experiment: Experiment, places: np.ndarray) -> np.ndarray:
+    """Places of the cases to look at: of few different loops, spread over all, the worst one among them."""
+    own = tuple(
+        f"{use.joint}.{part}." for use in experiment.structure.substitutions for part in ("servo", "bed", "law")
+    )
+    deciding = [c for c in experiment.cases.coordinates if any(path.startswith(own) for path in c.sets)]
+    if deciding:
+        rows = np.searchsorted(experiment.cases.table, pool.cases[places])
+        loops = np.unique(np.stack([c.values[rows] for c in deciding], axis=1), axis=0, return_inverse=True)[1].ravel()
+        count = int(loops.max(initial=0)) + 1
+        kept = np.unique(np.linspace(0, count - 1, min(count, MOST_LOOPS)).astype(int))
+        places = places[np.isin(loops, kept)]
+    if len(places) <= MOST_CASES:
+        return places
+    spread = places[np.linspace(0, len(places) - 1, MOST_CASES - 1).astype(int)]
+    worst = pool.worst_first[np.isin(pool.worst_first, places)][:1]
+    return np.unique(np.concatenate([spread, worst]))
+
+
+def _of(case: Sequence[Margin], joint: str) -> Margin | None:
+    return next((one for one in case if one.joint == joint), None)
+
+
+def _bed(joint: str, each: Sequence[Margin | None]) -> Bed:
+    there = [one for one in each if one is not None]
+    tightest = min(there, key=room)
+    r = np.array([np.nan if one is None else one.together for one in each])
+    limit = np.array([np.nan if one is None or one.limit is None else one.limit for one in each])
+    known = r[np.isfinite(r)]
+    spread = "-" if not len(known) else f"{known.min():.3g}"
+    if len(known) and f"{known.max():.3g}" != spread:
+        spread += f" to {known.max():.3g}"
+    return Bed(
+        joint, _words(one.law for one in there), _words(f"{one.rate_hz:g} Hz" for one in there),
+        _words(f"{one.delay:g}" for one in there), r, limit, spread, _limit(tightest), _margin(tightest),
+        all(one.stable for one in there),
+    )  # fmt: skip
+
+
+def _words(texts: Iterable[str]) -> str:
+    return ", ".join(dict.fromkeys(texts))
+
+
+def room(one: Margin) -> float:
+    """How many times heavier the arm might be at least; nothing is tighter than an arm whose r is no number."""
+    found = one.factor if one.factor is not None else one.searched / one.together
+    return found if found == found else 0.0
+
+
+def _limit(one: Margin) -> str:
+    if one.limit is None:
+        return f"more than {one.searched:.4g}"
+    return f"{one.limit:.3g}" if one.limit > 0.0 else "nothing"
+
+
+def _margin(one: Margin) -> str:
+    if one.together != one.together:
+        return "none: r is no number"
+    if not one.stable:
+        return "none: unstable"
+    return "no limit found" if one.factor is None else f"{one.factor:.2g} times"
+
+
+def _unstable(
+    pool: Pool, places: np.ndarray, found: Mapping[int, Sequence[Margin]], joints: Sequence[str]
+) -> tuple[str, ...]:
+    """For each joint that is not stable everywhere, in which cases."""
+    out = []
+    for joint in joints:
+        here = [(place, _of(found[place], joint)) for place in places.tolist()]
+        bad = [int(pool.cases[place]) for place, one in here if one is not None and not one.stable]
+        if bad:
+            out.append(f"{joint}: not stable in {len(bad):,} of {len(here):,} cases: {ranges(bad)}")
+    return tuple(out)

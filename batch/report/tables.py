@@ -1,0 +1,107 @@
+"""Tables of a report: the worst cases, and the structures of a sweep side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from batch.output import quoted
+from batch.report.content import ENDED, Column, Table, Worst
+from batch.report.pool import Pool, shown
+
+MOST_CASES = 20
+"""Rows of the table of worst cases."""
+
+MISSES = "\N{BALLOT X}"
+
+
+def worst(pool: Pool, archive: str, only: str) -> Worst | None:
+    """The worst cases, failed ones first. only: the run or sweep to be named in commands; "" where there is one."""
+    if pool.count < 2:
+        return None
+    places = pool.worst_first[:MOST_CASES]
+    columns = pool.columns
+    rows, marked = [], set()
+    ids = pool.texts("case_id", places)
+    for number, place in enumerate(places.tolist()):
+        cells = [f"#{pool.cases[place]}", ids[number][:8]]
+        for at, column in enumerate(columns):
+            text = cell_text(column, place)
+            if _misses(pool, column, place):
+                marked.add((number, at + 2))
+                text = f"{text} {MISSES}"
+            cells.append(text)
+        rows.append((*cells, ENDED[pool.ended[place]]))
+    table = Table(
+        heads=("case", "id", *(column.label for column in columns), "came out"),
+        units=("", "", *(column.unit for column in columns), ""),
+        rows=tuple(rows),
+        right=frozenset([0, *(at + 2 for at, column in enumerate(columns) if column.role != "choice")]),
+        marked=frozenset(marked),
+    )
+    numbers = tuple(int(pool.cases[place]) for place in places)
+    commands = tuple(replay(archive, only, case) for case in numbers)
+    return Worst(_title(pool, len(rows)), table, numbers, commands, pool.count - len(rows))
+
+
+def replay(archive: str, only: str, case: int | str) -> str:
+    """The command that runs a case again."""
+    named = f" {quoted(only)}" if only else ""
+    return f"met run {quoted(archive)}{named} --case '#{case}'"
+
+
+def cell_text(column: Column, place: int) -> str:
+    """A value as a table shows it."""
+    value = float(column.values[place])
+    if column.words:
+        return column.words[int(value)] if np.isfinite(value) else ""
+    return shown(value)
+
+
+def _misses(pool: Pool, column: Column, place: int) -> bool:
+    """Whether a metric misses a requirement there."""
+    return any(pool.outcomes[place, pool.requirements.index(limit.text)] == 0 for limit in column.limits)
+
+
+def _title(pool: Pool, shown: int) -> str:
+    every = shown == pool.count
+    if any(ENDED[each] not in ("met", "done") for each in np.unique(pool.ended)):
+        return "Cases, worst first" if every else "Worst cases"
+    if not pool.requirements:
+        return "Cases" if every else "The first cases"
+    return "Cases, closest to a limit first" if every else "Cases closest to a limit"
+
+
+def structures(pool: Pool) -> Table | None:
+    """A row a structure: what is chosen, cases, how many meet all, and the median of each metric."""
+    if len(pool.groups) < 2:
+        return None
+    metrics = pool.metrics()
+    judged = bool(pool.requirements)
+    choices = [column for column in pool.columns if column.role == "choice"]
+    rows = []
+    for number, _ in enumerate(pool.groups):
+        here = np.flatnonzero(pool.group_of == number)
+        chosen = [cell_text(column, int(here[0])) if len(here) else "" for column in choices]
+        good = int(np.isin(pool.ended[here], [ENDED.index("met"), ENDED.index("done")]).sum())
+        share = f"{good:,} ({100 * good / max(1, len(here)):.3g} %)"
+        rows.append((*chosen, f"{len(here):,}", share, *(_median(column.values[here]) for column in metrics)))
+    heads = (*(c.label for c in choices), "cases", "meet all" if judged else "reached their end")
+    return Table(
+        heads=(*heads, *(f"{c.label}, median" for c in metrics)),
+        units=(*[""] * len(heads), *(c.unit for c in metrics)),
+        rows=tuple(rows),
+        right=frozenset(range(len(choices), len(heads) + len(metrics))),
+    )
+
+
+def _median(values: Sequence[float] | np.ndarray) -> str:
+    """The middle of a metric's values, of which infinite ones count."""
+    rising = np.sort(np.asarray(values))
+    rising = rising[~np.isnan(rising)]
+    if not len(rising):
+        return shown(np.nan)
+    half = len(rising) // 2
+    low, high = rising[half if len(rising) % 2 else half - 1], rising[half]
+    return shown(float(low if low == high else 0.5 * (low + high)))

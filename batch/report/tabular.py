@@ -1,0 +1,114 @@
+"""Tables of a page: worst cases, structures, beds, parameters; and the deck's text with its lines numbered."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from batch.report.blocks import Anchors, case_link, scrolling, spot_link
+from batch.report.content import ParameterRow, SourceText, Stability, Table, Worst
+from batch.report.markup import Child, Html, el, join, lines
+
+
+def table(found: Table, label: str, cells: Sequence[Sequence[Child]] = (), more: Sequence[str] = ()) -> Html:
+    """A table of texts. cells, more: further cells of each row, and their heads."""
+    units = any(found.units)
+    heads = [el("th", el("span", name), el("span", unit, cls="unit") if units else None, scope="col",
+                cls="right" if n in found.right else None)
+             for n, (name, unit) in enumerate(zip(found.heads, found.units, strict=True))]  # fmt: skip
+    heads += [el("th", name, scope="col") for name in more]
+    rows = []
+    for number, row in enumerate(found.rows):
+        own = [
+            el("td", text, cls=" ".join(filter(None, ["right" if n in found.right else "",
+                                                      "bad" if (number, n) in found.marked else ""])) or None)
+            for n, text in enumerate(row)
+        ]  # fmt: skip
+        rows.append(el("tr", own, [el("td", cell) for cell in (cells[number] if cells else ())]))
+    return scrolling(el("table", el("thead", el("tr", heads)), el("tbody", lines(rows))), label)
+
+
+def worst(found: Worst) -> Html:
+    """The worst cases with the command that runs each again."""
+    rows = []
+    columns = found.table
+    for number, row in enumerate(columns.rows):
+        own: list[Html] = [el("th", case_link(found.cases[number]), scope="row", cls="right")]
+        for n, text in list(enumerate(row))[1:]:
+            classes = ["right"] if n in columns.right else []
+            classes += ["bad"] if (number, n) in columns.marked else []
+            last = n == len(row) - 1
+            classes += ["bad"] if last and text not in ("met", "done") else []
+            classes += ["id"] if n == 1 else []
+            own.append(el("td", el("code", text) if n == 1 else text, cls=" ".join(classes) or None))
+        own.append(el("td", command(found.commands[number]), cls="command"))
+        rows.append(el("tr", own, data_case=found.cases[number]))
+    heads = [
+        el("th", el("span", name), el("span", unit, cls="unit") if any(columns.units) else None, scope="col",
+           cls="right" if n in columns.right else None)
+        for n, (name, unit) in enumerate(zip(columns.heads, columns.units, strict=True))
+    ]  # fmt: skip
+    heads.append(el("th", "run it again, to the same bits", scope="col", cls="command"))
+    made = scrolling(el("table", el("thead", el("tr", heads)), el("tbody", lines(rows)), cls="cases"), found.title)
+    left = f"{found.left:,} more cases are in the archive." if found.left else ""
+    again = el("p", el("code", found.commands[0]), " runs the first again, to the same bits.", cls="said printed")
+    return join([made, el("p", left, cls="said") if left else None, again])
+
+
+def command(words: str) -> Html:
+    """A command line, and a button that copies it."""
+    button = el("button", "copy", type="button", cls="copy", data_copy=words, aria_label=f"Copy {words}")
+    return join([button, " ", el("code", words)])
+
+
+def beds(found: Stability) -> Html:
+    several = len(found.beds) > 1
+    heads = ("joint", "law", "servo", "delay", "r, together" if several else "r", "stable to r", "margin")
+    rows = tuple(
+        (bed.joint, bed.law, bed.servo, bed.delay, bed.spread, bed.stable_to, bed.margin) for bed in found.beds
+    )
+    marked = frozenset((n, 6) for n, bed in enumerate(found.beds) if not bed.ok)
+    return table(Table(heads, ("",) * len(heads), rows, frozenset({3, 4, 5}), marked), "Beds")
+
+
+# Parameters
+
+
+def parameters(found: Sequence[ParameterRow], anchors: Anchors) -> Html:
+    among = any(row.among for row in found)
+    heads = ["parameter", "value", "unit", "from", "written in", *(["structures"] if among else [])]
+    rows = [
+        el(
+            "tr",
+            el("th", el("code", row.path), scope="row"),
+            el("td", row.value, cls="right"),
+            el("td", row.unit),
+            el("td", row.origin),
+            el("td", spot_link(row.spot, anchors), _overrides(row, anchors)),
+            el("td", ", ".join(row.among)) if among else None,
+        )
+        for row in found
+    ]
+    head = el("tr", [el("th", name, scope="col", cls="right" if n == 1 else None) for n, name in enumerate(heads)])
+    return scrolling(el("table", el("thead", head), el("tbody", lines(rows)), cls="parameters"), "Parameters")
+
+
+def _overrides(row: ParameterRow, anchors: Anchors) -> Html | None:
+    if not row.overrides:
+        return None
+    found = [part for each in row.overrides for part in (spot_link(each, anchors), " ")]
+    return el("span", "overrides ", found, cls="under")
+
+
+# The deck
+
+
+def source(number: int, file: SourceText) -> Html:
+    """A file of the deck, each line with its number, to which others lead."""
+    texts = file.text.split("\n")
+    rows = [
+        el("li", el("code", line), id=f"f{number}-{n}") for n, line in enumerate(texts, start=1)
+    ]  # fmt: skip
+    left = el("p", f"{file.left:,} more lines are in the archive.", cls="said") if file.left else None
+    count = f"{len(texts) + file.left:,} lines"
+    head = el("summary", el("code", file.name), el("span", f" {count} · SHA-256 {file.sha256}", cls="under"))
+    return el("details", head, el("ol", lines(rows), cls="source"), left, cls="file")

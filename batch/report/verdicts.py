@@ -1,0 +1,115 @@
+"""How the cases of a run or sweep came out: yes or no, by requirement, by cause; and their metrics."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from batch.failures import failures, ranges
+from batch.report.content import ENDED, Column, Demand, Failing, MetricRow, Part, Verdict
+from batch.report.pool import Pool, shown
+from batch.summary import median
+from ic.printing.columns import count as counted
+from met.run import DONE
+
+BARS = 36
+"""Stretches of a histogram."""
+
+FEWEST = 8
+"""Values that have a shape worth drawing."""
+
+
+def verdict(pool: Pool, *, named: bool) -> Verdict:
+    """Whether all cases reached their end and met all that is required. named: whether to say of which run or sweep."""
+    ended = np.bincount(pool.ended, minlength=len(ENDED))
+    parts = tuple(Part(word, int(n)) for word, n in zip(ENDED, ended, strict=True) if n)
+    good = int(ended[ENDED.index("met")] + ended[ENDED.index("done")])
+    return Verdict(
+        kind="requirements",
+        about=pool.name if named else "",
+        ok=good == pool.count,
+        headline=_headline(pool, good),
+        parts=parts,
+        demands=tuple(_demand(pool, place, text) for place, text in enumerate(pool.requirements)),
+        failing=_failing(pool),
+        notes=_notes(pool),
+    )
+
+
+def _headline(pool: Pool, good: int) -> str:
+    """`31 of 37 cases meet every requirement`."""
+    several = len(pool.requirements) > 1
+    if pool.count == 1:
+        if pool.status[0] != DONE:
+            return "The case did not reach its end"
+        if not pool.requirements:
+            return "The case reached its end"
+        what = "every requirement" if several else "its requirement"
+        return f"The case meets {what}" if good else f"The case does not meet {what}"
+    who = f"All {pool.count:,} cases" if good == pool.count else f"{good:,} of {pool.count:,} cases"
+    if not pool.requirements:
+        return f"{who} reached their end"
+    verb = "meets" if good == 1 and good < pool.count else "meet"
+    return f"{who} {verb} {'every requirement' if several else 'the requirement'}"
+
+
+def _demand(pool: Pool, place: int, text: str) -> Demand:
+    outcomes = pool.outcomes[:, place]
+    met, missed, unknown = (int((outcomes == value).sum()) for value in (1, 0, -1))
+    furthest, case = "", None
+    for column in pool.metrics():
+        for limit in (each for each in column.limits if each.text == text):
+            values = np.where(np.isnan(column.values), -np.inf if limit.sense == "<" else np.inf, column.values)
+            worst = int(values.argmax() if limit.sense == "<" else values.argmin())
+            if not np.isnan(column.values[worst]):
+                furthest = f"{shown(float(column.values[worst]))} {column.unit}".rstrip()
+                case = int(pool.cases[worst])
+    return Demand(text, met, missed, unknown, pool.count, furthest, case)
+
+
+def _failing(pool: Pool) -> tuple[Failing, ...]:
+    failed = np.flatnonzero(pool.status != DONE)
+    if not len(failed):
+        return ()
+    causes, ids = (np.array(pool.texts(name, failed), dtype=object) for name in ("cause", "case_id"))
+    found = failures(pool.status[failed], causes, pool.cases[failed], ids)
+    return tuple(
+        Failing(each.status, each.cause.removeprefix(f"{each.status}: "), len(each.cases), ranges(each.cases), each.row)
+        for each in found
+    )
+
+
+def _notes(pool: Pool) -> tuple[str, ...]:
+    limited = int((pool.gathered("bed_limited", 0.0) > 0).sum())
+    if not limited:
+        return ()
+    of = "" if pool.count == 1 else f" in {limited:,} of {pool.count:,} cases"
+    return (f"The load motor of a bed was at its limit{of}: there the run is not what the joint would do.",)
+
+
+def metric_rows(pool: Pool) -> tuple[MetricRow, ...]:
+    return tuple(_metric(column) for column in pool.metrics())
+
+
+def _metric(column: Column) -> MetricRow:
+    """Spread of the finite values; of how many there are others is said."""
+    finite = np.sort(column.values[np.isfinite(column.values)])
+    infinite, unknown = int(np.isinf(column.values).sum()), int(np.isnan(column.values).sum())
+    said = [f"infinite in {counted(infinite, 'case')}"] if infinite else []
+    said += [f"no value in {counted(unknown, 'case')}"] if unknown else []
+    if not len(finite):
+        none = shown(np.nan)
+        return MetricRow(column.label, column.about, column.unit, none, none, none, ", ".join(said))
+    low, middle, high = float(finite[0]), median(finite), float(finite[-1])
+    bars: tuple[int, ...] = ()
+    from_, to = low, high
+    if len(finite) >= FEWEST and np.isfinite(high - low) and high > low:
+        near = [limit.value for limit in column.limits if abs(limit.value - middle) <= 2.0 * (high - low)]
+        from_, to = min([low, *near]), max([high, *near])
+        places = np.minimum(((finite - from_) / (to - from_) * BARS).astype(int), BARS - 1)
+        bars = tuple(np.bincount(places, minlength=BARS).tolist())
+    limits = tuple(limit.value for limit in column.limits if from_ <= limit.value <= to)
+    low_text, middle_text, high_text = (shown(value) for value in (low, middle, high))
+    return MetricRow(
+        column.label, column.about, column.unit, low_text, middle_text, high_text, ", ".join(said), bars, from_, to,
+        limits if bars else (),
+    )  # fmt: skip

@@ -1,0 +1,76 @@
+"""Pictures of docs/report.md: the reports of real runs, as a browser shows them.
+
+    python -m tests.batch.report.figures          writes docs/figures/report_*.png
+
+    report_page.png       the head of a report: the Panda's payload sweep
+    report_points.png     its cases, one of which is chosen, and two parameters at once
+    report_signals.png    its worst cases, near to
+    report_stability.png  a motor on a bed, under arms of ten weights
+    report_narrow.png     the head of the same on a telephone, dark
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import batch
+import ic
+from batch.report import report
+from tests.batch.report.browser import Page, browser
+
+FOLDER = Path(__file__).parents[3] / "docs" / "figures"
+
+BENCH = """
+#include <two_link.ic>
+run bench like nominal {
+    substitute shoulder { bed = emulated(delay = 1);  law = measured_acceleration; }
+    rates    { base = 1 kHz;  dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }
+    duration = 6 s;
+}
+sweep loads of bench { vary links.lower.mass = linspace(10, 100, 10) kg; }
+"""
+
+
+def draw(folder: Path) -> list[Path]:
+    """All pictures, in `folder`; gives back their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as name, browser() as chromium:
+        home = Path(name)
+        batch.run(ic.compile("panda.ic", select=["payload"]), output=home / "panda.payload.h5")
+        payload = report(home / "panda.payload.h5", title="Panda: payload against gain")
+        (home / "bench.ic").write_text(BENCH, encoding="utf-8")
+        batch.run(ic.compile(home / "bench.ic", select=["loads"]), output=home / "bench.loads.h5")
+        loads = report(home / "bench.loads.h5")
+        page = chromium.open(payload, width=1180, height=960, scale=1.5)
+        page.settle()
+        written = [_window(page, folder / "report_page.png")]
+        page.run("MET.models[0].choose(11)")
+        page.settle()
+        written.append(page.picture(folder / "report_points.png", "section.overview"))
+        left, top, width, height = page.box(".signals .u-over", 2)
+        page.drag([(left + 0.66 * width, top + 30), (left + 0.7 * width, top + 30), (left + 0.84 * width, top + 40)])
+        left, top, width, height = page.box(".signals .u-over", 2)
+        page.mouse("mouseMoved", left + 0.4 * width, top + 0.5 * height)
+        page.settle()
+        written.append(page.picture(folder / "report_signals.png", "section.signals"))
+        page = chromium.open(loads, width=1180, height=960, scale=1.5)
+        page.settle()
+        written.append(page.picture(folder / "report_stability.png", "section.stability"))
+        page = chromium.open(payload, width=390, height=844, dark=True, scale=2)
+        page.settle()
+        written.append(_window(page, folder / "report_narrow.png"))
+    return written
+
+
+def _window(page: Page, path: Path) -> Path:
+    """What is seen without scrolling."""
+    import base64
+
+    path.write_bytes(base64.b64decode(page.ask("Page.captureScreenshot", format="png")["data"]))
+    return path
+
+
+if __name__ == "__main__":
+    for path in draw(FOLDER):
+        print(path)

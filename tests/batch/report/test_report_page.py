@@ -1,0 +1,41 @@
+"""docs/report.md says what the code says, and its pictures are those that the code makes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from batch.report import histories, maps, overview, stability
+from batch.report.data import MOST_LINES
+from tests.batch.report import figures
+from tests.batch.report.browser import PACKAGE, program
+
+PAGE = (figures.FOLDER.parent / "report.md").read_text(encoding="utf-8")
+
+
+def test_the_limits_are_those_of_the_code() -> None:
+    for said in (
+        f"{overview.MOST_POINTS:,} cases", f"the {overview.KEPT} worst", f"{histories.MOST_POINTS:,} points",
+        f"{histories.MOST_VALUES:,} numbers", f"{maps.MOST_LEVELS} × {maps.MOST_LEVELS} cells",
+        f"{stability.MOST_CASES} cases, of six", f"{MOST_LINES:,} lines",
+    ):  # fmt: skip
+        assert said in PAGE
+    assert stability.MOST_LOOPS == 6
+
+
+def test_its_pictures_are_there_and_made_by_one_command() -> None:
+    shown = set(re.findall(r"figures/(report_\w+\.png)", PAGE))
+    assert shown == set(re.findall(r"report_\w+\.png", figures.__doc__ or ""))
+    assert shown == {path.name for path in figures.FOLDER.glob("report_*.png")}
+    assert "python -m tests.batch.report.figures" in PAGE
+
+
+@pytest.mark.browser
+def test_the_command_makes_them(tmp_path: Path) -> None:
+    if program() is None:
+        pytest.skip(f"no chromium; on Debian or Ubuntu: apt-get install {PACKAGE}")
+    written = figures.draw(tmp_path)
+    assert all(path.stat().st_size > 20_000 for path in written)
+    assert {path.name for path in written} == {path.name for path in figures.FOLDER.glob("report_*.png")}

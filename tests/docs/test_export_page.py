@@ -1,0 +1,53 @@
+"""docs/export.md: its commands run, and what they write is as the page says."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from met import cli
+from tests.batch.export.decks import Mcap
+
+PAGE = (Path(__file__).parents[2] / "docs" / "export.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the page's deck was run and exported."""
+    where = tmp_path_factory.mktemp("page")
+    [(name, deck)] = re.findall(r"<!-- (\S+\.ic) -->\n```c\n(.*?)```", PAGE, re.DOTALL)
+    (where / name).write_text(deck, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(where)
+        for command in re.findall(r"^\$ met (.*)$", PAGE, re.MULTILINE):
+            assert cli.main(shlex.split(command)) == cli.YES
+    return where
+
+
+def test_the_commands_write_what_they_name(folder: Path) -> None:
+    written = {path.name for path in folder.iterdir() if path.name.startswith("lengths")}
+    assert written == {"lengths.mcap", "lengths.layout.json", "lengths.csv", "lengths.parquet"}
+
+
+def test_the_topics_of_the_table_are_in_the_file(folder: Path) -> None:
+    read = Mcap(folder / "lengths.mcap")
+    table = PAGE[PAGE.index("| topic | is |") : PAGE.index("A channel's metadata")]
+    named = {name for cell in re.findall(r"^\| (.*?) \|", table, re.MULTILINE) for name in re.findall(r"`(.*?)`", cell)}
+    named -= {"/reaction/force"}  # not recorded in this run
+    assert {topic.replace("/case2", "") for topic in read.topics()} >= named
+    assert {topic.partition("/")[0] for topic in read.entities("/case0/scene")} == {"case0"}
+
+
+def test_the_table_begins_as_it_is_shown(folder: Path) -> None:
+    [shown] = re.findall(r"```text\n(.*?)```", PAGE, re.DOTALL)
+    assert (folder / "lengths.csv").read_text(encoding="utf-8").startswith(shown)
+
+
+def test_the_options_are_those_of_the_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["export", "--help"]) == cli.YES
+    told = set(re.findall(r"--[a-z]+", capsys.readouterr().out))
+    named = set(re.findall(r"^\| `(--[a-z]+)", PAGE, re.MULTILINE))
+    assert named <= told and told - named == {"--output", "--to", "--format", "--quiet", "--verbose", "--help"}
