@@ -16,7 +16,7 @@ import numpy as np
 from batch import choosing
 from batch.archive import layout as archive_layout
 from batch.folder import Folder, beside
-from batch.keep import Keep, chosen, keep, known
+from batch.keep import Keep, chosen, keep, known, listed
 from batch.output import check_output, check_room, default_output
 from batch.tasks import Section
 from ic.printing.columns import size as size_text
@@ -125,12 +125,18 @@ def prepare(
     selected     experiments with rows of their case tables, in place of `experiments` and `cases`
     kept         rows whose histories are kept, by the experiment's name, in place of `histories`
     """
+    all_of = None
     if selected is None:
-        selected = choosing.selected(choosing.experiments_named(plan, experiments), cases)
+        asked = choosing.experiments_named(plan, experiments)
+        all_of = sum(experiment.cases.count for experiment in asked)
+        selected = choosing.selected(asked, cases)
+    selected = [(experiment, rows) for experiment, rows in selected if len(rows)]
+    if not selected:
+        raise Problem(error("E311", "there is no case to run", help="`met cases DECK` lists them"))
     named = [experiment for experiment, _ in selected]
-    target = Path(output) if output is not None else default_output(plan, experiments, selected)
+    target = Path(output) if output is not None else default_output(plan, experiments, selected, all_of)
     wanted = keep(histories, named)
-    words = (histories,) if isinstance(histories, str | int) else tuple(histories)
+    words = tuple(listed(histories))
     parts = _parts(selected, wanted, float32)
     if kept is not None:
         parts = tuple(replace(part, kept=np.searchsorted(part.rows, kept[part.experiment.name])) for part in parts)
@@ -158,12 +164,15 @@ def _parts(
     """The experiments with what is kept of them. Raises Problem E311, E312 for cases that are none."""
     chosen = choosing.selected([experiment for experiment, _ in selected], wanted.cases) if wanted.cases else []
     named = {experiment.name: rows for experiment, rows in chosen}
+    strays = {experiment.cases.table[row] for experiment, rows in selected
+              for row in np.setdiff1d(named.get(experiment.name, rows), rows)}  # fmt: skip
+    run = {experiment.cases.table[row] for experiment, rows in selected
+           for row in np.intersect1d(named.get(experiment.name, rows[:0]), rows)}  # fmt: skip
+    if strays - run:
+        case = min(strays - run)
+        raise Problem(error("E351", f"the history of case #{case} cannot be kept: it is not among those to run"))
     parts = []
     for experiment, rows in selected:
-        stray = np.setdiff1d(named.get(experiment.name, rows), rows)
-        if len(stray):
-            case = experiment.cases.table[stray[0]]
-            raise Problem(error("E351", f"the history of case #{case} cannot be kept: it is not among those to run"))
         if experiment.structure.history_bytes:
             kept = known(wanted, experiment, rows, named.get(experiment.name, np.empty(0, np.int64)))
             parts.append(Part(experiment, rows, kept, wanted.at_most(len(rows)), single))

@@ -80,6 +80,8 @@ def _fields(path: str, before: Any, now: Any) -> Iterator[str]:
                 yield from _fields(name, getattr(before, each.name), getattr(now, each.name))
     elif isinstance(before, tuple) and isinstance(now, tuple):
         old, new = ({_name(each, index): each for index, each in enumerate(one)} for one in (before, now))
+        if list(old) != list(new) and sorted(old) == sorted(new):
+            yield f"{path}: in another order"
         for name in dict.fromkeys([*old, *new]):
             if name not in old or name not in new:
                 yield f"{path}: {name} is {'new' if name in new else 'gone'}"

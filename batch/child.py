@@ -96,8 +96,10 @@ class Child:
         """The next message; None where there is none so soon, or none any more (`_ended`)."""
         assert self._process.stdout is not None
         pipe = self._process.stdout.fileno()
+        poll = select.poll()
+        poll.register(pipe, select.POLLIN)
         while b"\n" not in self._read:
-            if not select.select([pipe], [], [], seconds)[0]:
+            if not poll.poll(1000.0 * seconds):
                 return None
             more = os.read(pipe, 1 << 16)
             if not more:

@@ -82,15 +82,16 @@ class Driver:
             count.seconds += done.seconds
         return missing
 
-    def run(self, section: Section, missing: Sequence[tuple[int, int]]) -> None:
-        """Run the cases that are missing. Raises Stopped."""
+    def run(self, section: Section, missing: Sequence[tuple[int, int]], cases: int | None = None) -> None:
+        """Run the cases that are missing. cases: of how many it is told how far it is; None: the section's. Raises
+        Stopped."""
         self.check()
         if not missing:
             return
         work = _Work(self, section, missing)
         if self.progress is not None:
             count = self.counts[section.number]
-            self.progress.begin(section.name, len(section.rows), count.done, count.failed, self.executor.about)
+            self.progress.begin(section.name, cases or len(section.rows), count.done, count.failed, self.executor.about)
         self._at = section.number
         work.run()
         self._at = None

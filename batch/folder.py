@@ -38,6 +38,7 @@ from met.version import VERSION
 
 SCHEMA, FORMAT = "met.campaign", 1
 ENDING = ".campaign"
+OURS = re.compile(r"(lock|shards|logs|plan\b.*|rows\..*|status\b.*|jobs\.json|\..*\.tmp|\.met-.*)$")
 SHARD = re.compile(r"(\d+)-(\d+)-(\d+)")
 
 
@@ -55,6 +56,11 @@ class Folder:
     @property
     def shards(self) -> Path:
         return self.path / "shards"
+
+    @property
+    def submitted(self) -> bool:
+        """Whether jobs of a queue have it, which may not have begun."""
+        return (self.path / "jobs.json").exists()
 
     def exists(self) -> bool:
         return (self.path / "campaign.json").exists()
@@ -83,6 +89,12 @@ class Folder:
             os.close(self._lock)
             self._lock = -1
 
+    def foreign(self) -> list[str]:
+        """What is in the folder where it is no campaign's; nothing of it is ours to remove."""
+        if self.exists() or not self.path.is_dir():
+            return []
+        return sorted(path.name for path in self.path.iterdir() if not OURS.match(path.name))
+
     def empty(self) -> None:
         """Take all but the lock out of the folder, which is locked by us."""
         for path in self.path.iterdir():
@@ -93,8 +105,18 @@ class Folder:
 
     def remove(self) -> None:
         """Take the folder away, which is locked by us, or of nobody's."""
-        with contextlib.suppress(FileNotFoundError):
-            self.path.rename(self.path.with_name(f".{self.path.name}.{os.getpid()}.leaving"))
+        leaving = self.path.with_name(f".{self.path.name}.{os.getpid()}.leaving")
+        if self.path.is_symlink():  # the folder that it leads to is its owner's
+            self.empty()
+            (self.path / "lock").unlink(missing_ok=True)
+            self.path.unlink()
+        else:
+            try:
+                self.path.rename(leaving)
+            except FileNotFoundError:
+                pass
+            except OSError:  # a name that would be too long
+                shutil.rmtree(self.path, ignore_errors=True)
         self.forget()
         self.close()
 
@@ -122,7 +144,8 @@ class Folder:
                 with (self.path / rows).open("wb") as file:
                     np.save(file, section.rows)
             told.append({
-                "number": section.number, "experiment": section.experiment, "cases": len(section.rows), "rows": rows,
+                "number": section.number, "name": section.name, "again": section.number != section.experiment,
+                "experiment": section.experiment, "cases": len(section.rows), "rows": rows,
                 "recorded": section.recorded, "single": section.single, "code": section.prepared.code_key,
             })  # fmt: skip
         data = {"schema": SCHEMA, "version": FORMAT, "met": VERSION, "deck": plan.deck, "sections": told, **about}

@@ -43,9 +43,11 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
         return 1
     asked = json.loads(tasks_file.read_text(encoding="utf-8"))
     sections = folder.sections()
+    if not 0 <= number < len(asked["shares"]):
+        print(f"met: {tasks_file} has no share {number}: it was submitted again since", file=sys.stderr)
+        return 0
     mine = [Task(*each) for each in asked["shares"][number]]
-    cores = int(os.environ.get("SLURM_CPUS_PER_TASK", "1"))
-    executor = Processes(1, threads=cores, timeout=asked["timeout"], command=command)
+    executor = Processes(1, threads=cores(), timeout=asked["timeout"], command=command)
     reporter = Reporter(folder, sum(task.cases for task in mine), Bar(), name=str(number))
     driver = Driver(folder, executor, reporter)
     executor.open(folder, sections, driver.tell)
@@ -53,8 +55,9 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
         for section in sections.values():
             wanted = [task for task in mine if task.section == section.number]
             left = _left(wanted, folder.named(section.number))
-            driver.counts[section.number] = Count(len(section.rows) - sum(last - first for first, last in left))
-            driver.run(section, left)
+            own = sum(task.cases for task in wanted)
+            driver.counts[section.number] = Count(own - sum(last - first for first, last in left))
+            driver.run(section, left, own)
         reporter.state("done")
     except (Stopped, Problem) as reason:
         reporter.state("stopped")
@@ -67,6 +70,12 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
         executor.close()
         folder.close()
     return 0
+
+
+def cores() -> int:
+    """That the queue gives a job; one where it does not say in a number."""
+    said = os.environ.get("SLURM_CPUS_PER_TASK", "")
+    return max(1, int(said)) if said.isdecimal() else 1
 
 
 def _left(wanted: Sequence[Task], there: Sequence[Task]) -> list[tuple[int, int]]:
@@ -84,8 +93,12 @@ def together(path: Path) -> int:
     from batch import look
     from batch.verdict import brief
 
+    if not Folder(path).exists():
+        archive = look(path.with_name(path.name.removesuffix(".campaign")))  # somebody else was first
+        print("\n".join(brief(archive)))
+        return 0 if archive.ok else 1
     campaign = described(Folder(path))
-    threads = int(os.environ.get("SLURM_CPUS_PER_TASK", "1"))
+    threads = cores()
     performed = perform(campaign, executor=Threads(threads), together=True, say=print)
     archive = look(campaign.output, performed.notes)
     print("\n".join(brief(archive)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -24,13 +25,13 @@ WORDS = "default, all, none, every:N, failed, worst:N, worst:N:METRIC, or cases 
 class Keep:
     """What is kept.
 
-    default, everything   all while there is room, or whatever it takes;  every: of how many one, 0 for no such rule
+    default, everything   all while there is room, or whatever it takes;  every: of how many one
     cases    as users name them;  failed: those that failed;  worst: (how many, by which metric, "" for the first)
     """
 
     default: bool = False
     everything: bool = False
-    every: int = 0
+    every: tuple[int, ...] = ()
     cases: tuple[int | str, ...] = ()
     failed: bool = False
     worst: tuple[tuple[int, str], ...] = ()
@@ -45,9 +46,15 @@ class Keep:
         return min(cases, sum(count for count, _ in self.worst))
 
 
+def listed(words: str | int | Sequence[str | int]) -> list[str | int]:
+    """One word or several, numbers of numpy's kind as Python's."""
+    several: Sequence[Any] = [words] if isinstance(words, str) or not hasattr(words, "__iter__") else list(words)
+    return [word if isinstance(word, str) else int(word) for word in several]
+
+
 def keep(words: str | int | Sequence[str | int], experiments: Sequence[Experiment]) -> Keep:
     """What words say (`WORDS`), one or several. Raises Problem E351."""
-    given = [words] if isinstance(words, str | int) else list(words)
+    given = listed(words)
     found = Keep()
     for word in given:
         found = _with(found, word, experiments)
@@ -68,7 +75,7 @@ def _with(found: Keep, word: str | int, experiments: Sequence[Experiment]) -> Ke
     if word == "failed":
         return replace(found, failed=True)
     if name == "every" and len(rest) == 1 and rest[0].isdecimal() and int(rest[0]) > 0:
-        return replace(found, every=int(rest[0]))
+        return replace(found, every=(*found.every, min(int(rest[0]), 2**62)))
     if name == "worst" and 1 <= len(rest) <= 2 and rest[0].isdecimal() and int(rest[0]) > 0:
         metric = rest[1] if len(rest) == 2 else ""
         _check_metric(metric, experiments)
@@ -99,8 +106,8 @@ def known(found: Keep, experiment: Experiment, rows: np.ndarray, named: np.ndarr
     if found.everything:
         return np.arange(len(rows))
     kept = np.isin(rows, named)
-    if found.every:
-        kept |= experiment.cases.table[rows] % found.every == 0
+    for every in found.every:
+        kept |= experiment.cases.table[rows] % every == 0
     return np.flatnonzero(kept)
 
 

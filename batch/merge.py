@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
@@ -59,7 +60,7 @@ def merge(
         if found.history is not None:
             writer.put_signals(number, at, _results(values, at, found.outputs.copy(), found.history, dict(found.fates)))
         fates |= {at - first + case: fate for case, fate in found.fates.items()}
-        waiting.append(found.outputs)
+        waiting.append(found.outputs.copy() if found.history is not None else found.outputs)  # not the shard with it
         held += len(found.outputs)
         while held >= BLOCK:
             put(BLOCK)
@@ -67,12 +68,33 @@ def merge(
         put(held)
     if histories is not None:
         again = np.concatenate(before)
+        first_kept = 0
         for at, found in pieces(folder, histories):
             # a case that gave nothing then has no history either: it is what was found of it first that counts
             lost = {case - at: fate for case, fate in ended.items() if 0 <= case - at < len(found.outputs)}
             known = {**found.fates, **lost}
             _check_bits(histories, at, found.outputs, again[at : at + len(found.outputs)], known)
-            writer.put_signals(number, at, _results(histories, at, found.outputs, found.history, known))
+            kept = np.array([case in lost or case not in found.fates for case in range(len(found.outputs))])
+            if kept.any():
+                run = _results(histories, at, found.outputs, found.history, known)
+                writer.put_signals(number, first_kept, run, kept)
+            first_kept += int(kept.sum())
+
+
+def without_history(folder: Folder, values: Section, histories: Section) -> dict[int, str]:
+    """Rows whose worker died, or that found no end, when they were run again for their histories, and why: they have
+    none. Those of which that was found the first time keep theirs, which is empty."""
+    first = {row for row, _ in _alone(folder, values)}
+    return {row: why for row, why in _alone(folder, histories) if row not in first}
+
+
+def _alone(folder: Folder, section: Section) -> Iterator[tuple[int, str]]:
+    """Rows that could not be run, and why; each has a shard of its own."""
+    for task in folder.named(section.number):
+        if task.cases == 1:
+            with contextlib.suppress(shard.Unsound, OSError):
+                for _, why in folder.read(section, task).fates.values():
+                    yield int(section.rows[task.first]), why
 
 
 def results(folder: Folder, section: Section) -> Run:
@@ -121,7 +143,7 @@ def _results(
 
 def _check_bits(section: Section, at: int, now: np.ndarray, before: np.ndarray, fates: Iterable[int]) -> None:
     """A case that was run again for its history gave the numbers that it gave before; those of `fates` gave none."""
-    alike = (now.view(np.int64) == before.view(np.int64)).all(axis=1)
+    alike = ((now.view(np.int64) == before.view(np.int64)) | (np.isnan(now) & np.isnan(before))).all(axis=1)
     alike[list(fates)] = True
     if not alike.all():
         case = section.prepared.experiment.cases.table[section.rows[at + int(np.argmin(alike))]]

@@ -13,22 +13,25 @@ from typing import Any
 import numpy as np
 
 from batch.archive.sink import Busy, Sink, temporary_of
+from batch.folder import Folder, beside
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem, error
 from met.plan import Experiment, Plan
 
 
 def default_output(
-    plan: Plan, experiments: Sequence[str] | None = None, selected: Sequence[tuple[Experiment, np.ndarray]] = ()
-) -> Path:
+    plan: Plan, experiments: Sequence[str] | None = None, selected: Sequence[tuple[Experiment, np.ndarray]] = (),
+    whole: int | None = None,
+) -> Path:  # fmt: skip
     """`two_link.h5`; `two_link.gains.h5` where runs are named; `two_link.gains.case7.h5` for some of the cases.
 
     They are named here, or were when the plan was made (`two_link.all.h5` where all were asked for).
     So a case that is run again does not take its sweep's place. A deck of the standard library is called `<name>`.
+    whole: how many cases there are of all that was asked for; None: of what is selected.
     """
     names = [Path(plan.deck.strip("<>")).stem, *(experiments or plan.selected)]
     count = sum(len(rows) for _, rows in selected)
-    if count < sum(experiment.cases.count for experiment, _ in selected):
+    if count < (sum(experiment.cases.count for experiment, _ in selected) if whole is None else whole):
         few = [int(position) for each, rows in selected for position in each.cases.table[rows]] if count <= 4 else []
         names.append("case" + "-".join(map(str, few)) if few else "cases")
     return Path(".".join([*names, "h5"]))
@@ -78,6 +81,9 @@ def _check_output(output: Path, plan: Plan) -> None:
             inside = quoted(target / default_output(plan))
             helps = f"name a file in it: `-o {inside}`" if target == output else ()
             raise Problem(error("E305", f"cannot write {target}: it is a folder", help=helps))
+    if foreign := Folder(beside(output)).foreign():
+        message = f"cannot write {output}: {beside(output)} is no campaign's folder, and holds {', '.join(foreign[:3])}"
+        raise Problem(error("E305", message, help="give another name with `-o`, or move the folder"))
     if not output.parent.is_dir():
         what = "is a file, not a folder" if output.parent.exists() else "does not exist"
         helps = () if output.parent.exists() else f"make it first: `mkdir -p {quoted(output.parent)}`"

@@ -21,7 +21,7 @@ from batch.drive import Driver, Progress, Stopped, TooManyFailures
 from batch.executors import Executor
 from batch.executors.threads import Threads
 from batch.folder import Busy, Folder, beside, gaps
-from batch.output import busy, cannot_write, check_room, publish
+from batch.output import busy, cannot_write, check_room, publish, quoted
 from batch.status import Reporter, died
 from batch.tasks import Section
 from met.diagnostic import Diagnostic, Problem, error
@@ -79,7 +79,7 @@ def perform(
     if there == resuming.WHOLE and not fresh:
         resuming.tidy(Folder(beside(campaign.output)), key)
         return Performed({}, whole=True)
-    if not there and not fresh:
+    if not there and not fresh and not together and not resuming.goes_on(Folder(beside(campaign.output)), key):
         resuming.guard(campaign)
     check_room(campaign.output, campaign.bytes_missing)
     values[0].prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
@@ -90,6 +90,9 @@ def perform(
         raise Problem(busy(campaign.output)) from None
     except OSError as reason:
         raise Problem(cannot_write(campaign.output, reason)) from reason
+    if not fresh and there != resuming.WHOLE and resuming.there(campaign, key) == resuming.WHOLE:
+        folder.remove()  # another run has ended meanwhile
+        return Performed({}, whole=True)
     if there == resuming.DAMAGED and not fresh:
         say(f"{campaign.output} is not as it was written: it is made again")
     work = _Work(campaign, folder, values, key, max_failures, progress, say)
@@ -180,7 +183,8 @@ class _Work:
         """Give up, for now. What is worth keeping stays; in words how much and where, else "" and nothing stays."""
         if not self.ours:
             return ""
-        if not self.resumed and self.folder.seconds(WORTH_SECONDS) < WORTH_SECONDS:
+        worth = self.resumed or self.folder.submitted or self.folder.seconds(WORTH_SECONDS) >= WORTH_SECONDS
+        if not worth:
             self.folder.remove()
             return ""
         self.reporter.state(state)
@@ -214,7 +218,13 @@ class _Work:
         for part, values in zip(self.campaign.parts, self.values, strict=True):
             kept = part.kept
             if values.number in histories:
-                kept = np.searchsorted(part.rows, histories[values.number].rows)
+                rows = histories[values.number].rows
+                lost = merge.without_history(self.folder, values, histories[values.number])
+                for row, why in lost.items():
+                    case = part.experiment.cases.table[row]
+                    again = f"`met run {quoted(self.campaign.output)} --case '#{case}'` tries again"
+                    self._note(f"no history of case #{case} of `{values.name}` is kept: {why}; {again}")
+                kept = np.searchsorted(part.rows, rows[~np.isin(rows, list(lost))])
             parts.append(Part(part.experiment, part.rows, kept, part.single, values.prepared.code_key))
         temporary = temporary_of(self.campaign.output)
         writer = Writer(temporary, self.campaign.plan, parts)

@@ -7,6 +7,7 @@ Without histories: metrics over the varied parameter.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 from collections.abc import Sequence
@@ -77,7 +78,8 @@ def plot(
     """Draw one experiment, the first unless one is named, into a PNG."""
     from batch.show import chosen
 
-    group = chosen(archive, (experiment,) if experiment else ())[0]
+    groups = chosen(archive, (experiment,) if experiment else ())
+    group = _with_case(groups, cases[0]) if cases else groups[0]
     output = Path(output)
     check_picture(output)
     matplotlib = _matplotlib()
@@ -88,6 +90,15 @@ def plot(
             figure = _metrics(archive, group)
         _save(figure, output)
     return output
+
+
+def _with_case(groups: Sequence[Group], case: str) -> Group:
+    """The first experiment that has a case; the first of all where none has it, which says so."""
+    for group in groups:
+        with contextlib.suppress(Problem):
+            group.find_case(case)
+            return group
+    return groups[0]
 
 
 def check_picture(output: Path) -> None:

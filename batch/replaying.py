@@ -115,7 +115,9 @@ def _signals(old: Group, new: Group, places: np.ndarray, ran: np.ndarray) -> lis
         for place in np.flatnonzero(ran).tolist():
             if places[place] in old.recorded_positions and place in new.recorded_positions:
                 a, b = old.signal(variable.name, int(places[place])), new.signal(variable.name, place)
-                if a.shape == b.shape and a.dtype == b.dtype and not _alike(a, b).all():
+                if a.dtype != b.dtype:  # of four bytes on one side
+                    a, b = a.astype(np.float32), b.astype(np.float32)
+                if a.shape == b.shape and not _alike(a, b).all():
                     row = int(np.argmin(_alike(a, b).reshape(len(a), -1).all(axis=1)))
                     case, time = new.values("case")[place], new.values("time")[row]
                     out.append(f"#{case} of {new.name}: {variable.name} differs from {time:g} s on")

@@ -80,6 +80,14 @@ def _what(found: Sequence[str]) -> list[str]:
     ]  # fmt: skip
 
 
+def goes_on(folder: Folder, key: str) -> bool:
+    """Whether the folder holds this very campaign, begun."""
+    try:
+        return folder.exists() and folder.described()["key"] == key
+    except Problem:
+        return False
+
+
 def tidy(folder: Folder, key: str) -> None:
     """Remove what a run left that was killed after its archive had got its name; not what another campaign began."""
     folder.forget()
@@ -103,7 +111,7 @@ def take_up(folder: Folder, campaign: Campaign, values: Sequence[Section], key: 
         folder.empty()
         yield f"starts over: {held:,} cases that were done before are removed"
         return
-    if not held:  # whoever began it had done nothing
+    if not held and not folder.submitted:  # whoever began it had done nothing
         folder.empty()
         return
     told = folder.described()

@@ -25,6 +25,7 @@ STALE_SECONDS = 30.0
 
 TYPES: dict[str, type | tuple[type, ...]] = {
     "state": str, "pid": int, "host": str, "workers": str, "cases": int, "failed": int, "updated": (int, float),
+    "section_done": int, "section_began": (int, float), "at_first": int,
 }  # fmt: skip
 """What a status file has at least."""
 
@@ -38,7 +39,7 @@ class Reporter:
         self._next = 0.0
         self._told: dict[str, Any] = {
             "state": "starting", "pid": os.getpid(), "host": socket.gethostname(), "began": time.time(), "cases": cases,
-            "done": 0, "failed": 0, "at_first": 0, "workers": "",
+            "failed": 0, "at_first": 0, "workers": "", "section_done": 0, "section_began": time.time(),
         }  # fmt: skip
         self._before: dict[str, tuple[int, int]] = {}
         self._name = ""
@@ -107,24 +108,23 @@ def report(folder: Folder, now: float) -> dict[str, Any]:
     """How far a campaign is, as data: of each section what is done, by the shards that are there, and who works."""
     sections = []
     told_here = folder.described()
-    names = [experiment.name for experiment in folder.plan().experiments]
     for each in told_here["sections"]:
         left = sum(last - first for first, last in gaps(folder.named(each["number"]), each["cases"]))
         sections.append({
-            "name": names[each["experiment"]], "cases": each["cases"], "done": each["cases"] - left,
-            "again": each["number"] >= len(names),
+            "name": each["name"], "cases": each["cases"], "done": each["cases"] - left,
+            "again": each["again"],
         })  # fmt: skip
     workers = []
     for each in told(folder):
         rate = None
-        done = each.get("section_done", 0) - each.get("at_first", 0)
-        seconds = each["updated"] - each.get("section_began", each["updated"])
+        done = each["section_done"] - each["at_first"]
+        seconds = each["updated"] - each["section_began"]
         if done > 0 and seconds > 0:
             rate = done / seconds
         workers.append({
             "job": each["name"], "state": each["state"] if alive(each, now) or each["state"] not in AT_WORK else "died",
             "host": each["host"], "pid": each["pid"], "workers": each["workers"], "cases": each["cases"],
-            "done": each.get("section_done", 0), "failed": each["failed"], "cases_per_s": rate,
+            "done": each["section_done"], "failed": each["failed"], "cases_per_s": rate,
             "seconds_ago": max(0.0, now - each["updated"]),
         })  # fmt: skip
     return {"folder": str(folder.path), "archive": told_here["archive"], "deck": told_here["deck"],

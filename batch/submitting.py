@@ -58,6 +58,8 @@ def submit(
     key = resuming.campaign_key(values)
     if not fresh and resuming.there(campaign, key) == resuming.WHOLE:
         return None
+    if not fresh and not resuming.goes_on(Folder(beside(campaign.output)), key):
+        resuming.guard(campaign)
     check_room(campaign.output, campaign.bytes_missing)
     folder = Folder(beside(campaign.output))
     try:

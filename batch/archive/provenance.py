@@ -26,7 +26,8 @@ class Revision:
         if not (home / ".git").exists():
             return
         command = ["git", "-C", str(home), "describe", "--always", "--dirty", "--abbrev=40", "--exclude", "*"]
-        quiet = {**os.environ, "GIT_OPTIONAL_LOCKS": "0"}
+        quiet = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}  # as a hook sets
+        quiet["GIT_OPTIONAL_LOCKS"] = "0"
         try:
             self._process = subprocess.Popen(
                 command,

@@ -68,11 +68,14 @@ class Writer:
             self.abandon()
             raise
 
-    def put_signals(self, number: int, first: int, run: Run) -> None:
-        """The histories of some cases of an experiment: of its recorded cases from the `first` one on."""
+    def put_signals(self, number: int, first: int, run: Run, kept: np.ndarray | None = None) -> None:
+        """The histories of some cases of an experiment: of its recorded cases from the `first` one on. kept: a mask of
+        those of `run` that are recorded; None: all."""
         group = self.groups[number]
+        last = first + (len(run.case) if kept is None else int(kept.sum()))
         for variable in group.layout.role("signal"):
-            group.node[variable.name][first : first + len(run.case)] = run.signals[variable.key]
+            values = run.signals[variable.key]
+            group.node[variable.name][first:last] = values if kept is None else values[kept]
         self._sink.check()
 
     def put_cases(self, number: int, first: int, run: Run) -> None:

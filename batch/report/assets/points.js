@@ -23,7 +23,7 @@ MET.points = (() => {
     const strips = STRIPS.filter(([, is]) => kept.some((place) => is(plot.y.values[place])));
     const at = { x: new Float64Array(kept.length), y: new Float64Array(kept.length) };
     const logX = spread(xs, 100) && !plot.x.words.length;
-    const logY = plot.logY || spread(ys.filter((v) => v !== null), 1000);
+    const logY = plot.logY ?? spread(ys.filter((v) => v !== null), 1000);
     let hovered = -1;
 
     function options() {

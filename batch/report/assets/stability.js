@@ -26,7 +26,7 @@ MET.stability = (() => {
       const one = limits.length === cases.length && new Set(limits).size === 1 ? limits[0] : 0;  // the same for all: a line
       plot = MET.points.make(frame, {
         x: cx, y: { label: "r", unit: "", words: [], values: bed.r,
-          limits: one ? [{ text: `unstable above ${number(one)}`, value: one, sense: "<" }] : [] }, height: 300, logY: Array.from(bed.r).every((v) => !(v <= 0)),
+          limits: one ? [{ text: `unstable above ${number(one)}`, value: one, sense: "<" }] : [] }, height: 300, logY: far([...bed.r, ...limits]),
         name: `r of ${bed.joint} against ${cx.label}`, reach: limits,
         style: (place, colours) => ({ fill: bad(bed, place) ? colours.attend : colours.accent, ring: bad(bed, place), size: 4.2 }),
         marks(u, ctx, colours, at, px) {
@@ -53,6 +53,9 @@ MET.stability = (() => {
       scale.replaceChildren(node("span", { class: "item tight" }, dot, "r of a case"),
         ...(one ? [] : [limits.length ? node("span", { class: "item" }, dash, "where it becomes unstable") : node("span", null, "no limit was found")]));
     }
+
+    // Whether values are so far apart that a logarithmic axis tells them apart better.
+    const far = (values) => Math.min(...values) > 0 && Math.max(...values) > 8 * Math.min(...values);
 
     // Where one parameter decides r and its limit that one, else the case.
     function start() {
