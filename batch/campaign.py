@@ -16,7 +16,7 @@ import numpy as np
 from batch import choosing
 from batch.archive import layout as archive_layout
 from batch.folder import Folder, beside
-from batch.keep import Keep, chosen, keep, known, listed
+from batch.keep import Keep, Known, chosen, keep, known, listed
 from batch.output import check_output, check_room, default_output
 from batch.tasks import Section
 from ic.printing.columns import size as size_text
@@ -24,7 +24,6 @@ from met import run as engine
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Experiment, Plan
-from met.run import Run
 
 KEPT_BYTES = 1 << 30
 """Histories are kept by default while the archive stays below this."""
@@ -189,7 +188,7 @@ def values_sections(campaign: Campaign) -> list[Section]:
     ]
 
 
-def histories_section(campaign: Campaign, values: Section, results: Callable[[], Run]) -> Section | None:
+def histories_section(campaign: Campaign, values: Section, results: Callable[[], Known]) -> Section | None:
     """The second pass over an experiment: the cases whose histories are kept, where that is not all of them.
 
     results  what became of its cases

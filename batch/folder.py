@@ -38,7 +38,9 @@ from met.version import VERSION
 
 SCHEMA, FORMAT = "met.campaign", 1
 ENDING = ".campaign"
-OURS = re.compile(r"(lock|shards|logs|plan\b.*|rows\..*|status\b.*|jobs\.json|\..*\.tmp|\.met-.*)$")
+OURS = re.compile(
+    r"(lock|shards|logs|plan\.json|plan\..*\.npy|rows\.\d+\.npy|status(\.\d+)?\.json|jobs\.json|\..*\.tmp|\.nfs.*)$"
+)
 SHARD = re.compile(r"(\d+)-(\d+)-(\d+)")
 
 
@@ -133,8 +135,9 @@ class Folder:
         about   `key` of the campaign, name of its `archive`, words for the `histories` that are kept
         """
         self.shards.mkdir(exist_ok=True)
-        for path in self.path.glob("plan*"):  # ours, and may be damaged: plan_file writes over nothing but plans
-            path.unlink()
+        # those that are there are ours, and may be damaged: plan_file writes over nothing but plans
+        for path in (self.path / "plan.json", *self.path.glob("plan.*.npy")):
+            path.unlink(missing_ok=True)
         plan_file.write(plan, self.path / "plan.json")
         told = []
         for section in sections:

@@ -41,13 +41,19 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
     except Busy:
         print(f"met: {path} is in the hands of another run: nothing was done here", file=sys.stderr)
         return 1
-    asked = json.loads(tasks_file.read_text(encoding="utf-8"))
+    try:
+        asked = json.loads(tasks_file.read_text(encoding="utf-8"))
+        dealt = [[Task(*each) for each in tasks] for tasks in asked["shares"]]
+        timeout = asked["timeout"]
+    except (OSError, ValueError, LookupError, TypeError):
+        print(f"met: {tasks_file} is gone or damaged: submit again", file=sys.stderr)
+        return 1
     sections = folder.sections()
-    if not 0 <= number < len(asked["shares"]):
+    if not 0 <= number < len(dealt):
         print(f"met: {tasks_file} has no share {number}: it was submitted again since", file=sys.stderr)
         return 0
-    mine = [Task(*each) for each in asked["shares"][number]]
-    executor = Processes(1, threads=cores(), timeout=asked["timeout"], command=command)
+    mine = dealt[number]
+    executor = Processes(1, threads=cores(), timeout=timeout, command=command)
     reporter = Reporter(folder, sum(task.cases for task in mine), Bar(), name=str(number))
     driver = Driver(folder, executor, reporter)
     executor.open(folder, sections, driver.tell)

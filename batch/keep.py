@@ -7,7 +7,7 @@ worst by a metric, are known when all are done, and are run again for their hist
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -111,9 +111,17 @@ def known(found: Keep, experiment: Experiment, rows: np.ndarray, named: np.ndarr
     return np.flatnonzero(kept)
 
 
-def chosen(found: Keep, experiment: Experiment, results: Run) -> np.ndarray:
-    """Places of the cases whose histories are kept for what became of them: results of all, without histories."""
-    kept = np.zeros(len(results.case), dtype=bool)
+@frozen
+class Known:
+    """How each case of an experiment ended, and its metrics, as `met.run.Run` has them."""
+
+    status: np.ndarray
+    metrics: Mapping[str, np.ndarray]
+
+
+def chosen(found: Keep, experiment: Experiment, results: Known | Run) -> np.ndarray:
+    """Places of the cases whose histories are kept for what became of them: results of all."""
+    kept = np.zeros(len(results.status), dtype=bool)
     if found.failed:
         kept |= results.status != 0
     for count, by in found.worst:

@@ -10,6 +10,7 @@ import numpy as np
 
 from batch import shard
 from batch.folder import Folder
+from batch.keep import Known
 from batch.tasks import Section
 from met import run as engine
 from met.diagnostic import Problem, error
@@ -89,22 +90,26 @@ def without_history(folder: Folder, values: Section, histories: Section) -> dict
 
 
 def _alone(folder: Folder, section: Section) -> Iterator[tuple[int, str]]:
-    """Rows that could not be run, and why; each has a shard of its own."""
+    """Rows that could not be run, and why; each has a shard of its own. One that a shard before it holds as well counts
+    as it is there, as in `pieces`: a worker that was thought dead may have come to its end."""
+    at = 0
     for task in folder.named(section.number):
-        if task.cases == 1:
-            with contextlib.suppress(shard.Unsound, OSError):
+        if task.cases == 1 and task.first >= at:
+            with contextlib.suppress(shard.Unsound, OSError):  # `pieces` comes upon it, too
                 for _, why in folder.read(section, task).fates.values():
                     yield int(section.rows[task.first]), why
+        at = max(at, task.last)
 
 
-def results(folder: Folder, section: Section) -> Run:
-    """What became of all cases of a section, without histories: a few numbers a case."""
-    outputs = np.empty((len(section.rows), len(section.prepared.program.outputs)))
-    fates: dict[int, tuple[int, str]] = {}
+def results(folder: Folder, section: Section) -> Known:
+    """What became of all cases of a section, as far as it decides whose histories are kept."""
+    status, metrics = np.empty(len(section.rows), np.int8), dict[str, np.ndarray]()
     for at, found in pieces(folder, section):
-        outputs[at : at + len(found.outputs)] = found.outputs
-        fates |= {at + case: fate for case, fate in found.fates.items()}
-    return _results(section, 0, outputs, None, fates)
+        run = _results(section, at, found.outputs, None, dict(found.fates))
+        status[at : at + len(run.status)] = run.status
+        for name, values in run.metrics.items():
+            metrics.setdefault(name, np.empty(len(section.rows)))[at : at + len(values)] = values
+    return Known(status, metrics)
 
 
 def pieces(folder: Folder, section: Section) -> Iterator[tuple[int, shard.Shard]]:

@@ -93,6 +93,7 @@ def _check_output(output: Path, plan: Plan) -> None:
     if output.exists() and output.stat().st_size > 0 and not is_archive(output):
         helps = "give another name with `-o`, or remove the file"
         raise Problem(error("E305", f"{output} exists and is no archive of MET: it is not written over", help=helps))
+    temporary_of(sidecar_path(output)).exists()  # the longest of the names that there will be beside it
     probe = Sink(temporary_of(output))
     probe.remove()
     probe.close()

@@ -58,7 +58,7 @@ def run_and_tell(
         again = replay(source, names, cases, failed, everything)
         if Path(output or again.output).resolve() == Path(source).resolve():
             helps = "`-o FILE` names another place"
-            raise Problem(error("E305", f"cannot write {output}: it is what is run again", help=helps))
+            raise Problem(error("E305", f"cannot write {output or again.output}: it is what is run again", help=helps))
         campaign = prepare(
             again.plan, output=output or again.output, selected=again.selected,
             histories=histories or ("all" if again.kept is None else "none"),

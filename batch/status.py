@@ -88,7 +88,7 @@ def told(folder: Folder) -> list[dict[str, Any]]:
     for path in folder.path.glob("status*.json"):
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             continue
         if isinstance(data, dict) and all(isinstance(data.get(name), kind) for name, kind in TYPES.items()):
             found.append({**data, "name": path.name.removeprefix("status").removesuffix(".json").strip(".")})

@@ -100,16 +100,17 @@ def _hand_over(campaign: Campaign, folder: Folder, count: int, cases: int, optio
     program, tasks = str(shutil.which("sbatch")), folder.path / "jobs.json"
     logs = folder.path / "logs"
     logs.mkdir(exist_ok=True)
+    log = str(logs.resolve()).replace("%", "%%")  # as sbatch reads names
     name = campaign.output.stem
     common = [program, "--parsable", f"--job-name=met-{name}", *options]
     array = ""
     if cases:
         script = _script(folder.path, "share", '"$SLURM_ARRAY_TASK_ID"', shlex.quote(str(tasks.resolve())))
-        words = [*common, f"--array=0-{count - 1}", f"--output={logs.resolve()}/%A_%a.log"]
+        words = [*common, f"--array=0-{count - 1}", f"--output={log}/%A_%a.log"]
         array = _sbatch(words, script, bool(options))
     script = _script(folder.path, "together")
     after = [f"--dependency=afterany:{array}"] if array else []
-    end = _sbatch([*common, *after, f"--output={logs.resolve()}/%A.log"], script, bool(options))
+    end = _sbatch([*common, *after, f"--output={log}/%A.log"], script, bool(options))
     return Submitted(array, end, count, cases)
 
 
@@ -127,7 +128,7 @@ def _script(folder: Path, *words: str) -> str:
     path = os.pathsep.join([str(package), *filter(None, [os.environ.get("PYTHONPATH")])])
     return "\n".join([
         "#!/bin/sh", f"export PYTHONPATH={shlex.quote(path)}",
-        f"exec {shlex.quote(sys.executable)} -m batch.job {shlex.quote(str(folder.resolve()))} {' '.join(words)}", "",
+        f"exec {shlex.quote(sys.executable)} -m batch.job {shlex.quote(str(folder.absolute()))} {' '.join(words)}", "",
     ])  # fmt: skip
 
 

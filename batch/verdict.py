@@ -132,7 +132,9 @@ def told(
             only = f" --run {quoted(summary.name)}" if len(summaries) > 1 else ""
             out.append(f"         met show {quoted(path)}{only} --case '{cases.first}'")
     if not any(summary.recorded for summary in summaries) and campaign.parts[0].experiment.structure.record:
-        out.append(f"         met run {quoted(source)} {summaries[0].name} --case '#0'")
+        part = campaign.parts[0]
+        first = part.experiment.cases.table[part.rows[0]]
+        out.append(f"         met run {quoted(source)} {part.experiment.asked} --case '#{first}'")
     if not ok:
         out.append(f"exit 1: {_why_not(summaries)}")
     return out
