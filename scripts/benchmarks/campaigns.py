@@ -30,7 +30,7 @@ sweep khz of fast {{
 }}
 """
 
-MILLION, KHZ, MINUTE = 1_000_000, 100_000, 250_000
+MILLION, KHZ, MINUTE = 1_000_000, 300_000, 650_000
 
 
 def _deck(cases: int) -> str:
