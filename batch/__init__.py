@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from met.frozen import frozen
 
 if TYPE_CHECKING:
-    from batch.differences.campaigns import Diff
+    from batch.differences.found import Diff
     from batch.drive import Progress
     from batch.executors import Executor
     from batch.summary import Summary

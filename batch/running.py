@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from batch.archive.read import ArchiveFile
-from batch.campaign import prepare
+from batch.campaign import Campaign, prepare
 from batch.executors.choose import choose
 from batch.output import quoted
 from batch.performing import TooMany, perform
@@ -65,14 +65,9 @@ def run_and_tell(
             kept=again.kept if not histories else None, float32=float32,
         )  # fmt: skip
     else:
-        plan = read_plan(
-            source, names, everything=everything, defines=defines, include_dirs=include_dirs, settings=settings,
-            quiet=quiet or json,
-        )  # fmt: skip
-        campaign = prepare(
-            plan, output=output, experiments=names or None, cases=cases or None, histories=histories or "default",
-            float32=float32,
-        )  # fmt: skip
+        campaign = _of_deck(
+            source, names, everything, output, cases, histories, float32, defines, include_dirs, settings, quiet or json
+        )
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
     try:
         performed = perform(
@@ -135,14 +130,9 @@ def submit_and_tell(
     from batch.submitting import submit
 
     say = (lambda *_: None) if quiet or json else print
-    plan = read_plan(
-        source, names, everything=everything, defines=defines, include_dirs=include_dirs, settings=settings,
-        quiet=quiet or json,
-    )  # fmt: skip
-    campaign = prepare(
-        plan, output=output, experiments=names or None, cases=cases or None, histories=histories or "default",
-        float32=float32,
-    )  # fmt: skip
+    campaign = _of_deck(
+        source, names, everything, output, cases, histories, float32, defines, include_dirs, settings, quiet or json
+    )
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
     done = submit(campaign, jobs=jobs, options=options, timeout=timeout, fresh=fresh, say=say)
     archive = str(campaign.output)
@@ -157,6 +147,21 @@ def submit_and_tell(
             say(f"submitted  array {done.array}: {many} for {done.cases:,} cases")
         say(f"           job {done.end}: merges them into {archive}")
         say(f"next       met status {quoted(archive)}")
+
+
+def _of_deck(
+    source: str, names: tuple[str, ...], everything: bool, output: str | None, cases: tuple[str, ...],
+    histories: str | Sequence[str], float32: bool, defines: tuple[str, ...], include_dirs: tuple[str, ...],
+    settings: tuple[str, ...], quiet: bool,
+) -> Campaign:  # fmt: skip
+    """The campaign that is asked of a deck or a plan."""
+    plan = read_plan(
+        source, names, everything=everything, defines=defines, include_dirs=include_dirs, settings=settings, quiet=quiet
+    )
+    return prepare(
+        plan, output=output, experiments=names or None, cases=cases or None, histories=histories or "default",
+        float32=float32,
+    )  # fmt: skip
 
 
 def _complain(problem: Problem, json: bool) -> None:

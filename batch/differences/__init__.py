@@ -3,7 +3,7 @@
     matching     which experiment, case, signal of one is which of the other
     tolerance    how much may differ, by signal; nothing unless it is given
     compare      two histories, or two columns of metrics: identical, equivalent, different, and where
-    campaigns    all of two archives, in bounded memory
+    campaigns    all of two archives, in bounded memory;  found: what comes of it
     changed      what made them: parameters, models, decks, versions
     samples      metrics as distributions, where single cases cannot be compared
     told, data   the same for people, and for programs

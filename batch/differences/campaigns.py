@@ -3,168 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group, Stored
 from batch.differences import matching
-from batch.differences.changed import Changed, changed
-from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE, VERDICTS, Difference, compare
+from batch.differences.changed import changed
+from batch.differences.compare import Difference, compare
+from batch.differences.found import Diff, Ended, Experiment, Place, Ranked, Signal
 from batch.differences.matching import Cases
-from batch.differences.samples import Sample, samples
+from batch.differences.samples import samples
 from batch.differences.tolerance import Tolerance, Tolerances, check
-from met.frozen import frozen
 
 WORST = 20
 """Cases that are ranked."""
 
 
-@frozen
-class Place:
-    """Where two archives differ most in one signal or metric: position of the case, label of the joint or component,
-    time (s), and both values."""
-
-    case: int
-    label: str
-    time: float
-    before: float
-    after: float
-
-
-@dataclass
-class Signal:
-    """One signal, or metric, over all matched cases.
-
-    verdict      of compare.VERDICTS;  why: of what is incomparable
-    compared     cases that both have;  identical, equivalent, different: of these
-    largest      the largest |b - a|, at `place`;  rms of all finite differences;  span: of the values of a
-    first        s, the earliest time of a difference, in whichever case; first_beyond: by more than is allowed
-    used         the largest share of the tolerance that was needed
-    nan          values that are not-a-number in one archive alone
-    """
-
-    name: str
-    unit: str
-    metric: bool
-    tolerance: Tolerance
-    compared: int = 0
-    identical: int = 0
-    equivalent: int = 0
-    different: int = 0
-    largest: float = 0.0
-    place: Place | None = None
-    first: float = float("inf")
-    first_beyond: float = float("inf")
-    used: float = 0.0
-    nan: int = 0
-    why: str = ""
-    note: str = ""
-    low: float = float("inf")
-    high: float = float("-inf")
-    squares: float = 0.0
-    values: int = 0
-
-    @property
-    def verdict(self) -> str:
-        if self.why:
-            return INCOMPARABLE
-        return DIFFERENT if self.different else EQUIVALENT if self.equivalent else IDENTICAL
-
-    @property
-    def rms(self) -> float:
-        return (self.squares / self.values) ** 0.5 if self.values else 0.0
-
-    @property
-    def share(self) -> float:
-        """The largest difference as a share of what the values of a span."""
-        span = self.high - self.low
-        return self.largest / span if span > 0.0 else float("inf") if self.largest else 0.0
-
-
-@frozen
-class Ended:
-    """A case that ended otherwise: position in the case table, id, status, cause and rows in a and b."""
-
-    case: int
-    case_id: str
-    before: int
-    after: int
-    cause_before: str
-    cause_after: str
-    rows_before: int
-    rows_after: int
-
-
-@frozen
-class Ranked:
-    """One of the worst cases: positions in both case tables, id in b, the signal that differs most, by which share of
-    its span (or of its tolerance, where one is given), and where."""
-
-    case_a: int
-    case_b: int
-    case_id: str
-    signal: str
-    score: float
-    place: Place
-    difference: float
-
-
-@dataclass
-class Experiment:
-    """Two matched experiments."""
-
-    name_a: str
-    name_b: str
-    cases: Cases
-    signals: list[Signal] = field(default_factory=list)
-    ended: list[Ended] = field(default_factory=list)
-    requirements: list[tuple[str, int, int]] = field(default_factory=list)
-    worst: list[Ranked] = field(default_factory=list)
-    samples: list[Sample] = field(default_factory=list)
-    only_a: list[int] = field(default_factory=list)
-    only_b: list[int] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    cases_different: int = 0
-
-    @property
-    def verdict(self) -> str:
-        found = [signal.verdict for signal in self.signals]
-        if self.ended or self.only_a or self.only_b:
-            found.append(DIFFERENT)
-        if not self.cases.count:
-            found.append(INCOMPARABLE)
-        worst = max(found, key=VERDICTS.index, default=IDENTICAL)
-        return DIFFERENT if worst == INCOMPARABLE and DIFFERENT in found else worst
-
-
-@frozen
-class Diff:
-    """The difference of two archives. only_a, only_b: experiments that one has alone."""
-
-    a: Path
-    b: Path
-    tolerances: Tolerances
-    changed: Changed
-    experiments: tuple[Experiment, ...]
-    only_a: tuple[str, ...]
-    only_b: tuple[str, ...]
-
-    @property
-    def verdict(self) -> str:
-        """identical, equivalent, different or incomparable: the worst of all, but different where anything differs."""
-        found = [experiment.verdict for experiment in self.experiments]
-        if not found:
-            return INCOMPARABLE
-        if DIFFERENT in found or self.only_a or self.only_b:
-            return DIFFERENT
-        return max(found, key=VERDICTS.index)
-
-
 def diff(a: str | Path, b: str | Path, given: Tolerances | None = None, *, distributions: bool = False) -> Diff:
-    """Compare two archives. given: tolerances; None: those of their decks. distributions: compare metrics as samples
-    even where the seeds are the same. Raises Problem."""
+    """Compare two archives. given: tolerances; None: nothing may differ. distributions: compare metrics as samples even
+    where the seeds are the same. Raises Problem."""
     with ArchiveFile(a) as file_a, ArchiveFile(b) as file_b:
         pairs, only_a, only_b = matching.experiments(file_a, file_b)
         allowed = given or Tolerances()
@@ -392,8 +251,6 @@ def _case(
         found = compare(a / scale, b / scale, tolerance, time)
         plain = compare(a, b, Tolerance(np.inf), time)
         if found is not None and plain is not None:
-            from dataclasses import replace
-
             found = replace(plain, beyond=found.beyond, first_beyond=found.first_beyond, used=found.used)
     else:
         found = compare(a, b, tolerance, time)

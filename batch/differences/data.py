@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from batch.differences.campaigns import Diff, Experiment, Signal
+from batch.differences.found import Diff, Experiment, Signal
 from batch.summary import finite
 
 SCHEMA, VERSION = "met.diff", 1

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from batch.differences.campaigns import Diff, Ended, Experiment, Ranked, Signal
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE
+from batch.differences.found import Diff, Ended, Experiment, Ranked, Signal
 from batch.differences.samples import LEVEL
 from batch.failures import STATUS, ranges
 from batch.output import quoted

@@ -24,15 +24,9 @@ from met.plan import Plan
 from met.render import render
 from met.run import DONE, FAILED, LOST, TIMED_OUT
 from tests.batch import plans, poisoned, whole
+from tests.batch.door import ARM
 
-DECK = """
-arm door {
-    link leaf   { mass = 4 kg;  shape = rod(length = 1 m, along = x); }
-    link handle { mass = 1 kg;  shape = rod(length = 0.2 m, along = x); }
-    joint hinge revolute { parent = base;  child = leaf;  axis = z; }
-    joint grip  revolute { parent = leaf;  child = handle;  axis = z;  at = [1, 0, 0] m; }
-}
-
+DECK = ARM + """
 run open {
     arm      = door;
     initial  { grip.q = 0.5 rad; }

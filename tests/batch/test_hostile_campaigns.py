@@ -30,6 +30,7 @@ from met.diagnostic import Problem
 from met.plan import Plan
 from tests.batch import plans, whole
 from tests.batch.begun import begin, plan, short_tasks
+from tests.batch.door import ARM
 
 DECK = """
 #include <two_link.ic>
@@ -38,14 +39,7 @@ run brief like nominal { duration = 1 s; }
 sweep kinds of brief { vary integrator = [modified_euler, rk4, midpoint]; }
 """
 
-DOOR = """
-arm door {
-    link leaf   { mass = 4 kg;  shape = rod(length = 1 m, along = x); }
-    link handle { mass = 1 kg;  shape = rod(length = 0.2 m, along = x); }
-    joint hinge revolute { parent = base;  child = leaf;  axis = z; }
-    joint grip  revolute { parent = leaf;  child = handle;  axis = z;  at = [1, 0, 0] m; }
-}
-run open {
+DOOR = ARM + """run open {
     arm = door;
     initial { grip.q = 0.5 rad; }
     rates { dynamics = 100 Hz;  record = 20 Hz; }

@@ -12,7 +12,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from batch.differences.campaigns import Diff, Signal, diff
+from batch.differences.campaigns import diff
+from batch.differences.found import Diff, Signal
 from batch.differences.tolerance import tolerances
 from met.plan import Experiment, Origin, Quantity
 from met.run import Run

@@ -17,26 +17,7 @@ import batch
 from batch import performing, shard, tasks
 from met import cli, plan_file
 from tests.batch import plans, whole
-from tests.batch.begun import CASES, OF_TASK, begin, flip, go_on, plan, refused, short_tasks
-
-
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """The archive of a serial run that nothing happened to."""
-    return batch.run(plan(), output=tmp_path_factory.mktemp("undisturbed") / "a.h5", threads=1).path.read_bytes()
-
-
-@pytest.fixture(autouse=True)
-def sizes(monkeypatch: pytest.MonkeyPatch) -> None:
-    short_tasks(monkeypatch)
-
-
-@pytest.fixture
-def archive(tmp_path: Path) -> Path:
-    """Where a campaign goes, in a folder with nothing else."""
-    (tmp_path / "out").mkdir()
-    return tmp_path / "out" / "a.h5"
-
+from tests.batch.begun import CASES, OF_TASK, begin, flip, go_on, plan, refused
 
 # The finished archive
 

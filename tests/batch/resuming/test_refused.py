@@ -12,7 +12,7 @@ import ic
 from met import plan_file
 from met.plan import Plan
 from tests.batch import plans, whole
-from tests.batch.begun import CASES, OF_TASK, begin, go_on, plan, refused, short_tasks
+from tests.batch.begun import CASES, OF_TASK, begin, go_on, plan, refused
 
 DECK = """
 #include <two_link.ic>
@@ -23,24 +23,6 @@ sweep it of brief {
     vary gearbox.kp = linspace(0.010, 0.040, 40) V*s/rad;
 }
 """
-
-
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """The archive of a serial run that nothing happened to."""
-    return batch.run(plan(), output=tmp_path_factory.mktemp("undisturbed") / "a.h5", threads=1).path.read_bytes()
-
-
-@pytest.fixture(autouse=True)
-def sizes(monkeypatch: pytest.MonkeyPatch) -> None:
-    short_tasks(monkeypatch)
-
-
-@pytest.fixture
-def archive(tmp_path: Path) -> Path:
-    """Where a campaign goes, in a folder with nothing else."""
-    (tmp_path / "out").mkdir()
-    return tmp_path / "out" / "a.h5"
 
 
 # Two at once
