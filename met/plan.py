@@ -157,6 +157,20 @@ class Requirement:
 
 
 @frozen
+class Tolerance:
+    """By how much another version may differ before a diff calls it different; `text` as the deck wrote it.
+
+    of     a signal, `q`; a joint's part of one, `elbow.q`; a metric; `rel`: of all, a share; `time`: of all, s
+    value  in SI
+    """
+
+    of: str
+    value: float
+    text: str
+    place: Place | None = None
+
+
+@frozen
 class Schedule:
     """Rates as integer divisors of one base rate. A run of `ticks` base ticks has both ends, 0 and `ticks`.
 
@@ -312,6 +326,7 @@ class Experiment:
     place: Place | None = None
     notes: tuple[str, ...] = ()
     sweep: str = ""
+    tolerances: tuple[Tolerance, ...] = ()
 
     @property
     def asked(self) -> str:

@@ -18,6 +18,7 @@ import numpy as np
 from met import models, units
 from met import plan_rest as rest
 from met.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
+from met.outputs import tolerable
 from met.parameter import Parameter
 from met.plan import Coordinate, Experiment, Formula, Quantity, Requirement, Structure
 from met.plan_codec import Damaged
@@ -55,6 +56,7 @@ def check(experiments: Iterable[Experiment]) -> None:
         _check_uses(experiment.structure, f"{where}.structure")
         _check_record(experiment.structure, f"{where}.structure.record")
         _check_requirements(experiment, f"{where}.requirements")
+        _check_tolerances(experiment, f"{where}.tolerances")
         _check_cases(experiment, f"{where}.cases")
         _check_formulas(experiment, where)
         _check_parameters(experiment, f"{where}.parameters")
@@ -257,6 +259,17 @@ def _check_requirements(experiment: Experiment, where: str) -> None:
             requirement.metric, requirement.comparison, requirement.limit
         ):  # fmt: skip
             raise Damaged(f"{where}[{index}].text", "another requirement has the same text")
+
+
+def _check_tolerances(experiment: Experiment, where: str) -> None:
+    known = tolerable(experiment.structure) if experiment.tolerances else {}
+    for index, tolerance in enumerate(experiment.tolerances):
+        if tolerance.of not in known:
+            raise Damaged(f"{where}[{index}].of", f"there is no signal or metric `{tolerance.of}`")
+        if not 0.0 <= tolerance.value < math.inf:
+            raise Damaged(f"{where}[{index}].value", "it should be a finite number, at least 0")
+    if len({tolerance.of for tolerance in experiment.tolerances}) < len(experiment.tolerances):
+        raise Damaged(where, "something has two tolerances")
 
 
 def _check_cases(experiment: Experiment, where: str) -> None:

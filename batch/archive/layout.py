@@ -32,9 +32,10 @@ from typing import Any, Literal
 import numpy as np
 
 from batch.archive import limits
-from met.channel import DIMENSIONS, channels, watched_unit
+from met.channel import DIMENSIONS, channels
 from met.frozen import frozen
-from met.plan import Coordinate, Experiment, MetricUse, Plan, Recorded
+from met.outputs import metric_units
+from met.plan import Coordinate, Experiment, Plan, Recorded
 
 SCHEMA = "met.archive"
 VERSION = 1
@@ -175,14 +176,6 @@ def coordinate_unit(experiment: Experiment, coordinate: Coordinate) -> str:
     return units.text(written)
 
 
-def metric_unit(experiment: Experiment, use: MetricUse) -> str:
-    """SI unit of a metric's result; `of` in its declaration stands for the channel's unit."""
-    from met import models
-
-    declared = models.find("metric", use.model, use.place).unit
-    return watched_unit(str(declared), channels(experiment.structure)[use.of].unit)
-
-
 def _case_variables(experiment: Experiment) -> list[Variable]:
     def variable(name: str, kind: Kind, long_name: str, **attributes: Any) -> Variable:
         return Variable(name, kind, ("case",), "case", long_name, attributes=attributes)
@@ -214,11 +207,11 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         *([variable("bed_limited", "int64", LIMITED)] if experiment.structure.substitutions else []),
     ]
     taken |= set(names.values())
-    metrics = [use.name for use in experiment.structure.metrics]
+    units = metric_units(experiment.structure)
     named: dict[str, str] = {}
     for use in experiment.structure.metrics:
-        name = _apart(use.name, "metrics", taken, metrics)
-        unit = metric_unit(experiment, use)
+        name = _apart(use.name, "metrics", taken, list(units))
+        unit = units[use.name]
         words = f"{use.model} of {use.of}"
         shown, scale = limits.deck_unit(use.name, unit, experiment.requirements)
         told = {"model": use.model, "of": use.of, "deck_unit": shown, "deck_scale": scale}

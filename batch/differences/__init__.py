@@ -6,7 +6,7 @@
     campaigns    all of two archives, in bounded memory;  found: what comes of it
     changed      what made them: parameters, models, decks, versions
     samples      metrics as distributions, where single cases cannot be compared
-    told, data   the same for people, and for programs
+    words        what is found in words, part by part;  told, data: all of it for people, and for programs
 """
 
 from __future__ import annotations

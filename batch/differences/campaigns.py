@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,49 +10,78 @@ import numpy as np
 from batch.archive.read import ArchiveFile, Group, Stored
 from batch.differences import matching
 from batch.differences.changed import changed
-from batch.differences.compare import Difference, compare
+from batch.differences.compare import (
+    DIFFERENT,
+    EQUIVALENT,
+    IDENTICAL,
+    VERDICTS,
+    Difference,
+    compare,
+    compare_cases,
+    spans,
+    unlike_bits,
+)
 from batch.differences.found import Diff, Ended, Experiment, Place, Ranked, Signal
 from batch.differences.matching import Cases
 from batch.differences.samples import samples
-from batch.differences.tolerance import Tolerance, Tolerances, check
+from batch.differences.tolerance import Tolerance, Tolerances, check, of_deck
+from met.diagnostic import Problem
+from met.outputs import joint_parts
+from met.plan import Plan
 
 WORST = 20
 """Cases that are ranked."""
 
+BLOCK = 1 << 16
+"""Values of a signal that are compared at a time: 512 KiB."""
+
 
 def diff(a: str | Path, b: str | Path, given: Tolerances | None = None, *, distributions: bool = False) -> Diff:
-    """Compare two archives. given: tolerances; None: nothing may differ. distributions: compare metrics as samples even
-    where the seeds are the same. Raises Problem."""
+    """Compare two archives. given: tolerances, besides and instead of those of b's deck. distributions: compare metrics
+    as samples even where the seeds are the same. Raises Problem."""
     with ArchiveFile(a) as file_a, ArchiveFile(b) as file_b:
         pairs, only_a, only_b = matching.experiments(file_a, file_b)
         allowed = given or Tolerances()
         _check(allowed, [*file_a.groups, *file_b.groups])
-        found = tuple(_experiment(group_a, group_b, allowed, distributions) for group_a, group_b in pairs)
+        plans = [_plan(file) for file in (file_a, file_b)]
+        found = tuple(_experiment(one, two, allowed, plans[1], distributions) for one, two in pairs)
         return Diff(
-            Path(a), Path(b), allowed, changed(file_a, file_b, pairs), found,
+            Path(a), Path(b), allowed, changed(file_a, file_b, pairs, plans), found,
             tuple(group.name for group in only_a), tuple(group.name for group in only_b),
         )  # fmt: skip
 
 
 def _check(allowed: Tolerances, groups: Sequence[Group]) -> None:
-    units, shown = {}, []
+    """That the command line's tolerances are of something in one of the archives."""
+    known: dict[str, Sequence[str]] = {}
+    shown: dict[str, None] = {}
     for group in groups:
         for variable in (*group.role("signal"), *group.role("metric")):
-            units[variable.name] = variable.unit or (variable.units_by_joint or ("1",))[0]
-            shown.append(variable.name)
+            units = variable.units_by_joint or [variable.unit]
+            known[variable.name] = list(dict.fromkeys(units))
+            shown[variable.name] = None
             if variable.role == "signal":
-                for joint, unit in zip(group.joints(variable), _units(group, variable), strict=True):
-                    units[f"{joint}.{variable.name}"] = unit
-    check(allowed, units, list(dict.fromkeys(shown)))
+                parts = joint_parts(variable.name, tuple(group.joints(variable)))
+                known.update(zip(parts, ([unit] for unit in units * (len(parts) // len(units))), strict=True))
+    check(allowed, known, list(shown))
 
 
-def _units(group: Group, variable: Stored) -> Sequence[str]:
-    return variable.units_by_joint or [variable.unit] * len(group.joints(variable))
+def _plan(file: ArchiveFile) -> Plan | str:
+    """The plan of an archive, or why it cannot be read here."""
+    try:
+        return file.plan(as_written=True)
+    except Problem as problem:
+        return problem.diagnostics[0].message
 
 
-def _experiment(a: Group, b: Group, allowed: Tolerances, distributions: bool) -> Experiment:
+def _experiment(a: Group, b: Group, given: Tolerances, plan: Plan | str, distributions: bool) -> Experiment:
+    """Of two groups. plan: that of b, or why it cannot be read."""
+    known = {} if isinstance(plan, str) else {experiment.name: experiment for experiment in plan.experiments}
+    allowed = given.over(of_deck(known[b.name], b) if b.name in known else Tolerances())
     matched = matching.cases(a, b)
-    out = Experiment(a.name, b.name, matched)
+    out = Experiment(a.name, b.name, matched, allowed)
+    if isinstance(plan, str) and not given.alone:
+        out.notes.append("what its deck allows is not known, for the plan cannot be read")
     out.only_a = a.values("case")[matched.only_a].tolist()
     out.only_b = b.values("case")[matched.only_b].tolist()
     scores = _Scores(matched.count)
@@ -64,14 +92,26 @@ def _experiment(a: Group, b: Group, allowed: Tolerances, distributions: bool) ->
     _requirements(a, b, matched, out)
     out.worst = scores.ranked(a, b, matched)
     out.cases_different = int(scores.beyond.sum())
+    out.how = _how(scores, matched, b, out)
     if distributions or _other_noise(a, b):
         out.samples = samples(a, b)
     return out
 
 
+def _how(scores: _Scores, matched: Cases, b: Group, found: Experiment) -> np.ndarray:
+    """Of each matched case its place in VERDICTS. One that ended otherwise is different."""
+    out = np.where(scores.unlike, VERDICTS.index(EQUIVALENT), VERDICTS.index(IDENTICAL)).astype(np.int8)
+    out[scores.beyond] = VERDICTS.index(DIFFERENT)
+    if found.ended:
+        ended = [each.case for each in found.ended]
+        out[np.isin(b.values("case")[matched.b], ended)] = VERDICTS.index(DIFFERENT)
+    return out
+
+
 def _other_noise(a: Group, b: Group) -> bool:
     """Whether the two have other seeds, so that single cases differ by chance."""
-    return not np.array_equal(np.unique(a.values("seed")), np.unique(b.values("seed")))
+    seeds = a.values("seed"), b.values("seed")
+    return not np.array_equal(*seeds) and not np.array_equal(*map(np.unique, seeds))
 
 
 def _ended(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
@@ -109,6 +149,7 @@ class _Scores:
 
     def __init__(self, count: int) -> None:
         self.score = np.zeros(count)
+        self.unlike = np.zeros(count, bool)
         self.beyond = np.zeros(count, bool)
         self.where: dict[int, tuple[str, Place, float]] = {}
 
@@ -159,6 +200,7 @@ def _metric(a: Group, b: Group, matched: Cases, name: str, allowed: Tolerances, 
     out.place = Place(case, "", float("nan"), found.before, found.after)
     unlike = np.flatnonzero((values_a.view(np.int64) != values_b.view(np.int64))
                             & ~(np.isnan(values_a) & np.isnan(values_b)))  # fmt: skip
+    scores.unlike[unlike] = True
     out.identical = out.compared - len(unlike)
     out.different = found.beyond
     out.equivalent = len(unlike) - found.beyond
@@ -212,64 +254,87 @@ def _signals(
         return
     places, ia, ib = _recorded(a, b, matched, notes)
     time_a, time_b = (group.values("time") if "time" in group.variables else np.empty(0) for group in (a, b))
-    rows_a, rows_b = matching.instants(time_a, time_b, allowed.time)
+    rows_a, rows_b = matching.instants(time_a, time_b, allowed.time or 0.0)
     if len(rows_a) < max(len(time_a), len(time_b)) and len(time_a) and len(time_b):
         of = f"of {len(time_a):,} and {len(time_b):,}"
         notes.append(f"signals are compared at the {len(rows_a):,} instants that both have, {of}")
     aligned = len(rows_a) == len(time_a) == len(time_b)
+    whole = slice(None)
+    at_a, at_b = (whole if np.array_equal(rows, np.arange(len(time))) else rows
+                  for rows, time in ((rows_a, time_a), (rows_b, time_b)))  # fmt: skip
+    numbers = b.values("recorded_case")[ib] if len(ib) else ib
     for name in names:
         unit = (a if name in a.variables else b).variables[name].unit
         out = Signal(name, unit, False, allowed.of(name))
         out.why = _incomparable(a, b, name, "signal") or ("" if len(rows_a) else "the two have no instant in common")
         if not out.why:
             labels = _labels(a, a.variables[name])
-            limits = [allowed.of(f"{label.partition('.')[0]}.{name}").absolute for label in labels]
-            for place, at_a, at_b in zip(places.tolist(), ia.tolist(), ib.tolist(), strict=True):
-                out.compared += 1
-                if aligned and (raw := a.raw(name, at_a)) is not None and raw == b.raw(name, at_b):
-                    out.identical += 1
-                    continue
-                values_a, values_b = a.recorded_signal(name, at_a), b.recorded_signal(name, at_b)
-                values_a = values_a.reshape(len(values_a), -1)[rows_a].astype(np.float64)
-                values_b = values_b.reshape(len(values_b), -1)[rows_b].astype(np.float64)
-                _case(out, values_a, values_b, time_a[rows_a], labels, limits, scores, place, b, matched)
+            out.by_joint = _by_joint(a, a.variables[name], allowed)
+            absolute = _absolute(a, a.variables[name], out)
+            together = max(1, BLOCK // max(1, len(labels) * max(len(time_a), len(time_b))))
+            for first in range(0, len(places), together):
+                some = slice(first, first + together)
+                values_a, values_b = _histories(a, name, ia[some]), _histories(b, name, ib[some])
+                which = unlike_bits(values_a, values_b) if aligned else np.ones(len(values_a), bool)
+                out.compared += len(which)
+                out.identical += int((~which).sum())
+                if not which.all():
+                    values_a, values_b = values_a[which], values_b[which]
+                _cases(out, values_a[:, at_a], values_b[:, at_b], time_a[rows_a], labels, absolute, scores, places[some][which],
+                       numbers[some][which])  # fmt: skip
         yield out
 
 
-def _case(
-    out: Signal, a: np.ndarray, b: np.ndarray, time: np.ndarray, labels: Sequence[str], limits: Sequence[float],
-    scores: _Scores, place: int, group: Group, matched: Cases,
+def _histories(group: Group, name: str, places: np.ndarray) -> np.ndarray:
+    """[case, row, column], of the recorded cases at these places."""
+    values = group.histories(name, places)
+    return values.reshape(*values.shape[:2], -1).astype(np.float64, copy=False)
+
+
+def _by_joint(group: Group, signal: Stored, allowed: Tolerances) -> dict[str, float]:
+    """The joints of a signal for which something of their own is allowed."""
+    joints = tuple(group.joints(signal))
+    limits = [allowed.of(part).absolute for part in joint_parts(signal.name, joints)]
+    return {joint: limit for joint, limit in zip(joints, limits, strict=True) if limit}
+
+
+def _absolute(group: Group, signal: Stored, found: Signal) -> np.ndarray | None:
+    """What is allowed of each column; None where it is the same for all."""
+    if not found.by_joint:
+        return None
+    each = [found.by_joint.get(joint, found.tolerance.absolute) for joint in group.joints(signal)]
+    return np.repeat(each, len(group.components(signal)) or 1)
+
+
+def _cases(
+    out: Signal, a: np.ndarray, b: np.ndarray, time: np.ndarray, labels: Sequence[str], absolute: np.ndarray | None,
+    scores: _Scores, places: np.ndarray, numbers: np.ndarray,
 ) -> None:  # fmt: skip
-    """One case of a signal whose bits are not all the same, or may not be."""
-    finite = a[np.isfinite(a)]
-    if len(finite):
-        out.low, out.high = min(out.low, float(finite.min())), max(out.high, float(finite.max()))
-    tolerance = out.tolerance
-    if any(limits):  # of single joints: what such a limit allows counts as what the signal's would
-        tolerance = Tolerance(1.0, 0.0, tolerance.time)
-        scale = np.array([limit or out.tolerance.absolute or 1e-300 for limit in limits])
-        found = compare(a / scale, b / scale, tolerance, time)
-        plain = compare(a, b, Tolerance(np.inf), time)
-        if found is not None and plain is not None:
-            found = replace(plain, beyond=found.beyond, first_beyond=found.first_beyond, used=found.used)
-    else:
-        found = compare(a, b, tolerance, time)
-    if found is None:
-        out.identical += 1
+    """Cases of a signal whose bits are not all the same, or may not be, [case, row, column]. places: of the cases among
+    those that are matched; numbers: in the case table of b."""
+    if not len(places):
         return
-    case = int(group.at("case", [matched.b[place]])[0])
-    where = Place(case, labels[found.column], float(time[found.row]), found.before, found.after)
-    if found.largest > out.largest or out.place is None:
-        out.place = where
-    _add(out, found)
-    out.first = min(out.first, float(time[found.first]))
-    if found.beyond:
-        out.different += 1
-        out.first_beyond = min(out.first_beyond, float(time[found.first_beyond]))
-        score = float("inf") if found.nan else found.largest / _unit_of(out)
-        scores.take(place, score, out.name, where, found.largest)
-    else:
-        out.equivalent += 1
+    lows, highs = spans(a)
+    differences = compare_cases(a, b, out.tolerance, time, absolute)
+    together = zip(differences, places.tolist(), numbers.tolist(), lows.tolist(), highs.tolist(), strict=True)
+    for found, place, number, low, high in together:
+        out.low, out.high = min(out.low, low), max(out.high, high)
+        if found is None:
+            out.identical += 1
+            continue
+        scores.unlike[place] = True
+        where = Place(number, labels[found.column], float(time[found.row]), found.before, found.after)
+        if found.largest > out.largest or out.place is None:
+            out.place = where
+        _add(out, found)
+        out.first = min(out.first, float(time[found.first]))
+        if found.beyond:
+            out.different += 1
+            out.first_beyond = min(out.first_beyond, float(time[found.first_beyond]))
+            score = float("inf") if found.nan else found.largest / _unit_of(out)
+            scores.take(place, score, out.name, where, found.largest)
+        else:
+            out.equivalent += 1
 
 
 def _recorded(

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from batch.archive.read import ArchiveFile, Group
 from batch.changes import changes
-from met.diagnostic import Problem
 from met.frozen import frozen
 from met.plan import Experiment, Plan
 
@@ -36,9 +35,11 @@ class Changed:
         return any((self.versions, self.code, self.structure, self.meaning, self.defaults, self.decks))
 
 
-def changed(a: ArchiveFile, b: ArchiveFile, pairs: Sequence[tuple[Group, Group]]) -> Changed:
-    """What differs between what two archives were made from."""
-    meaning, defaults = _meaning(a, b, pairs)
+def changed(
+    a: ArchiveFile, b: ArchiveFile, pairs: Sequence[tuple[Group, Group]], plans: Sequence[Plan | str]
+) -> Changed:
+    """What differs between what two archives were made from. plans: of each, or why it cannot be read here."""
+    meaning, defaults = _meaning(plans, pairs)
     return Changed(
         tuple(_versions(a, b)),
         tuple(one.name for one, two in pairs if _unlike(one, two, "code_key")),
@@ -73,16 +74,17 @@ def _dirty(dirty: str) -> str:
     return " with changes that were not committed" if dirty == "yes" else ""
 
 
-def _meaning(a: ArchiveFile, b: ArchiveFile, pairs: Sequence[tuple[Group, Group]]) -> tuple[list[str], list[str]]:
+def _meaning(
+    plans: Sequence[Plan | str], pairs: Sequence[tuple[Group, Group]]
+) -> tuple[list[str], list[str]]:
     """Changes of matched experiments; parameters that are new, and have their defaults, apart."""
-    try:
-        plans = a.plan(as_written=True), b.plan(as_written=True)
-    except Problem as problem:
-        return [f"the plan of one cannot be read here: {problem.diagnostics[0].message}"], []
+    before, now = plans
+    if isinstance(before, str) or isinstance(now, str):
+        return [f"the plan cannot be read here: {why}" for why in plans if isinstance(why, str)], []
     defaults: list[str] = []
     out: list[str] = []
     for one, two in pairs:
-        old, new = (_experiment(plan, group.name) for plan, group in zip(plans, (one, two), strict=True))
+        old, new = _experiment(before, one.name), _experiment(now, two.name)
         if old is None or new is None:
             continue
         fresh = [path for path, quantity in new.parameters.items()
@@ -91,11 +93,20 @@ def _meaning(a: ArchiveFile, b: ArchiveFile, pairs: Sequence[tuple[Group, Group]
             quantity = new.parameters[path]
             unit = f" {quantity.unit}" if quantity.unit not in ("", "1") else ""
             defaults.append(f"{path} is new, at its default, {quantity.value}{unit}")
-        told = changes(_alone(plans[0], old), _alone(plans[1], new), ordered=False)
+        told = [*changes(_alone(before, old), _alone(now, new), ordered=False), *_tolerances(old, new)]
         known = {f"{path} is new" for path in fresh}
         head = f"{two.name}: " if len(pairs) > 1 else ""
         out += [head + line for line in told if line not in known]
     return out, list(dict.fromkeys(defaults))
+
+
+def _tolerances(before: Experiment, now: Experiment) -> Iterator[str]:
+    """Another tolerance changes no number, but what is said of them."""
+    old, new = ({each.of: each for each in one.tolerances} for one in (before, now))
+    for name in dict.fromkeys([*old, *new]):
+        texts = [one[name].text if name in one else "none" for one in (old, new)]
+        if name not in old or name not in new or old[name].value != new[name].value:
+            yield f"tolerances.{name}: {texts[0]}, now {texts[1]}"
 
 
 def _experiment(plan: Plan, name: str) -> Experiment | None:

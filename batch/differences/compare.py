@@ -44,37 +44,81 @@ class Difference:
         return DIFFERENT if self.beyond else EQUIVALENT
 
 
-def compare(a: np.ndarray, b: np.ndarray, allowed: Tolerance, time: np.ndarray | None = None) -> Difference | None:
-    """None where all bits are the same. time: s of each row, where `allowed` has a tolerance of time."""
-    a, b = (np.ascontiguousarray(array, dtype=np.float64) for array in (a, b))
-    lost_a, lost_b = np.isnan(a), np.isnan(b)
-    same = (a.view(np.int64) == b.view(np.int64)) | (lost_a & lost_b)
-    if same.all():
-        return None
+def compare(
+    a: np.ndarray, b: np.ndarray, allowed: Tolerance, time: np.ndarray | None = None,
+    absolute: np.ndarray | None = None,
+) -> Difference | None:  # fmt: skip
+    """None where all bits are the same. time: s of each row, where `allowed` has a tolerance of time; absolute: of each
+    column, where `allowed.absolute` is not for all."""
+    return compare_cases(a[None], b[None], allowed, time, absolute)[0]
+
+
+def unlike_bits(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Which cases of two arrays of float64, [case, row, column], have a bit that differs."""
+    return np.asarray((_flat(a).view(np.int64) != _flat(b).view(np.int64)).any(axis=1))
+
+
+def spans(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest finite value of each case, [case, row, column]; inf and -inf where there is none."""
+    values = _flat(values)
+    finite = np.isfinite(values)
+    low, high = (values, values) if finite.all() else (np.where(finite, values, end) for end in (np.inf, -np.inf))
+    return low.min(axis=1, initial=np.inf), high.max(axis=1, initial=-np.inf)
+
+
+def _flat(values: np.ndarray) -> np.ndarray:
+    """[case, row, column] as [case, value]."""
+    return values.reshape(len(values), values.shape[1] * values.shape[2])
+
+
+def compare_cases(
+    a: np.ndarray, b: np.ndarray, allowed: Tolerance, time: np.ndarray | None = None,
+    absolute: np.ndarray | None = None,
+) -> list[Difference | None]:  # fmt: skip
+    """As `compare`, of several cases at once, [case, row, column]: one result a case."""
+    shape = a.shape
+    a, b = (_flat(np.ascontiguousarray(array, dtype=np.float64)) for array in (a, b))
+    unlike = a.view(np.int64) != b.view(np.int64)
+    nans = np.zeros(len(a), np.int64)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         apart = np.abs(b - a)
-        apart[same] = 0.0
-        limit = allowed.absolute + allowed.relative * np.maximum(np.abs(a), np.abs(b))
+        finite = np.isfinite(apart)
+        if not finite.all():
+            lost_a, lost_b = np.isnan(a), np.isnan(b)
+            nans = (lost_a ^ lost_b).sum(axis=1)
+            unlike &= ~(lost_a & lost_b)
+            apart[~unlike] = 0.0
+            finite = np.isfinite(apart)
+        limit = np.asarray(allowed.absolute) if absolute is None else np.tile(absolute, shape[1])
+        if allowed.relative:
+            limit = limit + allowed.relative * np.maximum(np.abs(a), np.abs(b))
         over = apart
-        if allowed.time and time is not None and len(a) > 1:
-            over = np.minimum(apart, _outside(a, b, time, allowed.time))
-        nan = lost_a ^ lost_b
-        beyond = ~same & (nan | ~(over <= limit))
-        shares = np.where(over == 0.0, 0.0, over / limit)
-    finite = np.where(np.isfinite(apart), apart, 0.0)
-    place = int(np.argmax(finite)) if finite.any() else int(np.argmax(~same))
-    row, column = divmod(place, a.shape[1])
-    first, first_beyond = (int(np.argmax(mask.any(axis=1))) if mask.any() else -1 for mask in (~same, beyond))
-    return Difference(
-        int(beyond.sum()), int(nan.sum()), float(finite.flat[place]), row, column, float(a.flat[place]),
-        float(b.flat[place]), float(np.square(finite).sum()), int(np.isfinite(apart).sum()), first, first_beyond,
-        float(np.nanmax(shares, initial=0.0)) if not nan.any() else float("inf"),
+        if allowed.time and time is not None and shape[1] > 1:
+            over = np.minimum(apart, _flat(_outside(a.reshape(shape), b.reshape(shape), time, allowed.time)))
+        beyond = unlike & ~(over <= limit)
+        # where all have one limit, the largest share is the share of the largest
+        tops = over if limit.ndim else np.fmax.reduce(over, axis=1, initial=0.0, keepdims=True)
+        used = np.fmax.reduce(np.where(tops == 0.0, 0.0, tops / limit), axis=1, initial=0.0)
+    used[nans > 0] = np.inf
+    sizes = apart if finite.all() else np.where(finite, apart, 0.0)
+    each = np.arange(len(a))
+    firsts, places = unlike.argmax(axis=1), sizes.argmax(axis=1)
+    places = np.where(sizes[each, places] > 0.0, places, firsts)
+    counts = beyond.sum(axis=1)
+    firsts_beyond = np.where(counts > 0, beyond.argmax(axis=1) // shape[2], -1)
+    found = (
+        counts, nans, sizes[each, places], places // shape[2], places % shape[2], a[each, places], b[each, places],
+        np.square(sizes).sum(axis=1), finite.sum(axis=1), firsts // shape[2], firsts_beyond, used,
     )  # fmt: skip
+    rows = zip(*(array.tolist() for array in found), strict=True)
+    return [Difference(*row) if some else None for some, row in zip(unlike.any(axis=1).tolist(), rows, strict=True)]
 
 
 def _outside(a: np.ndarray, b: np.ndarray, time: np.ndarray, early: float) -> np.ndarray:
     """How far each value of b lies outside of what a passes through within `early` s of its instant; a is taken as
-    straight between its rows."""
+    straight between its rows. [case, row, column]"""
+    shape = a.shape
+    a, b = (array.transpose(1, 0, 2).reshape(shape[1], -1) for array in (a, b))
     low, high = a.copy(), a.copy()
     for column in range(a.shape[1]):
         for shift in (-early, early):
@@ -89,4 +133,5 @@ def _outside(a: np.ndarray, b: np.ndarray, time: np.ndarray, early: float) -> np
             inside = (rows >= first) & (rows < last)
             low[inside] = np.fmin(low[inside], a[rows[inside]])
             high[inside] = np.fmax(high[inside], a[rows[inside]])
-    return np.asarray(np.maximum(np.maximum(low - b, b - high), 0.0))
+    outside = np.maximum(np.maximum(low - b, b - high), 0.0)
+    return np.asarray(outside.reshape(shape[1], shape[0], shape[2]).transpose(1, 0, 2))

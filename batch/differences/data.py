@@ -15,10 +15,6 @@ def as_data(found: Diff) -> dict[str, Any]:
     """Plain data; a number that is not finite is null."""
     data = {
         "schema": SCHEMA, "version": VERSION, "a": str(found.a), "b": str(found.b), "verdict": found.verdict,
-        "tolerances": {
-            "relative": found.tolerances.relative, "time": found.tolerances.time,
-            "absolute": {name: size for name, (size, _) in found.tolerances.absolute.items()},
-        },
         "changed": dataclasses.asdict(found.changed),
         "only_a": list(found.only_a), "only_b": list(found.only_b),
         "experiments": [_experiment(each) for each in found.experiments],
@@ -30,6 +26,10 @@ def as_data(found: Diff) -> dict[str, Any]:
 def _experiment(found: Experiment) -> dict[str, Any]:
     return {
         "name_a": found.name_a, "name_b": found.name_b, "verdict": found.verdict, "cases": found.cases.count,
+        "tolerances": {
+            "relative": found.tolerances.relative, "time": found.tolerances.time,
+            "absolute": {name: size for name, (size, _) in found.tolerances.absolute.items()},
+        },
         "cases_different": found.cases_different, "only_a": found.only_a, "only_b": found.only_b,
         "ended": [dataclasses.asdict(each) for each in found.ended],
         "requirements": [
@@ -49,5 +49,5 @@ def _signal(found: Signal) -> dict[str, Any]:
         **{name: getattr(found, name) for name in kept}, "verdict": found.verdict, "rms": found.rms,
         "share": found.share,
         "place": None if found.place is None else dataclasses.asdict(found.place),
-        "tolerance": dataclasses.asdict(found.tolerance),
+        "tolerance": {**dataclasses.asdict(found.tolerance), "by_joint": found.by_joint},
     }  # fmt: skip

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from batch.differences.changed import Changed
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE, VERDICTS
 from batch.differences.matching import Cases
@@ -30,6 +32,7 @@ class Signal:
     """One signal, or metric, over all matched cases.
 
     verdict      of compare.VERDICTS;  why: of what is incomparable
+    by_joint     what is allowed of single joints, in the stead of tolerance.absolute
     compared     cases that both have;  identical, equivalent, different: of these
     largest      the largest |b - a|, at `place`;  rms of all finite differences;  span: of the values of a
     first        s, the earliest time of a difference, in whichever case; first_beyond: by more than is allowed
@@ -41,6 +44,7 @@ class Signal:
     unit: str
     metric: bool
     tolerance: Tolerance
+    by_joint: dict[str, float] = field(default_factory=dict)
     compared: int = 0
     identical: int = 0
     equivalent: int = 0
@@ -105,11 +109,12 @@ class Ranked:
 
 @dataclass
 class Experiment:
-    """Two matched experiments."""
+    """Two matched experiments. tolerances: what the deck of b and the command line allow."""
 
     name_a: str
     name_b: str
     cases: Cases
+    tolerances: Tolerances = field(default_factory=Tolerances)
     signals: list[Signal] = field(default_factory=list)
     ended: list[Ended] = field(default_factory=list)
     requirements: list[tuple[str, int, int]] = field(default_factory=list)
@@ -119,6 +124,7 @@ class Experiment:
     only_b: list[int] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     cases_different: int = 0
+    how: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int8))
 
     @property
     def verdict(self) -> str:
@@ -133,7 +139,8 @@ class Experiment:
 
 @frozen
 class Diff:
-    """The difference of two archives. only_a, only_b: experiments that one has alone."""
+    """The difference of two archives. tolerances: of the command line; only_a, only_b: experiments that one has alone.
+    """
 
     a: Path
     b: Path

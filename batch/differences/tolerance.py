@@ -1,17 +1,24 @@
-"""How much may differ: `qd=1e-6rad/s, settle=0.04s, rel=1e-9, time=1ms`. Nothing may unless it is given."""
+"""How much may differ: `qd=1e-6rad/s, settle=0.04s, rel=1e-9, time=1ms`; nothing may unless it is given.
+
+The deck says so in `tolerances { }`, and its archives with it; the command line has its way over the deck.
+"""
 
 from __future__ import annotations
 
 import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 
+from batch.archive.read import Group
 from met import units
 from met.diagnostic import Problem, error
 from met.frozen import frozen
+from met.outputs import OF_ALL
+from met.plan import Experiment
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+NONE = "none"
 USAGE = "as in `--tol qd=1e-6rad/s,rel=1e-9,time=1ms`"
 
 
@@ -31,27 +38,65 @@ class Tolerance:
 
 @frozen
 class Tolerances:
-    """relative, time: of all; absolute: by the name of a signal, of a joint's part of one (`elbow.qd`), or of a metric:
-    SI value and unit as written."""
+    """What is allowed of all, relative and time (s), None where nothing is said; and absolute, by the name of a signal,
+    of a joint's part of one (`elbow.q`), or of a metric: SI value, and as it was written.
 
-    relative: float = 0.0
-    time: float = 0.0
+    alone   whether decks have no say in it
+    """
+
+    relative: float | None = None
+    time: float | None = None
     absolute: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    alone: bool = False
 
     @property
     def given(self) -> bool:
-        return bool(self.absolute or self.relative or self.time)
+        return bool(self.relative or self.time or any(size for size, _ in self.absolute.values()))
 
     def of(self, name: str) -> Tolerance:
         """Of a signal or a metric."""
-        return Tolerance(self.absolute.get(name, (0.0, ""))[0], self.relative, self.time)
+        return Tolerance(self.absolute.get(name, (0.0, ""))[0], self.relative or 0.0, self.time or 0.0)
+
+    def over(self, deck: Tolerances) -> Tolerances:
+        """With what a deck says besides."""
+        if self.alone:
+            return self
+        relative = deck.relative if self.relative is None else self.relative
+        time = deck.time if self.time is None else self.time
+        return Tolerances(relative, time, {**deck.absolute, **self.absolute})
+
+    def words(self) -> list[str]:
+        """Each in words."""
+        of_all = (("rel", self.relative, ""), ("time", self.time, " s"))
+        return [
+            *(f"{name} {text}" for name, (_, text) in self.absolute.items()),
+            *(f"{name} {size:g}{unit}" for name, size, unit in of_all if size is not None),
+        ]
+
+
+def of_deck(experiment: Experiment, group: Group) -> Tolerances:
+    """What the deck of an archive allows. group: of the archive, in which a metric may be called otherwise."""
+    metrics = {variable.path: variable.name for variable in group.role("metric")}
+    signals = {recorded.name for recorded in experiment.structure.record}
+    found = {each.of: each for each in experiment.tolerances}
+    absolute = {}
+    for name, each in found.items():
+        if name not in OF_ALL:
+            metric = name.removeprefix("metrics.")
+            known = name if name in signals or metric not in metrics else metrics[metric]
+            absolute[known] = (each.value, each.text)
+    of_all = {name: found[name].value if name in found else None for name in OF_ALL}
+    return Tolerances(of_all["rel"], of_all["time"], absolute)
 
 
 def tolerances(texts: Iterable[str]) -> Tolerances:
-    """What words say, each several with commas between. Raises Problem E360."""
-    found = Tolerances()
+    """What words say, each several with commas between; `none`: what decks say does not count. Raises Problem E360."""
+    of_all: dict[str, float] = {}
     absolute: dict[str, tuple[float, str]] = {}
-    for word in (word.strip() for text in texts for word in text.split(",")):
+    words = [word.strip() for text in texts for word in text.split(",")]
+    for word in words:
+        if word == NONE:
+            continue
         name, equals, value = (part.strip() for part in word.partition("="))
         number = NUMBER.match(value)
         if not equals or not name or number is None:
@@ -59,29 +104,35 @@ def tolerances(texts: Iterable[str]) -> Tolerances:
         size, unit = float(number.group()), value[number.end() :].strip()
         if not 0.0 <= size < float("inf"):
             raise _wrong(f"tolerance `{word}` is no size: it must be at least 0")
-        if name in absolute or (name == "rel" and found.relative) or (name == "time" and found.time):
+        if name in absolute or name in of_all:
             raise _wrong(f"tolerance `{name}` is given twice")
         if name == "rel":
             if unit and unit != "%":
                 raise _wrong(f"tolerance `{word}` has a unit: `rel` is a share of the value")
-            found = replace(found, relative=size / 100.0 if unit else size)
+            of_all[name] = size / 100.0 if unit else size
         elif name == "time":
-            found = replace(found, time=_in_si(word, size, unit, "s"))
+            of_all[name] = _in_si(word, size, unit, "s")
         else:
-            absolute[name] = (_in_si(word, size, unit), unit)
-    return replace(found, absolute=absolute)
+            absolute[name] = (_in_si(word, size, unit), f"{number.group()} {unit}".rstrip())
+    return Tolerances(of_all.get("rel"), of_all.get("time"), absolute, alone=NONE in words)
 
 
-def check(found: Tolerances, known: Mapping[str, str], shown: Sequence[str]) -> None:
-    """That every tolerance is of something, in its unit: SI units by the names of signals and metrics. Raises E360."""
-    for name, (_, unit) in found.absolute.items():
+def check(found: Tolerances, known: Mapping[str, Sequence[str]], shown: Sequence[str]) -> None:
+    """That every tolerance of the command line is of something, in its unit. known: SI units by the names of signals,
+    joints' parts of them and metrics, several where a signal's joints have several. Raises E360."""
+    for name, (_, written) in found.absolute.items():
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1)
             helps = [*(f"did you mean `{each}`?" for each in near), f"signals and metrics here: {', '.join(shown)}"]
             raise _wrong(f"tolerance of `{name}`: neither archive has such a signal or metric", *helps)
-        wanted = units.parse_unit(known[name] or "1").dimension
-        if not units.same(units.parse_unit(unit or "1").dimension, wanted):
-            raise _wrong(f"tolerance of `{name}` is in `{unit or '1'}`, and `{name}` in `{known[name] or '1'}`")
+        if len(known[name]) > 1:
+            parts = [part for part in known if part.endswith(f".{name}")]
+            raise _wrong(f"tolerance of `{name}`: it is in {' and in '.join(known[name])}",
+                         f"give each joint its own: {', '.join(parts)}")  # fmt: skip
+        [wanted] = known[name]
+        unit = written.partition(" ")[2]
+        if not units.same(units.parse_unit(unit or "1").dimension, units.parse_unit(wanted or "1").dimension):
+            raise _wrong(f"tolerance of `{name}` is in `{unit or '1'}`, and `{name}` in `{wanted or '1'}`")
 
 
 def _in_si(word: str, size: float, unit: str, wanted: str = "") -> float:

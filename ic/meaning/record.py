@@ -14,9 +14,10 @@ from ic.meaning.owner import Owner
 from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
 from met import models
-from met.channel import FAMILIES, Channel, carries, channels, recordable, watched_unit
+from met.channel import FAMILIES, Channel, carries, channels, recordable
 from met.diagnostic import Label, Place, did_you_mean, nearest
 from met.frozen import frozen
+from met.outputs import metric_units
 from met.parameter import Parameter
 from met.plan import MetricUse, Recorded, Requirement, Structure
 from met.trace import Scalar
@@ -174,11 +175,6 @@ def _not_one(name: Name, structure: Structure) -> tuple[str, list[str]]:
     return f"`{name.text}` is {count}", [known_words("a metric watches one of them", numbers)]
 
 
-def metric_unit(use: MetricUse, known: dict[str, Channel]) -> str:
-    """Unit of a metric's result."""
-    return watched_unit(str(models.find("metric", use.model).unit), known[use.of].unit)
-
-
 # Requirements
 
 
@@ -235,14 +231,13 @@ def _is_metric(expression: Expression, metrics: set[str]) -> bool:
 
 def resolve_requirements(scope: Scope, read: list[Comparison], structure: Structure) -> tuple[Requirement, ...]:
     """The requirements with their limits in SI."""
-    known = channels(structure)
-    uses = {use.name: use for use in structure.metrics}
+    metrics = metric_units(structure)
     found = []
     for each in read:
-        if each.metric not in uses:
+        if each.metric not in metrics:
             continue  # the metric failed, which was told
         owner = Owner("", each.statement.place, "require", called=f"the limit on `{each.metric}`")
-        wanted = Parameter(name="limit", unit=metric_unit(uses[each.metric], known), doc="limit")
+        wanted = Parameter(name="limit", unit=metrics[each.metric], doc="limit")
         number = _limit(scope, owner, wanted, each.limit)
         if number is not None:
             text = spell(each.statement.value)

@@ -19,17 +19,19 @@ from ic.meaning.schedule import Rate, base_rate, check_stability, divisor, faste
 from ic.meaning.scope import Scope
 from ic.meaning.servos import RATE, Use, check_rest, check_start, fixed_rate, resolve_servos
 from ic.meaning.substitution import check_ticks, resolve_substitutions
+from ic.meaning.tolerances import resolve_tolerances
 from ic.meaning.values import Value, Values, place_of
 from met import models, units
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import EnvironmentUse, Requirement, Schedule, ServoUse, Structure
+from met.plan import EnvironmentUse, Requirement, Schedule, ServoUse, Structure, Tolerance
 from met.trace import Real, Scalar
 from met.units import PURE
 
-KEYS = ("arm", "servos", "initial", "environment", "rates", "integrator", "duration", "record", "seed")
-BLOCKS = ("servos", "initial", "environment", "rates")
+KEYS = ("arm", "servos", "initial", "environment", "rates", "integrator", "duration", "record", "tolerances",
+        "seed")
+BLOCKS = ("servos", "initial", "environment", "rates", "tolerances")
 RATES = ("dynamics", "servos", "record", "base")
 DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
 SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")
@@ -39,13 +41,14 @@ ON_OFF = Parameter(name="velocity_products", shape="word", words=("on", "off"), 
 
 @frozen
 class Resolved:
-    """A run's structure and requirements; its parameters are in the scope.
+    """A run's structure, requirements and tolerances; its parameters are in the scope.
 
     stability  h * lambda of every joint whose servo knows it
     """
 
     structure: Structure
     requirements: tuple[Requirement, ...]
+    tolerances: tuple[Tolerance, ...]
     seed: int
     stability: tuple[tuple[str, Real], ...]
     place: Place
@@ -106,8 +109,9 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     structure = replace(structure, metrics=metrics, record=record)
     scope.setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure)
+    tolerances = resolve_tolerances(scope, _body(scope, block.get("tolerances")), structure)
     in_order = tuple((joint, stability[joint]) for joint in fastest if joint in stability)
-    return Resolved(structure, requirements, seed, in_order, definition.place)
+    return Resolved(structure, requirements, tolerances, seed, in_order, definition.place)
 
 
 def _keep_settings(scope: Scope, block: Block, arm: Arm, integrator: Any, rates: Mapping[str, Rate],

@@ -87,6 +87,10 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
     if structure.metrics:
         yield ""
         yield from _metrics(experiment)
+    if experiment.tolerances:
+        yield ""
+        yield "Tolerances: by how much another version may differ before `met diff` says so"
+        yield from columns([(each.of, each.text) for each in experiment.tolerances])
     yield ""
     yield from _cases(experiment)
     notes = [note for note in experiment.notes if not note.startswith(STABILITY)]

@@ -302,9 +302,9 @@ def _refuse(entry: object, words: list[str], base: str) -> None:
                             help=f"write `{usage[entry.path[0].text]}`"))
     if isinstance(entry, Setting) and not words:
         path = ".".join(word.text for word in entry.path)
+        vary = [] if entry.path[0].text == "tolerances" else [f"`vary {path} = [...];` to vary it"]
         raise Problem(error("D136", f"`{path} = ...` in a sweep", place,
-                            help=[f"`vary {path} = [...];` to vary it",
-                                  f"or set it in a run `like {base}`, and sweep that"]))
+                            help=[*vary, f"{'or ' if vary else ''}set it in a run `like {base}`, and sweep that"]))
     if words[:1] == ["sample"]:
         raise Problem(error("D136", "a sample names its design and how many", place,
                             help=f"write `sample lhs(200) {{ ... }}`; {known_words('designs', DESIGNS)}"))
@@ -314,6 +314,9 @@ def _refuse(entry: object, words: list[str], base: str) -> None:
     if words[:1] == ["require"]:
         raise Problem(error("D136", "`require` in a sweep", place,
                             help=f"it belongs to the run: write a run `like {base}` with it, and sweep that"))
+    if words[:1] == ["tolerances"]:
+        raise Problem(error("D136", "`tolerances` in a sweep", place,
+                            help=f"they belong to the run: write a run `like {base}` with them, and sweep that"))
     raise Problem(error("D136", f"no `{' '.join(words)}` in a sweep", place,
                         help=[*did_you_mean(" ".join(words), KNOWN), *belongs(words[0] if words else ""),
                               known_words("a sweep has", KNOWN)]))

@@ -1,0 +1,238 @@
+"""What a difference is in words, part by part, as plain data: `told` sets them in lines, a report in a page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE
+from batch.differences.found import Diff, Ended, Experiment, Ranked, Signal
+from batch.differences.samples import LEVEL, Sample
+from batch.failures import STATUS, ranges
+from batch.output import quoted
+from batch.signals import number_text, pretty_unit
+from met.frozen import frozen
+
+SAME = "made from the same: deck, parameters, models and versions"
+
+
+def made(found: Diff) -> list[tuple[str, tuple[str, ...]]]:
+    """What made the two and differs: its kind and what is said of it."""
+    changed = found.changed
+    said = [
+        ("versions", changed.versions),
+        ("code", tuple(f"the program of `{name}` is another" for name in changed.code)),
+        ("structure", tuple(f"of `{name}` is another: bits cannot be expected to agree" for name in changed.structure)),
+        ("deck", changed.decks),
+        ("changed", changed.meaning),
+        ("new", changed.defaults),
+    ]
+    return [(kind, lines) for kind, lines in said if lines]
+
+
+def alone(found: Diff) -> list[str]:
+    """Runs and sweeps that one archive has alone."""
+    both = ((found.only_a, found.a), (found.only_b, found.b))
+    return [f"`{name}` is only in {where}" for names, where in both for name in names]
+
+
+def heading(experiment: Experiment) -> str:
+    names = dict.fromkeys([experiment.name_a, experiment.name_b])
+    return f"{' and '.join(names)}: {experiment.cases.count:,} cases in both, {experiment.verdict}"
+
+
+def missing(found: Diff, experiment: Experiment) -> list[str]:
+    """Cases that one archive has alone."""
+    return [
+        f"{len(cases):,} case{'s' if len(cases) > 1 else ''} only in {where}: {ranges(cases)}"
+        for cases, where in ((experiment.only_a, found.a), (experiment.only_b, found.b)) if cases
+    ]  # fmt: skip
+
+
+def allowed(found: Diff, experiment: Experiment) -> list[str]:
+    """What may differ, and who says so."""
+    mine, every = set(found.tolerances.words()), experiment.tolerances.words()
+    both = (("the deck of b", [each for each in every if each not in mine]), ("--tol", sorted(mine & set(every))))
+    return [f"{who} allows {', '.join(what)}" for who, what in both if what]
+
+
+def requirement(before: int, now: int, of: int) -> str:
+    """By how many of the cases in both a requirement is met."""
+    return f"met by {before:,}, now by {now:,} of {of:,}"
+
+
+@frozen
+class Ending:
+    """Cases that end otherwise alike: how, which they are, and each of them."""
+
+    text: str
+    cases: str
+    each: tuple[Ended, ...]
+
+
+def endings(experiment: Experiment) -> list[Ending]:
+    """What fails now comes first."""
+    kinds: dict[str, list[Ended]] = {}
+    for each in experiment.ended:
+        kinds.setdefault(_kind(each), []).append(each)
+    order = sorted(kinds, key=lambda kind: not kind.startswith(("fail", "are timed", "are lost")))
+    return [
+        Ending(f"{len(cases):,} case{'s' if len(cases) > 1 else ''} {_one(kind, len(cases))}",
+               ranges(sorted(each.case for each in cases)), tuple(cases))
+        for kind, cases in ((kind, kinds[kind]) for kind in order)
+    ]  # fmt: skip
+
+
+def _kind(each: Ended) -> str:
+    if each.before == each.after:
+        return f"{STATUS.get(each.after, 'failed')} earlier or later"
+    if each.before == 0:
+        return "fail that did not" if each.after == 1 else f"are {STATUS.get(each.after, 'failed')} that were done"
+    if each.after == 0:
+        return "are done that failed" if each.before == 1 else f"are done that were {STATUS[each.before]}"
+    return f"are {STATUS.get(each.after)} that were {STATUS.get(each.before)}"
+
+
+def _one(kind: str, count: int) -> str:
+    return kind if count > 1 else kind.replace("fail that", "fails that").replace("are ", "is ").replace("were", "was")
+
+
+def cause(each: Ended) -> str:
+    """Why it ended so, now or before."""
+    return f"{'' if each.after else 'before: '}{each.cause_after or each.cause_before}"
+
+
+@frozen
+class Compared:
+    """A signal or a metric as a row of a table; texts, "" for what there is not.
+
+    cases      how many, of how many;  largest, unit: the largest difference;  share: of what the values of a span
+    where      of the largest, and its `case`;  first: s, the earliest difference;  tolerance: what was given and used
+    """
+
+    name: str
+    verdict: str
+    cases: str
+    largest: str = ""
+    unit: str = ""
+    share: str = ""
+    where: str = ""
+    first: str = ""
+    tolerance: str = ""
+    case: int | None = None
+
+
+def compared(signal: Signal) -> Compared:
+    if signal.verdict == INCOMPARABLE:
+        return Compared(signal.name, INCOMPARABLE, signal.why)
+    if signal.verdict == IDENTICAL:
+        return Compared(signal.name, IDENTICAL, f"{signal.compared:,}")
+    unit = pretty_unit(signal.unit).removesuffix("1") if signal.unit != "1" else ""
+    count = {DIFFERENT: signal.different, EQUIVALENT: signal.equivalent}.get(signal.verdict, signal.compared)
+    place = signal.place
+    where = first = ""
+    if place is not None:
+        where = " ".join(part for part in (place.label, f"#{place.case}") if part)
+        where += f" at {place.time:g} s" if place.time == place.time else ""
+    begins = signal.first_beyond if signal.different else signal.first
+    if begins < float("inf"):
+        first = f"{begins:g} s"
+    largest = number_text(signal.largest) if signal.largest or not signal.nan else ""
+    share = f"{number_text(float(f'{100 * signal.share:.2g}'))} %" if 0.0 < signal.share < float("inf") else ""
+    if signal.nan:
+        where = f"{signal.nan:,} not-a-number on one side" + (f", {where}" if where else "")
+    return Compared(
+        signal.name, signal.verdict, f"{count:,} of {signal.compared:,}", largest, unit if largest else "", share,
+        where, first, _tolerance(signal), None if place is None else place.case,
+    )  # fmt: skip
+
+
+def _tolerance(signal: Signal) -> str:
+    given, unit = signal.tolerance, pretty_unit(signal.unit) if signal.unit not in ("", "1") else ""
+    if not given.given and not signal.by_joint:
+        return ""
+    words = [f"{given.absolute:g} {unit}".strip()] if given.absolute else []
+    if signal.by_joint:
+        words += [f"{joint} {size:g} {unit}".strip() for joint, size in signal.by_joint.items()]
+        words = [f"({', '.join(words)})"]
+    if given.relative:
+        words.append(f"rel {given.relative:g}")
+    if given.time:
+        words.append(f"time {given.time:g} s")
+    return " + ".join(words) + _used(signal.used)
+
+
+def _used(share: float) -> str:
+    """Of a tolerance: how much was needed of it."""
+    if share == float("inf"):
+        return ""
+    return f", {100 * share:.3g} % used" if share <= 1.0 else f", {share:.3g} times that"
+
+
+@frozen
+class Distribution:
+    """A metric as a sample of each archive: cases that have a value, medians, distance, and how likely by chance; a
+    star where that is less than `LEVEL`."""
+
+    name: str
+    cases: tuple[str, str]
+    medians: tuple[str, str]
+    distance: str
+    chance: str
+
+
+def distribution(each: Sample) -> Distribution:
+    chance = f"{each.probability:.2g}" + (" *" if each.unlike else "")
+    cases, medians = [f"{count:,}" for count in each.cases], [number_text(median) for median in each.medians]
+    return Distribution(each.name, (cases[0], cases[1]), (medians[0], medians[1]), f"{each.distance:.3g}", chance)
+
+
+def starred(experiment: Experiment) -> str:
+    """What a star is, where there is one."""
+    if not any(each.unlike for each in experiment.samples):
+        return ""
+    return f"* less than {LEVEL:g}, corrected for {len(experiment.samples)} metrics (Kolmogorov-Smirnov, Holm)"
+
+
+WORST = "worst cases, each with what runs it again"
+
+
+def most(each: Ranked) -> tuple[str, str, str]:
+    """What differs most in a case, and where; its value before and now."""
+    where = f" of {each.place.label}" if each.place.label else ""
+    when = f" at {each.place.time:g} s" if each.place.time == each.place.time else ""
+    return (f"{each.signal}{where}{when}", *apart(each.place.before, each.place.after))
+
+
+def again(found: Diff, experiment: Experiment, each: Ranked) -> tuple[str, str]:
+    """The commands that run a case of both archives again."""
+    several = len(found.experiments) + len(found.only_a) + len(found.only_b) > 1
+    return (
+        _again(found.a, experiment.name_a if several else "", each.case_a),
+        _again(found.b, experiment.name_b if several else "", each.case_b),
+    )
+
+
+def _again(path: Path, name: str, case: int) -> str:
+    return f"met run {quoted(path)}{f' {quoted(name)}' if name else ''} --case '#{case}'"
+
+
+def apart(before: float, after: float) -> tuple[str, str]:
+    """Two numbers in as few digits as tell them apart, but four at least."""
+    for digits in range(4, 18):
+        texts = f"{before:.{digits}g}", f"{after:.{digits}g}"
+        if texts[0] != texts[1]:
+            break
+    return texts
+
+
+def verdict(found: Diff) -> str:
+    said = {
+        IDENTICAL: "identical, to the bit",
+        EQUIVALENT: "equivalent: bits differ, and no value by more than its tolerance",
+        DIFFERENT: "different",
+        INCOMPARABLE: "incomparable",
+    }[found.verdict]
+    given = any(experiment.tolerances.given for experiment in found.experiments)
+    if found.verdict in (EQUIVALENT, DIFFERENT) and not given:
+        said += "; no tolerance was given"
+    return said

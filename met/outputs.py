@@ -1,0 +1,43 @@
+"""What comes out of a case, and in which units: recorded signals, joints' parts of them, metrics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from met import models
+from met.channel import channel_paths, channels, watched_unit
+from met.plan import MetricUse, Recorded, Structure
+
+OF_ALL = {"rel": "1", "time": "s"}
+"""What a tolerance may allow of everything: a share of the value; how much earlier or later. With units."""
+
+
+def metric_units(structure: Structure) -> dict[str, str]:
+    """SI unit of each metric's result; `of` in its declaration stands for the channel's unit."""
+    watched = channels(structure, [use.of for use in structure.metrics])
+    return {use.name: _metric_unit(use, watched[use.of].unit) for use in structure.metrics}
+
+
+def _metric_unit(use: MetricUse, of: str) -> str:
+    return watched_unit(str(models.find("metric", use.model, use.place).unit), of)
+
+
+def joint_parts(name: str, joints: tuple[str, ...]) -> tuple[str, ...]:
+    """What each joint's part of a signal is called: `shoulder.qd`, `links.tip.jacobian.linear.shoulder`."""
+    return channel_paths(name, joints, ()) if joints else ()
+
+
+def tolerable(structure: Structure) -> dict[str, tuple[str, ...]]:
+    """What a tolerance may be of, with its unit, or units where a signal's joints have several: signals, a joint's part
+    of one, metrics (`metrics.<name>` where a signal has the name too), `rel` and `time`."""
+    out = {name: units for recorded in structure.record for name, units in _signal(recorded)}
+    for name, unit in metric_units(structure).items():
+        out[f"metrics.{name}" if name in out else name] = (unit,)
+    return out | {name: (unit,) for name, unit in OF_ALL.items()}
+
+
+def _signal(recorded: Recorded) -> Iterator[tuple[str, tuple[str, ...]]]:
+    yield recorded.name, tuple(dict.fromkeys(recorded.unit))
+    inner = len(recorded.components) or 1
+    for place, part in enumerate(joint_parts(recorded.name, recorded.joints)):
+        yield part, (recorded.unit[place * inner if len(recorded.unit) > 1 else 0],)
