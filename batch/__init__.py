@@ -62,7 +62,8 @@ def run(
 
     plan          what `ic.compile` gives, or a plan file (`met plan DECK -o p.json`)
     output        the archive; None: in the current folder, called as `met run` calls it: the deck's name, and those of
-                  the runs and sweeps that were asked for (`two_link.gains.h5`)
+                  the runs and sweeps that were asked for (`two_link.gains.h5`). FILE.mcap, FILE.csv or FILE.parquet:
+                  FILE.h5, and an export of it
     experiments   names of runs and sweeps; None: all of the plan's
     cases         rows of the case table, `"#7"`, or the beginnings of case_ids; None: all
     histories     whose signals are kept, one word or several: "default" (all while the archive stays below 1 GiB, else
@@ -80,13 +81,19 @@ def run(
     """
     from batch.campaign import prepare
     from batch.executors.choose import choose
+    from batch.export import straight
     from batch.performing import perform
 
+    archive, target = straight.parted(output)
     chosen = executor or choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
     campaign = prepare(
-        _plan(plan), output=output, experiments=experiments, cases=cases, histories=histories, float32=float32
+        _plan(plan), output=archive, experiments=experiments, cases=cases, histories=histories, float32=float32
     )
+    if target is not None:
+        straight.check(campaign, target)
     performed = perform(campaign, executor=chosen, fresh=fresh, max_failures=max_failures, progress=progress)
+    if target is not None:
+        straight.written(campaign, target)
     return look(campaign.output, (*campaign.notes, *performed.notes))
 
 
@@ -135,12 +142,20 @@ def look(path: str | os.PathLike[str], notes: Sequence[str] = ()) -> Archive:
         return Archive(Path(path), summarise(file), tuple(notes))
 
 
-def open(path: str | os.PathLike[str]) -> Any:
-    """An archive as an xarray.Dataset, or an xarray.DataTree where it holds several experiments; read lazily."""
+def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
+    """An archive as an xarray.Dataset, or an xarray.DataTree where it holds several experiments; read lazily.
+
+    chunks  as xarray.open_dataset has it: `{}` for arrays of Dask, in the archive's own chunks
+
+    What it can besides is in `data.met` (batch.notebook): cases by what is varied in them, where links are, and more.
+    """
     from batch.archive.read import ArchiveFile
 
     with ArchiveFile(Path(path)) as file:
         several = len(file.groups) > 1
     import xarray
 
-    return xarray.open_datatree(path, engine="h5netcdf") if several else xarray.open_dataset(path, engine="h5netcdf")
+    import batch.notebook  # noqa: F401 - registers `data.met`
+
+    opened = xarray.open_datatree if several else xarray.open_dataset
+    return opened(path, engine="h5netcdf", chunks=chunks)

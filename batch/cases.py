@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from batch import requirements
 from batch.archive.read import ArchiveFile, Group, Stored
 from batch.failures import STATUS
 from batch.signals import deck_unit, number_text, value_text
@@ -25,10 +26,7 @@ def worst_first(group: Group) -> np.ndarray:
     How far is relative to the limit (to the largest value where the limit is 0); a case that meets all requirements
     stands by how close it comes to one. Without requirements the order is the case table's.
     """
-    keys, outcomes = [np.arange(group.count)], _outcomes(group)
-    if outcomes.shape[1]:
-        keys += [-_excess(group), -(outcomes != 1).sum(axis=1)]
-    return np.lexsort((*keys, group.values("status") == 0))
+    return requirements.worst_first(group.values("status"), requirements.outcomes(group), _far(group))
 
 
 def table(group: Group, most: int | None = SHOWN_CASES, *, hint: bool = True) -> list[str]:
@@ -41,7 +39,7 @@ def table(group: Group, most: int | None = SHOWN_CASES, *, hint: bool = True) ->
     positions = worst_first(group)
     left = 0 if most is None else max(0, len(positions) - most)
     positions = positions[: len(positions) - left]
-    outcomes = _outcomes(group, positions)
+    outcomes = requirements.outcomes(group, positions)
     cells = [["", *(f"#{row}" for row in group.at("case", positions))]]
     cells.append(["id", *(case_id[:8] for case_id in group.at("case_id", positions))])
     marks, units = _marks(group, outcomes), ["", ""]
@@ -68,7 +66,7 @@ def table(group: Group, most: int | None = SHOWN_CASES, *, hint: bool = True) ->
 
 def title(group: Group, most: int | None = None) -> str:
     """What the order of the table is, or of its beginning."""
-    outcomes = _outcomes(group)
+    outcomes = requirements.outcomes(group)
     number = f"{min(most, group.count)} " if most is not None else ""
     if (group.values("status") != 0).any() or (outcomes != 1).any():
         return f"the {number}worst cases:" if number else "cases, worst first:"
@@ -85,8 +83,8 @@ def rows_json(
     numbers = [variable.name for variable in (*group.role("coordinate"), *group.role("metric"))]
     repeats = {"repeat": group.at("repeat", positions)} if "repeat" in group.variables else {}
     values = {name: group.at(name, positions) for name in ("case", "case_id", "status", "cause", *numbers)}
-    texts = [str(text) for text in group.values("requirement")] if "requirement" in group.variables else []
-    outcomes = _outcomes(group, positions)
+    texts = requirements.texts(group)
+    outcomes = requirements.outcomes(group, positions)
     return [
         {
             "row": int(values["case"][i]),
@@ -140,13 +138,6 @@ def varied_lines(archive: ArchiveFile, group: Group, position: int) -> list[str]
 # Outcomes
 
 
-def _outcomes(group: Group, positions: np.ndarray | None = None) -> np.ndarray:
-    """(case, requirement): 1 met, 0 missed, -1 unknown; of all cases or of some."""
-    if "met" not in group.variables:
-        return np.zeros((group.count if positions is None else len(positions), 0), np.int8)
-    return group.values("met") if positions is None else group.at("met", positions)
-
-
 def _outcome(status: int, outcomes: np.ndarray) -> str:
     if status != 0:
         return STATUS.get(int(status), "failed")
@@ -155,38 +146,18 @@ def _outcome(status: int, outcomes: np.ndarray) -> str:
     return "missed" if (outcomes == 0).any() else "unknown" if (outcomes < 0).any() else "met"
 
 
-def _limits(group: Group) -> list[tuple[int, str, str, float]]:
-    """Index, metric's variable, comparison and limit of each requirement; none in an archive that does not say."""
-    if "requirement" not in group.variables:
-        return []
-    told = group.variables["requirement"].attributes
-    metrics, comparisons, limits = (_listed(told.get(name, [])) for name in ("metric", "comparison", "limit"))
-    if not len(metrics) == len(comparisons) == len(limits) == len(group.values("requirement")):
-        return []
-    known = {variable.name for variable in group.role("metric")}
-    given = enumerate(zip(metrics, comparisons, limits, strict=True))
-    return [(i, m, str(c), float(x)) for i, (m, c, x) in given if m in known and isinstance(x, float)]
-
-
-def _listed(value: Any) -> list[Any]:
-    return value if isinstance(value, list) else [value]
-
-
 def _marks(group: Group, outcomes: np.ndarray) -> dict[str, np.ndarray]:
     """By metric that has requirements: which of the cases miss one."""
     out: dict[str, np.ndarray] = {}
-    for index, metric, _, _ in _limits(group):
-        out[metric] = out.get(metric, False) | (outcomes[:, index] == 0)
+    for each in requirements.required(group):
+        out[each.metric] = out.get(each.metric, False) | (outcomes[:, each.place] == 0)
     return out
 
 
-def _excess(group: Group) -> np.ndarray:
-    """How far each case is beyond the limit it violates most, relative to the limit; what is unknown is infinitely."""
+def _far(group: Group) -> np.ndarray:
+    """How far each case is beyond the limit that it misses most."""
     worst = np.full(group.count, -np.inf)
-    for _, metric, comparison, limit in _limits(group):
-        values = group.values(metric)
-        finite = values[np.isfinite(values)]
-        scale = abs(limit) or float(np.abs(finite).max(initial=0.0)) or 1.0
-        beyond = (values - limit if comparison.startswith("<") else limit - values) / scale
-        worst = np.maximum(worst, np.where(np.isnan(beyond), np.inf, beyond))
+    for each in requirements.required(group):
+        far = requirements.beyond(group.values(each.metric), each.comparison, each.limit)
+        worst = np.maximum(worst, far)
     return worst

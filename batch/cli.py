@@ -1,4 +1,4 @@
-"""`met show`, `plot`, `profile`, `margin`: faces of batch.show, .plot, met.profile and met.margin."""
+"""`met show`, `profile`, `margin`: faces of batch.show, met.profile and met.margin."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
+from met.cli import NO, YES, check_options, deck_options, format_option
 
 if TYPE_CHECKING:
     from met.plan import Experiment
@@ -47,30 +47,6 @@ def show(
             plots=not no_plots,
         )  # fmt: skip
         click.echo(text, nl=False, color=colour)
-    return YES
-
-
-@click.command(short_help="Draw an archive's signals into a PNG.")
-@click.argument("archive", metavar="ARCHIVE")
-@click.argument("signals", nargs=-1, metavar="[SIGNAL]...")
-@click.option("-o", "--output", metavar="FILE", help="The picture [ARCHIVE.png].")
-@click.option("--run", "experiment", metavar="NAME", help="The run or sweep to draw [the first].")
-@click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case (beginning of its id, or '#0').")
-@loudness_options
-def plot(
-    archive: str, signals: tuple[str, ...], output: str | None, experiment: str | None, cases: tuple[str, ...],
-    quiet: bool, verbose: bool,
-) -> int:  # fmt: skip
-    """Draw SIGNALs (`qd`, `elbow.q`; all by default): a panel each, joints as lines, cases overlaid or as a fan."""
-    from pathlib import Path
-
-    from batch.archive.read import ArchiveFile
-    from batch.plot import plot
-
-    with ArchiveFile(archive) as file:
-        target = plot(file, output or Path(archive).with_suffix(".png"), signals, experiment=experiment, cases=cases)
-    if not quiet:
-        click.echo(f"{target}")
     return YES
 
 

@@ -11,21 +11,30 @@ from met.cli import YES, loudness_options
 @click.argument("archive", metavar="ARCHIVE")
 @click.option("-o", "--output", metavar="FILE", help="The page [ARCHIVE.html].")
 @click.option("--run", "experiments", multiple=True, metavar="NAME", help="Only this run or sweep of the archive.")
+@click.option("--against", metavar="BEFORE.h5", help="An earlier archive: the page says what changed since.")
+@click.option("--tol", "tolerances", multiple=True, metavar="LIST", help="How much may differ from it, as `met diff` "
+              "has it: qd=1e-6rad/s,rel=1e-9,time=1ms; may be repeated.")  # fmt: skip
 @click.option("--title", default="", metavar="TEXT", help="What stands above it [names of deck, runs and sweeps].")
 @loudness_options
 def report(
-    archive: str, output: str | None, experiments: tuple[str, ...], title: str, quiet: bool, verbose: bool
-) -> int:
+    archive: str, output: str | None, experiments: tuple[str, ...], against: str | None, tolerances: tuple[str, ...],
+    title: str, quiet: bool, verbose: bool,
+) -> int:  # fmt: skip
     """Write what an archive holds as one page: verdict, cases, worst cases, signals, parameters and where they come
     from.
 
     The page is whole in one file, opens without a network, and prints. Nothing is written over but a report of MET.
+    Exit status: 0 it is written, whatever it says; 2 the input is wrong.
     """
     from batch.report import report as make
     from ic.printing.columns import size
 
+    if tolerances and against is None:
+        raise click.UsageError("--tol is for a comparison: `--against BEFORE.h5` names the other archive")
     told = (lambda done: click.echo(f"stability of {done} cases is known", err=True)) if verbose else None
-    target = make(archive, output, experiments=experiments, title=title, progress=told)
+    target = make(
+        archive, output, experiments=experiments, title=title, against=against, tolerances=tolerances, progress=told
+    )
     if not quiet:
         click.echo(f"{target}  ({size(target.stat().st_size)})")
     return YES

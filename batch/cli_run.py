@@ -40,7 +40,8 @@ SECONDS = Seconds()
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck; all cases of "
               "an archive.")  # fmt: skip
-@click.option("-o", "--output", metavar="FILE", help="The archive [DECK.h5, or DECK.NAME.h5, in this folder].")
+@click.option("-o", "--output", metavar="FILE", help="The archive [DECK.h5, or DECK.NAME.h5, in this folder]; "
+              "FILE.mcap, .csv or .parquet: FILE.h5, and an export of it.")  # fmt: skip
 @click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'.")
 @click.option("--failed", is_flag=True, help="Of an archive: run the cases again that did not reach their end.")
 @click.option("--histories", multiple=True, metavar="WHICH",

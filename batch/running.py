@@ -11,6 +11,7 @@ from typing import Any
 from batch.archive.read import ArchiveFile
 from batch.campaign import Campaign, prepare
 from batch.executors.choose import choose
+from batch.export.straight import check, parted, written
 from batch.output import quoted
 from batch.performing import TooMany, perform
 from batch.progress import Bar
@@ -53,21 +54,26 @@ def run_and_tell(
         helps = "`met run ARCHIVE.h5 --failed` runs those again that failed"
         raise Problem(error("E357", f"`--failed` is of an archive, and {source} is none", help=helps))
     executor = choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
+    archive, target = parted(output)
     again = None
     if names_archive(source):
         again = replay(source, names, cases, failed, everything)
-        if Path(output or again.output).resolve() == Path(source).resolve():
+        archive = archive or again.output
+        if archive.resolve() == Path(source).resolve():
             helps = "`-o FILE` names another place"
-            raise Problem(error("E305", f"cannot write {output or again.output}: it is what is run again", help=helps))
+            raise Problem(error("E305", f"cannot write {archive}: it is what is run again", help=helps))
         campaign = prepare(
-            again.plan, output=output or again.output, selected=again.selected,
+            again.plan, output=archive, selected=again.selected,
             histories=histories or ("all" if again.kept is None else "none"),
             kept=again.kept if not histories else None, float32=float32,
         )  # fmt: skip
     else:
         campaign = _of_deck(
-            source, names, everything, output, cases, histories, float32, defines, include_dirs, settings, quiet or json
-        )
+            source, names, everything, archive, cases, histories, float32, defines, include_dirs, settings,
+            quiet or json,
+        )  # fmt: skip
+    if target is not None:
+        check(campaign, target)
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
     try:
         performed = perform(
@@ -92,16 +98,30 @@ def run_and_tell(
         except KeyboardInterrupt as interrupt:
             say(f"{campaign.output} is whole; its picture is missing: `met plot {quoted(campaign.output)}`")
             raise type(interrupt) from None
+    exported = None
+    try:
+        exported = None if target is None else written(campaign, target)
+    except Problem as problem:
+        _complain(problem, json)
+    except KeyboardInterrupt as interrupt:
+        say(f"{campaign.output} is whole; {target} is missing: `met export {quoted(campaign.output)}`")
+        raise type(interrupt) from None
     ok = all(summary.ok for summary in summaries)
+    missing = target is not None and exported is None
     unlike = differences(again.archive, campaign.output) if again is not None else []
     notes = [*performed.notes, *_compared(again, unlike)]
     if json:
-        print(verdict_json(campaign, summaries, worst, picture, performed.seconds, notes, ok and not unlike))
+        print(verdict_json(campaign, summaries, worst, picture, exported, performed.seconds, notes,
+                           ok and not unlike and not missing))  # fmt: skip
     else:
-        say("\n".join(told(source, campaign, summaries, worst, picture, excuse, performed.seconds, ok, tables)))
+        say("\n".join(
+            told(source, campaign, summaries, worst, picture, excuse, exported, performed.seconds, ok, tables)
+        ))  # fmt: skip
         for line in _compared(again, unlike):
             say(line)
-    return ok and not unlike
+        if missing:
+            say(f"exit 1: {target} is missing: `met export {quoted(campaign.output)} -o {quoted(target)}`")
+    return ok and not unlike and not missing
 
 
 def submit_and_tell(
@@ -150,7 +170,7 @@ def submit_and_tell(
 
 
 def _of_deck(
-    source: str, names: tuple[str, ...], everything: bool, output: str | None, cases: tuple[str, ...],
+    source: str, names: tuple[str, ...], everything: bool, output: str | Path | None, cases: tuple[str, ...],
     histories: str | Sequence[str], float32: bool, defines: tuple[str, ...], include_dirs: tuple[str, ...],
     settings: tuple[str, ...], quiet: bool,
 ) -> Campaign:  # fmt: skip
@@ -217,9 +237,9 @@ def read_plan(
 
 def first_picture(archive: ArchiveFile) -> tuple[Path | None, str]:
     """The picture beside an archive; where there can be none, why not, in words."""
-    from batch.plot import plot
+    from batch.plotting import draw
 
     try:
-        return plot(archive, archive.path.with_suffix(".png")), ""
+        return draw(archive, archive.path.with_suffix(".png")), ""
     except Problem as problem:
         return None, problem.diagnostics[0].message

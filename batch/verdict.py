@@ -19,6 +19,7 @@ from met.frozen import frozen
 
 if TYPE_CHECKING:
     from batch import Archive
+    from batch.export import Exported
 
 WORST = 3
 """Cases of a sweep that the verdict names."""
@@ -104,7 +105,7 @@ def worst_cases(archive: ArchiveFile) -> tuple[Worst, ...]:
 
 def told(
     source: str, campaign: Campaign, summaries: tuple[Summary, ...], worst: tuple[Worst, ...], picture: Path | None,
-    excuse: str, seconds: Mapping[str, float], ok: bool, tables: Sequence[Sequence[str]],
+    excuse: str, exported: Exported | None, seconds: Mapping[str, float], ok: bool, tables: Sequence[Sequence[str]],
 ) -> list[str]:  # fmt: skip
     """The verdict, and where everything is. seconds: by experiment; tables: of sweeps of several structures."""
     out: list[str] = []
@@ -126,6 +127,8 @@ def told(
         out.append(f"picture  {picture}")
     elif excuse:
         out.append(f"picture  none: {excuse}")
+    if exported is not None:
+        out.append(f"export   {exported.path}  ({size_text(exported.path.stat().st_size)})")
     out.append(f"next     met show {quoted(path)}")
     for summary, cases in zip(summaries, worst, strict=True):
         if cases.rows and summary.sweep not in many:
@@ -162,13 +165,14 @@ def brief(archive: Archive) -> list[str]:
 
 def verdict_json(
     campaign: Campaign, summaries: tuple[Summary, ...], worst: tuple[Worst, ...], picture: Path | None,
-    seconds: Mapping[str, float], notes: Sequence[str], ok: bool,
+    exported: Exported | None, seconds: Mapping[str, float], notes: Sequence[str], ok: bool,
 ) -> str:  # fmt: skip
     """The verdict for programs."""
     data = {
         "ok": ok,
         "archive": str(campaign.output),
         "picture": None if picture is None else str(picture),
+        "export": None if exported is None else str(exported.path),
         "notes": [*campaign.notes, *notes],
         "experiments": [
             {**as_json(summary), "worst": list(cases.rows), "seconds": seconds.get(summary.name)}

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import shlex
+from binascii import unhexlify
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -138,26 +140,31 @@ class Group:
                 return np.asarray(dataset.asstr()[first:last], dtype=object)
             return np.asarray(dataset[first:last])
 
-    def raw(self, name: str, place: int) -> list[bytes] | None:
-        """The bytes of a signal's chunks of the recorded case at this place, with their checksums; None where they are
-        not chunked by case."""
+    def digests(self, name: str, first: int, last: int) -> np.ndarray:
+        """The same of digests, as whole numbers of 64 bits."""
         with reading(self.path):
-            dataset = self._node[name]
-            chunks = dataset.chunks
-            if chunks is None or chunks[0] != 1 or chunks[2:] != dataset.shape[2:]:
-                return None
-            rest = (0,) * (len(chunks) - 2)
-            starts = range(0, dataset.shape[1], chunks[1])
-            return [dataset.id.read_direct_chunk((place, start, *rest))[1] for start in starts]
+            words = np.asarray(self._node[name][first:last]).astype("S")
+            try:
+                numbers = np.frombuffer(unhexlify(words.tobytes()), ">u8")
+            except ValueError:
+                numbers = np.empty(0)
+            if len(numbers) != len(words):
+                raise Unlike(f"variable `{name}` is not of digests")
+            return numbers.astype(np.uint64)
 
     def signal(self, name: str, position: int) -> np.ndarray:
         """History of one signal in the case at this position, which has one: (time,), then joints, then components."""
-        return self.recorded_signal(name, int(np.searchsorted(self.recorded_positions, position)))
-
-    def recorded_signal(self, name: str, place: int) -> np.ndarray:
-        """The same of the recorded case at this place along recorded_case."""
         with reading(self.path):
-            return np.asarray(self._node[name][place])
+            return np.asarray(self._node[name][int(np.searchsorted(self.recorded_positions, position))])
+
+    def histories(self, name: str, places: np.ndarray) -> np.ndarray:
+        """Of one signal in the recorded cases at these places along recorded_case, in their order: (case, time), then
+        joints, then components. Neighbours are read at once."""
+        with reading(self.path):
+            dataset = self._node[name]
+            ends = [0, *(np.flatnonzero(np.diff(places) != 1) + 1).tolist(), len(places)]
+            parts = [dataset[places[first] : places[last - 1] + 1] for first, last in pairwise(ends)]
+            return np.asarray(parts[0] if len(parts) == 1 else np.concatenate(parts))
 
     @cached_property
     def recorded_positions(self) -> np.ndarray:
@@ -206,17 +213,24 @@ class Group:
 
     def find_case(self, wanted: str) -> int:
         """Position in this group of a case: `#7`, its row in the case table, or the beginning of its case_id."""
-        row = row_of(wanted)
-        if row is not None:
-            found = np.flatnonzero(self.values("case") == row)
-        else:
-            found = np.flatnonzero([case_id.startswith(wanted) for case_id in self.values("case_id")])
-        if len(found) == 1:
-            return int(found[0])
-        if len(found) == 0:
-            raise Problem(error("E321", f"no case `{wanted}` in `{self.name}`", help=_cases_here(self.values("case"))))
-        some = ", ".join(self.values("case_id")[found[:4]]) + (" ..." if len(found) > 4 else "")
+        ids = self.values("case_id") if row_of(wanted) is None else np.empty(0)
+        return int(found_cases(wanted, self.values("case"), ids, self.name)[0])
+
+
+def found_cases(wanted: str, rows: np.ndarray, ids: np.ndarray, name: str) -> np.ndarray:
+    """Where a case is among cases of `name`, by `#7`, its row, or the beginning of its case_id: at one place, unless
+    several have this row. ids: not read for a row. Raises Problem E321, E322."""
+    row = row_of(wanted)
+    if row is not None:
+        found = np.flatnonzero(rows == row)
+    else:
+        found = np.flatnonzero([case_id.startswith(wanted) for case_id in ids])
+    if len(found) == 0:
+        raise Problem(error("E321", f"no case `{wanted}` in `{name}`", help=_cases_here(np.unique(rows))))
+    if row is None and len(found) > 1:
+        some = ", ".join(ids[found[:4]]) + (" ..." if len(found) > 4 else "")
         raise Problem(error("E322", f"case `{wanted}` may be any of {len(found)}: {some}", help="give more of its id"))
+    return found
 
 
 def _of_joints(variable: Stored) -> bool:

@@ -18,6 +18,7 @@ from batch.differences.compare import (
     Difference,
     compare,
     compare_cases,
+    magnitude,
     spans,
     unlike_bits,
 )
@@ -110,8 +111,8 @@ def _how(scores: _Scores, matched: Cases, b: Group, found: Experiment) -> np.nda
 
 def _other_noise(a: Group, b: Group) -> bool:
     """Whether the two have other seeds, so that single cases differ by chance."""
-    seeds = a.values("seed"), b.values("seed")
-    return not np.array_equal(*seeds) and not np.array_equal(*map(np.unique, seeds))
+    mine, theirs = a.values("seed"), b.values("seed")
+    return not np.array_equal(mine, theirs) and not np.array_equal(np.unique(mine), np.unique(theirs))
 
 
 def _ended(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
@@ -215,7 +216,7 @@ def _rank_metric(
 ) -> None:  # fmt: skip
     with np.errstate(invalid="ignore"):
         apart = np.abs(b[unlike] - a[unlike])
-    limit = allowed.absolute + allowed.relative * np.maximum(np.abs(a[unlike]), np.abs(b[unlike]))
+    limit = allowed.absolute + allowed.relative * magnitude(a[unlike], b[unlike])
     nan = np.isnan(apart)
     over = nan | (apart > limit)
     unit = _unit_of(out)
@@ -271,17 +272,18 @@ def _signals(
             labels = _labels(a, a.variables[name])
             out.by_joint = _by_joint(a, a.variables[name], allowed)
             absolute = _absolute(a, a.variables[name], out)
-            together = max(1, BLOCK // max(1, len(labels) * max(len(time_a), len(time_b))))
+            together = max(1, BLOCK // (len(labels) * max(len(time_a), len(time_b))))
             for first in range(0, len(places), together):
                 some = slice(first, first + together)
                 values_a, values_b = _histories(a, name, ia[some]), _histories(b, name, ib[some])
                 which = unlike_bits(values_a, values_b) if aligned else np.ones(len(values_a), bool)
                 out.compared += len(which)
                 out.identical += int((~which).sum())
-                if not which.all():
-                    values_a, values_b = values_a[which], values_b[which]
-                _cases(out, values_a[:, at_a], values_b[:, at_b], time_a[rows_a], labels, absolute, scores, places[some][which],
-                       numbers[some][which])  # fmt: skip
+                if which.any():
+                    values_a, values_b = values_a[which][:, at_a], values_b[which][:, at_b]
+                    instants = time_a[rows_a]
+                    _cases(out, values_a, values_b, instants, labels, absolute, scores, places[some][which],
+                           numbers[some][which])  # fmt: skip
         yield out
 
 
@@ -312,8 +314,6 @@ def _cases(
 ) -> None:  # fmt: skip
     """Cases of a signal whose bits are not all the same, or may not be, [case, row, column]. places: of the cases among
     those that are matched; numbers: in the case table of b."""
-    if not len(places):
-        return
     lows, highs = spans(a)
     differences = compare_cases(a, b, out.tolerance, time, absolute)
     together = zip(differences, places.tolist(), numbers.tolist(), lows.tolist(), highs.tolist(), strict=True)

@@ -1,6 +1,7 @@
 """Two histories of one signal, or two columns of one metric: identical, equivalent or different, where and by how much.
 
-Not-a-number at the same place on both sides is the same; on one side alone it differs by more than any tolerance.
+Not-a-number at the same place on both sides is the same; on one side alone it differs by more than any tolerance, as an
+infinite value does.
 """
 
 from __future__ import annotations
@@ -58,6 +59,12 @@ def unlike_bits(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.asarray((_flat(a).view(np.int64) != _flat(b).view(np.int64)).any(axis=1))
 
 
+def magnitude(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The larger of two values, of which a share may be allowed: of an infinite one none is."""
+    larger = np.maximum(np.abs(a), np.abs(b))
+    return np.asarray(np.where(np.isinf(larger), 0.0, larger))
+
+
 def spans(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest finite value of each case, [case, row, column]; inf and -inf where there is none."""
     values = _flat(values)
@@ -91,10 +98,11 @@ def compare_cases(
             finite = np.isfinite(apart)
         limit = np.asarray(allowed.absolute) if absolute is None else np.tile(absolute, shape[1])
         if allowed.relative:
-            limit = limit + allowed.relative * np.maximum(np.abs(a), np.abs(b))
+            limit = limit + allowed.relative * magnitude(a, b)
         over = apart
         if allowed.time and time is not None and shape[1] > 1:
-            over = np.minimum(apart, _flat(_outside(a.reshape(shape), b.reshape(shape), time, allowed.time)))
+            outside = _flat(_outside(a.reshape(shape), b.reshape(shape), time, allowed.time))
+            over = np.where(finite, np.minimum(apart, outside), apart)
         beyond = unlike & ~(over <= limit)
         # where all have one limit, the largest share is the share of the largest
         tops = over if limit.ndim else np.fmax.reduce(over, axis=1, initial=0.0, keepdims=True)

@@ -37,7 +37,8 @@ def alone(found: Diff) -> list[str]:
 
 def heading(experiment: Experiment) -> str:
     names = dict.fromkeys([experiment.name_a, experiment.name_b])
-    return f"{' and '.join(names)}: {experiment.cases.count:,} cases in both, {experiment.verdict}"
+    count = experiment.cases.count
+    return f"{' and '.join(names)}: {count:,} case{'s' if count != 1 else ''} in both, {experiment.verdict}"
 
 
 def missing(found: Diff, experiment: Experiment) -> list[str]:

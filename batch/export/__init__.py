@@ -10,12 +10,13 @@
     layout     what Foxglove shows when it opens one
     csv        a table as text
     parquet    a table for other programs; needs pyarrow
+    straight   an export that a run is asked for
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from met.diagnostic import Problem, error
@@ -69,9 +70,8 @@ def export(
     if layout and form != "mcap":
         helps = "`-o FILE.mcap` writes one, and its layout"
         raise Problem(error("E375", f"a layout shows an MCAP file, and {target} is none", help=helps))
-    own = {"mcap": mcap.own, "csv": csv.own, "parquet": parquet.own}[form]
     with ArchiveFile(Path(archive)) as file:
-        check(target, file.path, own, force=force)
+        check(target, file.path, owner(form), force=force)
         picked = pick(file, runs, [f"#{case}" if isinstance(case, int) else case for case in cases], signals)
         if form != "mcap":
             rows = csv.write(file, picked, target) if form == "csv" else parquet.write(file, picked, target)
@@ -85,6 +85,13 @@ def export(
         rows = mcap.write(file, arms, target)
         layouts.write(place, told)
     return Exported(target, place, len(picked), rows)
+
+
+def owner(form: str) -> Callable[[Path], bool]:
+    """Whether a file is an export of this format that may be written over unasked."""
+    from batch.export import csv, mcap, parquet
+
+    return {"mcap": mcap.own, "csv": csv.own, "parquet": parquet.own}[form]
 
 
 def settled(

@@ -13,7 +13,7 @@ from typing import Any
 from batch.export import mcap, scene
 from batch.export.output import whole
 from batch.export.poses import Arm
-from batch.plot import COLOURS
+from batch.plotting.sheet import COLOURS
 from batch.signals import pretty_unit
 
 ENDING = ".layout.json"

@@ -30,7 +30,7 @@ from batch.export.poses import Arm, arm_of
 from batch.export.said import Line, lines, result, varied
 from batch.export.wire import plain
 from batch.output import quoted
-from met.diagnostic import Problem, error
+from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 from met.version import VERSION
 
@@ -66,14 +66,18 @@ def arms(file: ArchiveFile, cases: Sequence[Case], *, named: bool) -> list[Arm]:
     if len(cases) > OVERLAID and not named:
         helps = (f"`--case '#{cases[0].number}' --case '#{cases[1].number}'` shows these over one another",
                  f"`met show {quoted(file.path)}` lists the cases, the worst first")  # fmt: skip
-        message = f"{len(cases):,} cases of `{cases[0].asked}` are too many to show over one another"
-        raise Problem(error("E372", message, help=helps))
+        raise Problem(too_many(len(cases), cases[0].asked, helps))
     plan = file.plan(as_written=True)
     one_run = len({case.asked for case in cases}) == 1
     prefixes = [f"case{case.number}/" if one_run else f"{case.asked}/case{case.number}/" for case in cases]
     return [
         arm_of(plan, case, prefix if len(cases) > 1 else "") for case, prefix in zip(cases, prefixes, strict=True)
     ]
+
+
+def too_many(cases: int, asked: str, helps: Sequence[str]) -> Diagnostic:
+    """More than `OVERLAID` cases of what was asked for."""
+    return error("E372", f"{cases:,} cases of `{asked}` are too many to show over one another", help=helps)
 
 
 def root(arms: Sequence[Arm]) -> str:

@@ -12,16 +12,20 @@ from batch.output import quoted
 from met.diagnostic import Problem, error
 
 
-def check(output: Path, archive: Path, own: Callable[[Path], bool], *, force: bool) -> None:
-    """Refuse a place before anything is written. own: whether a file that is there is an export of MET's, and may go.
-    Raises Problem E305 where nothing can be written, E374 where something is there."""
+def check(output: Path, archive: Path, own: Callable[[Path], bool], *, force: bool | None) -> None:
+    """Refuse a place before anything is written. Raises Problem E305 where nothing can be written, E374 where something
+    is there.
+
+    own    whether a file that is there is an export of MET's, and may go
+    force  whether any other may; None where the user has no way to say so
+    """
     try:
         _check(output, archive, own, force)
     except OSError as reason:
         raise _cannot_write(output, reason) from reason
 
 
-def _check(output: Path, archive: Path, own: Callable[[Path], bool], force: bool) -> None:
+def _check(output: Path, archive: Path, own: Callable[[Path], bool], force: bool | None) -> None:
     if output.is_dir():
         helps = f"name a file in it: `-o {quoted(output / archive.with_suffix('.mcap').name)}`"
         raise Problem(error("E305", f"cannot write {output}: it is a folder", help=helps))
@@ -33,12 +37,13 @@ def _check(output: Path, archive: Path, own: Callable[[Path], bool], force: bool
         return
     if not output.is_file():
         raise Problem(error("E305", f"cannot write {output}: it is not a regular file"))
-    if output.samefile(archive):
+    if archive.exists() and output.samefile(archive):
         message = f"{output} is the archive itself: it is not written over"
         raise Problem(error("E374", message, help="give another name with `-o`"))
     if not force and output.stat().st_size > 0 and not own(output):
         message = f"{output} exists, and may hold work that is not in the archive: it is not written over"
-        raise Problem(error("E374", message, help="give another name with `-o`, or say `--force`"))
+        remedy = "remove the file" if force is None else "say `--force`"
+        raise Problem(error("E374", message, help=f"give another name with `-o`, or {remedy}"))
 
 
 @contextlib.contextmanager

@@ -42,7 +42,7 @@ def own(path: Path) -> bool:
 
 def write(file: ArchiveFile, cases: Sequence[Case], output: Path) -> int:
     """Write the cases; the number of rows. Raises Problem E305, and E373 where there is no pyarrow."""
-    arrow, parquet = _pyarrow()
+    arrow, parquet = pyarrow_here()
     columns, runs = united(cases), dict.fromkeys(case.asked for case in cases)
     told = {"archive": file.path.name, "deck": file.deck, "runs": list(runs), "met": VERSION,
             "provenance": file.provenance}  # fmt: skip
@@ -61,7 +61,8 @@ def write(file: ArchiveFile, cases: Sequence[Case], output: Path) -> int:
     return sum(len(case.time) for case in cases)
 
 
-def _pyarrow() -> tuple[Any, Any]:
+def pyarrow_here() -> tuple[Any, Any]:
+    """pyarrow and its parquet. Raises Problem E373 where there is none."""
     try:
         import pyarrow
         from pyarrow import parquet

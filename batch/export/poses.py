@@ -78,15 +78,20 @@ def arm_of(plan: Plan, case: Case, prefix: str) -> Arm:
     return Arm(case, experiment, prefix, values, first, parents, poses, start, travel)
 
 
-def parameters(experiment: Experiment, varied: Mapping[str, Any]) -> dict[str, float]:
-    """The numbers among a case's parameters, of which some follow from what is varied."""
-    outputs = experiment.formulas.replay({path: float(value) for path, value in varied.items()})
+def parameters(experiment: Experiment, varied: Mapping[str, Any]) -> dict[str, Any]:
+    """The numbers among a case's parameters, of which some follow from what is varied. varied: numbers, or arrays of
+    one shape, with which those that follow are arrays too."""
+    outputs = experiment.formulas.replay({path: _plain(value) for path, value in varied.items()})
     out = {}
     for path, quantity in experiment.parameters.items():
         value = outputs[quantity.value.output] if isinstance(quantity.value, Formula) else quantity.value
-        if isinstance(value, int | float | np.floating):
-            out[path] = float(value)
+        if isinstance(value, int | float | np.floating | np.ndarray):
+            out[path] = _plain(value)
     return out
+
+
+def _plain(value: Any) -> Any:
+    return float(value) if np.ndim(value) == 0 else value
 
 
 def positions(case: Case, joints: Sequence[str]) -> list[np.ndarray]:
@@ -112,19 +117,21 @@ def _position(case: Case, joint: str, signals: Mapping[str, Stored]) -> np.ndarr
     return None
 
 
-def world_poses(experiment: Experiment, values: Mapping[str, float], q: Sequence[Any]) -> dict[str, Pose]:
+def world_poses(experiment: Experiment, values: Mapping[str, Any], q: Sequence[Any]) -> dict[str, Pose]:
     """Every link's frame in the world, whose numbers are those of all rows at once where they change."""
-    tree = Machine(experiment).tree(lambda name: values[name.removeprefix(PARAMETER)])
-    motions = link_motions(tree, q, [0.0] * len(q))
+    machine = Machine(experiment)
+    memory = {PARAMETER + path: value for path, value in values.items()}
+    machine.keep_tree(memory.__getitem__, memory.__setitem__)
+    motions = link_motions(machine.tree(memory.__getitem__), q, [0.0] * len(q))
     return {name: motion.pose for name, motion in motions.items()}
 
 
-def moved(pose: Pose, rows: int) -> Moved:
-    """A pose with its numbers by row."""
+def moved(pose: Pose, rows: int | tuple[int, ...]) -> Moved:
+    """A pose with its numbers by row, or by whatever these are the sizes of."""
     rotation = tuple(tuple(np.broadcast_to(np.asarray(entry, np.float64), rows) for entry in row) for row in pose.R)
     parts = quaternion(rotation)  # type: ignore[arg-type]
     return Moved(_rows(pose.p, rows), _rows(parts, rows))
 
 
-def _rows(numbers: Sequence[Any], rows: int) -> np.ndarray:
-    return np.stack([np.broadcast_to(np.asarray(number, np.float64), rows) for number in numbers], axis=1)
+def _rows(numbers: Sequence[Any], rows: int | tuple[int, ...]) -> np.ndarray:
+    return np.stack([np.broadcast_to(np.asarray(number, np.float64), rows) for number in numbers], axis=-1)

@@ -17,7 +17,7 @@ import numpy as np
 
 from batch.export.poses import Arm
 from batch.export.wire import plain
-from batch.plot import COLOURS
+from batch.plotting.sheet import COLOURS
 from met.dynamics.spatial import IDENTITY, Pose, compose, rotation_rpy
 from met.plan import Joint, Link
 

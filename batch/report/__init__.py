@@ -1,6 +1,7 @@
 """`met report`: an archive as one HTML page, that opens anywhere and asks for nothing.
 
-    batch.report.report("two_link.gains.h5")          # -> two_link.gains.html
+    batch.report.report("two_link.gains.h5")                    # -> two_link.gains.html
+    batch.report.report("after.h5", against="before.h5")        # and what changed
 
 `data.gather` makes plain data of an archive (`content.Report`), `page.page` makes HTML of that; here it is written.
 """
@@ -18,26 +19,44 @@ def report(
     *,
     experiments: Sequence[str] = (),
     title: str = "",
+    against: str | os.PathLike[str] | None = None,
+    tolerances: str | Sequence[str] = (),
     progress: Callable[[int], None] | None = None,
 ) -> Path:
-    """Write a report of an archive; its place. The same archive gives the same bytes.
+    """Write a report of an archive; its place. The same archives give the same bytes.
 
     output       the page; None: beside the archive, `ARCHIVE.html`
     experiments  names of runs and sweeps; none: all
     title        what stands above it; "": the names of deck, runs and sweeps
+    against      an earlier archive: what changed is in the page too
+    tolerances   how much may differ from it, as `batch.diff` has them
     progress     called with the number of cases whose stability is known, where motors are on beds
 
     Raises met.diagnostic.Problem for what a user can mend.
     """
+    from contextlib import ExitStack
+
     from batch.archive.read import ArchiveFile
+    from batch.report.against import Against, called, named
     from batch.report.data import gather
     from batch.report.page import page
     from batch.report.writing import check, default, write
+    from batch.show import chosen
 
+    if tolerances and against is None:
+        raise ValueError("tolerances are for a comparison: against which archive?")
     archive = Path(path)
     target = default(archive) if output is None else Path(output)
-    with ArchiveFile(archive) as file:
+    with ExitStack() as stack:
+        file = stack.enter_context(ArchiveFile(archive))
         check(target)
-        text = page(gather(file, experiments, title, progress))
+        other = None
+        if against is not None:
+            from batch import diff
+
+            chosen(file, experiments)
+            found = named(diff(against, archive, tolerances=tolerances), *called(Path(against), archive))
+            other = Against(stack.enter_context(ArchiveFile(Path(against))), found)
+        text = page(gather(file, experiments, title, progress, other))
     write(target, text)
     return target

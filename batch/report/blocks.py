@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from batch.report.content import Demand, Fact, Failing, MetricRow, Section, Spot, Varied, Verdict
+from batch.report.content import Demand, Fact, Failing, Flow, MetricRow, Section, Spot, Varied, Verdict
 from batch.report.markup import Child, Html, el, join, lines
 
 Anchors = Mapping[str, tuple[int, int]]
@@ -52,6 +52,8 @@ def spot_link(spot: Spot | None, anchors: Anchors) -> Html | None:
 
 def verdict(found: Verdict) -> Html:
     """The answer, large; beside it what it rests on."""
+    if found.kind == "comparison":
+        return _comparison(found)
     yes, no = STRONG.get(found.kind, STRONG["requirements"]) if found.demands else NOTHING_ASKED
     answer = el(
         "div",
@@ -70,8 +72,66 @@ def verdict(found: Verdict) -> Html:
 
 def mark(ok: bool) -> Html:
     """A tick or a cross before the word that says the same."""
-    path = "M3 8.5l3.2 3.2L13 4.6" if ok else "M4 4l8 8M12 4l-8 8"
+    return _drawn("M3 8.5l3.2 3.2L13 4.6" if ok else "M4 4l8 8M12 4l-8 8")
+
+
+def _drawn(path: str) -> Html:
     return el("svg", el("path", d=path), cls="mark", viewBox="0 0 16 16", aria_hidden="true")
+
+
+ALIKE = {
+    "identical": "M3 5.7h10M3 10.3h10", "equivalent": "M3 6.2q2.5-2.4 5 0t5 0M3 10.8q2.5-2.4 5 0t5 0",
+    "different": "M3 5.7h10M3 10.3h10M10.7 2.6L5.3 13.4",
+}  # fmt: skip
+UNCLEAR = "M5.2 6q0-3 2.8-3t2.8 2.6q0 1.6-1.6 2.4T7.9 10.4M7.9 13v.3"
+
+
+def likeness(word: str) -> Html:
+    """Before the word of a comparison: two lines, two waves, two lines crossed out, a question mark."""
+    return _drawn(ALIKE.get(word, UNCLEAR))
+
+
+SHARES = {
+    "identical": ("same", "identical"), "equivalent": ("near", "equivalent"), "different": ("other", "different"),
+    "only before": ("gone", "only before"), "only now": ("new", "only now"),
+}  # fmt: skip
+
+
+def _comparison(found: Verdict) -> Html:
+    """The share of cases that meet all, before and now; how many cases differ; what each requirement gains and loses.
+    """
+    figure: list[Child] = []
+    if found.figure is not None:
+        was, now, of = found.figure
+        text = share(now, of) if was == now else [share(was, of), el("span", " → ", cls="to"), share(now, of)]
+        said = f"of the {of:,} cases in both meet all{', as before' if was == now else ''}"
+        figure = [el("p", text, cls="share two"), el("p", said, cls="under")]
+    answer = el(
+        "div", el("p", found.about, cls="about"), el("p", likeness(found.word), found.word.capitalize(), cls="word"),
+        figure, el("p", found.headline, ".", cls="headline") if found.headline else None, cls="answer",
+    )  # fmt: skip
+    parts = [(*SHARES.get(part.word, ("other", part.word)), part.count) for part in found.parts]
+    words = [(cls, f"{count:,} {word}") for cls, word, count in parts]
+    legend = el("ul", [el("li", el("span", cls=f"key {cls}"), text) for cls, text in words], cls="legend")
+    bars = bar([(cls, count) for cls, _, count in parts], "; ".join(text for _, text in words))
+    evidence = [join([bars, legend]) if found.cases > 1 else None, _flows(found.flows)]
+    return el("div", answer, el("div", evidence, cls="evidence"), cls="verdict against")
+
+
+def _flows(found: Sequence[Flow]) -> Html | None:
+    if not found:
+        return None
+    gained, lost = any(each.gained for each in found), any(each.lost for each in found)
+    heads = ["requirement", "cases in both", *(["met now, and not before"] if gained else []),
+             *(["missed now, and not before"] if lost else [])]  # fmt: skip
+    rows = [
+        el("tr", el("th", el("code", each.text), scope="row"), el("td", each.met, cls="words"),
+           el("td", each.gained or "–", cls="good words" if each.gained else None) if gained else None,
+           el("td", each.lost or "–", cls="bad words" if each.lost else None) if lost else None)
+        for each in found
+    ]  # fmt: skip
+    head = el("tr", [el("th", name, scope="col") for name in heads])
+    return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "Requirements, before and now")
 
 
 def _parts(found: Verdict) -> Html:
@@ -169,19 +229,27 @@ def metrics(section: Section) -> Html | None:
     """Each metric with its spread, and the shape of it."""
     if not section.metrics:
         return None
-    heads = ["metric", *(["value"] if section.single else ["smallest", "median", "largest"]), "unit"]
+    compared = any(each.before for each in section.metrics)
+    medians = ["median before", "median now"] if compared else ["median"]
+    values = ["smallest", *medians, "largest"]
+    if section.single:
+        values = ["before", "now"] if compared else ["value"]
+    heads = ["metric", *values, "unit"]
     heads += [] if section.single else ["how often"]
     shown = any(each.remark for each in section.metrics)
-    rows = [el("tr", _metric(each, section.single, shown)) for each in section.metrics]
-    numbers = range(1, 2 if section.single else 4)
+    rows = [el("tr", _metric(each, section.single, shown, compared)) for each in section.metrics]
+    numbers = range(1, len(values) + 1)
     head = el("tr", [el("th", name, scope="col", cls="right" if n in numbers else None)
                      for n, name in enumerate([*heads, *([""] if shown else [])])])  # fmt: skip
     made = el("table", el("thead", head), el("tbody", lines(rows)), cls="few" if section.single else None)
-    return scrolling(made, "Metrics")
+    outline = any(each.bars_before for each in section.metrics)
+    said = el("p", "Bars: how often now. Outline: before.", cls="said") if outline else None
+    return join([scrolling(made, "Metrics"), said])
 
 
-def _metric(each: MetricRow, single: bool, remarks: bool) -> list[Html]:
-    values = [each.median] if single else [each.minimum, each.median, each.maximum]
+def _metric(each: MetricRow, single: bool, remarks: bool, compared: bool) -> list[Html]:
+    values = [each.before, each.median] if compared else [each.median]
+    values = values if single else [each.minimum, *values, each.maximum]
     cells = [el("th", el("code", each.name), el("span", each.about, cls="under"), scope="row")]
     cells += [el("td", value, cls="right") for value in values]
     cells.append(el("td", each.unit))
@@ -191,10 +259,10 @@ def _metric(each: MetricRow, single: bool, remarks: bool) -> list[Html]:
 
 
 def histogram(each: MetricRow) -> Html | None:
-    """Counts as bars, limits as lines."""
+    """Counts as bars, limits as lines; those before as an outline."""
     if not each.bars:
         return None
-    top, wide = max(each.bars), 160 / len(each.bars)
+    top, wide = max(each.bars + each.bars_before), 160 / len(each.bars)
     bars = [
         el("rect", x=f"{n * wide:.2f}", y=f"{26 - 24 * count / top:.2f}", width=f"{wide - 0.6:.2f}",
            height=f"{24 * count / top:.2f}", cls="count")
@@ -204,9 +272,14 @@ def histogram(each: MetricRow) -> Html | None:
     for limit in each.limits:
         at = f"{160 * (limit - each.low) / (each.high - each.low):.2f}"
         limits.append(el("line", x1=at, x2=at, y1=0, y2=28, cls="limit"))
+    before = ""
+    for n, count in enumerate(each.bars_before):
+        y = f"{26 - 24 * count / top:.2f}"
+        before += f"{'L' if n else 'M'}{n * wide:.2f} {y}H{(n + 1) * wide - 0.6 * (n + 1 == len(each.bars)):.2f}"
+    outline = el("path", d=before, cls="before") if before else None
     words = f"{each.name} from {each.minimum} to {each.maximum} {each.unit}, median {each.median}"
     floor = el("line", x1=0, x2=160, y1=26.5, y2=26.5, cls="floor")
-    return el("svg", bars, floor, limits, cls="histogram", viewBox="-1 0 162 28", role="img", aria_label=words)
+    return el("svg", bars, floor, outline, limits, cls="histogram", viewBox="-1 0 162 28", role="img", aria_label=words)
 
 
 def scrolling(table: Html, label: str) -> Html:

@@ -6,13 +6,16 @@ are numbered through, and what decides the structure is a column of words.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from met.frozen import frozen
 
-Role = Literal["case", "choice", "parameter", "repeat", "metric"]
+if TYPE_CHECKING:
+    from batch.report.changes import Compared, Comparison
+
+Role = Literal["case", "choice", "parameter", "repeat", "metric", "change"]
 Ended = Literal["met", "missed", "unknown", "done", "failed", "timed out", "lost"]
 
 ENDED: tuple[Ended, ...] = ("met", "missed", "unknown", "done", "failed", "timed out", "lost")
@@ -73,12 +76,25 @@ class Failing:
 
 
 @frozen
+class Flow:
+    """A requirement in two archives: by how many of the cases in both it is met, in words, and which of these it is met
+    in now, or missed now, and was not before."""
+
+    text: str
+    met: str
+    gained: str
+    lost: str
+
+
+@frozen
 class Verdict:
     """An answer: yes or no, in one sentence, and what it rests on.
 
-    kind    what was asked: "requirements". A comparison with another archive will be another kind, beside this one
-    about   the run or sweep
+    kind    what was asked: "requirements"; "comparison", with another archive
+    about   the run or sweep, or the other archive
     parts   how the cases came out; they add up to all of them
+    word    of a comparison: "identical", "equivalent", "different" or "incomparable"
+    figure  of a comparison: cases with nothing against them, before and now, of how many in both
     """
 
     kind: str
@@ -89,6 +105,9 @@ class Verdict:
     demands: tuple[Demand, ...] = ()
     failing: tuple[Failing, ...] = ()
     notes: tuple[str, ...] = ()
+    word: str = ""
+    figure: tuple[int, int, int] | None = None
+    flows: tuple[Flow, ...] = ()
 
     @property
     def cases(self) -> int:
@@ -120,6 +139,7 @@ class MetricRow:
 
     bars    counts of equal stretches from `low` to `high`; none where there are too few values to show a shape
     limits  of requirements, in the metric's unit
+    before  the median of the other archive's cases, where one is compared with, and `bars_before` their counts
     """
 
     name: str
@@ -133,6 +153,8 @@ class MetricRow:
     low: float = 0.0
     high: float = 0.0
     limits: tuple[float, ...] = ()
+    before: str = ""
+    bars_before: tuple[int, ...] = ()
 
 
 @frozen
@@ -184,7 +206,11 @@ class Limit:
 
 @frozen
 class Column:
-    """A number a case: a metric, or what it may be drawn against. words: of a choice, what its numbers stand for."""
+    """A number a case: a metric, or what it may be drawn against. words: of a choice, what its numbers stand for.
+
+    before  of a metric, what it is in the other archive, where one is compared with; not a number where it has no such
+            case. A column of role "change" holds values less before; its key is that of the metric after "change:"
+    """
 
     key: str
     label: str
@@ -194,6 +220,7 @@ class Column:
     words: tuple[str, ...] = ()
     limits: tuple[Limit, ...] = ()
     about: str = ""
+    before: np.ndarray | None = None
 
 
 @frozen
@@ -260,11 +287,16 @@ class SignalPanel:
 @frozen
 class History:
     """What was recorded of a case: for each panel (by place in `Signals.panels`) its lines, (time, line), at the times
-    numbered `clock`."""
+    numbered `clock`.
+
+    before, change  what the other archive has of it, where one is compared with, and this less that
+    """
 
     case: int
     clock: int
     values: dict[int, np.ndarray]
+    before: History | None = None
+    change: History | None = None
 
 
 @frozen
@@ -273,6 +305,7 @@ class Signals:
 
     clocks  the times of histories, s
     shown   cases that are drawn first
+    most    cases that differ most from the other archive, where one is compared with;  worst  the worst of all
     middle  the case in the middle of the order, to compare the worst with; None where there are few
     said    what was left out, and how lines were thinned
     """
@@ -284,6 +317,8 @@ class Signals:
     shown: tuple[int, ...]
     middle: int | None = None
     said: tuple[str, ...] = ()
+    most: tuple[int, ...] = ()
+    worst: int | None = None
 
 
 @frozen
@@ -335,6 +370,7 @@ class Section:
     """A run or sweep.
 
     name        as it is asked for;  lede  what it is, in a sentence
+    compared    with another archive, a structure each;  what it lacks is in `Comparison.alone`
     trouble     why parameters and stability are missing; "" where they are not
     """
 
@@ -353,6 +389,7 @@ class Section:
     trouble: str = ""
     notes: tuple[str, ...] = ()
     single: bool = False
+    compared: tuple[Compared, ...] = ()
 
 
 @frozen
@@ -367,3 +404,4 @@ class Report:
     sections: tuple[Section, ...]
     sources: tuple[SourceText, ...]
     provenance: tuple[Fact, ...]
+    comparison: Comparison | None = None

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path, PurePath
 from typing import Any
 
 from batch.archive.read import ArchiveFile, Group
+from batch.report import comparison
+from batch.report.against import Against, Before, narrowed
+from batch.report.comparison import compared
 from batch.report.content import Fact, Report, Section, SourceText, Stability
 from batch.report.histories import MOST_VALUES, no_signals, signals
 from batch.report.overview import overview
@@ -32,30 +36,41 @@ BEGINS = 200
 
 
 def gather(
-    archive: ArchiveFile, names: Sequence[str] = (), title: str = "", progress: Callable[[int], None] | None = None
-) -> Report:
+    archive: ArchiveFile, names: Sequence[str] = (), title: str = "", progress: Callable[[int], None] | None = None,
+    against: Against | None = None,
+) -> Report:  # fmt: skip
     """All that a page says of an archive, or of these runs and sweeps of it. Raises Problem E325 for another name.
 
     progress  called with the number of cases whose margin is known, where motors are on beds
+    against   another archive to compare with
     """
     groups = chosen(archive, names)
     found = pools(groups)
     several = len({group.sweep or group.name for group in archive.groups}) > 1
     experiments, trouble = _experiments(archive)
-    name = archive.path.name
+    if against is not None and names:
+        against = replace(against, found=narrowed(against.found, groups))
+    name = archive.path.name if against is None else str(against.found.b)
     share = MOST_VALUES // max(1, len(found))
+    befores = [None if against is None else against.of(pool) for pool in found]
     sections = tuple(
-        _section(name, pool, pool.name if several else "", experiments, trouble, share, progress) for pool in found
-    )
+        replace(_section(name, pool, pool.name if several else "", experiments, trouble, share, progress, before),
+                compared=() if against is None else compared(against.found, before))
+        for pool, before in zip(found, befores, strict=True)
+    )  # fmt: skip
+    verdicts = [verdict(pool, named=len(found) > 1) for pool in found]
+    if against is not None:
+        verdicts.append(comparison.verdict(against, list(zip(found, befores, strict=True))))
     return Report(
         title=title[:BEGINS] or f"{_stem(archive.deck)} · {', '.join(pool.name for pool in found)}",
         archive=name,
         deck=archive.deck,
         replay=replay(name, found[0].name if several else "", int(found[0].cases[0]) if found[0].count else 0),
-        verdicts=tuple(verdict(pool, named=len(found) > 1) for pool in found),
+        verdicts=tuple(verdicts),
         sections=sections,
         sources=_sources(archive),
-        provenance=_provenance(archive, groups),
+        provenance=_provenance(archive, groups) + (() if against is None else _compared_with(against)),
+        comparison=None if against is None else comparison.comparison(against.found),
     )
 
 
@@ -73,7 +88,7 @@ def _experiments(archive: ArchiveFile) -> tuple[dict[str, Experiment], str]:
 
 def _section(
     archive: str, pool: Pool, only: str, experiments: Mapping[str, Experiment], trouble: str, values: int,
-    progress: Callable[[int], None] | None,
+    progress: Callable[[int], None] | None, before: Before | None,
 ) -> Section:  # fmt: skip
     own = {group.name: experiments[group.name] for group in pool.groups if group.name in experiments}
     beds: Stability | None = None
@@ -83,16 +98,16 @@ def _section(
         beds = stability(pool, own, progress)
     except Problem as problem:
         trouble = trouble or "; ".join(diagnostic.message for diagnostic in problem.diagnostics)
-    drawn = signals(pool, values)
+    drawn = signals(pool, values, before)
     return Section(
         name=pool.name,
         lede=_lede(pool),
         facts=_facts(pool, own),
         varied=varied(pool, own),
-        metrics=metric_rows(pool),
-        structures=structures(pool),
-        worst=worst(pool, archive, only),
-        overview=overview(pool),
+        metrics=metric_rows(pool, before),
+        structures=structures(pool, before),
+        worst=worst(pool, archive, only, before),
+        overview=overview(pool, before),
         signals=drawn,
         no_signals="" if drawn else no_signals(pool),
         stability=beds,
@@ -189,6 +204,13 @@ def _provenance(archive: ArchiveFile, groups: Sequence[Group]) -> tuple[Fact, ..
             if name in group.attributes:
                 facts.append(Fact(f"{about}{of}", str(group.attributes[name]), True))
     return tuple(facts)
+
+
+def _compared_with(against: Against) -> tuple[Fact, ...]:
+    path, name = against.file.path, str(against.found.a)
+    size = path.stat().st_size
+    digest = _digest(path) if size <= MOST_HASHED else "not computed: it is large"
+    return Fact("compared with", f"{name} ({size_text(size)})"), Fact(f"SHA-256 of {name}", digest, True)
 
 
 def _digest(path: Path) -> str:

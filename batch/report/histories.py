@@ -8,8 +8,11 @@ import numpy as np
 
 from batch.archive.read import Group
 from batch.arrange import joints_of, overlaid
+from batch.report.against import Before
 from batch.report.content import History, Line, SignalPanel, Signals
+from batch.report.earlier import Earlier
 from batch.report.pool import Pool
+from batch.report.thinning import stretch, thin, thin_clock
 from batch.signals import Panel, history, panels
 
 MOST_POINTS = 4000
@@ -29,14 +32,16 @@ MOST_PANELS = 32
 """Plots under one another."""
 
 
-def signals(pool: Pool, values: int = MOST_VALUES) -> Signals | None:
+def signals(pool: Pool, values: int = MOST_VALUES, before: Before | None = None) -> Signals | None:
     """Of the worst cases that have histories, and of the middle one; None where none has one.
 
     values  how many numbers there may be
+    before  another archive to compare with: the cases that differ most from it come first, each with what it was there
     """
-    known = _kept(pool)
+    known = _kept(pool, before)
     if not known:
         return None
+    values = values if before is None else values // 3  # what it is, what it was, and the difference
     groups = [_Group(group, [place for number, place in known if number == n]) for n, group in enumerate(pool.groups)]
     width = max(max((each.width for each in groups), default=1), 1)
     few = min(len(known), COMPARED)
@@ -57,38 +62,52 @@ def signals(pool: Pool, values: int = MOST_VALUES) -> Signals | None:
             names[key] = _joined(names.get(key), each.described(panel))
     found = tuple(names.values())[:MOST_PANELS]
     wanted, middle = known[:most], None
-    if len(known) >= FEWEST_COMPARED:
+    if len(known) >= FEWEST_COMPARED and before is None:
         middle = known[len(known) // 2]
         wanted = wanted if middle in wanted else [*wanted[:-1], middle]
     numbers = {each: int(pool.groups[each[0]].at("case", [each[1]])[0]) for each in wanted}
+    was = None if before is None else Earlier(before, found, clocks, points)
     histories = tuple(
-        History(numbers[n, position], clock_of[n], groups[n].thinned(found, position, points)) for n, position in wanted
-    )
+        History(numbers[n, position], clock_of[n], groups[n].thinned(found, position, points),
+                *(was.of(numbers[n, position], n, position) if was is not None else ()))
+        for n, position in wanted
+    )  # fmt: skip
     joints = tuple(dict.fromkeys(joint for each in groups if each.panels for joint in joints_of(each.group)))
-    shown = [numbers[each] for each in wanted[:COMPARED]]
+    shown = [numbers[each] for each in wanted[: COMPARED if before is None else 1]]
+    here = {each.case for each in histories}
+    worst = next((case for case in pool.cases[pool.worst_first[:1]].tolist() if case in here), None)
+    changed = () if before is None else tuple(case for case in before.most if case in here)
     if middle is not None:
         shown[-1] = numbers[middle]
-    said = _said(groups, len(known), len(histories), len(names), points)
+    said = _said(groups, len(known), len(histories), len(names), points, before is not None)
     compared = None if middle is None else numbers[middle]
-    return Signals(found, joints, tuple(clocks), histories, tuple(shown), compared, said)
+    return Signals(found, joints, tuple(clocks), histories, tuple(shown), compared, said, changed, worst)
 
 
-def _kept(pool: Pool) -> list[tuple[int, int]]:
-    """Group and position of the cases that have histories, worst first."""
+def _kept(pool: Pool, before: Before | None = None) -> list[tuple[int, int]]:
+    """Group and position of the cases that have histories, worst first. Where there is a `before`, those that differ
+    most from it come first, and the worst of all in the second place."""
     kept = [set(group.recorded_positions.tolist()) if group.role("signal") else set() for group in pool.groups]
     if not any(kept):
         return []
-    places = zip(pool.group_of[pool.worst_first].tolist(), pool.position_of[pool.worst_first].tolist(), strict=True)
-    return [(number, position) for number, position in places if position in kept[number]]
+    order = pool.worst_first
+    if before is not None:
+        most = np.flatnonzero(np.isin(pool.cases, before.most))
+        ranked = most[np.argsort([before.most.index(number) for number in pool.cases[most].tolist()])]
+        order = np.concatenate([ranked[:1], order[:1], ranked[1:], order])
+    places = zip(pool.group_of[order].tolist(), pool.position_of[order].tolist(), strict=True)
+    found = [(number, position) for number, position in places if position in kept[number]]
+    return list(dict.fromkeys(found))
 
 
 def _said(
-    groups: Sequence[_Group], known: int, here: int, plots: int, points: int
+    groups: Sequence[_Group], known: int, here: int, plots: int, points: int, compared: bool
 ) -> tuple[str, ...]:
     """What is not in the page. known, here: recorded cases, and those of them that are in it."""
     out = []
     if here < known:
-        out.append(f"Signals of the worst of {known:,} recorded cases are in this page, {here:,} of them.")
+        which = "those that changed most and of the worst" if compared else "the worst"
+        out.append(f"Signals of {which} of {known:,} recorded cases are in this page, {here:,} of them.")
     each = max(stretch(group.rows, points) for group in groups)
     if each > 1:
         out.append(
@@ -160,39 +179,3 @@ def _joined(one: SignalPanel | None, other: SignalPanel) -> SignalPanel:
     if one is None:
         return other
     return SignalPanel(one.name, one.about, one.unit, tuple(dict.fromkeys((*one.lines, *other.lines))))
-
-
-# Thinning
-
-
-def stretch(rows: int, points: int) -> int:
-    """Rows that two points stand for; 1 where every row has its point."""
-    return 1 if rows <= points else -(-rows // (points // 2))
-
-
-def thin_clock(time: np.ndarray, points: int) -> np.ndarray:
-    """The times of the points: of each stretch its first row and the one in its middle."""
-    each = stretch(len(time), points)
-    if each == 1:
-        return time
-    first = np.arange(0, len(time), each)
-    return np.stack([time[first], time[np.minimum(first + each // 2, len(time) - 1)]], axis=1).ravel()
-
-
-def thin(values: np.ndarray, points: int) -> np.ndarray:
-    """Of each stretch of rows the smallest and the largest value, in the order in which they come.
-
-    values: (time, line). Values that are not finite are none; a stretch of nothing else is not a number.
-    """
-    values = np.where(np.isfinite(values), values, np.nan)
-    each = stretch(len(values), points)
-    if each == 1:
-        return values
-    count = -(-len(values) // each)
-    padded = np.full((count * each, values.shape[1]), np.nan)
-    padded[: len(values)] = values
-    parts = padded.reshape(count, each, -1)
-    none = np.isnan(parts)
-    at = [np.where(none, other, sign * parts).argmin(axis=1) for sign, other in ((1.0, np.inf), (-1.0, np.inf))]
-    pair = np.sort(np.stack(at, axis=1), axis=1)
-    return np.take_along_axis(parts, pair, axis=1).reshape(2 * count, -1)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from batch.differences.compare import VERDICTS
+from batch.report.against import GOOD, Before, change
 from batch.report.content import ENDED, Column, Overview
 from batch.report.maps import maps
 from batch.report.pool import Pool
@@ -12,7 +16,7 @@ MOST_POINTS = 12_000
 """Cases that a page holds. Of more, those go that lie on a dot with another one."""
 
 DOTS = (1600, 500)
-"""Dots of a plot, across and up, that are told apart where there is room for it (as batch/plot.py has it)."""
+"""Dots of a plot, across and up, told apart where there is room for it (as batch/plotting/points.py has it)."""
 
 MOST_CAUSES = 300
 KEPT = 200
@@ -21,15 +25,20 @@ KEPT = 200
 BAD_CASE = "case"
 
 
-def overview(pool: Pool) -> Overview | None:
-    """Of a sweep; none where there is one case, or no metric."""
+def overview(pool: Pool, before: Before | None = None) -> Overview | None:
+    """Of a sweep; none where there is one case, or no metric. before: its cases in the archive it is compared with."""
     metrics, varied = pool.metrics(), pool.varied()
     if pool.count < 2 or not metrics:
         return None
     table = Column(BAD_CASE, "case", "", "case", pool.cases.astype(float))
     against = (*varied, *(() if len(varied) > 1 else (table,)))
-    places, dots = _drawn(pool, against, metrics)
-    shown = tuple(_at(column, places) for column in (*against, *metrics))
+    changes: tuple[Column, ...] = ()
+    if before is not None:
+        metrics = tuple(replace(column, before=before.values(column)) for column in metrics)
+        changes = tuple(each for each in map(change, metrics) if each is not None)
+    places, dots = _drawn(pool, against, metrics, _noted(pool, before, changes))
+    compared = _compared(pool, before) if before is not None else ()
+    shown = tuple(_at(column, places) for column in (*against, *compared, *metrics, *changes))
     said = ""
     if len(places) < pool.count:
         where = f"one of {dots[0]} × {dots[1]} dots of the plot" if dots else "the same dot of the plot"
@@ -48,7 +57,7 @@ def overview(pool: Pool) -> Overview | None:
         causes=dict(zip(failed, causes, strict=False)),
         total=pool.count,
         start=(against[0].key, judged.key, varied[1].key if len(varied) > 1 else ""),
-        maps=maps(pool, varied, metrics),
+        maps=maps(pool, varied, (*metrics, *changes)),
         said=said,
     )
 
@@ -60,14 +69,46 @@ def _interest(pool: Pool, column: Column) -> tuple[bool, int]:
 
 
 def _at(column: Column, places: np.ndarray) -> Column:
-    return Column(
-        column.key, column.label, column.unit, column.role, column.values[places], column.words, column.limits,
-        column.about,
-    )  # fmt: skip
+    before = None if column.before is None else column.before[places]
+    return replace(column, values=column.values[places], before=before)
 
 
-def _drawn(pool: Pool, against: tuple[Column, ...], metrics: tuple[Column, ...]) -> tuple[np.ndarray, tuple[int, ...]]:
-    """Places of the cases to draw, and the dots that were told apart to choose them.
+def _compared(pool: Pool, before: Before) -> tuple[Column, ...]:
+    """What a case is, compared with what it was: what `met diff` says of it, and whether it meets what is required."""
+    verdicts = (*VERDICTS[:3], "only now")
+    how = np.where(before.there, before.how, len(verdicts) - 1).astype(float)
+    yes, no = ("meets all", "does not") if pool.requirements else ("reaches its end", "does not")
+    words = (f"{yes}, and did not", f"{yes}, as before", f"{no}, as before", f"{no}, and did", "only now")
+    was, now = np.isin(before.ended, GOOD), np.isin(pool.ended, GOOD)
+    flow = np.where(now, np.where(was, 1, 0), np.where(was, 3, 2))
+    flow = np.where(before.there, flow, len(words) - 1).astype(float)
+    return (
+        Column("choice:compared", "compared with before", "", "choice", how, verdicts),
+        Column("choice:outcome", "outcome, now and before", "", "choice", flow, words),
+    )
+
+
+def _noted(pool: Pool, before: Before | None, changes: tuple[Column, ...]) -> np.ndarray:
+    """Places of the cases that are drawn since they changed: those that changed most, and in each metric the extremes;
+    and of those that came to miss a requirement, or to meet it, the first."""
+    if before is None:
+        return np.zeros(0, np.int64)
+    was, now = np.isin(before.ended, GOOD), np.isin(pool.ended, GOOD)
+    out = [np.flatnonzero(np.isin(pool.cases, before.most))]
+    out += [np.flatnonzero(before.there & other)[:KEPT] for other in (was & ~now, now & ~was)]
+    out += [_extremes(column) for column in changes]
+    return np.concatenate(out)
+
+
+def _extremes(column: Column) -> np.ndarray:
+    numbers = np.flatnonzero(np.isfinite(column.values))
+    return numbers[[column.values[numbers].argmin(), column.values[numbers].argmax()]] if len(numbers) else numbers
+
+
+def _drawn(
+    pool: Pool, against: tuple[Column, ...], metrics: tuple[Column, ...], noted: np.ndarray
+) -> tuple[np.ndarray, tuple[int, ...]]:
+    """Places of the cases to draw, among them those noted, and the dots that were told apart to choose them.
 
     Of every metric against every parameter each dot that any case lies on has a case, the worst of those on it; and the
     extremes of each metric are there. Where that makes too many, dots are made larger.
@@ -76,11 +117,7 @@ def _drawn(pool: Pool, against: tuple[Column, ...], metrics: tuple[Column, ...])
         return np.arange(pool.count), ()
     rank = np.empty(pool.count, np.int64)
     rank[pool.worst_first] = np.arange(pool.count)
-    always = [pool.worst_first[:KEPT]]
-    for column in metrics:
-        numbers = np.flatnonzero(np.isfinite(column.values))
-        if len(numbers):
-            always.append(numbers[[column.values[numbers].argmin(), column.values[numbers].argmax()]])
+    always = [pool.worst_first[:KEPT], noted, *map(_extremes, metrics)]
     across, up = DOTS
     while True:
         found = [_on_dots(x.values, y.values, rank, across, up) for x in against for y in metrics]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from batch.report import blocks, inlined, tabular
+from batch.report import blocks, compared, inlined, tabular
 from batch.report.content import Report, Section
 from batch.report.markup import Child, Html, el, join, lines
 from batch.report.payload import script_json, section_data
@@ -33,9 +33,10 @@ def page(report: Report) -> str:
         Html(f"<style>{style}</style>"),
     ])  # fmt: skip
     data = [
-        el("script", script_json(section_data(section, _replay(report, section))), type="application/json", id=f"d{n}")
+        el("script", script_json(section_data(section, _replay(report, section), report.comparison)),
+           type="application/json", id=f"d{n}")
         for n, section in enumerate(report.sections)
-    ]
+    ]  # fmt: skip
     body = lines([
         el("a", "To the report", href="#verdict", cls="skip"),
         _header(report),
@@ -57,17 +58,23 @@ def _replay(report: Report, section: Section) -> str:
 
 def _header(report: Report) -> Html:
     lede = report.sections[0].lede if len(report.sections) == 1 else f"{len(report.sections)} runs and sweeps."
-    links = [("verdict", "Verdict")]
+    links = [("verdict", "Verdict"), *([("changed", "What changed")] if report.comparison is not None else [])]
     links += [link for n, section in enumerate(report.sections) for link in _links(n, section, report)]
     links += [("parameters", "Parameters"), ("provenance", "Provenance")]
     items = [el("li", el("a", name, href=f"#{where}")) for where, name in links]
     return el(
         "header",
-        el("p", "Simulation report · ", el("span", report.deck), cls="kicker"),
+        el("p", "Simulation report · ", el("span", _about(report)), cls="kicker"),
         el("h1", report.title),
         el("p", lede, cls="lede"),
         el("nav", el("ul", items), aria_label="Contents"),
     )
+
+
+def _about(report: Report) -> str:
+    if report.comparison is None:
+        return report.deck
+    return f"{report.deck} · {report.comparison.now} against {report.comparison.before}"
 
 
 def _links(number: int, section: Section, report: Report) -> list[tuple[str, str]]:
@@ -84,6 +91,8 @@ def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
     several = len(report.sections) > 1
     answers = [blocks.verdict(each) for each in report.verdicts]
     out: list[Child] = [el("section", el("h2", "Verdict", cls="quiet"), answers, id="verdict")]
+    if report.comparison is not None:
+        out.append(el("section", el("h2", "What changed"), compared.made(report.comparison), id="changed"))
     for number, section in enumerate(report.sections):
         parts = lines(_section(number, section, anchors, "h3" if several else "h2"))
         if several:
@@ -104,10 +113,14 @@ def _section(number: int, section: Section, anchors: blocks.Anchors, head: str) 
         told = el("p", said, cls="said") if said else None
         return el("section", el(head, name), told, *children, id=f"s{number}-{key}", cls=key)
 
-    out: list[Child] = [part(
+    out: list[Child] = []
+    if section.compared:
+        out.append(el("section", [compared.compared(each) for each in section.compared], id=f"s{number}-compared",
+                      cls="compared"))  # fmt: skip
+    out.append(part(
         "run", "What was run", blocks.facts(section.facts), blocks.varied(section.varied, anchors),
         _notes(section.notes),
-    )]  # fmt: skip
+    ))  # fmt: skip
     table = blocks.metrics(section)
     if section.overview is not None:
         out.append(part(
@@ -174,7 +187,8 @@ def _parameters(report: Report, anchors: blocks.Anchors) -> Html:
 
 
 def _footer(report: Report) -> Html:
-    words = join(["Made by ", el("code", "met report"), " from ", el("code", report.archive),
+    against = None if report.comparison is None else [" against ", el("code", report.comparison.before)]
+    words = join(["Made by ", el("code", "met report"), " from ", el("code", report.archive), against,
                   ". The page is whole in this file and asks nothing of any network."])  # fmt: skip
     scripts = el("noscript", el("p", "The plots need JavaScript; all tables are here without.", cls="note"))
     return el("footer", el("p", words), scripts)

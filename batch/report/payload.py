@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from batch.report.content import ENDED, Column, Map, Overview, Section, Signals, Stability
+from batch.report.changes import Comparison
+from batch.report.content import ENDED, Column, History, Map, Overview, Section, Signals, Stability
 from batch.report.markup import Html, visible
 from batch.signals import pretty_unit
 
@@ -24,10 +25,11 @@ def script_json(data: Any) -> Html:
     return Html(json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).translate(LEGIBLE))
 
 
-def section_data(section: Section, replay: str) -> dict[str, Any]:
+def section_data(section: Section, replay: str, comparison: Comparison | None = None) -> dict[str, Any]:
     """All that the plots of a section need. replay: the command that runs a case again, with `#CASE` for which."""
     return {
         "name": visible(section.name),
+        "against": None if comparison is None else [visible(comparison.before), visible(comparison.now)],
         "replay": visible(replay),
         "ended": list(ENDED),
         "overview": None if section.overview is None else _overview(section.overview),
@@ -37,7 +39,7 @@ def section_data(section: Section, replay: str) -> dict[str, Any]:
 
 
 def packed(values: np.ndarray) -> dict[str, Any]:
-    """Numbers as base64: of whole ones `i4`, of others `f4` with an offset, or `f8` where that is not exact enough.
+    """Numbers as base64: of whole ones `i4`, of others `f4`, with an offset or `f8` where that is not exact enough.
 
     Little-endian. Infinite ones and not-a-numbers are kept.
     """
@@ -50,11 +52,12 @@ def packed(values: np.ndarray) -> dict[str, Any]:
     if len(values) > 2 and len(finite) == len(values) and low == high:
         return {"t": "c", "v": float(low), "n": len(values)}
     with np.errstate(all="ignore"):
-        offset = float(low + 0.5 * (high - low)) if len(finite) and np.isfinite(high - low) else 0.0
-        small = (values - offset).astype("<f4")
-        error = np.abs(small[np.isfinite(values)].astype("<f8") + offset - finite).max(initial=0.0)
-        if np.isfinite(error) and error <= PRECISE * (high - low):
-            return {"t": "f4", "o": offset, "b": _base64(small)}
+        middle = float(low + 0.5 * (high - low)) if len(finite) and np.isfinite(high - low) else 0.0
+        for offset in (0.0, middle):  # without one 0 stays 0, and what is small is as exact as what is large
+            small = (values - offset).astype("<f4")
+            error = np.abs(small[np.isfinite(values)].astype("<f8") + offset - finite).max(initial=0.0)
+            if np.isfinite(error) and error <= PRECISE * (high - low):
+                return {"t": "f4", **({"o": offset} if offset else {}), "b": _base64(small)}
     return {"t": "f8", "b": _base64(values)}
 
 
@@ -71,6 +74,7 @@ def _column(column: Column) -> dict[str, Any]:
         "about": visible(column.about),
         "words": [visible(word) for word in column.words],
         "values": packed(column.values),
+        "before": None if column.before is None else packed(column.before),
         "limits": [{"text": visible(e.text), "value": e.value, "sense": e.sense}
                    for e in column.limits if np.isfinite(e.value)],
     }  # fmt: skip
@@ -120,16 +124,22 @@ def _signals(signals: Signals) -> dict[str, Any]:
             for panel in signals.panels
         ],
         "histories": [
-            {
-                "case": each.case,
-                "clock": each.clock,
-                "panels": {str(place): [packed(line) for line in values.T] for place, values in each.values.items()},
-            }
+            {"case": each.case, **_history(each), "before": _history(each.before), "change": _history(each.change)}
             for each in signals.histories
         ],
         "shown": list(signals.shown),
+        "most": list(signals.most),
+        "worst": signals.worst if signals.most else None,
         "middle": signals.middle,
     }  # fmt: skip
+
+
+def _history(each: History | None) -> dict[str, Any]:
+    """Empty where there is none."""
+    if each is None:
+        return {}
+    lines = {str(place): [packed(line) for line in values.T] for place, values in each.values.items()}
+    return {"clock": each.clock, "panels": lines}
 
 
 def _stability(found: Stability) -> dict[str, Any]:

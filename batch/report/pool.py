@@ -7,8 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
+from batch import requirements
 from batch.archive.read import Group, Stored
 from batch.failures import STATUS
+from batch.grids import levels
 from batch.report.content import ENDED, Column, Limit, Role
 from batch.signals import deck_unit, number_text
 from met.run import DONE
@@ -57,7 +59,7 @@ class Pool:
     @cached_property
     def requirements(self) -> tuple[str, ...]:
         """Texts of the requirements of all groups."""
-        return tuple(dict.fromkeys(text for group in self.groups for text in requirement_texts(group)))
+        return tuple(dict.fromkeys(text for group in self.groups for text in requirements.texts(group)))
 
     @cached_property
     def outcomes(self) -> np.ndarray:
@@ -67,7 +69,7 @@ class Pool:
             here = self.group_of == number
             if "met" in group.variables:
                 found = group.values("met")[self.position_of[here]]
-                for column, text in enumerate(requirement_texts(group)):
+                for column, text in enumerate(requirements.texts(group)):
                     out[here, self.requirements.index(text)] = found[:, column]
         return out
 
@@ -88,30 +90,24 @@ class Pool:
         """By metric's variable: its requirements, limits in SI."""
         out: dict[str, dict[str, Limit]] = {}
         for group in self.groups:
-            for text, metric, comparison, limit in requirements(group):
-                out.setdefault(metric, {})[text] = Limit(text, limit, comparison[:1])
+            for each in requirements.required(group):
+                out.setdefault(each.metric, {})[each.text] = Limit(each.text, each.limit, each.comparison[:1])
         return {metric: tuple(found.values()) for metric, found in out.items()}
 
     @cached_property
     def worst_first(self) -> np.ndarray:
         """Places of the cases: failed ones, then those that miss most requirements, then by how far they miss, relative
         to the limit; as `batch.cases.worst_first` has it of one group."""
-        keys = [np.arange(self.count)]
-        if self.requirements:
-            keys += [-self._excess(), -(self.outcomes != 1).sum(axis=1)]
-        return np.lexsort((*keys, self.status == DONE))
+        return requirements.worst_first(self.status, self.outcomes, self._far())
 
-    def _excess(self) -> np.ndarray:
+    def _far(self) -> np.ndarray:
         worst = np.full(self.count, -np.inf)
         for metric, limits in self.limits.items():
             values = self.gathered(metric)
             has = np.isin(self.group_of, [n for n, group in enumerate(self.groups) if metric in group.variables])
-            finite = values[np.isfinite(values)]
             for limit in limits:
-                scale = abs(limit.value) or float(np.abs(finite).max(initial=0.0)) or 1.0
-                beyond = (values - limit.value if limit.sense == "<" else limit.value - values) / scale
-                beyond = np.where(np.isnan(beyond), np.inf, beyond)
-                worst = np.where(has, np.maximum(worst, beyond), worst)
+                far = requirements.beyond(values, limit.sense, limit.value)
+                worst = np.where(has, np.maximum(worst, far), worst)
         return worst
 
     @cached_property
@@ -166,30 +162,3 @@ def pools(groups: Sequence[Group]) -> list[Pool]:
     """A pool for each run or sweep among the groups."""
     names = list(dict.fromkeys(group.sweep or group.name for group in groups))
     return [Pool(name, [g for g in groups if (g.sweep or g.name) == name]) for name in names]
-
-
-def levels(values: np.ndarray) -> np.ndarray:
-    """The different values that are numbers, rising."""
-    return np.unique(values[np.isfinite(values)])
-
-
-def requirement_texts(group: Group) -> list[str]:
-    return [str(text) for text in group.values("requirement")] if "requirement" in group.variables else []
-
-
-def requirements(group: Group) -> list[tuple[str, str, str, float]]:
-    """Text, metric's variable, comparison and limit (SI) of each requirement of which the archive says all of this."""
-    texts = requirement_texts(group)
-    if not texts:
-        return []
-    told = group.variables["requirement"].attributes
-    given = (told.get(name, []) for name in ("metric", "comparison", "limit"))
-    metrics, comparisons, limits = (value if isinstance(value, list) else [value] for value in given)
-    if not len(metrics) == len(comparisons) == len(limits) == len(texts):
-        return []
-    known = {variable.name for variable in group.role("metric")}
-    return [
-        (text, str(metric), str(comparison), limit)
-        for text, metric, comparison, limit in zip(texts, metrics, comparisons, limits, strict=True)
-        if metric in known and isinstance(limit, float)
-    ]

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from batch.output import quoted
+from batch.report.against import GOOD, Before
 from batch.report.content import ENDED, Column, Table, Worst
 from batch.report.pool import Pool, shown
 
@@ -16,8 +17,9 @@ MOST_CASES = 20
 MISSES = "\N{BALLOT X}"
 
 
-def worst(pool: Pool, archive: str, only: str) -> Worst | None:
-    """The worst cases, failed ones first. only: the run or sweep to be named in commands; "" where there is one."""
+def worst(pool: Pool, archive: str, only: str, before: Before | None = None) -> Worst | None:
+    """The worst cases, failed ones first. only: the run or sweep to be named in commands; "" where there is one.
+    before: how they came out in another archive."""
     if pool.count < 2:
         return None
     places = pool.worst_first[:MOST_CASES]
@@ -32,10 +34,12 @@ def worst(pool: Pool, archive: str, only: str) -> Worst | None:
                 marked.add((number, at + 2))
                 text = f"{text} {MISSES}"
             cells.append(text)
-        rows.append((*cells, ENDED[pool.ended[place]]))
+        was = ENDED[before.ended[place]] if before is not None and before.there[place] else shown(np.nan)
+        rows.append((*cells, *([was] if before is not None else []), ENDED[pool.ended[place]]))
+    ends = ("before", "now") if before is not None else ("came out",)
     table = Table(
-        heads=("case", "id", *(column.label for column in columns), "came out"),
-        units=("", "", *(column.unit for column in columns), ""),
+        heads=("case", "id", *(column.label for column in columns), *ends),
+        units=("", "", *(column.unit for column in columns), *("" for _ in ends)),
         rows=tuple(rows),
         right=frozenset([0, *(at + 2 for at, column in enumerate(columns) if column.role != "choice")]),
         marked=frozenset(marked),
@@ -73,8 +77,9 @@ def _title(pool: Pool, shown: int) -> str:
     return "Cases, closest to a limit first" if every else "Cases closest to a limit"
 
 
-def structures(pool: Pool) -> Table | None:
-    """A row a structure: what is chosen, cases, how many meet all, and the median of each metric."""
+def structures(pool: Pool, before: Before | None = None) -> Table | None:
+    """A row a structure: what is chosen, cases, how many meet all, those in another archive before, and the median of
+    each metric."""
     if len(pool.groups) < 2:
         return None
     metrics = pool.metrics()
@@ -84,16 +89,24 @@ def structures(pool: Pool) -> Table | None:
     for number, _ in enumerate(pool.groups):
         here = np.flatnonzero(pool.group_of == number)
         chosen = [cell_text(column, int(here[0])) if len(here) else "" for column in choices]
-        good = int(np.isin(pool.ended[here], [ENDED.index("met"), ENDED.index("done")]).sum())
-        share = f"{good:,} ({100 * good / max(1, len(here)):.3g} %)"
-        rows.append((*chosen, f"{len(here):,}", share, *(_median(column.values[here]) for column in metrics)))
+        counts = [_good(pool.ended[here])]
+        if before is not None:
+            both = here[before.there[here]]
+            counts.append(_good(before.ended[both]) if len(both) else shown(np.nan))
+        rows.append((*chosen, f"{len(here):,}", *counts, *(_median(column.values[here]) for column in metrics)))
     heads = (*(c.label for c in choices), "cases", "meet all" if judged else "reached their end")
+    heads += ("before",) if before is not None else ()
     return Table(
         heads=(*heads, *(f"{c.label}, median" for c in metrics)),
         units=(*[""] * len(heads), *(c.unit for c in metrics)),
         rows=tuple(rows),
         right=frozenset(range(len(choices), len(heads) + len(metrics))),
     )
+
+
+def _good(ended: np.ndarray) -> str:
+    good = int(np.isin(ended, GOOD).sum())
+    return f"{good:,} ({100 * good / max(1, len(ended)):.3g} %)"
 
 
 def _median(values: Sequence[float] | np.ndarray) -> str:

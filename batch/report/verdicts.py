@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from batch.failures import failures, ranges
+from batch.report.against import Before
 from batch.report.content import ENDED, Column, Demand, Failing, MetricRow, Part, Verdict
 from batch.report.pool import Pool, shown
 from batch.summary import median
@@ -86,30 +87,40 @@ def _notes(pool: Pool) -> tuple[str, ...]:
     return (f"The load motor of a bed was at its limit{of}: there the run is not what the joint would do.",)
 
 
-def metric_rows(pool: Pool) -> tuple[MetricRow, ...]:
-    return tuple(_metric(column) for column in pool.metrics())
+def metric_rows(pool: Pool, before: Before | None = None) -> tuple[MetricRow, ...]:
+    """before: the cases of another archive to compare with."""
+    return tuple(_metric(column, None if before is None else before.values(column)) for column in pool.metrics())
 
 
-def _metric(column: Column) -> MetricRow:
-    """Spread of the finite values; of how many there are others is said."""
+def _metric(column: Column, before: np.ndarray | None) -> MetricRow:
+    """Spread of the finite values; of how many there are others is said. before: the values of the other archive."""
     finite = np.sort(column.values[np.isfinite(column.values)])
+    was = np.zeros(0) if before is None else np.sort(before[np.isfinite(before)])
+    was_text = shown(median(was)) if len(was) else "" if before is None else shown(np.nan)
     infinite, unknown = int(np.isinf(column.values).sum()), int(np.isnan(column.values).sum())
     said = [f"infinite in {counted(infinite, 'case')}"] if infinite else []
     said += [f"no value in {counted(unknown, 'case')}"] if unknown else []
     if not len(finite):
         none = shown(np.nan)
-        return MetricRow(column.label, column.about, column.unit, none, none, none, ", ".join(said))
+        return MetricRow(column.label, column.about, column.unit, none, none, none, ", ".join(said), before=was_text)
     low, middle, high = float(finite[0]), median(finite), float(finite[-1])
     bars: tuple[int, ...] = ()
-    from_, to = low, high
-    if len(finite) >= FEWEST and np.isfinite(high - low) and high > low:
-        near = [limit.value for limit in column.limits if abs(limit.value - middle) <= 2.0 * (high - low)]
-        from_, to = min([low, *near]), max([high, *near])
-        places = np.minimum(((finite - from_) / (to - from_) * BARS).astype(int), BARS - 1)
-        bars = tuple(np.bincount(places, minlength=BARS).tolist())
+    bars_before: tuple[int, ...] = ()
+    from_, to = min([low, *was[:1]]), max([high, *was[-1:]])
+    if len(finite) >= FEWEST and np.isfinite(to - from_) and to > from_:
+        near = [limit.value for limit in column.limits if abs(limit.value - middle) <= 2.0 * (to - from_)]
+        from_, to = min([from_, *near]), max([to, *near])
+        bars = _counts(finite, from_, to)
+        bars_before = _counts(was, from_, to) if len(was) else ()
     limits = tuple(limit.value for limit in column.limits if from_ <= limit.value <= to)
     low_text, middle_text, high_text = (shown(value) for value in (low, middle, high))
     return MetricRow(
         column.label, column.about, column.unit, low_text, middle_text, high_text, ", ".join(said), bars, from_, to,
-        limits if bars else (),
+        limits if bars else (), was_text, bars_before,
     )  # fmt: skip
+
+
+def _counts(values: np.ndarray, low: float, high: float) -> tuple[int, ...]:
+    """How many lie in each of `BARS` equal stretches."""
+    places = np.minimum(((values - low) / (high - low) * BARS).astype(int), BARS - 1)
+    return tuple(np.bincount(places, minlength=BARS).tolist())

@@ -156,7 +156,7 @@ def test_a_failed_case_says_why_and_is_not_a_number_from_there(here: Path, monke
         assert list(data.cause.values[[0, 1, 3]]) == ["", "", ""]
         assert data.n_valid.values[2] == 5
         assert np.isfinite(data.q.values[2, :5]).all() and np.isnan(data.q.values[2, 5:]).all()
-        assert list(data.met.sel(requirement="volts < 5 V").values) == [0, 0, -1, 0]
+        assert list(data["met"].sel(requirement="volts < 5 V").values) == [0, 0, -1, 0]
 
 
 def test_a_metric_that_is_not_a_number_leaves_its_requirement_open(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:

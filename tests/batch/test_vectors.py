@@ -13,7 +13,8 @@ import xarray
 import batch
 import ic
 from batch.archive.read import ArchiveFile
-from batch.plot import COLOURS, plot
+from batch.plotting import draw
+from batch.plotting.sheet import COLOURS
 from batch.show import show
 from batch.signals import Panel, history, panels
 from met import run as engine
@@ -165,10 +166,10 @@ def test_a_terminal_shows_components_by_their_names(one: ArchiveFile) -> None:
 @pytest.fixture
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The figures that were drawn, kept for a look at what is in them."""
-    from batch import plot as module
+    from batch.plotting import output as module
 
     kept: list[Any] = []
-    monkeypatch.setattr(module, "_save", lambda figure, output: kept.append(figure))
+    monkeypatch.setattr(module, "save", lambda figure, output: kept.append(figure))
     return kept
 
 
@@ -179,13 +180,13 @@ def shown(figure: Any) -> list[Any]:
 def test_components_have_colours_in_turn_and_joints_their_own(
     one: ArchiveFile, figures: list[Any], tmp_path: Path
 ) -> None:
-    plot(one, tmp_path / "a.png", ["links.sled.position", "x.reaction.force", "reaction.force.z", "x.b"])
+    draw(one, tmp_path / "a.png", ["links.sled.position", "x.reaction.force", "reaction.force.z", "x.b"])
     colours = [[COLOURS.index(line.get_color()) for line in ax.lines] for ax in shown(figures[0])]
     assert colours == [[0, 1, 2], [0, 1, 2], [0, 1], [1]]
 
 
 def test_cases_of_a_vector_have_a_plot_a_component(sweep: ArchiveFile, figures: list[Any], tmp_path: Path) -> None:
-    plot(sweep, tmp_path / "a.png", ["q", "x.reaction.force", "links.sled.position"])
+    draw(sweep, tmp_path / "a.png", ["q", "x.reaction.force", "links.sled.position"])
     axes = shown(figures[0])
     assert [(ax.get_title("left"), ax.get_ylabel().replace("\n", " ")) for ax in axes] == [
         ("y · joint position", "q  (rad)"), ("x · joint position", "q  (m)"),
@@ -199,7 +200,7 @@ def test_many_cases_are_a_fan_of_each_component(files: dict[str, Path], figures:
     (tmp_path / "crane.ic").write_text(DECK.replace("[1, 2, 3] kg", "linspace(1, 3, 12) kg"))
     batch.run(ic.compile(tmp_path / "crane.ic", select=["masses"]), output=tmp_path / "a.h5")
     with ArchiveFile(tmp_path / "a.h5") as file:
-        plot(file, tmp_path / "a.png", ["links.sled.position"])
+        draw(file, tmp_path / "a.png", ["links.sled.position"])
         middle = np.median([file.groups[0].signal("links.sled.position", i)[:, 2] for i in range(12)], axis=0)
     axes = shown(figures[0])
     assert [len(ax.collections) for ax in axes] == [2, 2, 2]

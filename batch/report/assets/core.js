@@ -47,8 +47,11 @@ const MET = (() => {
   function quantity(value, column) {
     if (column.words.length) return Number.isFinite(value) ? column.words[value] : "–";
     const unit = column.unit && Number.isFinite(value) ? ` ${column.unit}` : "";
-    return number(value) + unit;
+    return (column.role === "change" ? signed(value) : number(value)) + unit;
   }
+
+  // A change, with its sign.
+  const signed = (value) => (value > 0 ? "+" : "") + number(value).replace("-", "−");
 
   const titled = (column) => (column.unit ? `${column.label} (${column.unit})` : column.label);
 
@@ -97,6 +100,14 @@ const MET = (() => {
       return Math.round(a + (b - a) * (at - first));
     });
     return `rgb(${mixed.join(",")})`;
+  }
+
+  // A colour for a share from -1 to 1: blue below, the paper's at 0, orange above; both darker the further from it.
+  function diverging(share) {
+    const ends = dark() ? ["#2b2f34", "#6fb4f0", "#f0a56a"] : ["#f1f2f3", "#1f5f9e", "#b3510f"];
+    const far = Math.min(Math.abs(share), 1) ** 0.8;
+    const end = ends[share < 0 ? 1 : 2];
+    return `rgb(${[1, 3, 5].map((c) => Math.round(channel(ends[0], c) + (channel(end, c) - channel(ends[0], c)) * far)).join(",")})`;
   }
 
   // Black or white, whichever is read on a colour of the ramp.
@@ -153,7 +164,8 @@ const MET = (() => {
     if (overview) {
       made.cases = unpack(overview.cases);
       made.outcome = Array.from(unpack(overview.ended), (place) => data.ended[place]);
-      made.columns = overview.columns.map((column) => ({ ...column, values: unpack(column.values) }));
+      made.columns = overview.columns.map((column) => ({ ...column, values: unpack(column.values),
+        before: column.before && unpack(column.before) }));
       made.column = (key) => made.columns.find((column) => column.key === key);
       made.places = new Map(Array.from(made.cases, (number, place) => [number, place]));
     }
@@ -161,6 +173,6 @@ const MET = (() => {
     return made;
   }
 
-  return { unpack, number, ticks, quantity, titled, node, palette, ramp, over, drawn, width, print, tip, pairs, model,
+  return { unpack, number, ticks, quantity, titled, node, palette, ramp, diverging, signed, over, drawn, width, print, tip, pairs, model,
     dark, isPrinting: () => printing };
 })();

@@ -4,6 +4,7 @@
 MET.overview = (() => {
   const { node, number, quantity, titled } = MET;
   const FEW = 8;
+  const STEMS = 600;  // cases, of more it is not drawn at first where each was
   const BAD = ["missed", "unknown", "failed", "timed out", "lost"];
 
   function chooser(name, columns, start, changed, none) {
@@ -15,14 +16,18 @@ MET.overview = (() => {
 
   function make(root, model) {
     const metrics = model.columns.filter((c) => c.role === "metric");
-    const against = model.columns.filter((c) => c.role !== "metric");
+    const changes = model.columns.filter((c) => c.role === "change");
+    const against = model.columns.filter((c) => c.role !== "metric" && c.role !== "change");
+    let stems = changes.length > 0 && model.cases.length < STEMS;
     let [x, y, by] = model.data.overview.start;
     const frame = node("div", { class: "frame" });
     const scale = node("div", { class: "scale" });
+    const tick = node("input", { type: "checkbox", class: "stems", checked: stems, change: () => { stems = tick.checked; draw(); } });
     const controls = node("div", { class: "controls" },
-      chooser("Metric", metrics, y, (key) => { y = key; draw(); }),
+      chooser("Metric", [...metrics, ...changes], y, (key) => { y = key; draw(); }),
       chooser("against", [...against, ...metrics], x, (key) => { x = key; draw(); }),
-      chooser("coloured by", [...against, ...metrics], by, (key) => { by = key; draw(); }, "nothing"));
+      chooser("coloured by", [...against, ...metrics, ...changes], by, (key) => { by = key; draw(); }, "nothing"),
+      changes.length ? node("label", null, tick, "values before") : null);
     root.append(controls, frame, scale);
     let plot = null;
 
@@ -30,20 +35,23 @@ MET.overview = (() => {
       if (plot) plot.destroy();
       const [cx, cy, cb] = [model.column(x), model.column(y), by ? model.column(by) : null];
       const colour = cb ? colours(cb) : null;
+      tick.disabled = !cy.before;
       const size = model.cases.length < 400 ? 4.2 : model.cases.length < 4000 ? 2.8 : 1.8;
       const rings = model.cases.length < 4000;
       plot = MET.points.make(frame, {
-        x: cx, y: cy, height: 380, name: `${titled(cy)} against ${titled(cx)}, ${model.cases.length} cases`,
+        x: cx, y: cy, height: 380, logY: cy.role === "change" ? false : undefined, name: `${titled(cy)} against ${titled(cx)}, ${model.cases.length} cases`,
         style: (place, palette) => ({
           fill: colour ? colour.of(cb.values[place], palette) : palette.accent,
           ring: rings && BAD.includes(model.outcome[place]), size,
         }),
+        marks: stems && cy.before ? (u, ctx, palette, at, px) => was(ctx, palette, at, px, cx, cy, size) : null,
+        reach: stems && cy.before ? Array.from(cy.before).filter(Number.isFinite) : cy.role === "change" ? [0] : [],
         told: (place) => note(model, place, [cx, cy, cb]),
         choose: (place) => model.choose(model.cases[place]),
         chosen: () => (model.places.has(model.chosen) ? model.places.get(model.chosen) : -1),
       });
       model.plot = plot;
-      legend(scale, colour, cb, rings && model.outcome.some((each) => BAD.includes(each)), model);
+      legend(scale, colour, cb, rings && model.outcome.some((each) => BAD.includes(each)), model, stems && cy.before);
     }
 
     draw();
@@ -55,17 +63,45 @@ MET.overview = (() => {
     }).observe(root);
   }
 
+  // Of each case where the metric was, as a short bar, and a thin line from there to its point.
+  function was(ctx, palette, at, px, cx, cy, size) {
+    ctx.strokeStyle = palette.muted;
+    cy.before.forEach((before, place) => {
+      const [x, y] = [cx.values[place], cy.values[place]];
+      if (!Number.isFinite(x) || !Number.isFinite(before) || y === before) return;
+      const [left, top] = at(x, before);
+      ctx.lineWidth = 1.6 * px;
+      ctx.beginPath();
+      ctx.moveTo(left - 1.3 * size * px, top);
+      ctx.lineTo(left + 1.3 * size * px, top);
+      ctx.stroke();
+      if (!Number.isFinite(y)) return;
+      ctx.lineWidth = 0.8 * px;
+      ctx.beginPath();
+      ctx.moveTo(left, top);
+      ctx.lineTo(...at(x, y));
+      ctx.stroke();
+    });
+  }
+
   // Colours of a column's values: of few a step each, of many a ramp.
   function colours(column) {
     const levels = [...new Set(Array.from(column.values).filter(Number.isFinite))].sort((a, b) => a - b);
     const discrete = levels.length <= FEW;
     const place = new Map(levels.map((level, n) => [level, n]));
     const [low, high] = [levels[0], levels[levels.length - 1]];
+    if (column.role === "change") {
+      const far = Math.max(Math.abs(low), Math.abs(high)) || 1;
+      return { levels, discrete: false, far, of: (value, palette) => (Number.isFinite(value) ? MET.diverging(visible(value / far)) : palette.muted) };
+    }
     const share = (value) => (discrete ? place.get(value) / Math.max(1, levels.length - 1) : (value - low) / (high - low || 1));
     return { levels, discrete, share, of: (value, palette) => (Number.isFinite(value) ? MET.ramp(share(value)) : palette.muted) };
   }
 
-  function legend(box, colour, column, rings, model) {
+  // A point of no change is not to be lost on the paper.
+  const visible = (share) => Math.sign(share || 1) * Math.max(Math.abs(share), 0.12);
+
+  function legend(box, colour, column, rings, model, stems) {
     const items = [];
     if (colour) {
       items.push(node("span", null, `${titled(column)}:`));
@@ -74,13 +110,19 @@ MET.overview = (() => {
           const dot = node("span", { class: "dot", style: { background: MET.ramp(colour.share(level)) } });
           items.push(node("span", { class: "item tight" }, dot, column.words.length ? column.words[level] : number(level)));
         }
-      } else items.push(gradient(colour.levels[0], colour.levels[colour.levels.length - 1]));
+      } else if (colour.far) items.push(divide(colour.far));
+      else items.push(gradient(colour.levels[0], colour.levels[colour.levels.length - 1]));
     }
     if (rings) {
       const filled = node("span", { class: "dot", style: { background: "currentColor" } });
       const ring = node("span", { class: "dot", style: { border: "1.5px solid currentColor" } });
       const good = model.outcome.includes("done") ? "reached its end" : "meets all";
       items.push(node("span", { class: "item" }, node("span", null, filled, good), node("span", null, ring, good === "meets all" ? "does not" : "did not")));
+    }
+    if (stems) {
+      const bar = node("svg", { viewBox: "0 0 14 12", width: 14, height: 12, "aria-hidden": "true" },
+        node("line", { x1: 1, x2: 13, y1: 3, y2: 3, stroke: "currentColor", "stroke-width": 1.6 }), node("line", { x1: 7, x2: 7, y1: 3, y2: 12, stroke: "currentColor", "stroke-width": 0.8 }));
+      items.push(node("span", { class: "item" }, bar, `in ${model.data.against[0]}`));
     }
     box.replaceChildren(...items, node("span", { class: "hint" }, "drag to zoom, double click for all, click to choose a case"));
   }
@@ -90,13 +132,27 @@ MET.overview = (() => {
     return node("span", { class: "item" }, number(low), node("span", { class: "ramp", style: { background: `linear-gradient(90deg,${stops})` } }), number(high));
   }
 
+  // Changes, from less to more.
+  function divide(far) {
+    const stops = [...Array(9).keys()].map((n) => MET.diverging(n / 4 - 1)).join(",");
+    return node("span", { class: "item" }, MET.signed(-far), node("span", { class: "ramp", style: { background: `linear-gradient(90deg,${stops})` } }), MET.signed(far));
+  }
+
+  // A value, and what it was before.
+  function compared(column, place) {
+    const before = column.before ? column.before[place] : NaN;
+    const now = quantity(column.values[place], column);
+    return !column.before || Number.isNaN(before) || before === column.values[place] ? now : `${now}, before ${number(before)}`;
+  }
+
   function note(model, place, shown) {
-    const columns = [...new Set([...shown.filter(Boolean), ...model.columns])].slice(0, 9);
+    const plain = model.columns.filter((c) => c.role !== "change");
+    const columns = [...new Set([...shown.filter(Boolean), ...plain])].slice(0, 9);
     const outcome = model.outcome[place];
     return [
       node("p", null, node("b", null, `#${model.cases[place]} `), node("code", null, model.data.overview.ids[place]), "  ",
         node("span", { class: BAD.includes(outcome) ? "bad-text" : "" }, outcome === "done" ? "" : outcome)),
-      MET.pairs(columns.filter((c) => c.role !== "case").map((c) => [c.label, quantity(c.values[place], c)])),
+      MET.pairs(columns.filter((c) => c.role !== "case").map((c) => [c.label, compared(c, place)])),
     ];
   }
 
@@ -111,9 +167,9 @@ MET.overview = (() => {
       }
       const outcome = model.outcome[place];
       const cause = model.data.overview.causes[place];
-      const values = model.columns.filter((c) => c.role !== "case").map((c) => {
+      const values = model.columns.filter((c) => c.role !== "case" && c.role !== "change").map((c) => {
         const missed = (c.limits || []).some((l) => (l.sense === "<" ? c.values[place] > l.value : c.values[place] < l.value));
-        return node("div", null, node("dt", null, c.label), node("dd", { class: missed ? "bad" : "" }, quantity(c.values[place], c)));
+        return node("div", null, node("dt", null, c.label), node("dd", { class: missed ? "bad" : "" }, compared(c, place)));
       });
       const history = model.data.signals && model.data.signals.histories.some((each) => each.case === chosen);
       box.replaceChildren(
@@ -129,5 +185,5 @@ MET.overview = (() => {
   const run = (command) => node("div", { class: "command" },
     node("button", { type: "button", class: "copy", "data-copy": command, "aria-label": `Copy ${command}` }, "copy"), " ", node("code", null, command));
 
-  return { make, card, chooser, gradient, colours };
+  return { make, card, chooser, gradient, divide, colours };
 })();

@@ -267,11 +267,12 @@ MET.points = (() => {
   function reached(values, plot, log) {
     const numbers = values.filter((v) => v !== null);
     const limits = (plot.y.limits || []).map((limit) => limit.value);
-    if (!numbers.length) return [...limits, ...(plot.reach || [])];
+    const reach = (plot.reach || []).filter((v) => !log || v > 0);
+    if (!numbers.length) return [...limits, ...reach];
     const [low, high] = wide(numbers, false);
     const span = high - low;
     const near = limits.filter((v) => v > low - 1.2 * span && v < high + 1.2 * span && !(log && v <= 0));
-    return [...numbers, ...near, ...(plot.reach || [])];
+    return [...numbers, ...near, ...reach];
   }
 
   function point(ctx, left, top, style, px) {

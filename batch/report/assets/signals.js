@@ -1,4 +1,5 @@
-// Recorded signals: a plot a quantity, a colour a joint, a dash a case; time is common to all.
+// Recorded signals: a plot a quantity, a colour a joint, a dash a case; time is common to all. What another archive has
+// of them is wide and pale, under the lines of now; or the difference of the two is drawn.
 "use strict";
 
 MET.signals = (() => {
@@ -6,6 +7,7 @@ MET.signals = (() => {
   const DASHES = [[], [7, 4], [2, 3], [10, 3, 2, 3]];
   const MOST = DASHES.length;
   const READ = 8;
+  const WAS = 5;  // px, how wide a line of before is
 
   function make(root, model) {
     const data = model.data.signals;
@@ -15,18 +17,24 @@ MET.signals = (() => {
     const sync = uPlot.sync(`${model.id}-time`);
     let shown = data.shown.slice(0, MOST);
     const hidden = new Set();
+    const names = data.histories.some((each) => each.before.panels) ? model.data.against : null;
+    let how = names ? "both" : "now";
     let [plots, range] = [[], null];
     const caseChips = node("div", { class: "chips" });
     const jointChips = node("div", { class: "chips" });
-    const controls = node("div", { class: "controls kept" }, caseChips, jointChips,
+    const legend = node("div", { class: "versions" });
+    const which = names ? node("select", { "aria-label": "What is drawn", class: "how", change: () => { how = which.value; draw(); } },
+      node("option", { value: "both" }, "now over before"), node("option", { value: "change" }, "the difference, now − before"), node("option", { value: "now" }, "now alone")) : null;
+    const controls = node("div", { class: "controls kept" }, which, names ? legend : null, caseChips, jointChips,
       node("span", { class: "hint" }, "drag to zoom, double click for all"));
     const panels = node("div");
     root.append(controls, panels);
 
-    // The lines of a panel in a case, unpacked once.
-    function values(history, panel) {
-      const key = `${history.case}/${panel}`;
-      if (!lines.has(key)) lines.set(key, (history.panels[panel] || []).map((packed) => Array.from(unpack(packed), (v) => (Number.isNaN(v) ? null : v))));
+    // The lines of a panel in a case, unpacked once; of: "now", "before", "change".
+    function values(history, panel, of) {
+      const key = `${history.case}/${panel}/${of}`;
+      const panels = of === "now" ? history.panels : history[of].panels || {};
+      if (!lines.has(key)) lines.set(key, (panels[panel] || []).map((packed) => Array.from(unpack(packed), (v) => (Number.isNaN(v) ? null : v))));
       return lines.get(key);
     }
 
@@ -41,13 +49,16 @@ MET.signals = (() => {
       const out = [];
       shown.forEach((which, nth) => {
         const history = histories.get(which);
-        values(history, number_).forEach((points, at) => {
-          const line = panel.lines[at];
-          if (hidden.has(line.joint) || points.every((v) => v === null)) return;
-          out.push({ line, which, nth, points, clock: history.clock, own: alone(line.joint), at });
-        });
+        for (const of of { both: ["before", "now"], change: ["change"], now: ["now"] }[how]) {
+          const { clock } = of === "now" ? history : history[of];
+          values(history, number_, of).forEach((points, at) => {
+            const line = panel.lines[at];
+            if (hidden.has(line.joint) || points.every((v) => v === null)) return;
+            out.push({ line, which, nth, points, clock, own: alone(line.joint), at, was: of === "before" });
+          });
+        }
       });
-      return out;
+      return out.sort((a, b) => b.was - a.was);
     }
 
     function joined(found) {
@@ -72,26 +83,28 @@ MET.signals = (() => {
       const frame = node("div", { class: "frame", tabindex: 0, role: "application" });
       const reading = node("div", { class: "reading" });
       const unit = panel.unit ? ` (${panel.unit})` : "";
-      const box = node("div", { class: "panel" }, node("div", { class: "head" }, node("b", null, node("code", null, panel.name), unit),
+      const change = how === "change";
+      const box = node("div", { class: "panel" }, node("div", { class: "head" }, node("b", null, change ? "change of " : null, node("code", null, panel.name), unit),
         node("span", { class: "about" }, panel.about), reading), frame);
       panels.append(box);
-      frame.setAttribute("aria-label", `${panel.name}${unit} against time, cases ${shown.map((c) => `#${c}`).join(", ")}. Arrow keys move the reading, plus and minus zoom, Escape shows all.`);
+      frame.setAttribute("aria-label", `${change ? "change of " : ""}${panel.name}${unit} against time, cases ${shown.map((c) => `#${c}`).join(", ")}. Arrow keys move the reading, plus and minus zoom, Escape shows all.`);
       const flat = found.every((each) => each.points.every((v) => v === null || v === 0));
       const font = "12px " + getComputedStyle(document.body).fontFamily;
       const axis = { stroke: colours.muted, font, labelFont: font, labelSize: 18, labelGap: 2,
         grid: { stroke: colours.line, width: 1 }, ticks: { stroke: colours.faint, width: 1, size: 4 } };
-      const colour = (each) => (each.line.command ? colours.ink : colourOf(each.own ? each.line.joint : "", each.at, colours));
+      const strong = (each) => (each.line.command ? colours.ink : colourOf(each.own ? each.line.joint : "", each.at, colours));
+      const colour = (each) => (each.was ? pale(strong(each)) : strong(each));
       const u = new uPlot({
         width: MET.width(frame), height: (flat ? 90 : 178) + (last ? 18 : 0), padding: [8, 14, 0, 0], legend: { show: false },
         cursor: { y: false, points: { size: 6 }, drag: { x: true, y: false }, focus: { prox: -1 },
           sync: { key: sync.key, setSeries: false, filters: { pub: moves, sub: moves } } },
         scales: { x: { time: false }, y: { range: (self, low, high) => (low === null ? [-1, 1] : room(low, high)) } },
         series: [{}, ...found.map((each) => ({
-          stroke: colour(each), width: each.line.command ? 1 : each.nth ? 1.25 : wide(each.at, panel.lines.length), dash: each.line.command ? [3, 3] : DASHES[each.nth],
+          stroke: colour(each), width: each.was ? WAS : each.line.command ? 1 : each.nth ? 1.25 : wide(each.at, panel.lines.length), dash: each.line.command ? [3, 3] : DASHES[each.nth],
           points: { show: false }, spanGaps: false, pxAlign: 0,
         }))],
         axes: [{ ...axis, label: last ? "time (s)" : null, size: 26, values: (self, v) => ticks(v) },
-          { ...axis, label: `${panel.name.split(".").slice(-1)[0]}${unit}`, size: 62, space: 32, values: (self, v) => ticks(v), splits: flat ? () => [0] : undefined }],
+          { ...axis, label: `${change ? "Δ " : ""}${panel.name.split(".").slice(-1)[0]}${unit}`, size: 62, space: 32, values: (self, v) => ticks(v), splits: flat ? () => [0] : undefined }],
         hooks: {
           setCursor: [(self) => read(self, reading, found, colour)],
           setScale: [(self, key) => { if (key === "x") follow(self); }],
@@ -139,14 +152,16 @@ MET.signals = (() => {
     function read(self, box, found, colour) {
       const at = self.cursor.idx;
       if (at === null || at === undefined || self.cursor.left < 0) return box.replaceChildren();
-      const several = shown.length > 1 && found.length <= READ;
-      const listed = found.filter((each) => several || each.nth === 0).slice(0, READ);
+      const now = found.filter((each) => !each.was);
+      const several = shown.length > 1 && now.length <= READ;
+      const listed = now.filter((each) => several || each.nth === 0).slice(0, READ);
+      const text = (each) => { const value = each && self.data[found.indexOf(each) + 1][at]; return value === null || value === undefined ? "–" : number(value); };
       box.replaceChildren(node("span", null, "t ", node("b", null, `${number(self.data[0][at])} s`)), ...listed.map((each) => {
-        const value = self.data[found.indexOf(each) + 1][at];
+        const was = found.find((other) => other.was && other.which === each.which && other.at === each.at);
         const label = shown.length > 1 && several ? `#${each.which}` : each.line.label;  // the colour says which joint
         const words = [label, each.line.command ? "command" : ""].filter(Boolean).join(" ");
         return node("span", null, swatch(colour(each), each.line.command ? [3, 3] : DASHES[each.nth]), words,
-          node("b", null, value === null || value === undefined ? "–" : number(value)));
+          node("b", null, text(each)), was ? node("i", null, `before ${text(was)}`) : null);
       }));
     }
 
@@ -177,13 +192,16 @@ MET.signals = (() => {
 
     function chips() {
       const colours = palette();
+      if (names && how === "change") legend.replaceChildren(node("span", null, `${names[1]} − ${names[0]}`));
+      else if (names) legend.replaceChildren(...(how === "both" ? [node("span", null, swatch(pale(colours.ink), [], WAS), names[0])] : []), node("span", null, swatch(colours.ink, []), names[1]));
+      const told = (each) => (each === data.middle ? `#${each}, the middle one` : each === data.most[0] ? `#${each}, changed most` : each === data.worst ? `#${each}, the worst` : `#${each}`);
       const several = histories.size > 1;
       const offered = [...histories.keys()].filter((each) => !shown.includes(each));
       const add = node("select", { "aria-label": "Add a case", change: () => { show(+add.value); } },
-        node("option", { value: "" }, "add a case"), offered.map((each) => node("option", { value: each }, `#${each}`)));
+        node("option", { value: "" }, "add a case"), offered.map((each) => node("option", { value: each }, told(each))));
       caseChips.replaceChildren(...(several ? [...shown.map((each, nth) => node("button", { type: "button", class: "chip", title: `Case #${each}: take it out`,
         click: () => { if (shown.length > 1) { shown = shown.filter((other) => other !== each); draw(); } } },
-        swatch(colours.ink, DASHES[nth]), each === data.middle ? `#${each}, the middle one` : `#${each}`, shown.length > 1 ? node("span", { class: "drop", "aria-hidden": "true" }, "×") : null)),
+        swatch(colours.ink, DASHES[nth]), told(each), shown.length > 1 ? node("span", { class: "drop", "aria-hidden": "true" }, "×") : null)),
       offered.length ? add : null].filter(Boolean) : []));
       jointChips.replaceChildren(...(data.joints.length > 1 ? data.joints.map((joint, n) => node("button", { type: "button", class: "chip",
         "aria-pressed": String(!hidden.has(joint)), title: `${joint}: show or hide`,
@@ -224,8 +242,10 @@ MET.signals = (() => {
   // Of what happens to the pointer, only that it moves is told to the other plots: zooms are handed on by `follow`.
   const moves = (type) => type === "mousemove" || type === "mouseleave" || type === "mouseenter";
 
-  function swatch(colour, dash) {
-    return node("svg", { viewBox: "0 0 22 8", "aria-hidden": "true" }, node("line", { x1: 0, x2: 22, y1: 4, y2: 4, stroke: colour, "stroke-width": 2,
+  const pale = (colour) => (/^#[0-9a-f]{6}$/i.test(colour) ? `${colour}55` : colour);
+
+  function swatch(colour, dash, width = 2) {
+    return node("svg", { viewBox: "0 0 22 8", "aria-hidden": "true" }, node("line", { x1: 0, x2: 22, y1: 4, y2: 4, stroke: colour, "stroke-width": width,
       "stroke-dasharray": dash.length ? dash.join(" ") : null }));
   }
 

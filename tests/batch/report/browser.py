@@ -37,6 +37,15 @@ WORDS = (
 )  # fmt: skip
 
 
+INK = """(selector => Array.from(document.querySelectorAll(selector), canvas => {
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    let inked = 0;
+    for (let i = 3; i < data.length; i += 4) inked += data[i] > 0;
+    return inked / (data.length / 4);
+}))"""
+"""Of each canvas the share of pixels that are drawn."""
+
+
 class BrowserFailed(RuntimeError):
     """The browser did not do what it was told."""
 
@@ -247,3 +256,9 @@ class Page:
 
     def close(self) -> None:
         self.browser.ask("Target.closeTarget", targetId=self.target)
+
+
+def quiet(page: Page) -> None:
+    """Nothing went wrong in it, and it asked for nothing but itself."""
+    assert page.said == []
+    assert [address.partition(":")[0] for address in page.requests if not address.startswith("data:")] == ["file"]

@@ -7,6 +7,9 @@
     report_signals.png    its worst cases, near to
     report_stability.png  a motor on a bed, under arms of ten weights
     report_narrow.png     the head of the same on a telephone, dark
+    report_against.png           the story of docs/diff.md: the head of after.h5 against before.h5
+    report_against_signals.png   what was before under what is now
+    report_against_points.png    the metric of each case, and where it was; a map of the change
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ import batch
 import ic
 from batch.report import report
 from tests.batch.report.browser import Page, browser
+from tests.docs import mended_servo
 
 FOLDER = Path(__file__).parents[3] / "docs" / "figures"
 
@@ -60,6 +64,21 @@ def draw(folder: Path) -> list[Path]:
         page = chromium.open(payload, width=390, height=844, dark=True, scale=2)
         page.settle()
         written.append(_window(page, folder / "report_narrow.png"))
+        mended_servo.told(home)
+        against = report(home / "after.h5", against=home / "before.h5", title="Drive 2 against drive 1")
+        page = chromium.open(against, width=1180, height=1150, scale=1.5)
+        page.run(
+            "document.querySelectorAll('#changed dd p').forEach(p => p.textContent.startsWith('MET') && p.remove())"
+        )
+        page.settle()
+        written.append(_window(page, folder / "report_against.png"))
+        left, top, width, height = page.box(".signals .u-over", 1)
+        page.mouse("mouseMoved", left + 0.58 * width, top + 0.5 * height)
+        page.settle()
+        written.append(page.picture(folder / "report_against_signals.png", "section.signals"))
+        page.mouse("mouseMoved", 1, 1)
+        page.settle()
+        written.append(page.picture(folder / "report_against_points.png", "section.overview"))
     return written
 
 

@@ -14,8 +14,8 @@ from batch.archive.read import ArchiveFile
 from batch.report import histories, overview, stability
 from batch.report.content import ENDED, Part, Report
 from batch.report.data import gather
-from batch.report.histories import thin, thin_clock
 from batch.report.pool import Pool, pools
+from batch.report.thinning import thin, thin_clock
 from met.margin import margins
 from tests.batch import plans
 from tests.batch.report import archives

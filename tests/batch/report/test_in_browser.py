@@ -15,25 +15,9 @@ import batch
 from batch.report import report
 from tests.batch import plans
 from tests.batch.report import archives
-from tests.batch.report.browser import PACKAGE, Chromium, Page, browser, program
+from tests.batch.report.browser import INK, Chromium, Page, quiet
 
 pytestmark = pytest.mark.browser
-
-INK = """(selector => Array.from(document.querySelectorAll(selector), canvas => {
-    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-    let inked = 0;
-    for (let i = 3; i < data.length; i += 4) inked += data[i] > 0;
-    return inked / (data.length / 4);
-}))"""
-"""Of each canvas the share of pixels that are drawn."""
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Chromium]:
-    if program() is None:
-        pytest.skip(f"no chromium; on Debian or Ubuntu: apt-get install {PACKAGE}")
-    with browser() as started:
-        yield started
 
 
 @pytest.fixture(scope="module")
@@ -71,12 +55,6 @@ def test_the_browser_of_these_tests_hears_what_goes_wrong(chromium: Chromium, tm
     page = chromium.open(tmp_path / "asks.html")
     assert [address.rpartition("/")[2] for address in page.requests] == ["asks.html", "nothing.png"]
     page.close()
-
-
-def quiet(page: Page) -> None:
-    """Nothing went wrong in it, and it asked for nothing but itself."""
-    assert page.said == []
-    assert [address.partition(":")[0] for address in page.requests if not address.startswith("data:")] == ["file"]
 
 
 def test_it_opens_in_silence_and_its_plots_are_drawn(page: Page) -> None:

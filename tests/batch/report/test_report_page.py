@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from batch.report import histories, maps, overview, stability
+from batch import grids
+from batch.report import histories, overview, stability
 from batch.report.data import MOST_LINES
 from tests.batch.report import figures
 from tests.batch.report.browser import PACKAGE, program
@@ -18,7 +19,7 @@ PAGE = (figures.FOLDER.parent / "report.md").read_text(encoding="utf-8")
 def test_the_limits_are_those_of_the_code() -> None:
     for said in (
         f"{overview.MOST_POINTS:,} cases", f"the {overview.KEPT} worst", f"{histories.MOST_POINTS:,} points",
-        f"{histories.MOST_VALUES:,} numbers", f"{maps.MOST_LEVELS} × {maps.MOST_LEVELS} cells",
+        f"{histories.MOST_VALUES:,} numbers", f"{grids.MOST_LEVELS} × {grids.MOST_LEVELS} cells",
         f"{stability.MOST_CASES} cases, of six", f"{MOST_LINES:,} lines",
     ):  # fmt: skip
         assert said in PAGE

@@ -1,6 +1,5 @@
-"""`met plot`: pictures that exist, hold ink where they should, and never cover somebody's file."""
+"""Signals over time: which panels, lines, colours and commands are in a picture."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,37 +8,18 @@ import pytest
 
 import batch
 from batch.archive.read import ArchiveFile
-from batch.plot import COLOURS, FLAT, plot
-from met.diagnostic import Problem
+from batch.plotting import draw
+from batch.plotting.layout import FLAT
+from batch.plotting.sheet import COLOURS
 from tests.batch import plans
+from tests.batch.plotting.pictures import archive, shown
 
 pytestmark = pytest.mark.usefixtures("engine")
 
 
-def archive(cases: int, histories: str = "default") -> ArchiveFile:
-    experiment = plans.gains(cases) if cases > 1 else plans.nominal()
-    batch.run(plans.plan(experiment), output="a.h5", histories=histories)  # type: ignore[arg-type]
-    return ArchiveFile("a.h5")
-
-
-@pytest.fixture
-def figures(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
-    """The figures that were drawn, kept for a look at what is in them."""
-    from batch import plot as module
-
-    kept: list[Any] = []
-    save = module._save
-    monkeypatch.setattr(module, "_save", lambda figure, output: (kept.append(figure), save(figure, output)))
-    yield kept
-
-
-def shown(figure: Any) -> list[Any]:
-    return [ax for ax in figure.axes if ax.get_visible()]
-
-
 def test_a_case_has_a_panel_a_signal_and_a_line_a_joint(here: Path, figures: list[Any]) -> None:
     with archive(1) as file:
-        assert plot(file, "a.png") == Path("a.png")
+        assert draw(file, "a.png") == Path("a.png")
     axes = shown(figures[0])
     assert [ax.get_ylabel() for ax in axes] == ["q  (rad)", "qd  (rad/s)", "tau  (N·m)", "shoulder.servo.voltage\n(V)"]
     assert [len(ax.lines) for ax in axes] == [2, 2, 2, 1]
@@ -50,14 +30,14 @@ def test_a_case_has_a_panel_a_signal_and_a_line_a_joint(here: Path, figures: lis
 
 def test_a_joint_has_one_colour_in_all_panels(here: Path, figures: list[Any]) -> None:
     with archive(1) as file:
-        plot(file, "a.png", ["qd", "elbow.q", "shoulder.servo.voltage"])
+        draw(file, "a.png", ["qd", "elbow.q", "shoulder.servo.voltage"])
     colours = [[line.get_color() for line in ax.lines] for ax in shown(figures[0])]
     assert colours == [[COLOURS[0], COLOURS[1]], [COLOURS[1]], [COLOURS[0]]]
 
 
 def test_few_cases_are_overlaid_and_named_by_what_varies(here: Path, figures: list[Any]) -> None:
     with archive(3) as file:
-        plot(file, "a.png", ["qd"])
+        draw(file, "a.png", ["qd"])
     left, right = shown(figures[0])
     assert len(left.lines) == len(right.lines) == 3
     words = [text.get_text() for text in figures[0].legends[0].get_texts()]
@@ -67,7 +47,7 @@ def test_few_cases_are_overlaid_and_named_by_what_varies(here: Path, figures: li
 
 def test_joints_of_unlike_unit_stand_beside_one_another(here: Path, figures: list[Any]) -> None:
     with mixed(3) as file:
-        plot(file, "a.png")
+        draw(file, "a.png")
     axes = shown(figures[0])
     assert [ax.get_title("left") for ax in axes] == [
         "shoulder · joint position", "elbow · joint position", "shoulder · voltage on the drive motor",
@@ -119,7 +99,7 @@ def test_a_command_is_drawn_over_what_follows_it_and_nowhere_else(
 ) -> None:
     for cases, chosen in ((3, ()), (40, ()), (40, ("#3",))):
         with commanded(cases, monkeypatch) as file:
-            plot(file, "a.png", cases=chosen)
+            draw(file, "a.png", cases=chosen)
         axes = shown(figures[-1])
         over = [ax for ax in axes if dashed(ax)]
         assert len(over) == 1
@@ -132,7 +112,7 @@ def test_commands_that_differ_have_their_cases_colours(
     here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with commanded(3, monkeypatch, slope=0.01) as file:
-        plot(file, "a.png", ["shoulder.qd"])
+        draw(file, "a.png", ["shoulder.qd"])
     [ax] = shown(figures[0])
     assert [line.get_ydata()[0] for line in dashed(ax)] == pytest.approx([0.03, 0.04, 0.05])
     assert [line.get_color() for line in dashed(ax)] == [line.get_color() for line in ax.lines[:3]]
@@ -142,7 +122,7 @@ def test_a_command_is_shared_by_a_case_that_broke_off(
     here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with commanded(12, monkeypatch, fails=0) as file:
-        plot(file, "a.png", ["qd"])
+        draw(file, "a.png", ["qd"])
     [line] = dashed(shown(figures[0])[0])
     assert np.isfinite(line.get_ydata()).all()
 
@@ -151,7 +131,7 @@ def test_a_fan_of_unlike_commands_leaves_them_a_panel(
     here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with commanded(12, monkeypatch, slope=0.01) as file:
-        plot(file, "a.png")
+        draw(file, "a.png")
     axes = shown(figures[0])
     assert not any(dashed(ax) for ax in axes)
     assert any("rate asked" in ax.get_title("left") for ax in axes)
@@ -159,7 +139,7 @@ def test_a_fan_of_unlike_commands_leaves_them_a_panel(
 
 def test_many_cases_are_a_fan(here: Path, figures: list[Any]) -> None:
     with archive(40) as file:
-        plot(file, "a.png", ["qd"])
+        draw(file, "a.png", ["qd"])
     left, _ = shown(figures[0])
     assert len(left.lines) == 1 and len(left.collections) == 2
     values = plans.answer(plans.gains(40)).signals["qd"][:, :, 0]
@@ -168,7 +148,7 @@ def test_many_cases_are_a_fan(here: Path, figures: list[Any]) -> None:
 
 def test_one_case_of_a_sweep_is_named(here: Path, figures: list[Any]) -> None:
     with archive(40) as file:
-        plot(file, "a.png", ["qd"], cases=["#3"])
+        draw(file, "a.png", ["qd"], cases=["#3"])
     words = [text.get_text() for text in figures[0].texts]
     assert any(text.startswith("case #3 ") and "gearbox.kp = 0.01231 V·s/rad" in text for text in words)
 
@@ -180,25 +160,16 @@ def test_a_case_that_breaks_off_is_marked(here: Path, figures: list[Any], monkey
 
     monkeypatch.setattr(run, "run", partial(plans.answer, fails=frozenset({0})))
     with archive(1) as file:
-        plot(file, "a.png", ["shoulder.qd"])
+        draw(file, "a.png", ["shoulder.qd"])
     [ax] = shown(figures[0])
     assert [line.get_marker() for line in ax.lines] == ["None", "x"]
     assert ax.lines[1].get_xdata()[0] == pytest.approx(0.16)  # the fifth row, the last that is valid
 
 
-def test_without_histories_metrics_are_drawn_over_what_varies(here: Path, figures: list[Any]) -> None:
-    with archive(40, "none") as file:
-        plot(file, "a.png")
-    axes = shown(figures[0])
-    assert [ax.get_ylabel() for ax in axes] == ["settle  (s)", "volts  (V)"]
-    assert axes[-1].get_xlabel() == "gearbox.kp  (V·s/rad)"
-    assert "not finite in 2 cases" in axes[0].get_title("left")
-
-
 def test_the_legend_is_outside_of_the_data(here: Path, figures: list[Any]) -> None:
     for cases in (1, 3):
         with archive(cases) as file:
-            plot(file, "a.png", ["qd"])
+            draw(file, "a.png", ["qd"])
         figure = figures[-1]
         boxes = [ax.get_window_extent() for ax in shown(figure)]
         legends = [*figure.legends, *(ax.get_legend() for ax in shown(figure) if ax.get_legend())]
@@ -209,56 +180,23 @@ def test_the_legend_is_outside_of_the_data(here: Path, figures: list[Any]) -> No
             assert drawn.x1 <= figure.bbox.x1
 
 
-def test_the_same_archive_gives_the_same_picture(here: Path) -> None:
-    with archive(3) as file:
-        first = plot(file, "a.png").read_bytes()
-        assert plot(file, "a.png").read_bytes() == first
-
-
-@pytest.mark.parametrize(
-    ("output", "said"),
-    [
-        ("a.pdf", "cannot write a.pdf: pictures are PNG files"),
-        ("folder.png", "cannot write folder.png: it is a folder"),
-        ("no/a.png", "cannot write no/a.png: no is no folder"),
-        ("photo.png", "photo.png exists and was not drawn by MET: it is not written over"),
-    ],
-)
-def test_a_picture_that_cannot_be_written(here: Path, output: str, said: str) -> None:
-    (here / "folder.png").mkdir()
-    (here / "photo.png").write_bytes(b"\x89PNG\r\n\x1a\nholiday")
-    with archive(1) as file, pytest.raises(Problem) as caught:
-        plot(file, output)
-    assert caught.value.diagnostics[0].message == said
-
-
-def test_nothing_to_draw_is_said(here: Path) -> None:
-    from dataclasses import replace
-
-    experiment = plans.nominal()
-    bare = replace(experiment, structure=replace(experiment.structure, metrics=(), record=()), requirements=())
-    batch.run(plans.plan(bare), output="a.h5")
-    with ArchiveFile("a.h5") as file, pytest.raises(Problem) as caught:
-        plot(file, "a.png")
-    assert caught.value.diagnostics[0].message == "nothing to draw in `nominal`: it has neither histories nor metrics"
-
-
 def test_a_row_that_is_zero_throughout_is_low_and_the_others_are_not(
     here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from batch import plot as module
+    from batch.plotting import histories as module
 
     real = module.history
-    monkeypatch.setattr(module, "history", lambda group, panel, position: real(group, panel, position)
-                        * (panel.name != "qd"))
+    monkeypatch.setattr(
+        module, "history", lambda group, panel, position: real(group, panel, position) * (panel.name != "qd")
+    )
     with archive(1) as file:
-        plot(file, "a.png", ["q", "qd"])
-    grid = figures[0].axes[0].get_subplotspec().get_gridspec()
+        draw(file, "a.png", ["q", "qd"])
+    rows = figures[0].axes[0].get_subplotspec().get_gridspec()
     assert [ax.get_ylabel() for ax in shown(figures[0])] == ["q  (rad)", "qd  (rad/s)"]
-    assert grid.get_height_ratios() == [1.0, FLAT]
+    assert rows.get_height_ratios() == [1.0, FLAT]
 
 
 def test_under_many_panels_the_legend_is_there_again(here: Path, figures: list[Any]) -> None:
     with archive(1) as file:
-        plot(file, "a.png", ["q", "qd", "tau", "q", "qd", "tau"])
+        draw(file, "a.png", ["q", "qd", "tau", "q", "qd", "tau"])
     assert [ax.get_legend() is not None for ax in shown(figures[0])] == [True, False, False, False, True, False]

@@ -1,0 +1,55 @@
+"""An export straight from a run, `met run DECK -o FILE.mcap`: of an archive FILE.h5 that is run, and stays."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from batch.campaign import Campaign
+from batch.export import FORMATS, Exported, export, owner
+from batch.export.output import check as check_place
+from batch.output import quoted
+from met.diagnostic import Problem, error
+
+
+def parted(output: str | os.PathLike[str] | None) -> tuple[Path | None, Path | None]:
+    """The archive and the export that an output names; None for what it does not."""
+    target = None if output is None else Path(output)
+    if target is None or target.suffix.lower().removeprefix(".") not in FORMATS:
+        return target, None
+    return target.with_suffix(".h5"), target
+
+
+def check(campaign: Campaign, target: Path) -> None:
+    """Refuse what could not be exported in the end, before anything runs. Raises Problem E305, E323, E372-E374."""
+    form = target.suffix.lower().removeprefix(".")
+    kept = sum(len(part.kept) for part in campaign.parts)
+    if not kept and not campaign.keep.later:
+        message = f"{target} would be empty: no histories are kept"
+        helps = ["`--histories all` keeps them, and `--histories '#0'` those of a case"]
+        if not any(part.experiment.structure.record for part in campaign.parts):
+            helps = ["`record = [q, qd, tau];` in the run records signals"]
+        raise Problem(error("E323", message, help=[*helps, *campaign.notes]))
+    if form == "parquet":
+        from batch.export.parquet import pyarrow_here
+
+        pyarrow_here()
+    if form == "mcap":
+        from batch.export.mcap import OVERLAID, too_many
+
+        if kept > OVERLAID:
+            archive = quoted(target.with_suffix(".h5"))
+            helps = ["`--case '#0'` runs one alone, and `--histories '#0'` keeps the signals of one",
+                     f"or run all, and choose then: `-o {archive}`, `met export {archive} --case '#0'`"]  # fmt: skip
+            raise Problem(too_many(kept, ", ".join(_asked(campaign)), helps))
+    check_place(target, campaign.output, owner(form), force=None)
+
+
+def written(campaign: Campaign, target: Path) -> Exported:
+    """Export all that was run. Raises Problem."""
+    return export(campaign.output, target, runs=_asked(campaign))
+
+
+def _asked(campaign: Campaign) -> list[str]:
+    """The runs and sweeps, by the names by which they are asked for."""
+    return list(dict.fromkeys(part.experiment.asked for part in campaign.parts))

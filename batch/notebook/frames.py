@@ -1,0 +1,133 @@
+"""Where the links are: from the q of a Dataset, and the plan in its archive. The same functions as the export's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray
+
+from batch.archive.read import Group
+from batch.export.poses import POSITION, moved, parameters, world_poses
+from batch.notebook.quantities import number
+from batch.notebook.source import experiment, places
+from batch.notebook.table import CASE, RECORDED, asked, missing
+from met.diagnostic import Problem, error
+from met.plan import Experiment
+
+LINK = "link"
+POSITION_TOLD = {"units": "m", "long_name": "origin of the link's frame", "frame": "world axes"}
+ORIENTATION_TOLD = {
+    "units": "1", "long_name": "unit quaternion of the link's frame", "frame": "from link axes to world axes, w >= 0"
+}  # fmt: skip
+"""What an archive says of the same where it is recorded."""
+
+
+def frames(
+    path: Path, parts: Mapping[str, xarray.Dataset], links: Sequence[str], *, whole: bool = False
+) -> dict[str, xarray.Dataset]:
+    """Frames in the world of these links, none: of all, by Dataset of an archive; one that has none of the links is
+    left out. whole: every case has to have its history. Raises Problem E328, E370, E385, E389."""
+    out: dict[str, xarray.Dataset] = {}
+    known: dict[str, None] = {}
+    for name, data in parts.items():
+        with experiment(path, data) as (file, group):
+            own = next(each for each in file.plan().experiments if each.name == group.name)
+            names = [link.name for link in own.structure.links]
+            known |= dict.fromkeys(names)
+            chosen = [link for link in links if link in names] if links else names
+            if chosen:
+                if whole:
+                    _all_recorded(data, group)
+                out[name] = _frames(path, data, group, own, chosen)
+    for link in links:
+        if link not in known:
+            raise missing(list(parts.values()), link, "no link", known)
+    return out
+
+
+def _frames(path: Path, data: xarray.Dataset, group: Group, own: Experiment, links: Sequence[str]) -> xarray.Dataset:
+    q = _positions(data, own)
+    instants = q[0] if q else _instants(data)
+    dims, shape = instants.dims, instants.shape
+    found = places(group, path, data, _cases(data, instants))
+    by_case = (-1, *(1,) * (len(shape) - 1)) if RECORDED in dims else ()
+    varied = {v.path: group.at(v.name, found).reshape(by_case) for v in group.role("coordinate")}
+    rows = [each.values for each in q]
+    world = world_poses(own, parameters(own, varied), rows)
+    unknown = np.isnan(sum(rows, np.zeros(shape)))
+    poses = [moved(world[link], shape) for link in links]
+    kept = {str(name): array for name, array in instants.coords.items() if not str(name).startswith("joint")}
+    out = xarray.Dataset(
+        {
+            "position": ((*dims, LINK, "axis"), _stacked([pose.position for pose in poses], unknown), POSITION_TOLD),
+            "orientation": (
+                (*dims, LINK, "quaternion"), _stacked([pose.orientation for pose in poses], unknown), ORIENTATION_TOLD
+            ),
+        },
+        coords={**kept, LINK: list(links), "axis": list("xyz"), "quaternion": list("wxyz")},
+        attrs=data.attrs,
+    )  # fmt: skip
+    out.encoding = {"source": str(path)}
+    return out
+
+
+def _stacked(links: Sequence[np.ndarray], unknown: np.ndarray) -> np.ndarray:
+    """(..., link, component), not-a-number where a row is unknown."""
+    out = np.stack(links, axis=-2)
+    out[unknown] = np.nan
+    return out
+
+
+def _all_recorded(data: xarray.Dataset, group: Group) -> None:
+    """Raises Problem E328 where a case has no history."""
+    recorded = data[RECORDED].values if RECORDED in data.coords else np.empty(0)
+    for case in np.setdiff1d(data[CASE].values, recorded) if CASE in data.coords else ():
+        group.recorded_position(f"#{int(case)}")
+
+
+def _positions(data: xarray.Dataset, own: Experiment) -> tuple[xarray.DataArray, ...]:
+    """q of each joint that moves, over the same dimensions, cases first; rad or m. Raises Problem E370."""
+    units = {joint.name: "m" if joint.kind == "prismatic" else "rad" for joint in own.structure.moving}
+    found = {joint: _position(data, joint, unit) for joint, unit in units.items()}
+    lacking = [joint for joint, q in found.items() if q is None]
+    if lacking:
+        which = POSITION if len(lacking) == len(found) else ", ".join(f"{joint}.{POSITION}" for joint in lacking)
+        message = f"the links of `{asked(data)}` cannot be placed: {which} is not in this Dataset"
+        helps = "`record = [q, ...]` in the run keeps where its joints are; then run it again"
+        raise Problem(error("E370", message, help=helps))
+    alike: tuple[xarray.DataArray, ...] = xarray.broadcast(*(q for q in found.values() if q is not None))
+    return tuple(q.transpose(RECORDED, ..., missing_dims="ignore") for q in alike)
+
+
+def _position(data: xarray.Dataset, joint: str, unit: str) -> xarray.DataArray | None:
+    """q of a joint, as a signal of its own or as one of all joints'."""
+    if f"{joint}.{POSITION}" in data:
+        q = data[f"{joint}.{POSITION}"]
+    elif POSITION in data:
+        every = data[POSITION]
+        dim = next((str(name) for name in every.coords if str(name).startswith("joint")), "")
+        names = np.atleast_1d(every[dim].values).tolist() if dim else []
+        if joint not in names:
+            return None
+        q = every.isel({dim: names.index(joint)}, drop=True) if dim in every.dims else every
+    else:
+        return None
+    return q.astype(np.float64) / number(f"1 {unit}", POSITION, str(q.attrs.get("units", unit)))
+
+
+def _instants(data: xarray.Dataset) -> xarray.DataArray:
+    """Zeros over cases and time, where no joint moves."""
+    dims = [dim for dim in (RECORDED, "time") if dim in data.dims]
+    return xarray.DataArray(np.zeros([data.sizes[dim] for dim in dims]), {dim: data[dim] for dim in dims}, dims)
+
+
+def _cases(data: xarray.Dataset, q: xarray.DataArray) -> np.ndarray:
+    """Positions in the case table of the cases whose q it is. Raises Problem E389."""
+    for name in (RECORDED, CASE):
+        if name in q.coords:
+            return np.atleast_1d(np.asarray(q[name].values))
+    if data.sizes.get(CASE) == 1:
+        return np.asarray(data[CASE].values)
+    raise Problem(error("E389", "it is not known of which case this q is: `recorded_case` is gone"))

@@ -1,0 +1,162 @@
+"""Cases unfolded into a block: a dimension for each parameter that is varied."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray
+
+from batch.notebook.quantities import in_deck_unit
+from batch.notebook.table import CASE, RECORDED, asked, missing, varied
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+
+EMPTIEST, SMALL = 100, 1_000_000
+"""So many places for each case a block may have at most, and so many whatever its cases are."""
+
+
+@frozen
+class Axis:
+    """A dimension of the block. values: its labels; codes: the place along it of each case; beside: parameters that
+    are varied in step with it, by path, with a value a label."""
+
+    path: str
+    values: np.ndarray
+    codes: np.ndarray
+    beside: Mapping[str, np.ndarray]
+
+
+def unfolded(parts: Sequence[xarray.Dataset], names: Sequence[str]) -> xarray.Dataset:
+    """Variables that lie along cases, over what is varied; none: all metrics. Parameters that are varied in step share
+    a dimension, and one that is the same in all cases is a coordinate without one. Where there is no case it is
+    not-a-number. Raises Problem E385, E388."""
+    sweeps = list(dict.fromkeys(asked(data) for data in parts))
+    if len(sweeps) > 1:
+        helps = f"of one of them: `data.met.sel(run={sweeps[0]!r}).met.grid(...)`"
+        raise Problem(error("E388", f"these are the cases of several: {', '.join(sweeps)}", help=helps))
+    known = [str(each) for data in parts for each in data if {CASE, RECORDED} & set(data[each].dims)]
+    if not names:
+        names = list(dict.fromkeys(str(n) for data in parts for n in data if data[n].attrs.get("role") == "metric"))
+    dims: dict[str, str] = {}
+    for name in names or [""]:
+        having = [data for data in parts if name in data]
+        if not having or not {CASE, RECORDED} & set(having[0][name].dims):
+            raise missing(parts, name, "no variable of cases", known)
+        dims[name] = CASE if CASE in having[0][name].dims else RECORDED
+        if dims[name] == RECORDED and len(parts) > 1:
+            helps = "of one structure: `data[NAME].met.grid(...)`"
+            message = f"`{name}` is a signal, which each structure has at times of its own"
+            raise Problem(error("E388", message, help=helps))
+        if dims[name] != dims[names[0]]:
+            message = f"one of `{names[0]}` and `{name}` is a signal, which only some cases may have"
+            raise Problem(error("E388", message, help="a block of each: `data.met.grid(...)` twice"))
+    return xarray.Dataset({
+        name: _block([data for data in parts if dim in data.dims], name, dim) for name, dim in dims.items()
+    })  # fmt: skip
+
+
+def _block(parts: Sequence[xarray.Dataset], name: str, dim: str) -> xarray.DataArray:
+    count = sum(data.sizes[dim] for data in parts)
+    if not count:
+        raise Problem(error("E388", f"there are no cases of which `{name}` could be"))
+    columns = _columns(parts, dim)
+    axes, alike = _axes(columns)
+    shape = tuple(len(axis.values) for axis in axes)
+    if np.prod(shape, dtype=float) > max(SMALL, EMPTIEST * count):
+        told = " x ".join(f"{size} of {axis.path}" for size, axis in zip(shape, axes, strict=True))
+        helps = "samples are points: plot them over `data[PATH]`, or choose fewer by `data.met.sel(...)`"
+        raise Problem(error("E388", f"{count:,} cases are no block of {told}", help=helps))
+    places = np.ravel_multi_index([axis.codes for axis in axes], shape) if axes else np.zeros(count, np.int64)
+    _each_once(parts, dim, places, columns)
+    having = [data[name].transpose(dim, ...) for data in parts if name in data and data.sizes[dim]]
+    inside = having[0].isel({dim: 0}, drop=True)
+    kept = np.concatenate([np.full(data.sizes[dim], name in data) for data in parts])
+    values = np.concatenate([array.values for array in having])
+    cells = int(np.prod(shape, dtype=np.int64))
+    if len(values) < cells:
+        values = values.astype(object if values.dtype.kind not in "iubf" else np.result_type(values.dtype, np.float32))
+    block = np.full((cells, *values.shape[1:]), np.nan if len(values) < cells else values[:1], dtype=values.dtype)
+    block[places[kept]] = values
+    attributes = {path: column.attrs for path, column in columns.items()}
+    labels: dict[str, Any] = {axis.path: (axis.path, axis.values, attributes[axis.path]) for axis in axes}
+    beside = {path: (axis.path, values, attributes[path]) for axis in axes for path, values in axis.beside.items()}
+    single = {path: ((), value, attributes[path]) for path, value in alike.items()}
+    own = {str(each): array for each, array in inside.coords.items() if set(array.dims) and each not in columns}
+    return xarray.DataArray(
+        block.reshape((*shape, *values.shape[1:])), dims=(*(axis.path for axis in axes), *inside.dims),
+        coords={**labels, **beside, **single, **own}, attrs=having[0].attrs,
+    )  # fmt: skip
+
+
+def _columns(parts: Sequence[xarray.Dataset], dim: str) -> dict[str, xarray.DataArray]:
+    """What is varied, by path, over all cases; what a structure lacks is not-a-number in it, or no word."""
+    tables = [varied(data, dim) for data in parts]
+    out = {}
+    for path in dict.fromkeys(path for table in tables for path in table):
+        first = next(table[path] for table in tables if path in table)
+        lacking = np.nan if first.dtype.kind in "iuf" else ""
+        pieces = [
+            table[path].values if path in table else np.full(data.sizes[dim], lacking)
+            for data, table in zip(parts, tables, strict=True)
+        ]
+        values = np.concatenate([piece if first.dtype.kind in "iuf" else piece.astype(str) for piece in pieces])
+        out[path] = xarray.DataArray(values, dims=(dim,), attrs=first.attrs)
+    return out
+
+
+def _axes(columns: Mapping[str, xarray.DataArray]) -> tuple[list[Axis], dict[str, Any]]:
+    """The dimensions, in the deck's order; and by path what all cases share."""
+    axes: list[Axis] = []
+    alike: dict[str, Any] = {}
+    for path, column in columns.items():
+        values, codes = _labels(column.values)
+        if len(values) < 2:
+            alike[path] = values[0]
+            continue
+        new: Axis | None = Axis(path, values, codes, {})
+        for number, axis in enumerate(axes):
+            mine, yours = np.divmod(np.unique(axis.codes * len(values) + codes), len(values))
+            if len(mine) == len(axis.values):  # it follows from the other
+                axes[number] = Axis(axis.path, axis.values, axis.codes, {**axis.beside, path: values[yours]})
+                new = None
+                break
+            if len(mine) == len(values):  # the other follows from it
+                order = mine[np.argsort(yours)]
+                beside = {axis.path: axis.values[order], **{k: v[order] for k, v in axis.beside.items()}}
+                axes[number] = Axis(path, values, codes, beside)
+                new = None
+                break
+        axes += [new] if new is not None else []
+    return axes, alike
+
+
+def _labels(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The different values, numbers rising, words as they come; and which of them each is."""
+    labels, first, codes = np.unique(values, return_index=True, return_inverse=True)
+    if values.dtype.kind in "iuf":
+        return labels, codes
+    order = np.argsort(first)
+    return labels[order], np.argsort(order)[codes]
+
+
+def _each_once(
+    parts: Sequence[xarray.Dataset], dim: str, places: np.ndarray, columns: Mapping[str, xarray.DataArray]
+) -> None:
+    """Raises Problem E388 where two cases are at one place."""
+    order = np.argsort(places, kind="stable")
+    twice = np.flatnonzero(np.diff(places[order]) == 0)
+    if not len(twice):
+        return
+    one, other = order[twice[0]], order[twice[0] + 1]
+    rows = np.concatenate([data[dim].values for data in parts])
+    told = [
+        f"{path} = {in_deck_unit([column.values[one]], column.attrs)[0]}"
+        if column.dtype.kind in "iuf"
+        else f"{path} = {column.values[one]}"
+        for path, column in columns.items()
+    ]
+    where = f"are both at {', '.join(told)}" if told else "differ in nothing that is varied here"
+    helps = "choose some by `data.met.sel(...)`, one of them by `data.met.sel(case=[...])`"
+    raise Problem(error("E388", f"cases #{rows[one]} and #{rows[other]} {where}", help=helps))

@@ -1,0 +1,34 @@
+"""All parameters of one case, with who wrote them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray
+
+from batch import cases
+from batch.notebook.source import experiment, places
+
+
+def table(path: Path, data: xarray.Dataset, case: int) -> Any:
+    """A pandas.DataFrame by path: value (SI), unit, varies, origin (deck, default, case, derived), place. Raises
+    Problem E389."""
+    with experiment(path, data) as (file, group):
+        [position] = places(group, path, data, np.array([case]))
+        found = cases.parameters(file, group, int(position))
+        own = next(each for each in file.plan().experiments if each.name == group.name)
+    origins = {name: quantity.origin for name, quantity in own.parameters.items()}
+    columns: dict[str, list[Any]] = {key: [each[key] for each in found.values()] for key in ("value", "unit", "varies")}
+    columns["origin"] = [origins[name].kind for name in found]
+    columns["place"] = [str(origins[name].place or "") for name in found]
+    held = {name: ("path", _column(values)) for name, values in columns.items()}
+    return xarray.Dataset(held, coords={"path": list(found)}).to_dataframe()
+
+
+def _column(values: list[Any]) -> np.ndarray:
+    """Values as they are: a list of words and lists of numbers too is no array of more dimensions."""
+    out = np.empty(len(values), object)
+    out[:] = values
+    return out

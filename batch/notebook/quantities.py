@@ -1,0 +1,100 @@
+"""Numbers with units as somebody types them, `"20 kN*m/rad"`, and variables in other units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import xarray
+
+from batch.notebook.table import missing, path_of
+from met import units
+from met.diagnostic import Problem, error
+
+QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+"""A number and its unit."""
+
+
+def number(given: Any, name: str, unit: str) -> float:
+    """What was given for a variable, in its unit: a number is taken as it is, a text has a unit of its own. Raises
+    Problem E386."""
+    if isinstance(given, int | float | np.integer | np.floating) and not isinstance(given, bool):
+        return float(given)
+    example = f'such as "0.5{"" if unit in ("", "1") else f" {unit}"}"'
+    if not isinstance(given, str):
+        raise _wrong(f"`{name}` = {given!r}: it is a number", f"write a number, or a text {example}")
+    found = QUANTITY.fullmatch(given)
+    if found is None:
+        raise _wrong(f"`{name}` = {given!r} cannot be read", f"write a number and its unit, {example}")
+    measure, own = _measure(found[2], name), _measure(unit, name)
+    if not units.same(measure.dimension, own.dimension):
+        which = f"is in {found[2]}" if found[2] else "has no unit"
+        raise _wrong(f"`{name}` = {given!r} {which}; it is in {unit or '1'}", f"write one {example}")
+    value = measure.to_si(float(found[1]))
+    return value if own.scale == 1.0 else value / own.scale
+
+
+def in_units(data: xarray.Dataset, wanted: Mapping[str, str] | None) -> xarray.Dataset:
+    """Variables in these units; None: parameters and metrics as the deck writes them. What is repeated along
+    recorded_case follows. Raises Problem E385, E386."""
+    changed: dict[Any, xarray.Variable] = {}
+    for name, unit in (deck_units(data) if wanted is None else wanted).items():
+        found = [each for each, array in data.variables.items() if name in (each, path_of(str(each), array.attrs))]
+        if not found:
+            raise missing([data], name, "no variable", [str(each) for each in data.variables])
+        changed |= {each: _converted(data[each].variable, name, unit) for each in found}
+    coordinates = {name: variable for name, variable in changed.items() if name in data.coords}
+    others = {name: variable for name, variable in changed.items() if name not in data.coords}
+    return data.assign_coords(coordinates).assign(others)
+
+
+def deck_units(data: xarray.Dataset) -> dict[str, str]:
+    """The units in which the deck writes parameters and metrics, by the names of their variables."""
+    return {
+        str(name): str(array.attrs["deck_unit"])
+        for name, array in data.variables.items()
+        if "deck_unit" in array.attrs and _known(str(array.attrs["deck_unit"]))
+    }
+
+
+def in_deck_unit(values: Iterable[float], attributes: Mapping[str, Any]) -> list[str]:
+    """Values of a variable as a deck would write them, to ten digits: what `number` reads back."""
+    unit, shown = str(attributes.get("units", "")), str(attributes.get("deck_unit", attributes.get("units", "")))
+    if not _known(unit) or not _known(shown):
+        unit = shown = ""
+    scale = units.parse_unit(shown or "1").scale / units.parse_unit(unit or "1").scale
+    return [f"{value / scale:.10g}{'' if shown in ('', '1') else f' {shown}'}" for value in values]
+
+
+def _converted(variable: xarray.Variable, name: str, unit: str) -> xarray.Variable:
+    """A variable in another unit, which its attributes then say."""
+    if "units_by_joint" in variable.attrs:
+        own = dict.fromkeys(map(str, variable.attrs["units_by_joint"]))
+        raise _wrong(f"`{name}` has units of its own at each joint: {', '.join(own)}")
+    before, after = _measure(str(variable.attrs.get("units", "")), name), _measure(unit, name)
+    if not units.same(before.dimension, after.dimension) or variable.dtype.kind not in "iuf":
+        raise _wrong(f"`{name}` cannot be in {unit}; it is in {variable.attrs.get('units') or '1'}")
+    scaled = variable.to_base_variable() * before.scale / after.scale
+    scaled.attrs = {**variable.attrs, "units": unit}
+    return scaled
+
+
+def _known(unit: str) -> bool:
+    try:
+        units.parse_unit(unit or "1")
+    except ValueError:
+        return False
+    return True
+
+
+def _measure(unit: str, name: str) -> units.Measure:
+    try:
+        return units.parse_unit(unit or "1")
+    except ValueError as reason:
+        raise _wrong(f"`{name}`: {reason}", "units are those of decks: `met doc units`") from None
+
+
+def _wrong(message: str, *helps: str) -> Problem:
+    return Problem(error("E386", message, help=helps))

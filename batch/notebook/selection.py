@@ -1,0 +1,213 @@
+"""Cases by what is varied in them, with units; by their places and ids; by how they ended."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray
+
+from batch.archive.read import found_cases
+from batch.notebook.quantities import in_deck_unit, number
+from batch.notebook.table import CASE, PREFIX, RECORDED, along, asked, dimension, missing, name_of, varied
+from met.diagnostic import Problem, did_you_mean, error
+
+CLOSE = 1e-9
+"""Relative: a number that somebody types is one that the archive has, within this. The engine's rounding is 1e-16."""
+
+ZERO = 1e-14
+"""The same of 0, relative to the largest of the values: -1 + 10 * 0.1 is 0 but for its rounding."""
+
+RUN, FAILED, MET, MISSED = "run", "failed", "met", "missed"
+"""What cases are asked for by, besides names of variables: the run or sweep; whether they did not reach their end;
+whether they met every requirement; whether they missed one."""
+
+NEAREST = 2
+"""Values that are told where none is the one asked for."""
+
+Parts = Mapping[str, xarray.Dataset]
+"""Datasets of an archive, by path."""
+
+
+def selected(parts: Parts, wanted: Mapping[str, Any]) -> dict[str, xarray.Dataset]:
+    """What is left of Datasets when only cases are kept that are as wanted, by name of a variable or path in the deck.
+
+    A name is of numbers (a number, a text with a unit, a list of these, or a slice, both ends in it), of words (one,
+    or a list), or one of the words above. A Dataset without such cases is left out, unless it is the only one. One
+    case asked for by its name is no dimension any more. Raises Problem E321, E322, E325, E385-E387.
+    """
+    if RUN in wanted and not any(RUN in data.variables for data in parts.values()):
+        parts = _of_runs(parts, wanted[RUN])
+        wanted = {name: value for name, value in wanted.items() if name != RUN}
+    dims = {path: dimension(data) for path, data in parts.items()}
+    known = {path: along(data, dims[path]) for path, data in parts.items()}
+    masks = {path: np.ones(data.sizes[dims[path]], bool) for path, data in parts.items()}
+    for name, value in wanted.items():
+        for path, mask in _masks(parts, dims, known, name, value).items():
+            masks[path] &= mask
+    left = {path: _cut(data, dims[path], masks[path]) for path, data in parts.items()}
+    if len(left) > 1:
+        left = {path: data for path, data in left.items() if masks[path].any()} or left
+    return {path: _alone(data, wanted[CASE]) for path, data in left.items()} if _one(wanted) else left
+
+
+def _masks(
+    parts: Parts, dims: Mapping[str, str], known: Mapping[str, Mapping[str, xarray.DataArray]], name: str, value: Any
+) -> dict[str, np.ndarray]:
+    """By Dataset: which of its cases are as one name wants them."""
+    if name == CASE and not isinstance(value, slice):
+        return _named(parts, dims, value)
+    found = {path: variables[name] for path, variables in known.items() if name in variables}
+    if name == MET or (name in (FAILED, MISSED) and not found):
+        return {path: _ended(data, dims[path], name, value) for path, data in parts.items()}
+    out = {path: np.zeros(data.sizes[dims[path]], bool) for path, data in parts.items()}
+    if not found:
+        names = [each for path, data in parts.items() for each in _names(data, dims[path])]
+        raise missing(list(parts.values()), name, "no parameter or metric", names)
+    arrays = list(found.values())
+    values = np.concatenate([array.values for array in arrays])
+    if arrays[0].dtype.kind in "iuf":
+        chosen = _numbers(values.astype(np.float64), value, name, arrays[0].attrs)
+    else:
+        chosen = _words(values.astype(str), value, name)
+    ends = np.cumsum([len(array) for array in arrays])[:-1]
+    return out | dict(zip(found, np.split(chosen, ends), strict=True))
+
+
+def _names(data: xarray.Dataset, dim: str) -> list[str]:
+    """By what cases are chosen most of the time."""
+    metrics = [str(name) for name in data if data[name].attrs.get("role") == "metric"] if dim == CASE else []
+    return [*varied(data, dim), *metrics, CASE, *((FAILED, MET, MISSED) if dim == CASE else ())]
+
+
+def _numbers(values: np.ndarray, wanted: Any, name: str, attributes: Mapping[str, Any]) -> np.ndarray:
+    unit = str(attributes.get("units", ""))
+    if isinstance(wanted, slice):
+        if wanted.step is not None:
+            raise Problem(error("E386", f"`{name}`: a range of values has no step", help="`slice(first, last)`"))
+        out = np.ones(len(values), bool)
+        for given, sign in ((wanted.start, 1.0), (wanted.stop, -1.0)):
+            if given is not None:
+                bound = number(given, name, unit)
+                slack = CLOSE * abs(bound) if np.isfinite(bound) else 0.0
+                out &= sign * values >= sign * bound - slack
+        return out
+    out = np.zeros(len(values), bool)
+    for given in _listed(wanted):
+        value = number(given, name, unit)
+        here = np.isclose(values, value, rtol=CLOSE, atol=0.0 if value else ZERO * _largest(values))
+        if not here.any():
+            raise _no_such(values, value, given, name, attributes)
+        out |= here
+    return out
+
+
+def _words(values: np.ndarray, wanted: Any, name: str) -> np.ndarray:
+    if isinstance(wanted, slice):
+        raise Problem(error("E386", f"`{name}` is a word: it has no range", help="write a list of words"))
+    out = np.zeros(len(values), bool)
+    for word in map(str, _listed(wanted)):
+        here = values == word
+        if not here.any():
+            words = list(dict.fromkeys(values.tolist()))
+            helps = [*did_you_mean(word, words), f"there are: {', '.join(words)}"]
+            raise Problem(error("E387", f"no case has `{name}` = {word}", help=helps))
+        out |= here
+    return out
+
+
+def _largest(values: np.ndarray) -> float:
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
+def _no_such(values: np.ndarray, value: float, given: Any, name: str, attributes: Mapping[str, Any]) -> Problem:
+    """E387, with the values next to the one that no case has."""
+    finite = np.unique(values[np.isfinite(values)])
+    nearest = np.sort(finite[np.argsort(np.abs(finite - value), kind="stable")[:NEAREST]])
+    unit, shown = (str(attributes.get(key, "")) for key in ("units", "deck_unit"))
+    texts = in_deck_unit(nearest, attributes)
+    helps = [f"nearest are: {', '.join(repr(text).replace(chr(39), chr(34)) for text in texts)}"] if texts else []
+    if not isinstance(given, str) and shown not in ("", unit):
+        helps.append(f"a number alone is in {unit or '1'}, as the values here are")
+    told = given if isinstance(given, str) else f"{value:g} {unit}".removesuffix(" 1").rstrip()
+    return Problem(error("E387", f"no case has `{name}` = {told}", help=helps))
+
+
+def _named(parts: Parts, dims: Mapping[str, str], wanted: Any) -> dict[str, np.ndarray]:
+    """By Dataset: which of its cases have these names, as `--case` takes them, or these positions."""
+    rows = {path: data[dims[path]].values for path, data in parts.items()}
+    ids = [_ids(data, dims[path]) for path, data in parts.items()]
+    every, every_id = np.concatenate(list(rows.values())), np.concatenate(ids)
+    out = np.zeros(len(every), bool)
+    where = ", ".join(dict.fromkeys(map(asked, parts.values())))
+    for each in _listed(wanted):
+        text = f"#{int(each)}" if isinstance(each, int | np.integer) and not isinstance(each, bool) else each
+        if not isinstance(text, str):
+            helps = 'a position, 7; "#7"; or the beginning of a case_id'
+            raise Problem(error("E386", f"`{CASE}` = {each!r} names no case", help=helps))
+        out[found_cases(text, every, every_id, where)] = True
+    return dict(zip(rows, np.split(out, np.cumsum([len(each) for each in rows.values()])[:-1]), strict=True))
+
+
+def _ids(data: xarray.Dataset, dim: str) -> np.ndarray:
+    name = "case_id" if dim == CASE else f"{PREFIX}case_id"
+    known = name in data.variables and data[name].dims == (dim,)
+    return data[name].values.astype(str) if known else np.full(data.sizes[dim], "")
+
+
+def _ended(data: xarray.Dataset, dim: str, name: str, wanted: Any) -> np.ndarray:
+    """Which cases ended so. Raises Problem E385, E386."""
+    if not isinstance(wanted, bool | np.bool_):
+        raise Problem(error("E386", f"`{name}` = {wanted!r}: it is True or False"))
+    needed = "status" if name == FAILED else "met"
+    if needed not in data.variables or dim not in data[needed].dims:
+        helps = "a run that requires nothing has none" if needed == "met" else ()
+        message = f"how cases ended is not in this Dataset: it lacks the variable `{needed}`"
+        raise Problem(error("E385", message, help=helps))
+    if name == FAILED:
+        return np.asarray((data["status"].values != 0) == wanted)
+    outcomes = data["met"].transpose(dim, ...).values.reshape(data.sizes[dim], -1)
+    found = (outcomes == 1).all(axis=1) if name == MET else (outcomes == 0).any(axis=1)
+    return np.asarray(found == wanted)
+
+
+def _of_runs(parts: Parts, wanted: Any) -> dict[str, xarray.Dataset]:
+    """The Datasets of these runs and sweeps. Raises Problem E325."""
+    names = _listed(wanted)
+    for name in names:
+        if all(name not in (name_of(data), asked(data)) for data in parts.values()):
+            known = ", ".join(dict.fromkeys(map(asked, parts.values())))
+            raise Problem(error("E325", f"no run or sweep `{name}` here", help=f"there are: {known}"))
+    return {path: data for path, data in parts.items() if {name_of(data), asked(data)} & set(names)}
+
+
+def _cut(data: xarray.Dataset, dim: str, mask: np.ndarray) -> xarray.Dataset:
+    """A Dataset of these cases alone, and of the histories that are theirs."""
+    keep: dict[Hashable, Any] = {dim: np.flatnonzero(mask)}
+    if dim == CASE and RECORDED in data.dims:
+        keep[RECORDED] = np.flatnonzero(np.isin(data[RECORDED].values, data[CASE].values[mask]))
+    return data.isel(keep)
+
+
+def _one(wanted: Mapping[str, Any]) -> bool:
+    """Whether one case is asked for by its name."""
+    return CASE in wanted and not isinstance(wanted[CASE], slice) and _single(wanted[CASE])
+
+
+def _alone(data: xarray.Dataset, name: Any) -> xarray.Dataset:
+    """The Dataset of a single case, which is no dimension any more; without signals where it has none."""
+    dim = dimension(data)
+    if data.sizes[dim] != 1:
+        raise Problem(error("E387", f"case {name!r} is none of those that are chosen by the other values"))
+    if data.sizes.get(RECORDED) == 0:
+        data = data.drop_dims(RECORDED)
+    return data.isel({each: 0 for each in (CASE, RECORDED) if each in data.dims})
+
+
+def _listed(wanted: Any) -> Sequence[Any]:
+    return [wanted] if _single(wanted) else list(wanted)
+
+
+def _single(wanted: Any) -> bool:
+    return isinstance(wanted, str) or np.ndim(wanted) == 0

@@ -1,0 +1,71 @@
+"""The archive that a Dataset's numbers came from, asked for what the Dataset itself does not hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import xarray
+
+from batch.archive.read import ArchiveFile, Group
+from batch.notebook.table import CASE, PREFIX, RECORDED, cases_of, name_of, positions
+from met.diagnostic import Problem, error
+
+SOURCE = "source"
+"""Where xarray keeps the name of the file in the encoding of what it has opened."""
+
+
+def file_of(data: xarray.Dataset | xarray.DataTree) -> Path:
+    """The file that was opened. Raises Problem E389 where it is not known any more, as after `where` and `merge`."""
+    root = data.root if isinstance(data, xarray.DataTree) else data
+    known = [root.encoding.get(SOURCE), *(array.encoding.get(SOURCE) for array in data.variables.values())]
+    for found in known:
+        if isinstance(found, str):
+            return Path(found)
+    helps = '`data.encoding["source"] = "FILE.h5"` says it'
+    raise Problem(error("E389", "it is not known from which archive these numbers are", help=helps))
+
+
+@contextmanager
+def experiment(path: Path, data: xarray.Dataset) -> Iterator[tuple[ArchiveFile, Group]]:
+    """The open archive, and the group in it that a Dataset is of. Raises Problem E301-E303, E389."""
+    name = name_of(data)
+    if not name:
+        raise Problem(error("E389", "this Dataset is of no archive: it has no attribute `experiment`"))
+    with ArchiveFile(path) as file:
+        group = next((group for group in file.groups if group.name == name), None)
+        if group is None or group.attributes.get("code_key") != data.attrs.get("code_key"):
+            raise _changed(path)
+        yield file, group
+
+
+@contextmanager
+def archive(path: Path, parts: Mapping[str, xarray.Dataset]) -> Iterator[ArchiveFile]:
+    """The open archive of these Datasets, of which the first has to be in it. Raises Problem E301-E303, E389."""
+    data = next(iter(parts.values()))
+    with experiment(path, data) as (file, group):
+        if {CASE, RECORDED} & set(data.coords):
+            places(group, path, data, cases_of(data))
+        yield file
+
+
+def places(group: Group, path: Path, data: xarray.Dataset, cases: np.ndarray) -> np.ndarray:
+    """Positions in the archive of cases of a Dataset. Raises Problem E389 where they are other cases there."""
+    found = positions(group.values(CASE), cases)
+    if found is None:
+        raise _changed(path)
+    for dim, name in ((CASE, "case_id"), (RECORDED, f"{PREFIX}case_id")):
+        if name in data.variables and data[name].dims == data[dim].dims:
+            own, ids = np.atleast_1d(data[dim].values), np.atleast_1d(data[name].values)
+            mine = dict(zip(own.tolist(), ids.astype(str).tolist(), strict=True))
+            theirs = dict(zip(cases.tolist(), group.at("case_id", found).tolist(), strict=True))
+            if any(mine.get(case, case_id) != case_id for case, case_id in theirs.items()):
+                raise _changed(path)
+    return found
+
+
+def _changed(path: Path) -> Problem:
+    helps = "open it again: `batch.open(...)`"
+    return Problem(error("E389", f"{path} is another archive than the one that was opened", help=helps))

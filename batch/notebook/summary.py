@@ -1,0 +1,54 @@
+"""What a Dataset of an archive is, in a few lines."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray
+
+from batch.failures import STATUS
+from batch.notebook.quantities import in_deck_unit
+from batch.notebook.table import CASE, RECORDED, name_of, varied
+from met.run import DONE
+
+FEW = 5
+"""So many different values are listed."""
+
+
+def summary(data: xarray.Dataset) -> str:
+    """What was run, how many cases are here, how they ended, what is varied in them."""
+    if not name_of(data):
+        return "a Dataset that is of no archive of MET"
+    deck = str(data.attrs.get("deck", "")).strip("<>")
+    out = [f"{name_of(data)}{f' of {deck}' if deck else ''}: {_cases(data)}"]
+    if CASE in data.dims and "status" in data:
+        status = data["status"].values
+        ended = (f"{(status == code).sum():,} {word}" for code, word in STATUS.items()
+                 if code == DONE or (status == code).any())  # fmt: skip
+        out.append(f"  {', '.join(ended)}")
+    if "met" in data and data["met"].dims == (CASE, "requirement"):
+        for text, met in zip(data["requirement"].values.astype(str), data["met"].values.T, strict=True):
+            out.append(f"  require {text}: met by {(met == 1).sum():,} of {len(met):,}")
+    dim = next((name for name in (CASE, RECORDED) if name in data.dims), "")
+    out += [f"  {path}: {_values(array)}" for path, array in (varied(data, dim) if dim else {}).items()]
+    return "\n".join(out)
+
+
+def _cases(data: xarray.Dataset) -> str:
+    if CASE in data.dims:
+        count, kept = data.sizes[CASE], data.sizes.get(RECORDED, 0)
+        return f"{count:,} case{'s' if count != 1 else ''}, {kept:,} with a history"
+    if RECORDED in data.dims:
+        return f"histories of {data.sizes[RECORDED]:,} cases"
+    return f"case #{int(data[CASE])}" if CASE in data.coords else "no cases"
+
+
+def _values(array: xarray.DataArray) -> str:
+    """The different values, few of them, or from where to where they are; in the deck's unit."""
+    values = np.unique(array.values)
+    numbers = values.dtype.kind in "iuf"
+    if len(values) <= FEW:
+        return ", ".join(in_deck_unit(values, array.attrs) if numbers else values.astype(str))
+    if not numbers:
+        return f"{len(values):,} words"
+    first, last = in_deck_unit(values[[0, -1]], array.attrs)
+    return f"{first} to {last}, {len(values):,} values"

@@ -1,0 +1,102 @@
+"""The cases of Datasets: along which dimension they lie, what is varied in them, and what they are called."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray
+
+from met.diagnostic import Problem, did_you_mean, error
+
+CASE, RECORDED = "case", "recorded_case"
+REPEAT = "repeat"
+PREFIX = "recorded."
+"""Of what is repeated along recorded_case."""
+
+MOST_NAMES = 12
+"""So many of what there is are listed where something is not."""
+
+
+def dimension(data: xarray.Dataset) -> str:
+    """Along which dimension the cases of a Dataset lie: recorded_case where only signals are left. Raises Problem
+    E385."""
+    for name in (CASE, RECORDED):
+        if name in data.dims:
+            return name
+    raise Problem(error("E385", "this Dataset has no dimension of cases", help="one case was taken out of it, or none"))
+
+
+def cases_of(data: xarray.Dataset) -> np.ndarray:
+    """Positions in the case table of a Dataset's cases, also of a single one that was taken out. Raises Problem
+    E385."""
+    known = next((name for name in (CASE, RECORDED) if name in data.coords), None)
+    return np.atleast_1d(data[known or dimension(data)].values)
+
+
+def path_of(name: str, attributes: Mapping[str, Any]) -> str:
+    """The path in the deck of what is varied; of any other variable, its name."""
+    if attributes.get("role") == "recorded":
+        name = name.removeprefix(PREFIX)
+    return str(attributes.get("path", name))
+
+
+def along(data: xarray.Dataset, dim: str) -> dict[str, xarray.DataArray]:
+    """What each case has one of, by path; also by the variable's name where that is another. `case` is its position."""
+    out = {CASE: data[dim]}
+    for name in map(str, data.variables):
+        if data[name].dims == (dim,):
+            attributes = data[name].attrs
+            own = name.removeprefix(PREFIX) if attributes.get("role") == "recorded" else name
+            out.setdefault(own, data[name])
+            out.setdefault(path_of(name, attributes), data[name])
+    return out
+
+
+def varied(data: xarray.Dataset, dim: str) -> dict[str, xarray.DataArray]:
+    """What is varied, by path, along a dimension of cases, in the deck's order: choices, parameters, repeats."""
+    if dim == RECORDED and CASE in data.dims:
+        places = positions(data[CASE].values, data[RECORDED].values)
+        if places is not None:
+            cases = varied(data, CASE)
+            return {path: array.isel({CASE: places}).rename({CASE: RECORDED}) for path, array in cases.items()}
+    roles = ("choice", "coordinate", "recorded")
+    found = {
+        path_of(name, data[name].attrs): data[name]
+        for name in map(str, data.variables)
+        if data[name].dims == (dim,) and data[name].attrs.get("role") in roles and name != f"{PREFIX}case_id"
+    }
+    repeated = data.variables.get(REPEAT)
+    if repeated is not None and repeated.dims == (dim,) and repeated.values.any():
+        found[REPEAT] = data[REPEAT]
+    return found
+
+
+def positions(values: np.ndarray, wanted: np.ndarray) -> np.ndarray | None:
+    """Where these are among rising values; None where one is not there."""
+    places = np.searchsorted(values, wanted)
+    if len(values) == 0 or (places == len(values)).any():
+        return None if len(wanted) else places
+    return places if (values[places] == wanted).all() else None
+
+
+def name_of(data: xarray.Dataset | xarray.DataTree) -> str:
+    """Of the run, sweep or structure that a Dataset is of; "" where it does not say."""
+    return str(data.attrs.get("experiment", ""))
+
+
+def asked(data: xarray.Dataset) -> str:
+    """Of the run or sweep, by which a user asks for it."""
+    return str(data.attrs.get("sweep") or name_of(data))
+
+
+def missing(parts: Sequence[xarray.Dataset], name: str, what: str, known: Iterable[str]) -> Problem:
+    """E385: something is asked for by a name that nothing here has. what: `no link`, `nothing`."""
+    names = list(dict.fromkeys(known))
+    some = ", ".join(names[:MOST_NAMES]) + (" ..." if len(names) > MOST_NAMES else "")
+    helps = [*did_you_mean(name, names), f"there are: {some}" if names else "there are none"]
+    if any(name in data.dims for data in parts):
+        helps.insert(0, f"`{name}` is a dimension: `data.sel({name}=...)`")
+    where = ", ".join(dict.fromkeys(f"`{asked(data)}`" for data in parts if asked(data)))
+    return Problem(error("E385", f"{what} `{name}`" + (f" in {where}" if where else ""), help=helps))

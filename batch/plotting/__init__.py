@@ -1,0 +1,108 @@
+"""`met plot`: an archive as a picture, for a screen or for a paper.
+
+    batch.plotting.plot("two_link.h5")                                       # -> two_link.png
+    batch.plotting.plot("a.h5", "fig3.svg", ["settle"], over=["gearbox.kp", "gearbox.ki"], size="8.5cm")
+
+`asked` says whether signals or metrics are meant; `histories`, `points` and `maps` draw them, over `layout`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from batch.archive.read import ArchiveFile, Group
+    from batch.plotting.sheet import Sheet
+
+
+def plot(
+    path: str | os.PathLike[str],
+    output: str | os.PathLike[str] | None = None,
+    names: Sequence[str] = (),
+    *,
+    run: str | None = None,
+    cases: Sequence[str] = (),
+    over: Sequence[str] = (),
+    against: str | os.PathLike[str] | None = None,
+    size: str = "",
+    dpi: int | None = None,
+) -> Path:
+    """Draw one run or sweep of an archive; the picture. The same archive gives the same bytes.
+
+    output   PNG, SVG or PDF by its ending; None: beside the archive, `ARCHIVE.png`
+    names    signals (`qd`, `elbow.q`), which are drawn over time, or metrics; none: histories where they were kept,
+             else metrics
+    run      its name; None: the first
+    cases    only these, by `#7` or the beginning of an id: of signals
+    over     what is varied, by its path: metrics as points over one parameter, as maps over two, beside one another for
+             each value of a third
+    against  another archive: its cases of the same values under the own ones; in maps the difference, own less theirs
+    size     for a paper: `8.5cm` wide, or `8.5x6cm`; letters are then of 8 pt, and a caption says what is drawn
+    dpi      dots of a PNG; None: 144, on paper 300
+
+    Raises met.diagnostic.Problem for what a user can mend.
+    """
+    from batch.archive.read import ArchiveFile
+    from batch.plotting.sheet import sheet
+
+    on = sheet(size, dpi)
+    with contextlib.ExitStack() as files:
+        archive = files.enter_context(ArchiveFile(Path(path)))
+        other = None if against is None else files.enter_context(ArchiveFile(Path(against)))
+        target = Path(output) if output is not None else archive.path.with_suffix(".png")
+        return draw(archive, target, names, run=run, cases=cases, over=over, against=other, sheet=on)
+
+
+def draw(
+    archive: ArchiveFile, output: str | os.PathLike[str], names: Sequence[str] = (), *, run: str | None = None,
+    cases: Sequence[str] = (), over: Sequence[str] = (), against: ArchiveFile | None = None, sheet: Sheet | None = None,
+) -> Path:  # fmt: skip
+    """The same of archives that are open."""
+    from batch.plotting import histories, metrics
+    from batch.plotting import output as place
+    from batch.plotting.against import beside
+    from batch.plotting.asked import asked
+    from batch.plotting.sheet import Sheet
+    from batch.report.pool import pools
+    from batch.show import chosen
+
+    target, sheet = Path(output), sheet or Sheet()
+    groups = chosen(archive, (run,) if run else ())
+    group = _with_case(groups, cases[0]) if cases else groups[0]
+    place.check(target)
+    [pool] = [pool for pool in pools(groups) if group in pool.groups]
+    wanted = asked(group, pool, names, cases, over)
+    with _matplotlib().rc_context(sheet.style):
+        if wanted.histories:
+            found = None if against is None else beside(archive, [group], against)[0]
+            figure = histories.Histories(archive, group, wanted.signals, cases, sheet, found).draw()
+        else:
+            theirs = [None] * len(pool.groups) if against is None else beside(archive, pool.groups, against)
+            others = {number: each for number, each in enumerate(theirs) if each is not None}
+            figure = metrics.draw(archive, pool, wanted.metrics, over, sheet, others, against)
+        place.save(figure, target)
+    return target
+
+
+def _with_case(groups: Sequence[Group], case: str) -> Group:
+    """The first experiment that has a case; the first of all where none has it, which says so."""
+    from met.diagnostic import Problem
+
+    for group in groups:
+        with contextlib.suppress(Problem):
+            group.find_case(case)
+            return group
+    return groups[0]
+
+
+def _matplotlib() -> Any:
+    """matplotlib without pyplot, and without its remarks about caches of fonts."""
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    import matplotlib
+
+    return matplotlib

@@ -1,0 +1,118 @@
+"""Another archive beside the one that is drawn: its cases by what is varied in them, its signals by their channels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from batch.archive.read import ArchiveFile, Group
+from batch.differences import matching
+from batch.output import quoted
+from batch.signals import Panel, pretty_unit
+from met.channel import channel_paths
+from met.diagnostic import Problem, error
+
+
+class Beside:
+    """The group of another archive that is matched with one that is drawn.
+
+    places  of each case of the drawn group its position in the other; -1 where it is not there
+    """
+
+    def __init__(self, drawn: Group, group: Group, names: tuple[str, str]) -> None:
+        self.drawn, self.group = drawn, group
+        self.own, self.name = names
+        found = matching.cases(drawn, group)
+        self.places = np.full(drawn.count, -1)
+        self.places[found.a] = found.b
+
+    @cached_property
+    def time(self) -> np.ndarray:
+        return self.group.values("time")
+
+    def recorded(self, positions: Sequence[int]) -> dict[int, int]:
+        """By position of a drawn case the position of the same in the other, where its history was kept."""
+        kept = set(self.group.recorded_positions.tolist())
+        found = {position: int(self.places[position]) for position in positions}
+        return {position: place for position, place in found.items() if place in kept}
+
+    def columns(self, panel: Panel) -> list[int]:
+        """Where the other has each line of a panel, as `Panel.columns`; -1 where it has not. Raises Problem E393 where
+        it has it in another unit."""
+        theirs = _channels(self.group, panel.variable)
+        mine = {column: path for path, (column, _) in _channels(self.drawn, panel.variable).items()}
+        out = []
+        for column in panel.columns:
+            place, unit = theirs.get(mine[column], (-1, panel.unit))
+            if unit != panel.unit:
+                raise unlike(mine[column], panel.unit, unit, self)
+            out.append(place)
+        return out
+
+    def history(self, panel: Panel, columns: Sequence[int], place: int) -> np.ndarray:
+        """The panel's lines in the other's case at this position: (its time, line); not a number where it has none."""
+        values = self.group.signal(panel.variable, place)
+        values = values.reshape(len(values), -1)
+        lacking = np.full(len(values), np.nan)
+        return np.stack([values[:, column] if column >= 0 else lacking for column in columns], axis=1)
+
+
+def _channels(group: Group, name: str) -> dict[str, tuple[int, str]]:
+    """By channel: where it lies among a signal's columns, and its unit."""
+    variable = group.variables.get(name)
+    if variable is None or variable.role != "signal":
+        return {}
+    joints, components = group.joints(variable), group.components(variable)
+    units = variable.units_by_joint or (variable.unit,) * max(1, len(joints))
+    width = max(1, len(components))
+    paths = channel_paths(name, joints, components)
+    return {path: (column, units[column // width if joints else 0]) for column, path in enumerate(paths)}
+
+
+def unlike(name: str, mine: str, theirs: str, beside: Beside) -> Problem:
+    units = [pretty_unit(unit) if unit not in ("", "1") else "no unit" for unit in (mine, theirs)]
+    message = f"`{name}` is in {units[0]} in {beside.own}, and in {units[1]} in {beside.name}"
+    helps = ("name what is alike in both", _differ(beside.drawn.path, beside.group.path))
+    return Problem(error("E393", message, help=helps))
+
+
+def lacking(name: str, beside: Beside, there: Sequence[str]) -> Problem:
+    """What is drawn is not in the other archive. there: what is."""
+    helps = f"in {beside.name}: {', '.join(there)}" if there else _differ(beside.drawn.path, beside.group.path)
+    return Problem(error("E393", f"no `{name}` in {beside.name} to draw against", help=helps))
+
+
+def beside(archive: ArchiveFile, groups: Sequence[Group], other: ArchiveFile) -> list[Beside | None]:
+    """Of each group the other archive's; none where that has not this structure. Raises Problem E393 where nothing is
+    the same in the two."""
+    names = file_names(archive.path, other.path)
+    pairs = {id(mine): theirs for mine, theirs in matching.experiments(archive, other)[0]}
+    found = [Beside(group, pairs[id(group)], names) if id(group) in pairs else None for group in groups]
+    if not any(found):
+        asked = groups[0].sweep or groups[0].name
+        known = dict.fromkeys(group.sweep or group.name for group in other.groups)
+        message = f"no run or sweep `{asked}` in {names[1]} to draw against"
+        raise Problem(error("E393", message, help=f"in it: {', '.join(known)}"))
+    if not any((each.places >= 0).any() for each in found if each is not None):
+        message = f"no case of `{groups[0].sweep or groups[0].name}` is in both {names[0]} and {names[1]}"
+        helps = ("cases are the same where what is varied has the same values", _differ(archive.path, other.path))
+        raise Problem(error("E393", message, help=helps))
+    return found
+
+
+def file_names(a: Path, b: Path) -> tuple[str, str]:
+    """What the two are called in a picture: names of files, with folders where these are the same."""
+    one, other = (a.name, b.name) if a.name != b.name else (str(a), str(b))
+    return _labelling(one), _labelling(other)
+
+
+def _labelling(name: str) -> str:
+    """matplotlib leaves out of a legend what begins with `_`."""
+    return f"./{name}" if name.startswith("_") else name
+
+
+def _differ(a: Path, b: Path) -> str:
+    return f"`met diff {quoted(a)} {quoted(b)}` says what differs"

@@ -1,0 +1,165 @@
+"""What is asked for: signals over time, or metrics over what is varied; and over which parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from batch.archive.read import ArchiveFile, Group, Stored
+from batch.grids import is_grid, levels
+from batch.output import quoted
+from batch.report.content import Column
+from batch.report.pool import Pool
+from batch.signals import number_text, panels
+from met.diagnostic import Problem, did_you_mean, error
+from met.frozen import frozen
+
+MOST_OVER = 3
+MOST_BESIDE = 6
+"""Maps beside one another, one for each value of a third parameter."""
+
+MAPPED = 5
+"""Values that two parameters must have for a map where none is asked for: of fewer, curves say more."""
+
+
+@frozen
+class Asked:
+    """Signals, or metrics; of these both are empty where none is named."""
+
+    signals: tuple[str, ...] = ()
+    metrics: tuple[str, ...] = ()
+    histories: bool = True
+
+
+def asked(group: Group, pool: Pool, names: Sequence[str], cases: Sequence[str], over: Sequence[str]) -> Asked:
+    """Signals or metrics, by what the names are, and by the other options. Raises Problem E323, E324, E391."""
+    metrics = {name: v for v in pool_metrics(pool) for name in (v.path, v.name)}
+    signals, others = [], []
+    for name in names:
+        if _is_signal(group, name):
+            signals.append(name)
+        elif name in metrics:
+            others.append(metrics[name].name)
+        else:
+            raise _unknown(group, name, list(metrics))
+    if signals and others:
+        message = f"`{signals[0]}` is a signal and `{others[0]}` a metric: they have no axis in common"
+        raise Problem(error("E391", message, help="draw two pictures, each with a name of its own: `-o FILE`"))
+    if signals and over:
+        message = f"`{signals[0]}` is a signal, which is drawn over time, and not over `{over[0]}`"
+        known = f": {', '.join(dict.fromkeys(v.path for v in metrics.values()))}" if metrics else ""
+        raise Problem(error("E391", message, help=f"`--over` is of metrics{known}"))
+    if cases and (others or over):
+        message = f"`--case` is of signals, and {f'`{others[0]}` is a metric' if others else '`--over` of metrics'}"
+        raise Problem(error("E391", message, help="a case's metrics are numbers: `met show --case` tells them"))
+    if others or over:
+        return Asked(metrics=tuple(dict.fromkeys(others)), histories=False)
+    whole = group.recorded == group.count or (group.recorded > 0 and not group.role("metric"))
+    return Asked(signals=tuple(signals), histories=bool(signals or cases or whole))
+
+
+def pool_metrics(pool: Pool) -> list[Stored]:
+    """The metrics of all groups, by name."""
+    return list({v.name: v for group in reversed(pool.groups) for v in group.role("metric")}.values())
+
+
+def _is_signal(group: Group, name: str) -> bool:
+    try:
+        panels(group, [name])
+    except Problem:
+        return False
+    return True
+
+
+def _unknown(group: Group, name: str, metrics: Sequence[str]) -> Problem:
+    """What is said of a name that is neither: of signals what `panels` says."""
+    signals = [v.name for v in group.role("signal")]
+    here = f"metrics here: {', '.join(dict.fromkeys(metrics))}"
+    if signals and metrics:
+        helps = [*did_you_mean(name, [*signals, *metrics]), f"signals here: {', '.join(signals)}", here]
+        return Problem(error("E324", f"no signal or metric `{name}` in `{group.name}`", help=helps))
+    try:
+        panels(group, [name])
+    except Problem as problem:
+        [told] = problem.diagnostics
+        meant = did_you_mean(name, metrics) if not signals else ()
+        return Problem(error(told.code, told.message, help=[*meant, *told.help, *([here] if metrics else [])]))
+    raise AssertionError(name)
+
+
+# Over what
+
+
+def over(archive: ArchiveFile, pool: Pool, names: Sequence[str]) -> tuple[Column, ...]:
+    """What metrics are drawn over: the parameters that are named; else two that make a grid of some size, or the one
+    with most values; none where nothing is varied. Raises Problem E390."""
+    varied = pool.varied()
+    if not names:
+        x, y = (*varied, None, None)[:2]
+        if x is None or y is None:
+            return varied[:1]
+        mapped = min(len(levels(x.values)), len(levels(y.values))) >= MAPPED and is_grid(x.values, y.values)
+        return (x, y) if mapped else (x,)
+    known = {column.label: column for column in varied}
+    if len(names) > MOST_OVER:
+        helps = "one gives points, two a map, a third maps beside one another"
+        raise Problem(error("E390", f"{len(names)} parameters in `--over`: {MOST_OVER} at most", help=helps))
+    for place, name in enumerate(names):
+        if name not in known:
+            raise _not_varied(archive, pool, name, list(known))
+        if name in names[:place]:
+            raise Problem(error("E390", f"`{name}` twice in `--over`", help=_here(list(known))))
+    found = tuple(known[name] for name in names)
+    count = len(levels(found[2].values)) if len(found) > 2 else 0
+    if count > MOST_BESIDE:
+        message = f"`{names[2]}` has {count:,} values: a map for each of them is more than {MOST_BESIDE}"
+        shorter = f"`--over {names[0]},{names[1]}` shows in each cell the worst case or the middle one"
+        raise Problem(error("E390", message, help=("as the third take what has few values", shorter)))
+    return found
+
+
+def _not_varied(archive: ArchiveFile, pool: Pool, name: str, known: Sequence[str]) -> Problem:
+    helps = [*did_you_mean(name, known), _here(known)]
+    for column in pool.columns:
+        if column.label == name and column.role != "metric":
+            value = column.values[np.isfinite(column.values)][:1]
+            words = column.words[int(value[0])] if column.words else number_text(float(value[0])) if len(value) else "-"
+            message = f"`{name}` has one value in all cases of `{pool.name}`: {words} {column.unit}".rstrip()
+            return Problem(error("E390", message, help=helps))
+        if column.label == name:
+            message = f"`{name}` is a metric: it is drawn over what is varied"
+            return Problem(error("E390", message, help=[f"`met plot {quoted(archive.path)} {name}`", _here(known)]))
+    if pool.count == 1:
+        return Problem(error("E390", f"`{pool.name}` is one case: nothing is varied in it", help=()))
+    message = f"`{name}` is not varied in `{pool.name}`" if _is_parameter(archive, pool, name) else (
+        f"no parameter `{name}` is varied in `{pool.name}`")  # fmt: skip
+    return Problem(error("E390", message, help=helps))
+
+
+def _is_parameter(archive: ArchiveFile, pool: Pool, name: str) -> bool:
+    try:
+        experiments = archive.plan(as_written=True).experiments
+    except Problem:
+        return False
+    names = {group.name for group in pool.groups}
+    return any(name in each.parameters for each in experiments if each.name in names)
+
+
+def _here(known: Sequence[str]) -> str:
+    return f"varied here: {', '.join(known)}" if known else "nothing is varied here"
+
+
+def coloured(pool: Pool, drawn: Sequence[Column]) -> Column | None:
+    """What tells points over one parameter apart by colour: of what else is varied that with most values, which does
+    not go in step with it."""
+    for column in pool.varied():
+        if all(column is not each for each in drawn) and free(column, drawn[0]):
+            return column
+    return None
+
+
+def free(column: Column, other: Column) -> bool:
+    """Whether a column does not rise, or fall, wherever another one rises."""
+    ranks, others = (np.searchsorted(levels(each.values), each.values) for each in (column, other))
+    return not (np.array_equal(ranks, others) or np.array_equal(ranks, others.max(initial=0) - others))

@@ -1,0 +1,304 @@
+"""Signals over time. One case: a line a joint. Up to `OVERLAID` cases: a column a joint, a line a case. More: a line
+for the median of all cases, a dark band for nine in ten and a light one for all.
+
+A recorded command is dashed over what should follow it. Another archive's cases lie wide and pale under these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from batch.archive.read import ArchiveFile, Group, Stored
+from batch.arrange import Cell, Command, arranged, joints_of, overlaid, spread
+from batch.output import quoted
+from batch.plotting import layout
+from batch.plotting.against import Beside, lacking
+from batch.plotting.sheet import COLOURS, FAINT, INK, Sheet, sequence
+from batch.signals import Panel, case_text, deck_unit, history, number_text, panels
+from met.diagnostic import Problem, error
+
+OVERLAID = 8
+LEGEND_EVERY = 4
+"""Panels under one another that a legend serves at most."""
+
+MOST_COLUMNS = 3
+LEAST_COLUMN = 1.5
+"""Inches of a column of panels on paper."""
+
+COMMAND = "command"
+DASHED: dict[str, Any] = {"linestyle": (0, (4, 3)), "linewidth": 1.0}
+WIDER, PALE = 3.0, 0.35
+"""How another archive's lines are drawn: so much wider than the own ones, and so opaque."""
+
+
+class Histories:
+    """The signals of some cases of a group, and how they are drawn."""
+
+    def __init__(
+        self, archive: ArchiveFile, group: Group, signals: Sequence[str], cases: Sequence[str], sheet: Sheet,
+        other: Beside | None,
+    ) -> None:  # fmt: skip
+        self.archive, self.group, self.sheet, self.other = archive, group, sheet, other
+        panels(group)  # refuses an archive without histories
+        found = panels(group, signals)
+        chosen = [group.recorded_position(case) for case in cases]
+        self.positions: list[int] = chosen or group.recorded_positions.tolist()
+        self.single, self.fan = len(self.positions) == 1, len(self.positions) > OVERLAID
+        self.time = group.values("time")
+        self.joints = joints_of(group)
+        self.commands = overlaid(group, found, self.positions, apart=not self.single and not self.fan)
+        if not signals:  # a command that is drawn where it belongs needs no panel of its own
+            drawn = {(command.variable, command.column) for command in self.commands.values()}
+            found = [panel for panel in found if not drawn.issuperset((panel.variable, c) for c in panel.columns)]
+        self.panels = found
+        self.pairs, self.theirs = self._against(bool(signals))
+
+    def _against(self, asked: bool) -> tuple[dict[int, int], dict[int, list[int]]]:
+        """By position of a case that of the other archive's, and by number of a panel where its lines are there."""
+        other = self.other
+        if other is None:
+            return {}, {}
+        if not other.group.role("signal"):
+            message = f"no histories of `{other.group.name}` are in {other.name} to draw against"
+            helps = f"`met run {quoted(other.group.path)} --all --histories all` runs it again with them"
+            raise Problem(error("E393", message, help=helps))
+        pairs = other.recorded(self.positions)
+        if not pairs:
+            message = f"no case that is drawn has its history in {other.name}"
+            raise Problem(error("E393", message, help=f"`met show {quoted(other.group.path)}` lists its cases"))
+        columns = {number: other.columns(panel) for number, panel in enumerate(self.panels)}
+        for number, places in columns.items():
+            if asked and max(places) < 0:
+                raise lacking(self.panels[number].name, other, [each.name for each in other.group.role("signal")])
+        return pairs, columns
+
+    def draw(self) -> Any:
+        rows = arranged(self.group, self.panels)
+        most = MOST_COLUMNS if not self.sheet.width else max(1, int(self.sheet.width / LEAST_COLUMN))
+        by_joint = self.single or len(rows[0]) > most
+        if by_joint:
+            rows = [[Cell(panel, tuple(range(len(panel.lines))), panel.axis, panel.about)] for panel in self.panels]
+        flat = [not self.fan and self._is_zero(row) for row in rows]
+        figure, axes = grid(self.sheet, rows, flat)
+        for cells, row in zip(rows, axes, strict=True):
+            for cell, ax in zip(cells, row, strict=True):
+                if cell is not None:
+                    self._cell(ax, cell, by_joint)
+        dress(axes, rows, self.sheet)
+        self._legend(figure, axes, rows, flat, by_joint)
+        layout.title(figure, self.archive, self.group.name, self._below(), self.sheet)
+        return figure
+
+    def _below(self) -> str:
+        count = len(self.positions)
+        if self.single:
+            below = case_text(self.group, self.positions[0]) if self.group.attributes["cases_in_table"] > 1 else ""
+        else:
+            below = f"{count:,} cases" + (": median, nine in ten, and all" if self.fan else "")
+        if self.other is not None and len(self.pairs) < count:
+            below += f"; {len(self.pairs):,} of them also in {self.other.name}"
+        return below
+
+    def _is_zero(self, row: Sequence[Cell | None]) -> bool:
+        """Whether nothing of a row is ever other than zero."""
+        cells = [cell for cell in row if cell is not None]
+        return not any(
+            np.any(history(self.group, cell.panel, position)[:, list(cell.lines)])
+            for cell in cells for position in self.positions
+        )  # fmt: skip
+
+    def _cell(self, ax: Any, cell: Cell, by_joint: bool) -> None:
+        panel = cell.panel
+        for line in cell.lines:
+            colour = self._joint_colour(panel, line)
+            self._their_lines(ax, panel, line, colour if by_joint or self.fan else None)
+            if self.single:
+                thin = 0.75 if self.sheet.paper else 1.0
+                style = {"linewidth": thin * _width(line, len(panel.lines)), "linestyle": _dashes(line)}
+                y = history(self.group, panel, self.positions[0])[:, line]
+                _line(ax, self.time, y, color=colour, label=panel.lines[line] or None, **style)
+            elif self.fan:
+                self._fan(ax, panel, line, colour)
+            else:
+                self._overlay(ax, panel, line, colour if by_joint else None)
+        for line in cell.lines:
+            self._draw_command(ax, self.commands.get((panel.name, panel.unit, line)))
+        ax.margins(x=0.0)
+
+    def _joint_colour(self, panel: Panel, line: int) -> str:
+        """A joint has one colour in all panels, also where a signal is its alone (`shoulder.servo.voltage`); components
+        of one vector have the colours in turn."""
+        joint = panel.joints[line]
+        own = joint in self.joints and panel.joints.count(joint) == 1
+        return COLOURS[(self.joints.index(joint) if own else line) % len(COLOURS)]
+
+    def _fan(self, ax: Any, panel: Panel, line: int, colour: str) -> None:
+        """Median, nine in ten, all."""
+        values = np.stack([history(self.group, panel, position)[:, line] for position in spread(self.positions)])
+        good = np.isfinite(values).any(axis=0)
+        time, values = self.time[good], values[:, good]
+        if not len(time):
+            return
+        low, five, middle, ninety_five, high = np.nanpercentile(values, (0, 5, 50, 95, 100), axis=0)
+        ax.fill_between(time, low, high, color=colour, alpha=0.15, linewidth=0)
+        ax.fill_between(time, five, ninety_five, color=colour, alpha=0.30, linewidth=0)
+        ax.plot(time, middle, color=colour, label=panel.lines[line] or None)
+
+    def _overlay(self, ax: Any, panel: Panel, line: int, colour: str | None) -> None:
+        """A line a case; where joints share the panel they have the colours, and cases are told apart by how faint."""
+        count = len(self.positions)
+        for index, position in enumerate(self.positions):
+            y = history(self.group, panel, position)[:, line]
+            if colour is not None:
+                alpha = 1.0 - 0.7 * index / max(1, count - 1)
+                label = panel.lines[line] if index == 0 and panel.lines[line] else None
+                _line(ax, self.time, y, color=colour, alpha=alpha, linewidth=1.0, label=label)
+            else:
+                _line(ax, self.time, y, color=sequence(index, count), label=_case_label(self.group, position))
+
+    def _their_lines(self, ax: Any, panel: Panel, line: int, colour: str | None) -> None:
+        """The other archive's cases under the own ones; of a fan its median, and nine in ten between dots."""
+        other, columns = self.other, self.theirs.get(self.panels.index(panel), [])
+        if other is None or columns[line] < 0:
+            return
+        style: dict[str, Any] = {"alpha": PALE, "solid_capstyle": "butt", "zorder": 1.8}
+        if self.fan:
+            places = list(self.pairs.values())
+            values = np.stack([other.history(panel, columns, place)[:, line] for place in spread(places)])
+            good = np.isfinite(values).any(axis=0)
+            if good.any():
+                five, middle, ninety_five = np.nanpercentile(values[:, good], (5, 50, 95), axis=0)
+                ax.plot(other.time[good], middle, color=colour, linewidth=1.4 + WIDER, **style)
+                for edge in (five, ninety_five):
+                    ax.plot(other.time[good], edge, color=colour, linewidth=1.0, linestyle=":")
+            return
+        for index, position in enumerate(self.positions):
+            if position in self.pairs:
+                y = other.history(panel, columns, self.pairs[position])[:, line]
+                tone = colour or sequence(index, len(self.positions))
+                ax.plot(other.time, y, color=tone, linewidth=1.2 + WIDER, **style)
+
+    def _draw_command(self, ax: Any, command: Command | None) -> None:
+        """Dashed, over what followed it; in the cases' colours where each has its own."""
+        if command is None:
+            return
+        if command.shared:
+            known = COMMAND in ax.get_legend_handles_labels()[1]
+            label = None if known else COMMAND
+            ax.plot(self.time, command.values(self.group, command.longest), color=INK, label=label, **DASHED)
+            return
+        for index, position in enumerate(self.positions):
+            colour = sequence(index, len(self.positions))
+            ax.plot(self.time, command.values(self.group, position), color=colour, **DASHED)
+        ax.plot([], [], color=INK, label=COMMAND, **DASHED)
+
+    def _legend(
+        self, figure: Any, axes: list[list[Any]], rows: Sequence[Sequence[Cell | None]], flat: Sequence[bool],
+        by_joint: bool,
+    ) -> None:  # fmt: skip
+        """Beside the panels, once for some that share it; not beside a flat one, where it has no room."""
+        archives = self._archives()
+        if by_joint and not self.sheet.narrow:
+            last: list[str] | None = None
+            since = 0
+            for row, low in zip(axes, flat, strict=True):
+                handles, labels = row[0].get_legend_handles_labels()
+                since += 1
+                if (labels or (archives and last is None)) and (labels != last or (since > LEGEND_EVERY and not low)):
+                    row[0].legend(
+                        [*handles, *archives.values()], [*labels, *archives], loc="upper left",
+                        bbox_to_anchor=(1.005, 1.06), fontsize=self.sheet.small, handlelength=1.4,
+                    )  # fmt: skip
+                    last, since = labels, 1
+            return
+        known = layout.labelled([[ax for cell, ax in zip(cells, row, strict=True) if cell is not None]
+                                 for cells, row in zip(rows, axes, strict=True)])  # fmt: skip
+        if self.fan and not by_joint:  # its panels have their joints' names above them
+            known = {text: handle for text, handle in known.items() if text == COMMAND}
+        command = {text: known.pop(text) for text in [COMMAND] if text in known}
+        title = _case_title(self.group) if known and not self.fan and not by_joint else None
+        layout.legend(figure, known | command | archives, self.sheet, title)
+
+    def _archives(self) -> dict[str, Any]:
+        """What the legend says of the two archives."""
+        from matplotlib.lines import Line2D
+
+        if self.other is None:
+            return {}
+        theirs = Line2D([], [], color=INK, linewidth=1.2 + WIDER, alpha=PALE, solid_capstyle="butt")
+        return {self.other.own: Line2D([], [], color=INK, linewidth=1.4), self.other.name: theirs}
+
+
+def _width(line: int, count: int) -> float:
+    """The first lines are wider, so that they are seen under those that run over them."""
+    widest = 2.6 if count <= 3 else 2.0
+    return 1.4 if count == 1 else widest - (widest - 1.2) * line / (count - 1)
+
+
+def _dashes(line: int) -> str:
+    """Where there are more joints than colours."""
+    return ("-", "--", ":", "-.")[line // len(COLOURS) % 4]
+
+
+def _line(ax: Any, time: np.ndarray, y: np.ndarray, **style: Any) -> None:
+    """A line; a cross where it breaks off."""
+    ax.plot(time, y, **style)
+    valid = np.flatnonzero(np.isfinite(y))
+    if len(valid) and valid[-1] < len(y) - 1:
+        ax.plot(time[valid[-1]], y[valid[-1]], marker="x", markersize=6, color=style["color"])
+
+
+def _differing(group: Group) -> list[Stored]:
+    """The varied parameters that tell the cases here apart."""
+    return [v for v in group.role("coordinate") if len(np.unique(group.values(v.name))) > 1]
+
+
+def _case_label(group: Group, position: int) -> str:
+    """The values of what differs; the legend's title says of what."""
+    values = [number_text(group.values(v.name)[position] / deck_unit(v)[0]) for v in _differing(group)]
+    return " · ".join(values) or f"case #{group.values('case')[position]}"
+
+
+def _case_title(group: Group) -> str:
+    """What the values in the legend are of, a line each."""
+    return " ·\n".join(f"{v.name}  ({deck_unit(v)[1]})" if deck_unit(v)[1] else v.name for v in _differing(group))
+
+
+# Panels
+
+
+def grid(sheet: Sheet, rows: Sequence[Sequence[Cell | None]], flat: Sequence[bool]) -> tuple[Any, list[list[Any]]]:
+    """Axes for all cells; time shared, and in a row the scale of what has the same unit. flat: which rows are low."""
+    figure, axes = layout.figure(sheet, len(rows[0]), [layout.FLAT if low else 1.0 for low in flat])
+    for ax in (ax for row, low in zip(axes, flat, strict=True) for ax in row if low):
+        ax.set_yticks([0.0])
+    for cells, row in zip(rows, axes, strict=True):
+        first: dict[str, Any] = {}
+        for cell, ax in zip(cells, row, strict=True):
+            if cell is None:
+                ax.set_visible(False)
+            elif cell.axis in first:
+                ax.sharey(first[cell.axis])
+            else:
+                first[cell.axis] = ax
+    return figure, axes
+
+
+def dress(axes: list[list[Any]], rows: Sequence[Sequence[Cell | None]], sheet: Sheet) -> None:
+    """Labels of the axes, once where neighbours share them, and above each panel what it shows."""
+    for number, (cells, row) in enumerate(zip(rows, axes, strict=True)):
+        before = None
+        for column, (cell, ax) in enumerate(zip(cells, row, strict=True)):
+            if cell is not None:
+                alike = before is not None and before.axis == cell.axis
+                ax.set_ylabel("" if alike else layout.broken(cell.axis))
+                ax.tick_params(labelleft=not alike)
+                text = cell.title.partition(" · ")[0] if sheet.narrow and len(cells) > 1 else cell.title
+                layout.head(ax, text, sheet, len(cells), INK if len(cells) > 1 or sheet.paper else FAINT)
+                last = all(later[column] is None for later in rows[number + 1 :])
+                ax.set_xlabel("time  (s)" if last else "")
+                ax.tick_params(labelbottom=last)
+            before = cell

@@ -1,0 +1,129 @@
+"""Panels under and beside one another, what is written on them, and where legends and the title stand."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from pathlib import PurePath
+from typing import Any
+
+from batch.archive.read import ArchiveFile
+from batch.plotting.sheet import FAINT, INK, Sheet
+
+PANEL_INCHES, TALL_INCHES = 1.85, (4.2, 2.9)
+FLAT = 0.3
+"""Height of a row that is zero throughout, against the others."""
+
+WIDE, TALL = (1.1, 0.4, 1.5), (1.3, 0.62, 2.6)
+"""On paper: the least and the greatest height of a panel in inches, and between them height against width."""
+
+LETTER = 0.56
+"""Mean width of a letter of DejaVu Sans, against its size."""
+
+BESIDE, BESIDE_ON_PAPER = 1.0, 0.75
+"""Inches of a panel's width that its numbers and its label take."""
+
+LINE = 1.45
+"""From line to line, against the letters' size."""
+
+TICK_INCHES = 0.5
+"""On paper: of a number below a panel, with room around it."""
+
+
+def figure(
+    sheet: Sheet, columns: int, heights: Sequence[float], *, tall: bool = False, share_y: bool = False
+) -> tuple[Any, list[list[Any]]]:
+    """A figure and its axes, row by row, which share what is below. heights: of the rows, against one another; tall:
+    panels are nearly as high as they are wide."""
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    if sheet.paper:
+        engine = ConstrainedLayoutEngine(h_pad=0.04, w_pad=0.03, hspace=0.02)
+        width = sheet.width or 0.0
+        least, slope, most = TALL if tall else WIDE
+        panel = min(most, max(least, slope * width / columns))
+        height = sheet.height or panel * max(sum(heights), 1.0) + 0.5
+    else:
+        engine = ConstrainedLayoutEngine(h_pad=0.05, w_pad=0.06, hspace=0.02)
+        width = TALL_INCHES[0] * columns + 1.6 if tall else 8.6 if columns == 1 else 3.6 * columns + 2.2
+        panel = TALL_INCHES[1] if tall else PANEL_INCHES
+        height = panel * max(sum(heights), 1.0 if tall else 1.5) + 1.0
+    made = Figure(figsize=(width, height), layout=engine)
+    axes = made.subplots(len(heights), columns, sharex=True, sharey=share_y, squeeze=False, height_ratios=list(heights))
+    if sheet.paper:  # its own choice of ticks counts on shorter numbers
+        axes[0][0].locator_params(axis="x", nbins=max(2, int((width / columns - BESIDE_ON_PAPER) / TICK_INCHES)))
+    return made, [list(row) for row in axes]
+
+
+def letters(sheet: Sheet, inches: float) -> int:
+    """How many letters of the small size stand side by side in a width."""
+    return max(12, int(inches * 72 / (LETTER * sheet.small)))
+
+
+def head(ax: Any, text: str, sheet: Sheet, columns: int, colour: str = INK) -> None:
+    """What stands above a panel, in as many lines as its width asks for."""
+    wide = letters(sheet, ax.figure.get_figwidth() / columns - (BESIDE_ON_PAPER if sheet.paper else BESIDE))
+    parts = text.split(" · ") if len(text) > wide else [text]
+    lines = [line for part in parts for line in textwrap.wrap(part, wide)]
+    if ax.get_subplotspec().colspan.start == 0:
+        _grow(ax.figure, sheet, len(lines) - 1)
+    ax.set_title("\n".join(lines), loc="left", fontsize=sheet.small, color=colour, pad=3 if sheet.paper else 4)
+
+
+def _grow(figure: Any, sheet: Sheet, lines: float) -> None:
+    """On paper, room for so many lines more, unless the height is given."""
+    if sheet.paper and sheet.height is None:
+        figure.set_figheight(figure.get_figheight() + lines * LINE * sheet.small / 72)
+
+
+def broken(label: str, most: int = 16) -> str:
+    """A long label in two lines: name, unit."""
+    return label.replace("  (", "\n(") if len(label) > most else label
+
+
+def legend(
+    figure: Any, found: Mapping[str, Any], sheet: Sheet, title: str | None = None, *, below: bool = False
+) -> None:
+    """One for the whole picture, handles by their texts: right of the panels; under them on a narrow sheet, and where
+    that is asked for."""
+    if not found:
+        return
+    style: dict[str, Any] = {"fontsize": sheet.small, "alignment": "left", "title_fontsize": sheet.small}
+    if sheet.narrow or below:
+        longest = max(len(text) for text in found)
+        columns = max(1, int(figure.get_figwidth() * 72 / ((longest * LETTER + 4.0) * sheet.small)))
+        columns = min(columns, len(found))
+        title = textwrap.fill(title.replace("\n", " "), letters(sheet, figure.get_figwidth() - 0.2)) if title else None
+        _grow(figure, sheet, -(-len(found) // columns) + (title.count("\n") + 1 if title else 0) + 0.5)
+        style |= {"loc": "outside lower left", "ncols": columns, "columnspacing": 1.2}
+        style |= {"handlelength": 1.6, "borderaxespad": 0.2}
+    else:
+        style |= {"loc": "outside right upper"}
+    figure.legend(found.values(), found.keys(), title=title, **style)
+
+
+def labelled(axes: Sequence[Sequence[Any]]) -> dict[str, Any]:
+    """All that has a label in these panels: handle by text, each text once."""
+    known: dict[str, Any] = {}
+    for ax in (ax for row in axes for ax in row):
+        handles, labels = ax.get_legend_handles_labels()
+        known |= {text: handle for text, handle in zip(labels, handles, strict=True) if text not in known}
+    return known
+
+
+def title(figure: Any, archive: ArchiveFile, name: str, below: str, sheet: Sheet) -> None:
+    """On a screen deck and run, and `below` what is shown of it; on paper the latter alone."""
+    if sheet.paper:
+        if below:
+            text = textwrap.fill(below, letters(sheet, figure.get_figwidth() - 0.1))
+            _grow(figure, sheet, text.count("\n") + 1)
+            figure.suptitle(text, x=0.012, ha="left", fontsize=sheet.small, color=INK)
+        return
+    line = f"{PurePath(archive.deck.strip('<>')).name} · {name}"
+    lines = textwrap.wrap(below, letters(sheet, figure.get_figwidth() - 0.3)) if below else []
+    spare = "\n" * len(lines)
+    figure.suptitle(f"{line}{spare}", x=0.012, ha="left", fontsize=12, fontweight="bold", linespacing=1.5)
+    for number, each in enumerate(lines):
+        at = 1.0 - (0.42 + 0.2 * number) / figure.get_figheight()
+        figure.text(0.012, at, each, fontsize=sheet.small, color=FAINT, ha="left", va="center")

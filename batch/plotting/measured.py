@@ -1,0 +1,106 @@
+"""A metric of the cases of a run or sweep, in the deck's unit: its values, who misses what is required, what to say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from batch.plotting.against import Beside, lacking, unlike
+from batch.report.content import Column
+from batch.report.pool import Pool
+from batch.signals import deck_unit
+from met.frozen import frozen
+from met.run import DONE
+
+
+@frozen
+class Measured:
+    """values, theirs: of each case, theirs of the same case in another archive, none where there is no other; missed:
+    whether a requirement of the metric is."""
+
+    column: Column
+    values: np.ndarray
+    missed: np.ndarray
+    failed: np.ndarray
+    theirs: np.ndarray | None = None
+    theirs_missed: np.ndarray | None = None
+
+    @property
+    def label(self) -> str:
+        """What to write on the axis: `settle  (s)`."""
+        return f"{self.column.label}  ({self.column.unit})" if self.column.unit else self.column.label
+
+    @property
+    def worse(self) -> str:
+        """As `grids.standing` has it."""
+        return self.column.limits[0].sense if self.column.limits else ""
+
+    @property
+    def about(self) -> str:
+        """What it is, and how many cases miss what is required of it."""
+        parts = [self.column.about] if self.column.about else []
+        count = len(self.values)
+        if self.column.limits:
+            texts = " and ".join(limit.text for limit in self.column.limits)
+            missed = int(self.missed.sum())
+            parts.append(f"{texts}: missed by {missed:,} of {count:,}" if missed else f"{texts}: missed by none")
+        return " · ".join(parts)
+
+    @property
+    def difference(self) -> np.ndarray:
+        """Own less theirs; 0 where both are infinite alike."""
+        assert self.theirs is not None
+        same = self.values == self.theirs
+        with np.errstate(invalid="ignore"):
+            return np.where(same, 0.0, self.values - self.theirs)
+
+
+def measured(pool: Pool, names: Sequence[str], others: Mapping[int, Beside]) -> list[Measured]:
+    """The metrics of these names, all for none. others: by number of a group that of another archive. Raises Problem
+    E393 for a metric that it has in another unit, or which is named and not there."""
+    failed = pool.status != DONE
+    out = []
+    for column in pool.metrics():
+        name = column.key.partition(":")[2]
+        if not names or name in names:
+            missed = np.zeros(pool.count, bool)
+            for limit in column.limits:
+                missed |= pool.outcomes[:, pool.requirements.index(limit.text)] == 0
+            theirs, theirs_missed = _theirs(pool, name, [limit.text for limit in column.limits], others, bool(names))
+            out.append(Measured(column, column.values, missed, failed, theirs, theirs_missed))
+    return sorted(out, key=lambda each: _place(names, each.column.key.partition(":")[2]))
+
+
+def _place(names: Sequence[str], name: str) -> int:
+    return list(names).index(name) if name in names else 0
+
+
+def _theirs(
+    pool: Pool, name: str, required: Sequence[str], others: Mapping[int, Beside], asked: bool
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Of each case the metric in the other archive, in the unit of the own, and whether it misses what is required."""
+    if not others:
+        return None, None
+    out, missed, found = np.full(pool.count, np.nan), np.zeros(pool.count, bool), False
+    for number, other in others.items():
+        variable = other.group.variables.get(name)
+        mine = pool.groups[number].variables.get(name)
+        if mine is None:
+            continue
+        if variable is None or variable.role != "metric":
+            if asked:
+                raise lacking(name, other, [each.name for each in other.group.role("metric")])
+            continue
+        if variable.unit != mine.unit:
+            raise unlike(name, mine.unit, variable.unit, other)
+        found = True
+        here = np.flatnonzero(pool.group_of == number)
+        places = other.places[pool.position_of[here]]
+        here, places = here[places >= 0], places[places >= 0]
+        out[here] = other.group.values(name)[places] / deck_unit(mine)[0]
+        if "met" in other.group.variables:
+            texts = [str(text) for text in other.group.values("requirement")]
+            columns = [texts.index(text) for text in required if text in texts]
+            missed[here] = (other.group.values("met")[places][:, columns] == 0).any(axis=1)
+    return (out, missed) if found else (None, None)

@@ -1,0 +1,77 @@
+"""Metrics over what is varied: points over one parameter, maps over two."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from batch.archive.read import ArchiveFile
+from batch.output import quoted
+from batch.plotting import layout, maps, points
+from batch.plotting.against import Beside, file_names
+from batch.plotting.asked import coloured, free, over
+from batch.plotting.measured import Measured, measured
+from batch.plotting.sheet import Sheet
+from batch.report.content import Column
+from batch.report.pool import Pool
+from met.diagnostic import Problem, error
+
+
+def draw(
+    archive: ArchiveFile, pool: Pool, names: Sequence[str], parameters: Sequence[str], sheet: Sheet,
+    others: Mapping[int, Beside], other: ArchiveFile | None,
+) -> Any:  # fmt: skip
+    """The figure. names: of metrics, all for none; parameters: what they are drawn over, none: as is best. others: by
+    number of a group of the pool that of the other archive. Raises Problem E327, E390, E393."""
+    found = over(archive, pool, parameters)
+    if not pool.metrics():
+        helps = "`--histories all` keeps histories; a `metric` in the deck gives a number a case"
+        message = f"nothing to draw in `{pool.name}`: it has neither histories nor metrics"
+        raise Problem(error("E327", message, help=helps))
+    if pool.count < 2:
+        message = f"nothing to draw in `{pool.name}`: the metrics of one case are single numbers"
+        raise Problem(error("E327", message, help=f"`met show {quoted(archive.path)}` tells them"))
+    metrics = measured(pool, names, others)
+    files = file_names(archive.path, other.path) if other is not None else None
+    count = f"{pool.count:,} cases"
+    matched = sum(int((each.places >= 0).sum()) for each in others.values())
+    if files is not None and matched < pool.count:
+        count += f", {matched:,} of them also in {files[1]}"
+    if len(found) < 2:
+        by = coloured(pool, found) if found else None
+        figure = _points(pool, metrics, found[0] if found else None, by, sheet, files)
+        drawn = {each.key for each in (*found, by) if each is not None}
+        besides = [each.label for each in pool.varied() if each.key not in drawn and free(each, found[0])]
+        below = f"{count}; {' and '.join(besides)} varied too" if besides else count
+    else:
+        if files is not None:
+            metrics = [each for each in metrics if each.theirs is not None]
+        third = found[2] if len(found) > 2 else None
+        planned = maps.plan(found[0], found[1], third, files)
+        figure, _ = maps.draw(sheet, planned, metrics, third)
+        below = f"{count}: {maps.said(planned, metrics, third)}"
+    layout.title(figure, archive, pool.groups[0].name if len(pool.groups) == 1 else pool.name, below, sheet)
+    return figure
+
+
+def _points(
+    pool: Pool, metrics: Sequence[Measured], x: Column | None, by: Column | None, sheet: Sheet,
+    files: tuple[str, str] | None,
+) -> Any:  # fmt: skip
+    """A panel a metric."""
+    x = x or Column("case", "case", "", "case", pool.cases.astype(np.float64))
+    figure, axes = layout.figure(sheet, 1, [1.0] * len(metrics))
+    mapped = None
+    for each, [ax] in zip(metrics, axes, strict=True):
+        mapped = points.scatter(ax, each, x, by, sheet)
+        text = " · ".join(part for part in (each.about, points.lost(each.values)) if part)
+        layout.head(ax, text, sheet, 1)
+        ax.set_ylabel(layout.broken(each.label))
+        points.below(ax, x)
+    axes[-1][0].set_xlabel(f"{x.label}  ({x.unit})" if x.unit else x.label)
+    if mapped is not None and by is not None:
+        points.bar(figure, mapped, [ax for [ax] in axes], by, sheet)
+    layout.legend(figure, points.legend_of(layout.labelled(axes), files), sheet)
+    return figure

@@ -1,0 +1,94 @@
+"""Where a picture goes: PNG, SVG or PDF by the name's ending; what is not written over; that it is there whole."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from batch.output import quoted
+from met.diagnostic import Problem, error
+
+SOFTWARE = "MET"
+HEAD_BYTES, TAIL_BYTES = 2000, 20_000
+
+# By ending: what is told of its making, without a date, and how that stands in the file.
+METADATA: dict[str, dict[str, str | None]] = {
+    ".png": {"Software": SOFTWARE},
+    ".svg": {"Creator": SOFTWARE, "Date": None},
+    ".pdf": {"Creator": SOFTWARE, "CreationDate": None},
+}
+MARKS = {
+    ".png": b"Software\0" + SOFTWARE.encode(),
+    ".svg": f"<dc:title>{SOFTWARE}</dc:title>".encode(),
+    ".pdf": f"/Creator ({SOFTWARE})".encode(),
+}
+
+
+def check(output: Path) -> None:
+    """Refuse to write over what is no picture of MET's. Raises Problem E305; E326 for another ending."""
+    try:
+        _check(output)
+    except OSError as reason:
+        raise _cannot_write(output, reason) from reason
+
+
+def _check(output: Path) -> None:
+    if output.is_dir():
+        inside = quoted(output / "plot.png")
+        raise Problem(error("E305", f"cannot write {output}: it is a folder", help=f"`-o {inside}`"))
+    if output.suffix.lower() not in METADATA:
+        helps = [f"`-o {quoted(output.with_suffix('.png'))}`"] if output.name else []
+        raise Problem(error("E326", f"cannot write {output}: pictures are PNG, SVG or PDF files", help=helps))
+    if not output.parent.is_dir():
+        helps = [f"`mkdir -p {quoted(output.parent)}`"]
+        raise Problem(error("E305", f"cannot write {output}: {output.parent} is no folder", help=helps))
+    if output.exists() and not output.is_file():
+        raise Problem(error("E305", f"cannot write {output}: it is not a regular file"))
+    if output.exists() and output.stat().st_size and not own(output):
+        message = f"{output} exists and was not drawn by MET: it is not written over"
+        raise Problem(error("E305", message, help="give another name with `-o`, or remove the file"))
+
+
+def own(output: Path) -> bool:
+    """Whether a picture says that MET drew it."""
+    with output.open("rb") as file:
+        text = file.read(HEAD_BYTES)
+        file.seek(max(len(text), output.stat().st_size - TAIL_BYTES))
+        return MARKS[output.suffix.lower()] in text + file.read()
+
+
+def save(figure: Any, output: Path) -> None:
+    """The picture under its name when it is whole; the same figure gives the same bytes. Raises Problem E305, and E392
+    where the panels have no room."""
+    import importlib
+    import warnings
+
+    kind = output.suffix.lower()
+    backend, canvas = {
+        ".png": ("agg", "FigureCanvasAgg"), ".svg": ("svg", "FigureCanvasSVG"), ".pdf": ("pdf", "FigureCanvasPdf"),
+    }[kind]  # fmt: skip
+    drawn = getattr(importlib.import_module(f"matplotlib.backends.backend_{backend}"), canvas)(figure)
+    temporary = output.with_name(f".{output.name}.{os.getpid()}.tmp")
+    try:
+        try:
+            with temporary.open("wb") as file, warnings.catch_warnings():
+                warnings.filterwarnings("error", message="constrained_layout not applied")
+                warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+                getattr(drawn, f"print_{kind[1:]}")(file, metadata=METADATA[kind])
+            temporary.replace(output)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+    except OSError as reason:
+        raise _cannot_write(output, reason) from reason
+    except UserWarning as reason:
+        wide, high = (f"{2.54 * side:.3g}" for side in figure.get_size_inches())
+        message = f"{wide} x {high} cm have no room for {len(figure.axes)} panels, with what is written on them"
+        helps = ("a larger `--size`, or its width alone: the height is then what is needed", "name fewer to draw")
+        raise Problem(error("E392", message, help=helps)) from reason
+
+
+def _cannot_write(output: Path, reason: OSError) -> Problem:
+    why = (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
+    return Problem(error("E305", f"cannot write {output}: {why}"))

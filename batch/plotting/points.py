@@ -1,0 +1,197 @@
+"""Metrics over one parameter: a point a case, in the colours of another parameter; curves where these make a grid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from batch.grids import MOST_LEVELS, is_grid, levelled, levels
+from batch.plotting.measured import Measured
+from batch.plotting.sheet import COLOURS, FAINT, INK, Sheet, sequence
+from batch.plotting.sides import is_log
+from batch.report.content import Column
+from batch.signals import number_text
+from met.frozen import frozen
+
+MARKER, NAMED = 14, 8
+"""Area of a point, in square points; levels that a legend names: of more, a colour bar."""
+
+MANY, DOTS = 20_000, (1600, 500)
+"""Points from which on it is looked which of them hide others; dots of a panel, across and up, that are told apart."""
+
+RASTERED = 2000
+"""More points than these are a raster within an SVG or a PDF."""
+
+BEHIND, PALE = 3.0, 0.3
+
+
+@frozen
+class Set:
+    """The cases of one colour. text: of the legend; joined: whether a curve goes through them."""
+
+    places: np.ndarray
+    colour: Any
+    text: str
+    joined: bool
+
+
+def scatter(ax: Any, each: Measured, x: Column, by: Column | None, sheet: Sheet) -> Any:
+    """One metric over x, by the levels of another column. Gives what a colour bar is of, if there is to be one."""
+    finite = np.isfinite(each.values)
+    drawn = _apart(x.values, np.where(finite, each.values, np.nan))
+    size = MARKER / marker_scale(len(x.values)) ** 2
+    style: dict[str, Any] = {"s": size, "linewidths": 0, "rasterized": len(drawn) > RASTERED}
+    mapped = None
+    sets = _sets(x, by)
+    if by is not None and not any(one.text for one in sets):
+        mapped = _scale(by)
+    if not sets and by is not None:
+        mapped = ax.scatter(x.values[drawn], each.values[drawn], c=by.values[drawn], cmap="viridis", **style)
+    for one in sets:
+        here = drawn[np.isin(drawn, one.places)] if len(sets) > 1 else drawn
+        if one.joined:
+            order = one.places[np.argsort(x.values[one.places])]
+            y = np.where(np.isfinite(each.values[order]), each.values[order], np.nan)
+            ax.plot(x.values[order], y, color=one.colour, linewidth=1.0)
+        ax.scatter(x.values[here], each.values[here], color=one.colour, label=one.text or None, **style)
+    if each.theirs is not None:
+        _theirs(ax, each, x, sets, by)
+    _edge(ax, each.values, x.values, size)
+    _limits(ax, each)
+    return mapped
+
+
+def _sets(x: Column, by: Column | None) -> list[Set]:
+    """One for each level that the legend names; none where there are too many of them and no curves."""
+    if by is None:
+        every = np.arange(len(x.values))
+        return [Set(every, COLOURS[0], "", x.role == "parameter" and len(levels(x.values)) == len(every) < 200)]
+    found = levelled(by.values, by.words)
+    count = len(found.texts)
+    if found.stretches or (count > NAMED and not _curves(x, by)):
+        return []
+    joined = _curves(x, by)
+    sets = []
+    for index, text in enumerate(found.texts):
+        colour = COLOURS[index % len(COLOURS)] if by.words else sequence(index, count)
+        if count > NAMED:
+            colour = _scale(by).to_rgba(found.values[index])
+        named = text if by.words else f"{by.label} = {text} {by.unit}".rstrip()
+        sets.append(Set(np.flatnonzero(found.places == index), colour, named if count <= NAMED else "", joined))
+    return sets
+
+
+def _scale(by: Column) -> Any:
+    """Colours by value, where there are too many to name."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    finite = levels(by.values)
+    return ScalarMappable(Normalize(finite[0], finite[-1]), "viridis")
+
+
+def _curves(x: Column, by: Column) -> bool:
+    """Whether there is one case for each value of both, so that a curve goes through those of one colour."""
+    if x.role != "parameter" or not is_grid(x.values, by.values) or len(levels(by.values)) > MOST_LEVELS:
+        return False
+    pairs = np.unique(np.stack([x.values, by.values]), axis=1).shape[1] if len(x.values) <= MANY else 0
+    return pairs == len(x.values)
+
+
+def _theirs(ax: Any, each: Measured, x: Column, sets: list[Set], by: Column | None) -> None:
+    """The other archive's cases: hollow, under the own ones, with wide pale curves."""
+    assert each.theirs is not None
+    y = np.where(np.isfinite(each.theirs), each.theirs, np.nan)
+    drawn = _apart(x.values, y)
+    size = 2.6 * MARKER / marker_scale(len(x.values)) ** 2
+    for one in sets or [Set(drawn, FAINT, "", False)]:
+        here = drawn[np.isin(drawn, one.places)]
+        if one.joined:
+            order = one.places[np.argsort(x.values[one.places])]
+            ax.plot(x.values[order], y[order], color=one.colour, linewidth=1.0 + BEHIND, alpha=PALE, zorder=0.8,
+                    solid_capstyle="butt")  # fmt: skip
+        ax.scatter(x.values[here], y[here], s=size, facecolors="none", edgecolors=[one.colour], linewidths=0.7,
+                   zorder=0.9, rasterized=len(drawn) > RASTERED)  # fmt: skip
+
+
+def _edge(ax: Any, values: np.ndarray, x: np.ndarray, size: float) -> None:
+    """What is no number, on the panel's edges: ▲ infinite, ▼ infinite below, × no value."""
+    for there, marker, at in ((np.isposinf(values), "^", 1.0), (np.isneginf(values), "v", 0.0),
+                              (np.isnan(values), "x", 1.0)):  # fmt: skip
+        where = x[there & np.isfinite(x)]
+        if len(where):
+            where = where[_apart(where, np.zeros(len(where)))]
+            ax.scatter(where, np.full(len(where), at), marker=marker, s=max(12.0, size), color=INK, linewidths=0.8,
+                       transform=ax.get_xaxis_transform(), clip_on=False, zorder=4)  # fmt: skip
+
+
+def lost(values: np.ndarray) -> str:
+    """What the marks on the edges say, in words."""
+    parts = []
+    for there, text in ((np.isinf(values), "infinite in {} (▲)"), (np.isnan(values), "no value in {} (×)")):
+        if there.any():
+            parts.append(text.format(f"{int(there.sum()):,}"))
+    return ", ".join(parts)
+
+
+def _limits(ax: Any, each: Measured) -> None:
+    """Lines at the limits that lie near enough to the points."""
+    shown = each.values if each.theirs is None else np.concatenate([each.values, each.theirs])
+    finite = shown[np.isfinite(shown)]
+    for limit in each.column.limits:
+        low, high = (finite.min(), finite.max()) if len(finite) else (limit.value, limit.value)
+        if low == high or low - (high - low) <= limit.value <= high + (high - low):
+            ax.axhline(limit.value, color=INK, linewidth=0.9, linestyle=(0, (1, 1.5)), label="limit", zorder=1.5)
+
+
+def marker_scale(count: int) -> float:
+    """How much smaller than alone a marker is among so many; the legend's are not."""
+    return 1.0 if count < 400 else 1.7 if count < 20_000 else 3.7
+
+
+def _apart(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Places of the points to draw, of many: of those that fall on one dot of the picture, the last, which hides the
+    others. So none that stands alone is left out."""
+    if len(x) <= MANY:
+        return np.arange(len(x))
+    there = np.flatnonzero(np.isfinite(y) & np.isfinite(x))[::-1]
+    dots = np.zeros(len(there), np.int64)
+    for values, count in ((x, DOTS[0]), (y, DOTS[1])):
+        low, high = values[there].min(initial=np.inf), values[there].max(initial=-np.inf)
+        dots = dots * (count + 1) + (count * (values[there] - low) / ((high - low) or 1.0)).astype(np.int64)
+    return np.sort(there[np.unique(dots, return_index=True)[1]])
+
+
+def legend_of(known: Mapping[str, Any], other: tuple[str, str] | None) -> dict[str, Any]:
+    """What is in the colours' legend, then the limit, then which archive is which."""
+    from matplotlib.lines import Line2D
+
+    limit = {text: known[text] for text in ("limit",) if text in known}
+    out = {text: handle for text, handle in known.items() if text != "limit"} | limit
+    if other is None:
+        return {} if list(out) == ["limit"] else out  # the panel's head says what is required
+    dot: dict[str, Any] = {"linestyle": "", "marker": "o", "color": INK}
+    return {
+        **out, other[0]: Line2D([], [], markersize=3.5, markeredgewidth=0, **dot),
+        other[1]: Line2D([], [], markersize=6, markerfacecolor="none", markeredgewidth=0.8, **dot),
+    }  # fmt: skip
+
+
+def bar(figure: Any, mapped: Any, axes: list[Any], by: Column, sheet: Sheet) -> None:
+    drawn = figure.colorbar(mapped, ax=axes, pad=0.01, aspect=18 * len(axes))
+    drawn.set_label(f"{by.label}  ({by.unit})" if by.unit else by.label, fontsize=sheet.small)
+    drawn.outline.set_visible(False)
+
+
+def below(ax: Any, x: Column) -> None:
+    """The axis of what is varied: a choice's words at their places, whole numbers of cases, orders of magnitude."""
+    if is_log(x):
+        ax.set_xscale("log")
+        ax.xaxis.set_major_formatter(lambda value, _: number_text(value))
+    if x.words:
+        ax.set_xticks(range(len(x.words)), x.words)
+        ax.set_xlim(-0.5, len(x.words) - 0.5)
+    elif x.role in ("case", "repeat"):
+        ax.xaxis.get_major_locator().set_params(integer=True)

@@ -1,0 +1,145 @@
+"""Another archive that a report is held against: which of its cases is which, and what they were there."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from batch.archive.read import ArchiveFile, Group
+from batch.differences.found import Diff, Experiment
+from batch.report.content import ENDED, Column
+from batch.report.pool import Pool
+from batch.signals import deck_unit
+from met.frozen import frozen
+
+GOOD = (ENDED.index("met"), ENDED.index("done"))
+
+
+@frozen
+class Against:
+    """The other archive, which is before, and what differs from it, in which both have the names that a page uses."""
+
+    file: ArchiveFile
+    found: Diff
+
+    def of(self, pool: Pool) -> Before | None:
+        """The cases that are those of a pool; None where there is no such run or sweep."""
+        groups = {group.name: group for group in self.file.groups}
+        by_name = {experiment.name_b: experiment for experiment in self.found.experiments}
+        pairs = [
+            (number, groups[by_name[group.name].name_a], by_name[group.name])
+            for number, group in enumerate(pool.groups) if group.name in by_name
+        ]  # fmt: skip
+        return Before(pool, pairs) if pairs else None
+
+
+class Before:
+    """The cases of the other archive that are those of a pool, in the pool's order.
+
+    pool   theirs;  pairs  of each structure in both: which of the first pool's it is, theirs, and how they differ
+    place  [case] which case of `pool` it is, -1 where there is none;  how: its place in VERDICTS, likewise
+    """
+
+    def __init__(self, now: Pool, pairs: Sequence[tuple[int, Group, Experiment]]) -> None:
+        self.now, self.pairs = now, tuple(pairs)
+        self.pool = Pool(now.name, [group for _, group, _ in pairs])
+        self.place = np.full(now.count, -1)
+        self.how = np.full(now.count, -1, np.int8)
+        for theirs, (number, _, experiment) in enumerate(pairs):
+            mine = _places(now, number)[experiment.cases.b]
+            self.place[mine] = _places(self.pool, theirs)[experiment.cases.a]
+            self.how[mine] = experiment.how
+
+    @cached_property
+    def there(self) -> np.ndarray:
+        """[case] whether it is in both."""
+        return self.place >= 0
+
+    @cached_property
+    def ended(self) -> np.ndarray:
+        """[case] how it came out before: its place in `content.ENDED`; -1 where there is none."""
+        return np.where(self.there, self.pool.ended[self.place], -1)
+
+    @cached_property
+    def most(self) -> tuple[int, ...]:
+        """Numbers of the cases that differ most, the first ones first."""
+        ranked = [each for _, _, experiment in self.pairs for each in experiment.worst]
+        return tuple(each.case_b for each in sorted(ranked, key=lambda each: -each.score))
+
+    def values(self, metric: Column) -> np.ndarray | None:
+        """A metric of the pool as it was, in its unit: [case], not a number where there is none; None where the other
+        archive has no such metric in this unit."""
+        name = metric.key.partition(":")[2]
+        mine, theirs = ([group.variables[name] for group in pool.groups if name in group.variables
+                         and group.variables[name].role == "metric"] for pool in (self.now, self.pool))  # fmt: skip
+        if not theirs or {each.unit for each in theirs} != {each.unit for each in mine}:
+            return None
+        before = self.pool.gathered(name) / deck_unit(mine[0])[0]
+        return np.where(self.there, before[self.place], np.nan)
+
+    def history_of(self, number: int, position: int) -> tuple[Group, int] | None:
+        """Of a case of the pool's structure `number`, the other archive's group and its position in it, where it has
+        its history."""
+        for mine, group, experiment in self.pairs:
+            if mine == number:
+                found = np.flatnonzero(experiment.cases.b == position)
+                if len(found) and (there := int(experiment.cases.a[found[0]])) in group.recorded_positions:
+                    return group, there
+        return None
+
+
+def _places(pool: Pool, number: int) -> np.ndarray:
+    """By position in one of a pool's groups: which of its cases that is."""
+    here = np.flatnonzero(pool.group_of == number)
+    out = np.empty(len(here), np.int64)
+    out[pool.position_of[here]] = here
+    return out
+
+
+def change(column: Column) -> Column | None:
+    """A metric less what it was; 0 where both are the same infinity. None where nothing is known of it."""
+    before = column.before
+    if before is None:
+        return None
+    with np.errstate(invalid="ignore"):
+        values = np.where(column.values == before, 0.0, column.values - before)
+    return Column(f"change:{column.key}", f"change of {column.label}", column.unit, "change", values)
+
+
+def called(before: Path, now: Path) -> tuple[str, str]:
+    """What two archives are called in a page: by their names, or where these are the same by as much of their paths as
+    tells them apart."""
+    one, two = before.absolute().parts, now.absolute().parts
+    for length in range(1, max(len(one), len(two)) + 1):
+        if one[-length:] != two[-length:]:
+            return str(Path(*one[-length:])), str(Path(*two[-length:]))
+    return before.name, now.name
+
+
+def named(found: Diff, before: str, now: str) -> Diff:
+    """The same, with these names for the two archives in all that is said of them."""
+    names = {str(found.b): now, str(found.a): before}
+    either = re.compile("|".join(re.escape(path) for path in sorted(names, key=len, reverse=True)))
+
+    def said(text: str) -> str:
+        return either.sub(lambda match: names[match[0]], text)
+
+    experiments = tuple(
+        replace(each, signals=[replace(signal, why=said(signal.why)) for signal in each.signals],
+                notes=[said(note) for note in each.notes])
+        for each in found.experiments
+    )  # fmt: skip
+    return replace(found, a=Path(before), b=Path(now), experiments=experiments)
+
+
+def narrowed(found: Diff, groups: Sequence[Group]) -> Diff:
+    """What is found of these runs and sweeps of the second archive alone."""
+    names = {group.name for group in groups}
+    experiments = tuple(each for each in found.experiments if each.name_b in names)
+    only_b = tuple(name for name in found.only_b if name in names)
+    return replace(found, experiments=experiments, only_a=(), only_b=only_b)

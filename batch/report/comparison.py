@@ -1,0 +1,149 @@
+"""What changed against another archive, as a page says it; the words are those of `met diff`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from batch.differences import words
+from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, VERDICTS
+from batch.differences.found import Diff, Experiment
+from batch.failures import ranges
+from batch.report.against import GOOD, Against, Before
+from batch.report.changes import ChangedCase, Compared, Comparison, EndedAlike, EndedCase, Made, SignalRow
+from batch.report.content import Flow, Part, Table, Verdict
+from batch.report.pool import Pool, shown
+from batch.signals import pretty_unit
+
+MOST_LINES, MOST_ENDED = 200, 20
+"""Of one kind of change, and of cases that end otherwise alike."""
+
+KINDS = {
+    "versions": "Versions", "code": "Code", "structure": "Structure", "deck": "Deck",
+    "changed": "Parameters and models", "new": "New parameters",
+}  # fmt: skip
+
+
+def comparison(found: Diff) -> Comparison:
+    made = tuple(
+        Made(KINDS[kind], lines[:MOST_LINES], max(0, len(lines) - MOST_LINES)) for kind, lines in words.made(found)
+    )
+    return Comparison(str(found.a), str(found.b), made, tuple(words.alone(found)))
+
+
+def compared(found: Diff, before: Before | None) -> tuple[Compared, ...]:
+    """Of a section's structures, each that both archives have."""
+    if before is None:
+        return ()
+    several = len(before.pairs) > 1
+    return tuple(_compared(found, experiment, several) for _, _, experiment in before.pairs)
+
+
+def _compared(found: Diff, experiment: Experiment, several: bool) -> Compared:
+    """several: whether requirements are to be told of here, since the verdict has those of all structures together."""
+    alone = words.missing(found, experiment)
+    if several:
+        alone += [
+            f"require {text}: {words.requirement(before, now, experiment.cases.count)}"
+            for text, before, now in experiment.requirements if before != now
+        ]  # fmt: skip
+    allowed = (line.replace("the deck of b ", f"the deck of {found.b} ") for line in words.allowed(found, experiment))
+    ended = tuple(
+        EndedAlike(
+            each.text, each.cases,
+            tuple(EndedCase(one.case, one.case_id[:8], words.cause(one)) for one in each.each[:MOST_ENDED]),
+            max(0, len(each.each) - MOST_ENDED),
+        )
+        for each in words.endings(experiment)
+    )  # fmt: skip
+    return Compared(
+        words.heading(experiment), experiment.verdict, tuple(alone), ended, tuple(experiment.notes), tuple(allowed),
+        tuple(map(_row, map(words.compared, experiment.signals))), _samples(experiment), words.starred(experiment),
+        _worst(found, experiment), max(0, experiment.cases_different - len(experiment.worst)),
+    )  # fmt: skip
+
+
+def _row(each: words.Compared) -> SignalRow:
+    largest = f"{each.largest} {each.unit}".rstrip()
+    return SignalRow(
+        each.name, each.verdict, each.cases, largest, each.share, each.where, each.first, each.tolerance, each.case
+    )
+
+
+def _samples(experiment: Experiment) -> Table | None:
+    if not experiment.samples:
+        return None
+    rows = [(each.name, *each.cases, *each.medians, each.distance, each.chance)
+            for each in map(words.distribution, experiment.samples)]  # fmt: skip
+    heads = ("as distributions", "cases before", "now", "median before", "now", "distance", "by chance")
+    return Table(heads, ("",) * 7, tuple(rows), frozenset(range(1, 7)))
+
+
+def _worst(found: Diff, experiment: Experiment) -> tuple[ChangedCase, ...]:
+    units = {each.name: "" if each.unit in ("", "1") else pretty_unit(each.unit) for each in experiment.signals}
+    out = []
+    for each in experiment.worst:
+        what, was, now = words.most(each)
+        was, now = (shown(np.nan) if text == "nan" else text for text in (was, now))
+        commands = words.again(found, experiment, each)
+        out.append(ChangedCase(each.case_b, each.case_id[:8], what, was, now, units.get(each.signal, ""), commands))
+    return tuple(out)
+
+
+# The verdict
+
+
+def verdict(against: Against, pairs: Sequence[tuple[Pool, Before | None]]) -> Verdict:
+    """Of all cases together. pairs: what the page is about, with what it was before."""
+    found = against.found
+    both = [(pool, before) for pool, before in pairs if before is not None]
+    said = words.verdict(found).removeprefix(found.verdict).lstrip(",;: ")
+    if not any(each.cases.count for each in found.experiments):
+        said = "the two have no case in common"
+    return Verdict(
+        kind="comparison",
+        about=f"Against {found.a}",
+        ok=found.verdict in (IDENTICAL, EQUIVALENT),
+        headline=said[:1].upper() + said[1:],
+        parts=_parts(against, pairs),
+        word=found.verdict,
+        figure=_figure(both),
+        flows=tuple(flow for pool, before in both for flow in _flows(pool, before, named=len(pairs) > 1)),
+    )
+
+
+def _parts(against: Against, pairs: Sequence[tuple[Pool, Before | None]]) -> tuple[Part, ...]:
+    found = against.found
+    how = np.concatenate([np.zeros(0, np.int8), *(each.how for each in found.experiments)])
+    counts = {word: int((how == VERDICTS.index(word)).sum()) for word in (IDENTICAL, EQUIVALENT, DIFFERENT)}
+    gone = sum(group.count for group in against.file.groups if group.name in found.only_a)
+    new = sum(group.count for pool, _ in pairs for group in pool.groups if group.name in found.only_b)
+    counts["only before"] = sum(len(each.only_a) for each in found.experiments) + gone
+    counts["only now"] = sum(len(each.only_b) for each in found.experiments) + new
+    return tuple(Part(word, count) for word, count in counts.items() if count)
+
+
+def _figure(both: Sequence[tuple[Pool, Before]]) -> tuple[int, int, int] | None:
+    """How many cases meet all that is required, before and now, of how many in both; None where nothing is."""
+    judged = [(pool, before) for pool, before in both if pool.requirements and before.pool.requirements]
+    total = sum(int(before.there.sum()) for _, before in judged)
+    if total < 2:
+        return None
+    was = sum(int(np.isin(before.ended, GOOD).sum()) for _, before in judged)
+    now = sum(int((np.isin(pool.ended, GOOD) & before.there).sum()) for pool, before in judged)
+    return was, now, total
+
+
+def _flows(pool: Pool, before: Before, *, named: bool) -> list[Flow]:
+    """By requirement of both: which cases meet it now, and which no longer. named: whether to say of which run."""
+    out = []
+    for place, text in enumerate(pool.requirements):
+        if text not in before.pool.requirements or not before.there.any():
+            continue
+        was = before.there & (before.pool.outcomes[before.place, before.pool.requirements.index(text)] == 1)
+        now = before.there & (pool.outcomes[:, place] == 1)
+        met = words.requirement(int(was.sum()), int(now.sum()), int(before.there.sum()))
+        gained, lost = (ranges(pool.cases[which].tolist()) for which in (now & ~was, was & ~now))
+        out.append(Flow(f"{pool.name}: {text}" if named else text, met, gained, lost))
+    return out

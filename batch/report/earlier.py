@@ -1,0 +1,74 @@
+"""What another archive has recorded of a page's cases, and what changed in them since."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from batch.archive.read import Group
+from batch.differences.matching import instants
+from batch.report.against import Before
+from batch.report.content import History, SignalPanel
+from batch.report.thinning import thin, thin_clock
+from batch.signals import Panel, history, panels
+
+
+class Earlier:
+    """Histories of the other archive, in the panels of a page.
+
+    found   the page's panels;  points  of a line at most
+    clocks  the page's times, to which those of the other archive are added
+    """
+
+    def __init__(
+        self, before: Before, found: Sequence[SignalPanel], clocks: list[np.ndarray], points: int
+    ) -> None:
+        self.before, self.found, self.clocks, self.points = before, found, clocks, points
+        self._panels: dict[tuple[bool, str], dict[tuple[str, str], Panel]] = {}
+
+    def of(self, case: int, number: int, position: int) -> tuple[History | None, History | None]:
+        """Of the case at a position of the pool's structure `number`: what was recorded of it, and this less that, at
+        the instants that both have; None where it has no history there."""
+        there = self.before.history_of(number, position)
+        if there is None:
+            return None, None
+        (other, place), group = there, self.before.now.groups[number]
+        time, was_time = group.values("time"), other.values("time")
+        rows, was_rows = instants(time, was_time, 0.0)
+        was_values, changes = {}, {}
+        for n, panel in enumerate(self.found):
+            key = panel.name, panel.unit
+            mine, theirs = self._of(False, group).get(key), self._of(True, other).get(key)
+            if theirs is None:
+                continue
+            was = _lines(panel, theirs, history(other, theirs, place))
+            was_values[n] = thin(was, self.points)
+            if mine is not None and len(rows):
+                now = _lines(panel, mine, history(group, mine, position))
+                changes[n] = thin(now[rows] - was[was_rows], self.points)
+        change = History(case, self._clock(time[rows]), changes) if changes else None
+        return (History(case, self._clock(was_time), was_values), change) if was_values else (None, None)
+
+    def _of(self, other: bool, group: Group) -> dict[tuple[str, str], Panel]:
+        key = other, group.name
+        if key not in self._panels:
+            self._panels[key] = {(panel.name, panel.unit): panel for panel in panels(group)}
+        return self._panels[key]
+
+    def _clock(self, time: np.ndarray) -> int:
+        thinned = thin_clock(time, self.points)
+        same = [n for n, clock in enumerate(self.clocks) if np.array_equal(clock, thinned)]
+        if not same:
+            self.clocks.append(thinned)
+        return same[0] if same else len(self.clocks) - 1
+
+
+def _lines(page: SignalPanel, panel: Panel, values: np.ndarray) -> np.ndarray:
+    """Values of a panel, (time, line), as the lines of the page's; not a number for what is not among them."""
+    places = {(line.label, line.joint): n for n, line in enumerate(page.lines) if not line.command}
+    out = np.full((len(values), len(page.lines)), np.nan)
+    for column, line in enumerate(zip(panel.lines, panel.joints, strict=True)):
+        if line in places:
+            out[:, places[line]] = values[:, column]
+    return out

@@ -1,0 +1,38 @@
+"""Lines with fewer points, of which none that stands out is lost."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def stretch(rows: int, points: int) -> int:
+    """Rows that two points stand for; 1 where every row has its point."""
+    return 1 if rows <= points else -(-rows // (points // 2))
+
+
+def thin_clock(time: np.ndarray, points: int) -> np.ndarray:
+    """The times of the points: of each stretch its first row and the one in its middle."""
+    each = stretch(len(time), points)
+    if each == 1:
+        return time
+    first = np.arange(0, len(time), each)
+    return np.stack([time[first], time[np.minimum(first + each // 2, len(time) - 1)]], axis=1).ravel()
+
+
+def thin(values: np.ndarray, points: int) -> np.ndarray:
+    """Of each stretch of rows the smallest and the largest value, in the order in which they come.
+
+    values: (time, line). Values that are not finite are none; a stretch of nothing else is not a number.
+    """
+    values = np.where(np.isfinite(values), values, np.nan)
+    each = stretch(len(values), points)
+    if each == 1:
+        return values
+    count = -(-len(values) // each)
+    padded = np.full((count * each, values.shape[1]), np.nan)
+    padded[: len(values)] = values
+    parts = padded.reshape(count, each, -1)
+    none = np.isnan(parts)
+    at = [np.where(none, other, sign * parts).argmin(axis=1) for sign, other in ((1.0, np.inf), (-1.0, np.inf))]
+    pair = np.sort(np.stack(at, axis=1), axis=1)
+    return np.take_along_axis(parts, pair, axis=1).reshape(2 * count, -1)

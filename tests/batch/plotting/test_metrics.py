@@ -1,0 +1,197 @@
+"""Metrics as points and as maps: what is drawn over what, in which colours, and what is marked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.collections import PathCollection
+
+from batch.archive.read import ArchiveFile
+from batch.plotting import draw, plot
+from batch.plotting.maps import GREY, STRIPES
+from batch.plotting.points import NAMED
+from batch.plotting.sheet import COLOURS
+from tests.batch.plotting.pictures import archive, cells, mesh, said, shown
+from tests.batch.report import archives
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+KP, MASS = [0.01, 0.02, 0.03, 0.04, 0.05], [10.0, 20.0, 30.0, 40.0, 50.0]
+
+
+def made(kps: list[float] = KP, masses: list[float] = MASS, **options: Any) -> Path:
+    """A sweep over all combinations, without histories."""
+    return archives.made(Path("a.h5"), archives.grid(kps, masses, **options), histories="none")
+
+
+class TestPoints:
+    def test_are_drawn_over_what_varies_where_there_are_no_histories(self, here: Path, figures: list[Any]) -> None:
+        with archive(40, "none") as file:
+            draw(file, "a.png")
+        axes = shown(figures[0])
+        assert [ax.get_ylabel() for ax in axes] == ["settle  (s)", "volts  (V)"]
+        assert [ax.get_xlabel() for ax in axes] == ["", "gearbox.kp  (V·s/rad)"]
+        assert axes[0].get_title("left") == (
+            "settling_time of shoulder.qd · settle < 10 s: missed by 2 of 40 · infinite in 2 (▲)"
+        )
+        assert said(figures[0]) == "40 cases"
+
+    def test_of_cases_without_a_value_stand_on_the_edge(
+        self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        archives.failing(monkeypatch, 5, 6, 7)
+        with archive(40, "none") as file:
+            draw(file, "a.png", ["settle"])
+        [ax] = shown(figures[0])
+        assert ax.get_title("left").endswith("infinite in 2 (▲), no value in 3 (×)")
+        *points, infinite, lost = (each for each in ax.collections if isinstance(each, PathCollection))
+        heights = np.concatenate([np.ma.filled(each.get_offsets(), np.nan)[:, 1] for each in points])
+        assert np.isfinite(heights).sum() == 35
+        assert (infinite.get_offsets()[:, 1] == 1.0).all() and len(infinite.get_offsets()) == 2
+        assert len(lost.get_offsets()) == 3
+
+    def test_of_few_values_of_another_parameter_are_curves_with_its_name(self, here: Path, figures: list[Any]) -> None:
+        made(masses=MASS[:3])
+        plot("a.h5", over=["gearbox.kp"])
+        axes = shown(figures[0])
+        assert [len([line for line in ax.lines if len(line.get_xdata()) > 2]) for ax in axes] == [3, 3]
+        words = [text.get_text() for text in figures[0].legends[0].get_texts()]
+        assert words == [*(f"links.lower.mass = {mass} g" for mass in (10000, 20000, 30000)), "limit"]
+
+    def test_of_many_values_of_another_parameter_have_a_colour_bar(self, here: Path, figures: list[Any]) -> None:
+        made(masses=[10.0 + mass for mass in range(NAMED + 1)])
+        plot("a.h5", over=["gearbox.kp"])
+        assert [ax.get_ylabel() for ax in figures[0].axes] == ["settle  (s)", "volts  (V)", "links.lower.mass  (g)"]
+        assert not figures[0].legends
+
+    def test_have_the_limit_as_a_line_where_it_is_near(self, here: Path, figures: list[Any]) -> None:
+        def limits(ax: Any) -> list[float]:
+            return [line.get_ydata()[0] for line in ax.lines if line.get_label() == "limit"]
+
+        made(kps=[0.03, 0.035, 0.04], masses=[10.0])
+        plot("a.h5")
+        assert [limits(ax) for ax in shown(figures[0])] == [[], [5.0]]  # what takes 4 s at most may take 10 s
+
+    def test_of_a_million_cases_are_those_that_are_seen(self) -> None:
+        from batch.plotting.points import DOTS, _apart
+
+        rng = np.random.default_rng(1)
+        x, y = rng.random(300_000), rng.random(300_000) ** 9
+        y[7], y[8] = 40.0, np.nan
+        kept = _apart(x, y)
+        assert 7 in kept and 8 not in kept and len(kept) <= DOTS[0] * DOTS[1] / 8
+        assert _apart(x[:100], y[:100]).tolist() == list(range(100))
+
+
+class TestMaps:
+    def test_are_drawn_where_two_parameters_make_a_grid(self, here: Path, figures: list[Any]) -> None:
+        made()
+        plot("a.h5")
+        settle, volts, *bars = shown(figures[0])
+        assert [ax.get_ylabel() for ax in bars] == ["settle  (s)", "volts  (V)"]
+        assert settle.get_ylabel() == "links.lower.mass  (g)" and volts.get_ylabel() == ""
+        assert {settle.get_xlabel(), volts.get_xlabel()} == {"gearbox.kp  (V·s/rad)"}
+        with np.errstate(divide="ignore"):
+            expected = np.where(np.array(KP) < 0.011, np.nan, 0.1 / np.array(KP))
+        np.testing.assert_allclose(mesh(settle), np.tile(expected, (5, 1)), rtol=1e-14)
+        assert said(figures[0]) == "25 cases: a cell a case"
+        assert settle.get_title("left") == "settling_time of shoulder.qd\nsettle < 10 s: missed by 5 of 25"
+
+    def test_stripe_what_misses_and_mark_what_has_no_number(
+        self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        archives.failing(monkeypatch, 24)
+        made()
+        plot("a.h5")
+        settle, volts = shown(figures[0])[:2]
+        assert cells(settle, hatch=STRIPES) == 5 and cells(volts, hatch=STRIPES) == 24
+        assert cells(settle, face=GREY) == 6 and cells(volts, face=GREY) == 1  # one failed, five are infinite
+        marks = [len(each.get_offsets()) for each in settle.collections if isinstance(each, PathCollection)]
+        assert marks == [1, 5]
+        assert [text.get_text() for text in figures[0].legends[0].get_texts()] == [
+            "misses what is required", "infinite", "failed",
+        ]  # fmt: skip
+
+    def test_leave_cells_white_that_have_no_case(self, here: Path, figures: list[Any]) -> None:
+        one = archives.grid(KP, MASS)
+        first, second = one.cases.coordinates
+        kept = np.arange(25) != 12
+        coordinates = (replace(first, values=first.values[kept]), replace(second, values=second.values[kept]))
+        cases = replace(one.cases, count=24, coordinates=coordinates)
+        archives.made(Path("a.h5"), replace(one, cases=cases), histories="none")
+        plot("a.h5", names=["volts"])
+        ax, _ = shown(figures[0])
+        assert np.isnan(mesh(ax)).sum() == 1 and cells(ax, face=GREY) == 0
+        assert [text.get_text() for text in figures[0].legends[0].get_texts()] == ["misses what is required", "no case"]
+
+    def test_show_the_worst_of_several_cases_and_say_so(self, here: Path, figures: list[Any]) -> None:
+        steps = np.linspace(0.02, 0.05, 96).tolist()
+        made(kps=steps)
+        plot("a.h5")
+        [ax] = shown(figures[0])[:1]
+        assert mesh(ax).shape == (5, 48)
+        np.testing.assert_allclose(mesh(ax)[0], 0.1 / np.array(steps[::2]), rtol=1e-14)  # the longest of each two
+        assert said(figures[0]) == "480 cases: up to 2 cases in a cell, which shows the worst by what is required"
+
+    def test_of_cases_that_fill_no_grid_are_points(self, here: Path, figures: list[Any]) -> None:
+        with archive(40, "none") as file:
+            draw(file, "a.png", ["volts"], over=["gearbox.kp", "links.lower.mass"])
+        [ax] = shown(figures[0])[:1]
+        points = ax.collections[0]
+        assert isinstance(points, PathCollection) and len(points.get_offsets()) == 40
+        assert said(figures[0]) == "40 cases: a point a case"
+
+    def test_have_axes_of_the_values_and_logarithmic_ones_of_factors(self, here: Path, figures: list[Any]) -> None:
+        made(kps=[0.02, 0.04, 0.06, 0.08, 0.1], masses=[1.0, 10.0, 100.0, 1000.0, 10000.0])
+        plot("a.h5")
+        [ax] = shown(figures[0])[:1]
+        assert (ax.get_xscale(), ax.get_yscale()) == ("linear", "log")
+        assert ax.get_xlim() == pytest.approx((0.01, 0.11))
+        made(masses=[1.0, 2.0, 30.0, 31.0, 90.0])
+        plot("a.h5")
+        ax = shown(figures[1])[0]
+        assert ax.get_ylim() == (-0.5, 4.5)
+        assert [text.get_text() for text in ax.get_yticklabels()] == ["1000", "2000", "30000", "31000", "90000"]
+
+    def test_have_colours_for_the_many_where_a_few_stray(self) -> None:
+        from batch.plotting import maps
+        from batch.plotting.measured import Measured
+        from batch.report.content import Column
+
+        values = np.concatenate([np.linspace(1.0, 2.0, 99), [1e6]])
+        every = np.zeros(100, bool)
+        each = Measured(Column("metric:a", "a", "s", "metric", values), values, every, every)
+        side = Column("parameter:x", "x", "", "parameter", np.arange(100.0))
+        norm, ends = maps._norm(each, maps.plan(side, side, None, None))
+        assert ends == "max" and norm.vmin == 1.0 and 2.0 < norm.vmax < 4.0
+
+    def test_read_in_grey(self) -> None:
+        import matplotlib
+
+        from batch.plotting.maps import RISING, _lightness
+
+        light = _lightness(matplotlib.colormaps[RISING](np.linspace(0, 1, 50)))
+        assert (np.diff(light) > 0).all() and light[-1] - light[0] > 0.6
+
+
+def test_colours_of_words_are_those_that_eyes_tell_apart() -> None:
+    from batch.plotting.points import _sets
+    from batch.report.content import Column
+
+    by = Column("choice:a", "a", "", "choice", np.array([0.0, 1.0, 0.0, 1.0]), ("one", "two"))
+    x = Column("parameter:x", "x", "", "parameter", np.array([0.0, 0.0, 1.0, 1.0]))
+    found = _sets(x, by)
+    assert [(one.text, one.colour, one.joined) for one in found] == [
+        ("one", COLOURS[0], True), ("two", COLOURS[1], True),
+    ]  # fmt: skip
+
+
+def test_an_archive_file_that_is_open_is_drawn_as_well(here: Path) -> None:
+    made()
+    with ArchiveFile("a.h5") as file:
+        first = draw(file, "b.png").read_bytes()
+    assert plot("a.h5").read_bytes() == first

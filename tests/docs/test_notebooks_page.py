@@ -1,0 +1,41 @@
+"""docs/notebooks.md: what it shows is what Python says."""
+
+from __future__ import annotations
+
+import doctest
+import re
+from pathlib import Path
+
+import pytest
+
+from batch.notebook.accessor import DatasetAccessor
+from met import cli
+
+PAGE = (Path(__file__).parents[2] / "docs" / "notebooks.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the page's deck was run."""
+    where = tmp_path_factory.mktemp("page")
+    [(name, deck)] = re.findall(r"<!-- (\S+\.ic) -->\n```c\n(.*?)```", PAGE, re.DOTALL)
+    [command] = re.findall(r"^After `met (run .*)`:$", PAGE, re.MULTILINE)
+    (where / name).write_text(deck, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(where)
+        assert cli.main([*command.split(), "-q", "--no-picture"]) == cli.NO  # not all cases meet both requirements
+    return where
+
+
+def test_the_page_shows_what_is_said(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    session = "\n".join(re.findall(r"```pycon\n(.*?)```", PAGE, re.DOTALL))
+    test = doctest.DocTestParser().get_doctest(session, {}, "notebooks.md", "notebooks.md", 0)
+    told: list[str] = []
+    result = doctest.DocTestRunner(verbose=False).run(test, out=told.append)
+    assert result.attempted > 12 and not result.failed, "".join(told)
+
+
+def test_everything_there_is_is_on_the_page() -> None:
+    there = {name for name in dir(DatasetAccessor) if not name.startswith("_")}
+    assert there == {name for name in there if f"`data.met.{name}" in PAGE or f"data.met.{name}(" in PAGE}
