@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from benchmarks import arms, evaluation, long_deck, peer, report, stepping
+from benchmarks import arms, differences, evaluation, long_deck, peer, report, stepping
 from benchmarks import machine as measured_on
 from benchmarks.__main__ import SUBJECTS, main
 from benchmarks.benchmark import Benchmark, Derived, Target, Untaken, ratio, take, with_sources
@@ -213,3 +213,58 @@ def test_against_a_report_of_a_different_machine_says_so() -> None:
 def test_the_run_that_is_timed_has_few_events_and_the_other_many() -> None:
     few, many = (stepping._events(arms.TWO, command)() for command in ("steady", "reversing"))
     assert few < stepping.FEW < many
+
+
+@pytest.mark.parametrize(("state", "unlike"), [("same", 0), ("few", differences.FEW), ("all", 28)])
+def test_the_pairs_that_are_compared_differ_by_what_was_planted(state: str, unlike: int) -> None:
+    import batch
+
+    [found] = batch.diff(*differences.archives(differences.SMALL, state)).experiments
+    assert found.cases.count == 28 and not found.ended
+    assert {each.name: each.different for each in found.signals} == dict.fromkeys(
+        ["settle", "volts", "q", "qd", "tau", "shoulder.servo.voltage"], unlike
+    )
+
+
+def test_every_tool_comes_to_the_right_answer_over_the_small_pair() -> None:
+    for name, command in differences.TOOLS.items():
+        try:
+            words = command()
+        except Untaken:  # h5diff is no Python package: what is said without it has a test of its own
+            continue
+        for state in ("same", "few"):
+            used = differences.compared(words, name, differences.SMALL, state)
+            assert used.status == (state == "few") and used.seconds > 0.0 and used.memory > 1.0
+
+
+def test_a_file_is_dropped_from_memory_and_what_stays_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "some"
+    path.write_bytes(bytes(100_000))
+    assert differences.resident(path) == 25
+    differences.drop(path)
+    assert differences.resident(path) == 0
+    monkeypatch.setattr(differences, "resident", lambda path: 7)
+    with pytest.raises(Untaken) as caught:
+        differences.drop(path)
+    assert str(caught.value) == (
+        f"7 pages of a file stay in memory in {tmp_path}: its file system may lie there; TMPDIR names another"
+    )
+
+
+def test_without_h5diff_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(differences.shutil, "which", lambda name: None)
+    with pytest.raises(Untaken) as caught:
+        differences.TOOLS["h5diff"]()
+    assert str(caught.value) == (
+        "`h5diff` is not installed; `apt install hdf5-tools`, or the package of the HDF5 tools here"
+    )
+
+
+def test_a_wrong_answer_ends_the_benchmark(monkeypatch: pytest.MonkeyPatch) -> None:
+    said = differences.Used(1.0, 1.0, 1.0, 0, "identical")
+    monkeypatch.setattr(differences, "timed", lambda *words, **options: said)
+    with pytest.raises(SystemExit) as caught:
+        differences.compared(["met"], "met", differences.SMALL, "few")
+    assert str(caught.value) == (
+        "met was wrong over 28 cases, all histories, a few values differ: it ended with 0:\nidentical"
+    )

@@ -8,14 +8,24 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
-from benchmarks import arms, campaigns, compiling, evaluation, hybrid, report, stepping, whole_process
+from benchmarks import (
+    arms,
+    campaigns,
+    compiling,
+    differences,
+    evaluation,
+    hybrid,
+    report,
+    stepping,
+    whole_process,
+)  # fmt: skip
 from benchmarks.benchmark import Benchmark, Derived, take, with_sources
 from benchmarks.machine import machine, told
 
 RATIOS = SimpleNamespace(
     TITLE="ratios of throughput over many cases, each on one core and in the same turns", BENCHMARKS=evaluation.RATIOS
 )
-SUBJECTS = (RATIOS, evaluation, stepping, hybrid, compiling, whole_process, campaigns)
+SUBJECTS = (RATIOS, evaluation, stepping, hybrid, compiling, whole_process, campaigns, differences)
 """In the order of the report: ratios first, since they change least with machine and load."""
 
 TURNS, QUICK = 15, 3

@@ -6,7 +6,8 @@ import os
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks import long_deck
@@ -22,23 +23,45 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYT
 
 def run(*words: str, deck: str = "") -> tuple[float, float]:
     """Wall time (s) and memory (MiB) of `scripts/met` with these words, where `deck.ic` is this text and nothing else.
-
-    Memory: the largest that the process had in use at any time.
     """
     with tempfile.TemporaryDirectory() as directory:
         if deck:
             Path(directory, "deck.ic").write_text(deck, encoding="utf-8")
-        with tempfile.TemporaryFile() as said:
-            begun = time.perf_counter()
-            done = subprocess.Popen([MET, *words], cwd=directory, env=ENVIRONMENT, stdout=said, stderr=said)
-            _, status, used = os.wait4(done.pid, 0)
-            seconds = time.perf_counter() - begun
-            done.returncode = os.waitstatus_to_exitcode(status)
-            said.seek(0)
-            text = said.read().decode()
-    if done.returncode not in (0, 1):  # 1: a requirement was missed, which is an answer
-        raise SystemExit(f"`met {' '.join(words)}` ended with {done.returncode}:\n{text}")
-    return seconds, used.ru_maxrss / 1024
+        used = timed([MET, *words], directory)
+    return used.seconds, used.memory
+
+
+@dataclass(frozen=True)
+class Used:
+    """What a process needed: wall time (s), memory (MiB), the largest that it had in use at any time, what was read
+    from the disk for it (MiB); and its exit status and what it said."""
+
+    seconds: float
+    memory: float
+    read: float
+    status: int
+    text: str
+
+
+def timed(command: Sequence[str | Path], directory: str | Path, *, status: Sequence[int] = (0, 1)) -> Used:
+    """A process from its start to its end. status: that it may end with; another ends the benchmark. 1 is an answer: a
+    requirement was missed, archives differ."""
+    with tempfile.TemporaryFile() as said:
+        begun = time.perf_counter()
+        done = subprocess.Popen(command, cwd=directory, env=ENVIRONMENT, stdout=said, stderr=said)
+        _, ended, used = os.wait4(done.pid, 0)
+        seconds = time.perf_counter() - begun
+        done.returncode = os.waitstatus_to_exitcode(ended)
+        said.seek(0)
+        text = said.read().decode()
+    if done.returncode not in status:
+        words = " ".join(["met" if word == MET else str(word) for word in command])
+        raise SystemExit(f"`{words}` ended with {done.returncode}:\n{text}")
+    return Used(seconds, used.ru_maxrss / 1024, used.ru_inblock * BLOCK / 2**20, done.returncode, text)
+
+
+BLOCK = 512
+"""Bytes, in which the kernel counts what is read."""
 
 
 def _prepared(*words: str) -> Callable[[], Callable[[], float]]:

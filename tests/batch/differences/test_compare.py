@@ -84,9 +84,7 @@ def test_where_the_difference_is_largest() -> None:
 
 
 @pytest.mark.parametrize("words", [[], ["q=1e-7rad", "rel=1e-9"], ["time=50ms"]])
-def test_blocks_of_any_size_give_one_answer(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: list[str]
-) -> None:
+def test_blocks_of_any_size_give_one_answer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: list[str]) -> None:
     def plant(run: Run, place: dict[int, int]) -> None:
         for values in run.signals.values():
             values[::3] += 1e-8
