@@ -11,7 +11,7 @@ from typing import Any
 from batch.archive.read import ArchiveFile
 from batch.campaign import Campaign, prepare
 from batch.executors.choose import choose
-from batch.export.straight import check, parted, written
+from batch.export.straight import check, later, parted, written
 from batch.output import quoted
 from batch.performing import TooMany, perform
 from batch.progress import Bar
@@ -99,17 +99,21 @@ def run_and_tell(
             say(f"{campaign.output} is whole; its picture is missing: `met plot {quoted(campaign.output)}`")
             raise type(interrupt) from None
     exported = None
+    refused: list[str] = []
     try:
         exported = None if target is None else written(campaign, target)
     except Problem as problem:
-        _complain(problem, json)
+        refused = [each.message for each in problem.diagnostics]
+        if not json:
+            _complain(problem, json)
     except KeyboardInterrupt as interrupt:
-        say(f"{campaign.output} is whole; {target} is missing: `met export {quoted(campaign.output)}`")
+        if target is not None:
+            say(f"{campaign.output} is whole; {target} is missing: `{later(campaign, target)}`")
         raise type(interrupt) from None
     ok = all(summary.ok for summary in summaries)
     missing = target is not None and exported is None
     unlike = differences(again.archive, campaign.output) if again is not None else []
-    notes = [*performed.notes, *_compared(again, unlike)]
+    notes = [*performed.notes, *_compared(again, unlike), *refused]
     if json:
         print(verdict_json(campaign, summaries, worst, picture, exported, performed.seconds, notes,
                            ok and not unlike and not missing))  # fmt: skip
@@ -119,8 +123,8 @@ def run_and_tell(
         ))  # fmt: skip
         for line in _compared(again, unlike):
             say(line)
-        if missing:
-            say(f"exit 1: {target} is missing: `met export {quoted(campaign.output)} -o {quoted(target)}`")
+        if missing and target is not None:
+            say(f"exit 1: {target} is missing: `{later(campaign, target)}`")
     return ok and not unlike and not missing
 
 

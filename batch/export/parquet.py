@@ -79,7 +79,7 @@ def _schema(arrow: Any, cases: Sequence[Case], columns: Sequence[Column]) -> Any
     fields = [arrow.field("run", arrow.string()), arrow.field("case", arrow.int64())]
     for variable in _varied(cases):
         kind = arrow.string() if variable.role == "choice" else arrow.float64()
-        fields.append(arrow.field(variable.name, kind, metadata=_told(variable.unit, variable.long_name)))
+        fields.append(arrow.field(_apart(variable), kind, metadata=_told(variable.unit, variable.long_name)))
     fields.append(arrow.field("time", arrow.float64(), metadata=_told("s", "time")))
     for column in columns:
         kind = arrow.float64() if column.path in double else arrow.float32()
@@ -103,11 +103,16 @@ def _varied(cases: Sequence[Case]) -> list[Stored]:
     return list(found.values())
 
 
+def _apart(variable: Stored) -> str:
+    """The column of what is varied: a deck may vary a `let run`."""
+    return f"coordinates.{variable.name}" if variable.name == "run" else variable.name
+
+
 def _table(arrow: Any, schema: Any, case: Case) -> Any:
     """A case as a table; nulls in columns that it does not have."""
     rows = len(case.time)
     alike: dict[str, Any] = {"run": case.asked, "case": case.number}
-    alike |= {v.name: case.group.at(v.name, [case.position])[0] for v in _varied([case])}
+    alike |= {_apart(v): case.group.at(v.name, [case.position])[0] for v in _varied([case])}
     arrays: dict[str, Any] = {"time": case.time}
     signals = {name: case.signal(name) for name in dict.fromkeys(column.variable for column in case.columns)}
     arrays |= {column.path: signals[column.variable][:, column.place] for column in case.columns}

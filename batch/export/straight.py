@@ -21,7 +21,7 @@ def parted(output: str | os.PathLike[str] | None) -> tuple[Path | None, Path | N
 
 
 def check(campaign: Campaign, target: Path) -> None:
-    """Refuse what could not be exported in the end, before anything runs. Raises Problem E305, E323, E372-E374."""
+    """Refuse what could not be exported in the end, before anything runs. Raises Problem E305, E323, E370-E374."""
     form = target.suffix.lower().removeprefix(".")
     kept = sum(len(part.kept) for part in campaign.parts)
     if not kept and not campaign.keep.later:
@@ -37,12 +37,34 @@ def check(campaign: Campaign, target: Path) -> None:
     if form == "mcap":
         from batch.export.mcap import OVERLAID, too_many
 
+        _placed(campaign, target)
         if kept > OVERLAID:
             archive = quoted(target.with_suffix(".h5"))
             helps = ["`--case '#0'` runs one alone, and `--histories '#0'` keeps the signals of one",
                      f"or run all, and choose then: `-o {archive}`, `met export {archive} --case '#0'`"]  # fmt: skip
             raise Problem(too_many(kept, ", ".join(_asked(campaign)), helps))
     check_place(target, campaign.output, owner(form), force=None)
+
+
+def _placed(campaign: Campaign, target: Path) -> None:
+    """Raises Problem E370 where q of a joint is not recorded, without which no arm can be shown."""
+    for part in campaign.parts:
+        structure = part.experiment.structure
+        recorded = {channel for each in structure.record for channel in each.channels}
+        lacking = [f"{joint.name}.q" for joint in structure.moving if f"{joint.name}.q" not in recorded]
+        if part.recorded and lacking:
+            which = "q" if len(lacking) == len(structure.moving) else ", ".join(lacking)
+            message = f"the arm of `{part.experiment.asked}` could not be shown in {target}: {which} is not recorded"
+            helps = ("`record = [q, ...]` in the run keeps where its joints are",
+                     f"`-o {quoted(target.with_suffix('.csv'))}` needs no positions")  # fmt: skip
+            raise Problem(error("E370", message, help=helps))
+
+
+def later(campaign: Campaign, target: Path) -> str:
+    """The command that makes the export of an archive that is whole."""
+    runs = _asked(campaign)
+    named = "".join(f" --run {quoted(name)}" for name in runs) if len(runs) > 1 else ""
+    return f"met export {quoted(campaign.output)}{named} -o {quoted(target)}"
 
 
 def written(campaign: Campaign, target: Path) -> Exported:

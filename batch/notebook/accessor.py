@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 import xarray
 
 from batch.notebook import grid, quantities, selection, source
-from batch.notebook.table import CASE, cases_of, name_of
+from batch.notebook.table import CASE, cases_of, missing, name_of
 from met.diagnostic import Problem, error
 
 if TYPE_CHECKING:
@@ -100,8 +100,14 @@ class Accessor(Generic[Data]):
         """Variables in other units, `in_units(qd="deg/s")`; none given: parameters and metrics as the deck writes
         them. `units` of each says so. `sel`, `grid` and `frames` go on working."""
         units = {**(wanted or {}), **more}
+        parts = self._parts()
+        known = {name: [each for each in units if quantities.named(data, each)] for name, data in parts.items()}
+        for each in units:
+            if not any(each in names for names in known.values()):
+                raise missing(list(parts.values()), each, "no variable", [str(v) for d in parts.values() for v in d])
         return self._whole({
-            name: quantities.in_units(data, units or None) for name, data in self._parts().items()
+            name: quantities.in_units(data, {each: units[each] for each in known[name]} if units else None)
+            for name, data in parts.items()
         })  # fmt: skip
 
     @told

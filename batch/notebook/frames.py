@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray
@@ -12,11 +13,14 @@ from batch.archive.read import Group
 from batch.export.poses import POSITION, moved, parameters, world_poses
 from batch.notebook.quantities import number
 from batch.notebook.source import experiment, places
-from batch.notebook.table import CASE, RECORDED, asked, missing
+from batch.notebook.table import CASE, RECORDED, asked, missing, path_of
 from met.diagnostic import Problem, error
 from met.plan import Experiment
 
 LINK = "link"
+OWN = frozenset({"position", "orientation", LINK, "axis", "quaternion"})
+"""Names of what is computed; a deck's that is one of them gets a word before it, as in an archive."""
+
 POSITION_TOLD = {"units": "m", "long_name": "origin of the link's frame", "frame": "world axes"}
 ORIENTATION_TOLD = {
     "units": "1", "long_name": "unit quaternion of the link's frame", "frame": "from link axes to world axes, w >= 0"
@@ -58,7 +62,13 @@ def _frames(path: Path, data: xarray.Dataset, group: Group, own: Experiment, lin
     world = world_poses(own, parameters(own, varied), rows)
     unknown = np.isnan(sum(rows, np.zeros(shape)))
     poses = [moved(world[link], shape) for link in links]
-    kept = {str(name): array for name, array in instants.coords.items() if not str(name).startswith("joint")}
+    kept: dict[str, Any] = {}
+    for name, array in instants.coords.items():
+        if name in OWN:
+            told = {**array.attrs, "path": path_of(str(name), array.attrs)}
+            kept[f"coordinates.{name}"] = (array.dims, array.values, told)
+        elif not _of_joints(array):
+            kept[str(name)] = array.variable
     out = xarray.Dataset(
         {
             "position": ((*dims, LINK, "axis"), _stacked([pose.position for pose in poses], unknown), POSITION_TOLD),
@@ -107,7 +117,7 @@ def _position(data: xarray.Dataset, joint: str, unit: str) -> xarray.DataArray |
         q = data[f"{joint}.{POSITION}"]
     elif POSITION in data:
         every = data[POSITION]
-        dim = next((str(name) for name in every.coords if str(name).startswith("joint")), "")
+        dim = next((str(name) for name, array in every.coords.items() if _of_joints(array)), "")
         names = np.atleast_1d(every[dim].values).tolist() if dim else []
         if joint not in names:
             return None
@@ -115,6 +125,12 @@ def _position(data: xarray.Dataset, joint: str, unit: str) -> xarray.DataArray |
     else:
         return None
     return q.astype(np.float64) / number(f"1 {unit}", POSITION, str(q.attrs.get("units", unit)))
+
+
+def _of_joints(array: xarray.DataArray) -> bool:
+    """Whether a coordinate is of joints' names: a deck may vary `joint_1.servo.kp`, which is of numbers."""
+    name = str(array.name)
+    return (name == "joint" or name.startswith("joint_of_")) and array.dtype.kind not in "iuf"
 
 
 def _instants(data: xarray.Dataset) -> xarray.DataArray:

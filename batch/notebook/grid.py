@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray
 
-from batch.notebook.quantities import in_deck_unit
-from batch.notebook.table import CASE, RECORDED, asked, missing, varied
+from batch.notebook.quantities import in_deck_unit, same_units
+from batch.notebook.table import CASE, RECORDED, REPEAT, asked, missing, name_of, varied
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 
@@ -52,16 +52,22 @@ def unfolded(parts: Sequence[xarray.Dataset], names: Sequence[str]) -> xarray.Da
         if dims[name] != dims[names[0]]:
             message = f"one of `{names[0]}` and `{name}` is a signal, which only some cases may have"
             raise Problem(error("E388", message, help="a block of each: `data.met.grid(...)` twice"))
+    inner = {str(dim) for data in parts for name in dims if name in data for dim in data[name].dims}
+    for name in dims:
+        same_units({name_of(data): data[name] for data in parts if name in data}, name)
     return xarray.Dataset({
-        name: _block([data for data in parts if dim in data.dims], name, dim) for name, dim in dims.items()
+        name: _block([data for data in parts if dim in data.dims], name, dim, inner) for name, dim in dims.items()
     })  # fmt: skip
 
 
-def _block(parts: Sequence[xarray.Dataset], name: str, dim: str) -> xarray.DataArray:
+def _block(parts: Sequence[xarray.Dataset], name: str, dim: str, inner: Collection[str]) -> xarray.DataArray:
+    """inner: dimensions of the variables; a parameter of such a name gets a word before it, as in an archive."""
     count = sum(data.sizes[dim] for data in parts)
     if not count:
         raise Problem(error("E388", f"there are no cases of which `{name}` could be"))
-    columns = _columns(parts, dim)
+    columns = {
+        f"coordinates.{path}" if path in inner else path: column for path, column in _columns(parts, dim).items()
+    }  # fmt: skip
     axes, alike = _axes(columns)
     shape = tuple(len(axis.values) for axis in axes)
     if np.prod(shape, dtype=float) > max(SMALL, EMPTIEST * count):
@@ -98,12 +104,17 @@ def _columns(parts: Sequence[xarray.Dataset], dim: str) -> dict[str, xarray.Data
         first = next(table[path] for table in tables if path in table)
         lacking = np.nan if first.dtype.kind in "iuf" else ""
         pieces = [
-            table[path].values if path in table else np.full(data.sizes[dim], lacking)
-            for data, table in zip(parts, tables, strict=True)
+            np.full(data.sizes[dim], lacking) if held is None else held.values
+            for data, held in zip(parts, (_held(*each, path) for each in zip(parts, tables, strict=True)), strict=True)
         ]
         values = np.concatenate([piece if first.dtype.kind in "iuf" else piece.astype(str) for piece in pieces])
         out[path] = xarray.DataArray(values, dims=(dim,), attrs=first.attrs)
     return out
+
+
+def _held(data: xarray.Dataset, table: Mapping[str, xarray.DataArray], path: str) -> xarray.DataArray | None:
+    """What is varied of one Dataset; where nothing is repeated in it, its only repeat; None where it has no such."""
+    return data[path] if path not in table and path == REPEAT and path in data.variables else table.get(path)
 
 
 def _axes(columns: Mapping[str, xarray.DataArray]) -> tuple[list[Axis], dict[str, Any]]:
@@ -115,20 +126,20 @@ def _axes(columns: Mapping[str, xarray.DataArray]) -> tuple[list[Axis], dict[str
         if len(values) < 2:
             alike[path] = values[0]
             continue
-        new: Axis | None = Axis(path, values, codes, {})
+        beside: dict[str, np.ndarray] = {}
+        within: list[int] = []
         for number, axis in enumerate(axes):
             mine, yours = np.divmod(np.unique(axis.codes * len(values) + codes), len(values))
             if len(mine) == len(axis.values):  # it follows from the other
                 axes[number] = Axis(axis.path, axis.values, axis.codes, {**axis.beside, path: values[yours]})
-                new = None
                 break
             if len(mine) == len(values):  # the other follows from it
                 order = mine[np.argsort(yours)]
-                beside = {axis.path: axis.values[order], **{k: v[order] for k, v in axis.beside.items()}}
-                axes[number] = Axis(path, values, codes, beside)
-                new = None
-                break
-        axes += [new] if new is not None else []
+                beside |= {axis.path: axis.values[order], **{k: v[order] for k, v in axis.beside.items()}}
+                within.append(number)
+        else:
+            axes.insert(within[0] if within else len(axes), Axis(path, values, codes, beside))
+            axes = [axis for number, axis in enumerate(axes) if number - 1 not in within]
     return axes, alike
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from batch.notebook.table import missing, path_of
+from batch.notebook.table import path_of
 from met import units
 from met.diagnostic import Problem, error
 
@@ -20,6 +20,12 @@ QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s
 def number(given: Any, name: str, unit: str) -> float:
     """What was given for a variable, in its unit: a number is taken as it is, a text has a unit of its own. Raises
     Problem E386."""
+    if isinstance(given, xarray.DataArray) and given.ndim == 0 and given.dtype.kind in "iuf":
+        own, told = _measure(unit, name), str(given.attrs.get("units", unit))
+        measure = _measure(told, name)
+        if not units.same(measure.dimension, own.dimension):
+            raise _wrong(f"`{name}` = {given.item()!r} is in {told or '1'}; it is in {unit or '1'}")
+        return float(given) if measure.scale == own.scale else float(given) * measure.scale / own.scale
     if isinstance(given, int | float | np.integer | np.floating) and not isinstance(given, bool):
         return float(given)
     example = f'such as "0.5{"" if unit in ("", "1") else f" {unit}"}"'
@@ -36,18 +42,29 @@ def number(given: Any, name: str, unit: str) -> float:
     return value if own.scale == 1.0 else value / own.scale
 
 
+def same_units(arrays: Mapping[str, xarray.DataArray], name: str) -> None:
+    """Raises Problem E386 where a variable is in other units in one Dataset than in another."""
+    own = {path: str(array.attrs.get("units", "")) for path, array in arrays.items()}
+    if len(set(own.values())) > 1:
+        some = {unit: path.lstrip("/") for path, unit in reversed(own.items())}
+        told = " and in ".join(f"{unit or '1'} in `{path}`" for unit, path in reversed(some.items()))
+        raise _wrong(f"`{name}` is in {told}", f"ask one of them: `data[{next(reversed(some.values()))!r}].met`")
+
+
 def in_units(data: xarray.Dataset, wanted: Mapping[str, str] | None) -> xarray.Dataset:
     """Variables in these units; None: parameters and metrics as the deck writes them. What is repeated along
-    recorded_case follows. Raises Problem E385, E386."""
+    recorded_case follows. Raises Problem E386."""
     changed: dict[Any, xarray.Variable] = {}
     for name, unit in (deck_units(data) if wanted is None else wanted).items():
-        found = [each for each, array in data.variables.items() if name in (each, path_of(str(each), array.attrs))]
-        if not found:
-            raise missing([data], name, "no variable", [str(each) for each in data.variables])
-        changed |= {each: _converted(data[each].variable, name, unit) for each in found}
+        changed |= {each: _converted(data[each].variable, name, unit) for each in named(data, name)}
     coordinates = {name: variable for name, variable in changed.items() if name in data.coords}
     others = {name: variable for name, variable in changed.items() if name not in data.coords}
     return data.assign_coords(coordinates).assign(others)
+
+
+def named(data: xarray.Dataset, name: str) -> list[Any]:
+    """The variables that are meant by a name, or by a path in the deck."""
+    return [each for each, array in data.variables.items() if name in (each, path_of(str(each), array.attrs))]
 
 
 def deck_units(data: xarray.Dataset) -> dict[str, str]:

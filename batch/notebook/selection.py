@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 
 from batch.archive.read import found_cases
-from batch.notebook.quantities import in_deck_unit, number
+from batch.notebook.quantities import in_deck_unit, number, same_units
 from batch.notebook.table import CASE, PREFIX, RECORDED, along, asked, dimension, missing, name_of, varied
 from met.diagnostic import Problem, did_you_mean, error
 
@@ -65,6 +65,7 @@ def _masks(
     if not found:
         names = [each for path, data in parts.items() for each in _names(data, dims[path])]
         raise missing(list(parts.values()), name, "no parameter or metric", names)
+    same_units(found, name)
     arrays = list(found.values())
     values = np.concatenate([array.values for array in arrays])
     if arrays[0].dtype.kind in "iuf":
@@ -90,7 +91,8 @@ def _numbers(values: np.ndarray, wanted: Any, name: str, attributes: Mapping[str
         for given, sign in ((wanted.start, 1.0), (wanted.stop, -1.0)):
             if given is not None:
                 bound = number(given, name, unit)
-                slack = CLOSE * abs(bound) if np.isfinite(bound) else 0.0
+                slack = CLOSE * abs(bound) if bound else ZERO * _largest(values)
+                slack = slack if np.isfinite(bound) else 0.0
                 out &= sign * values >= sign * bound - slack
         return out
     out = np.zeros(len(values), bool)
@@ -107,7 +109,7 @@ def _words(values: np.ndarray, wanted: Any, name: str) -> np.ndarray:
     if isinstance(wanted, slice):
         raise Problem(error("E386", f"`{name}` is a word: it has no range", help="write a list of words"))
     out = np.zeros(len(values), bool)
-    for word in map(str, _listed(wanted)):
+    for word in (str(_item(each)) for each in _listed(wanted)):
         here = values == word
         if not here.any():
             words = list(dict.fromkeys(values.tolist()))
@@ -141,7 +143,8 @@ def _named(parts: Parts, dims: Mapping[str, str], wanted: Any) -> dict[str, np.n
     every, every_id = np.concatenate(list(rows.values())), np.concatenate(ids)
     out = np.zeros(len(every), bool)
     where = ", ".join(dict.fromkeys(map(asked, parts.values())))
-    for each in _listed(wanted):
+    for each in map(_item, _listed(wanted)):
+        each = int(each) if isinstance(each, float) and each.is_integer() else each  # as idxmin gives positions
         text = f"#{int(each)}" if isinstance(each, int | np.integer) and not isinstance(each, bool) else each
         if not isinstance(text, str):
             helps = 'a position, 7; "#7"; or the beginning of a case_id'
@@ -206,7 +209,13 @@ def _alone(data: xarray.Dataset, name: Any) -> xarray.Dataset:
 
 
 def _listed(wanted: Any) -> Sequence[Any]:
-    return [wanted] if _single(wanted) else list(wanted)
+    every = [wanted] if _single(wanted) else list(wanted)
+    return [each.item() if isinstance(each, np.ndarray) and each.ndim == 0 else each for each in every]
+
+
+def _item(given: Any) -> Any:
+    """What an array of no dimensions holds, and anything else as it is."""
+    return given.item() if isinstance(given, xarray.DataArray) and given.ndim == 0 else given
 
 
 def _single(wanted: Any) -> bool:

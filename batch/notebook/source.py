@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,7 +23,7 @@ def file_of(data: xarray.Dataset | xarray.DataTree) -> Path:
     root = data.root if isinstance(data, xarray.DataTree) else data
     known = [root.encoding.get(SOURCE), *(array.encoding.get(SOURCE) for array in data.variables.values())]
     for found in known:
-        if isinstance(found, str):
+        if isinstance(found, str | os.PathLike):
             return Path(found)
     helps = '`data.encoding["source"] = "FILE.h5"` says it'
     raise Problem(error("E389", "it is not known from which archive these numbers are", help=helps))
@@ -35,19 +36,25 @@ def experiment(path: Path, data: xarray.Dataset) -> Iterator[tuple[ArchiveFile, 
     if not name:
         raise Problem(error("E389", "this Dataset is of no archive: it has no attribute `experiment`"))
     with ArchiveFile(path) as file:
-        group = next((group for group in file.groups if group.name == name), None)
-        if group is None or group.attributes.get("code_key") != data.attrs.get("code_key"):
-            raise _changed(path)
-        yield file, group
+        yield file, _group(file, data)
+
+
+def _group(file: ArchiveFile, data: xarray.Dataset) -> Group:
+    """The group that a Dataset is of. Raises Problem E389."""
+    group = next((group for group in file.groups if group.name == name_of(data)), None)
+    if group is None or group.attributes.get("code_key") != data.attrs.get("code_key"):
+        raise _changed(file.path)
+    return group
 
 
 @contextmanager
 def archive(path: Path, parts: Mapping[str, xarray.Dataset]) -> Iterator[ArchiveFile]:
-    """The open archive of these Datasets, of which the first has to be in it. Raises Problem E301-E303, E389."""
-    data = next(iter(parts.values()))
-    with experiment(path, data) as (file, group):
-        if {CASE, RECORDED} & set(data.coords):
-            places(group, path, data, cases_of(data))
+    """The open archive of these Datasets, which all have to be in it. Raises Problem E301-E303, E389."""
+    with experiment(path, next(iter(parts.values()))) as (file, _):
+        for data in parts.values():
+            group = _group(file, data)
+            if {CASE, RECORDED} & set(data.coords):
+                places(group, path, data, cases_of(data))
         yield file
 
 
@@ -59,9 +66,9 @@ def places(group: Group, path: Path, data: xarray.Dataset, cases: np.ndarray) ->
     for dim, name in ((CASE, "case_id"), (RECORDED, f"{PREFIX}case_id")):
         if name in data.variables and data[name].dims == data[dim].dims:
             own, ids = np.atleast_1d(data[dim].values), np.atleast_1d(data[name].values)
-            mine = dict(zip(own.tolist(), ids.astype(str).tolist(), strict=True))
             theirs = dict(zip(cases.tolist(), group.at("case_id", found).tolist(), strict=True))
-            if any(mine.get(case, case_id) != case_id for case, case_id in theirs.items()):
+            mine = zip(own.tolist(), ids.astype(str).tolist(), strict=True)
+            if any(theirs.get(case, case_id) != case_id for case, case_id in mine):
                 raise _changed(path)
     return found
 

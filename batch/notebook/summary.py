@@ -39,7 +39,8 @@ def _cases(data: xarray.Dataset) -> str:
         return f"{count:,} case{'s' if count != 1 else ''}, {kept:,} with a history"
     if RECORDED in data.dims:
         return f"histories of {data.sizes[RECORDED]:,} cases"
-    return f"case #{int(data[CASE])}" if CASE in data.coords else "no cases"
+    alone = next((name for name in (CASE, RECORDED) if name in data.coords), "")
+    return f"case #{int(data[alone])}" if alone else "no cases"
 
 
 def _values(array: xarray.DataArray) -> str:
