@@ -35,7 +35,7 @@ def _experiment(before: Experiment, now: Experiment, ordered: bool) -> Iterator[
             yield f"{path} is {'new' if old is None else 'gone'}"
         elif _value(old) != _value(new) and not (isinstance(old.value, Formula) and isinstance(new.value, Formula)):
             place = new.origin.place
-            yield f"{path}: {_shown(old)}, now {_shown(new)}" + (f" ({place.file}:{place.line})" if place else "")
+            yield f"{path}: {', now '.join(_apart(old, new))}" + (f" ({place.file}:{place.line})" if place else "")
     yield from _cases(before.cases, now.cases, ordered)
     if before.formulas != now.formulas:
         yield "what follows from the varied parameters"
@@ -100,9 +100,18 @@ def _value(quantity: Quantity) -> Any:
     return "varied" if isinstance(quantity.value, Formula) else quantity.value
 
 
-def _shown(quantity: Quantity) -> str:
+def _apart(before: Quantity, now: Quantity) -> tuple[str, str]:
+    """Two parameters' values in as few digits as tell them apart, but six at least."""
+    for digits in range(6, 18):
+        texts = _shown(before, digits), _shown(now, digits)
+        if texts[0] != texts[1]:
+            break
+    return texts
+
+
+def _shown(quantity: Quantity, digits: int) -> str:
     value = _value(quantity)
-    shown = f"{value:g}" if isinstance(value, float) else str(value)
+    shown = f"{value:.{digits}g}" if isinstance(value, float) else str(value)
     return f"{shown} {quantity.unit}" if isinstance(value, float) and quantity.unit != "1" else shown
 
 

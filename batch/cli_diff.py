@@ -26,11 +26,14 @@ def diff(a: str, b: str, tolerances: tuple[str, ...], require: str, distribution
     import json
 
     from batch.differences.campaigns import diff
-    from batch.differences.compare import VERDICTS
+    from batch.differences.compare import EQUIVALENT, VERDICTS
     from batch.differences.data import as_data
     from batch.differences.told import told
     from batch.differences.tolerance import tolerances as read
 
     found = diff(a, b, read(tolerances), distributions=distributions)
     click.echo(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(told(found)))
-    return YES if VERDICTS.index(found.verdict) <= VERDICTS.index(require) else NO
+    enough = VERDICTS.index(found.verdict) <= VERDICTS.index(require)
+    if form != "json" and found.verdict == EQUIVALENT and not enough:
+        click.echo("exit 1: `--require identical` asks for the same bits")
+    return YES if enough else NO

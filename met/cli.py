@@ -236,7 +236,7 @@ def _confess(defect: Exception, arguments: Sequence[str], verbose: bool) -> None
         with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
             file.write(f"{command}\nmet {VERSION}, Python {platform.python_version()}, {platform.platform()}\n\n")
             traceback.print_exception(defect, file=file)
-        where = f"The traceback is in {path}; with -v it is printed."
+        where = f"The traceback is in {path}."
     print(
         f"met: this is a defect of MET, not of what you gave it: {type(defect).__name__}: {defect}. {where} "
         f"Please report it together with the deck and the command, `{command}`.",

@@ -338,7 +338,8 @@ def check_signature(path: Path) -> None:
         helps = "archives are written by `met run DECK`" if isinstance(reason, FileNotFoundError) else ()
         raise Problem(error("E301", f"cannot read the archive {path}: {why}", help=helps)) from reason
     if begins != SIGNATURE:
-        raise Problem(error("E302", f"{path} is no archive of MET: it is not an HDF5 file"))
+        helps = f"`met run {path}` runs a deck into one" if path.suffix == ".ic" else ()
+        raise Problem(error("E302", f"{path} is no archive of MET: it is not an HDF5 file", help=helps))
 
 
 HEAD_BYTES = 4096

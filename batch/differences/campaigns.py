@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,22 +17,30 @@ from batch.differences.compare import (
     IDENTICAL,
     VERDICTS,
     Difference,
+    Passed,
     compare,
     compare_cases,
     magnitude,
     spans,
     unlike_bits,
 )
-from batch.differences.found import Diff, Ended, Experiment, Place, Ranked, Signal
+from batch.differences.found import Diff, Ended, Experiment, Place, Ranked, Required, Signal
 from batch.differences.matching import Cases
 from batch.differences.samples import samples
-from batch.differences.tolerance import Tolerance, Tolerances, check, of_deck
+from batch.differences.tolerance import Tolerance, Tolerances, check, fits, of_deck
+from batch.requirements import required
+from batch.signals import deck_unit
 from met.diagnostic import Problem
 from met.outputs import joint_parts
 from met.plan import Plan
 
 WORST = 20
 """Cases that are ranked."""
+
+NO_CASE = "no case is in both"
+
+LARGEST = float(np.finfo(float).max)
+"""A span is no larger, so that a share of it is a number."""
 
 BLOCK = 1 << 16
 """Values of a signal that are compared at a time: 512 KiB."""
@@ -57,14 +66,23 @@ def _check(allowed: Tolerances, groups: Sequence[Group]) -> None:
     known: dict[str, Sequence[str]] = {}
     shown: dict[str, None] = {}
     for group in groups:
-        for variable in (*group.role("signal"), *group.role("metric")):
-            units = variable.units_by_joint or [variable.unit]
-            known[variable.name] = list(dict.fromkeys(units))
-            shown[variable.name] = None
-            if variable.role == "signal":
-                parts = joint_parts(variable.name, tuple(group.joints(variable)))
-                known.update(zip(parts, ([unit] for unit in units * (len(parts) // len(units))), strict=True))
+        shown |= {variable.name: None for variable in (*group.role("signal"), *group.role("metric"))}
+        for name, units in _known(group).items():
+            if name not in allowed.absolute or name not in known or not fits(allowed.absolute[name][1], known[name]):
+                known[name] = units
     check(allowed, known, list(shown))
+
+
+def _known(group: Group) -> dict[str, Sequence[str]]:
+    """Units of signals, joints' parts of them and metrics, by name."""
+    known: dict[str, Sequence[str]] = {}
+    for variable in (*group.role("signal"), *group.role("metric")):
+        units = variable.units_by_joint or [variable.unit]
+        known[variable.name] = list(dict.fromkeys(units))
+        if variable.role == "signal":
+            parts = joint_parts(variable.name, tuple(group.joints(variable)))
+            known.update(zip(parts, ([unit] for unit in units * (len(parts) // len(units))), strict=True))
+    return known
 
 
 def _plan(file: ArchiveFile) -> Plan | str:
@@ -78,6 +96,7 @@ def _plan(file: ArchiveFile) -> Plan | str:
 def _experiment(a: Group, b: Group, given: Tolerances, plan: Plan | str, distributions: bool) -> Experiment:
     """Of two groups. plan: that of b, or why it cannot be read."""
     known = {} if isinstance(plan, str) else {experiment.name: experiment for experiment in plan.experiments}
+    given = given.within(_known(a)).within(_known(b))
     allowed = given.over(of_deck(known[b.name], b) if b.name in known else Tolerances())
     matched = matching.cases(a, b)
     out = Experiment(a.name, b.name, matched, allowed)
@@ -89,9 +108,12 @@ def _experiment(a: Group, b: Group, given: Tolerances, plan: Plan | str, distrib
     _ended(a, b, matched, out)
     for name in matching.names([v.name for v in a.role("metric")], [v.name for v in b.role("metric")]):
         out.signals.append(_metric(a, b, matched, name, allowed, scores))
-    out.signals += _signals(a, b, matched, allowed, scores, out.notes)
+    out.signals += _signals(a, b, matched, allowed, scores, out)
+    if not out.signals:
+        out.notes.append("neither has a metric or a history: nothing is compared but how cases end")
     _requirements(a, b, matched, out)
-    out.worst = scores.ranked(a, b, matched)
+    _counts(a, b, matched, out)
+    out.worst = scores.ranked(a, b, matched, out.signals)
     out.cases_different = int(scores.beyond.sum())
     out.how = _how(scores, matched, b, out)
     if distributions or _other_noise(a, b):
@@ -116,7 +138,7 @@ def _other_noise(a: Group, b: Group) -> bool:
 
 
 def _ended(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
-    """Cases that ended otherwise, or earlier, or for another cause."""
+    """Cases that ended otherwise, or earlier."""
     status, rows = ([group.values(name) for group in (a, b)] for name in ("status", "n_valid"))
     here, there = status[0][matched.a], status[1][matched.b]
     unlike = (here != there) | ((here != 0) & (rows[0][matched.a] != rows[1][matched.b]))
@@ -134,15 +156,53 @@ def _ended(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
 
 
 def _requirements(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
-    """By requirement of both: how many matched cases meet it in a, and in b."""
-    if "met" not in a.variables or "met" not in b.variables:
+    """How many matched cases meet each requirement in a, and in b; one whose limit is another is taken for the same.
+    Those of one alone are noted."""
+    met_a, met_b = _met(a, matched.a), _met(b, matched.b)
+    now = {text: text for text in met_a if text in met_b}
+    for one in required(a):
+        alike = [other.text for other in required(b) if (other.metric, other.comparison[:1]) == (
+            one.metric, one.comparison[:1]) and other.text not in met_a and other.text not in now.values()]  # fmt: skip
+        if one.text not in now and alike:
+            now[one.text] = alike[0]
+    for text, here in met_a.items():
+        if text in now:
+            there = met_b[now[text]]
+            out.requirements.append(Required(text, now[text], int(here.sum()), int(there.sum())))
+            if here.sum() == there.sum() and (here != there).any():
+                count = int((here & ~there).sum())
+                out.notes.append(f"require {now[text]} is met by as many as before, but by others: "
+                                 f"{count:,} no more, {count:,} now")  # fmt: skip
+    for mine, others, path in ((met_a, now, a.path), (met_b, now.values(), b.path)):
+        out.notes += [f"require {text} is only in {path}, met by {int(met.sum()):,} of {matched.count:,}"
+                      for text, met in mine.items() if text not in others]  # fmt: skip
+
+
+COUNTS = {
+    "friction_splits": "steps that friction split", "friction_clamped": "rates that friction clamped",
+    "friction_undecided": "modes of friction that were left open", "bed_limited": "ticks at a bed's limit",
+}  # fmt: skip
+"""What is counted of each case besides what it records."""
+
+
+def _counts(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
+    """Notes counts that differ where nothing else does: then something differs that was not recorded."""
+    if any(signal.equivalent or signal.different for signal in out.signals):
         return
-    texts_a, texts_b = ([str(text) for text in group.values("requirement")] for group in (a, b))
-    met_a, met_b = a.values("met"), b.values("met")
-    for text in texts_a:
-        if text in texts_b:
-            here, there = met_a[matched.a, texts_a.index(text)] == 1, met_b[matched.b, texts_b.index(text)] == 1
-            out.requirements.append((text, int(here.sum()), int(there.sum())))
+    for name, words in COUNTS.items():
+        if name in a.variables and name in b.variables:
+            unlike = int((a.values(name)[matched.a] != b.values(name)[matched.b]).sum())
+            if unlike:
+                out.notes.append(f"the number of {words} is another in {unlike:,} of {matched.count:,} cases")
+                out.partial = True
+
+
+def _met(group: Group, cases: np.ndarray) -> dict[str, np.ndarray]:
+    """By requirement whether each of these cases meets it."""
+    if "met" not in group.variables:
+        return {}
+    met = group.values("met")[cases] == 1
+    return {str(text): met[:, column] for column, text in enumerate(group.values("requirement"))}
 
 
 class _Scores:
@@ -155,25 +215,22 @@ class _Scores:
         self.where: dict[int, tuple[str, Place, float]] = {}
 
     def take(self, place: int, score: float, signal: str, where: Place, difference: float) -> None:
-        """Of one case; of the many only those that may be among the worst keep where."""
-        self.beyond[place] = True
+        """Of one case, that is among the worst of a signal."""
         if score > self.score[place] or place not in self.where:
-            self.score[place] = max(score, self.score[place])
+            self.score[place] = score
             self.where[place] = (signal, where, difference)
-            if len(self.where) > 50 * WORST:
-                kept = sorted(self.where, key=lambda each: -self.score[each])[:WORST]
-                self.where = {each: self.where[each] for each in kept}
 
-    def ranked(self, a: Group, b: Group, matched: Cases) -> list[Ranked]:
+    def ranked(self, a: Group, b: Group, matched: Cases, signals: Sequence[Signal]) -> list[Ranked]:
+        by_name = {signal.name: signal for signal in signals}
         places = sorted(self.where, key=lambda each: (-self.score[each], each))[:WORST]
         if not places:
             return []
         case_a, case_b = a.at("case", matched.a[places]), b.at("case", matched.b[places])
         ids = b.at("case_id", matched.b[places])
         return [
-            Ranked(int(case_a[i]), int(case_b[i]), str(ids[i]), self.where[place][0], float(self.score[place]),
-                   self.where[place][1], self.where[place][2])
-            for i, place in enumerate(places)
+            Ranked(int(case_a[i]), int(case_b[i]), str(ids[i]), name, float(self.score[place]), where, difference,
+                   by_name[name].deck_unit, by_name[name].deck_scale)
+            for i, place in enumerate(places) for name, where, difference in [self.where[place]]
         ]  # fmt: skip
 
 
@@ -182,23 +239,24 @@ class _Scores:
 
 def _metric(a: Group, b: Group, matched: Cases, name: str, allowed: Tolerances, scores: _Scores) -> Signal:
     unit = (a if name in a.variables else b).variables[name].unit
-    out = Signal(name, unit, True, allowed.of(name))
-    out.why = _incomparable(a, b, name, "metric")
+    tolerance = replace(allowed.of(name), time=0.0)
+    out = Signal(name, unit, True, tolerance)
+    out.why = _incomparable(a, b, name, "metric") or ("" if matched.count else NO_CASE)
     if out.why:
         return out
+    out.deck_scale, out.deck_unit = deck_unit(b.variables[name])
+    out.said = allowed.said({"": name})
     values_a, values_b = a.values(name)[matched.a], b.values(name)[matched.b]
     finite = values_a[np.isfinite(values_a)]
     if len(finite):
         out.low, out.high = float(finite.min()), float(finite.max())
     out.compared = matched.count
-    tolerance = Tolerance(out.tolerance.absolute, out.tolerance.relative)
     found = compare(values_a[:, None], values_b[:, None], tolerance)
     if found is None:
         out.identical = out.compared
         return out
-    _add(out, found)
     case = int(b.at("case", [matched.b[found.row]])[0])
-    out.place = Place(case, "", float("nan"), found.before, found.after)
+    _add(out, found, Place(case, "", float("nan"), found.before, found.after))
     unlike = np.flatnonzero((values_a.view(np.int64) != values_b.view(np.int64))
                             & ~(np.isnan(values_a) & np.isnan(values_b)))  # fmt: skip
     scores.unlike[unlike] = True
@@ -214,13 +272,13 @@ def _rank_metric(
     out: Signal, a: np.ndarray, b: np.ndarray, allowed: Tolerance, unlike: np.ndarray, scores: _Scores, group: Group,
     matched: Cases,
 ) -> None:  # fmt: skip
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         apart = np.abs(b[unlike] - a[unlike])
-    limit = allowed.absolute + allowed.relative * magnitude(a[unlike], b[unlike])
+        limit = allowed.absolute + allowed.relative * magnitude(a[unlike], b[unlike])
     nan = np.isnan(apart)
     over = nan | (apart > limit)
-    unit = _unit_of(out)
-    score = np.where(nan, np.inf, apart / unit)
+    with np.errstate(over="ignore"):
+        score = np.where(nan, np.inf, apart / _unit_of(out))
     scores.beyond[unlike[over]] = True
     worst = np.flatnonzero(over)[np.argsort(-score[over], kind="stable")[:WORST]]
     cases = group.at("case", matched.b[unlike[worst]])
@@ -231,13 +289,21 @@ def _rank_metric(
 
 
 def _unit_of(signal: Signal) -> float:
-    """What a difference is measured by to rank cases: the tolerance, else what the values of a span."""
-    span = signal.high - signal.low
-    return signal.tolerance.absolute or (span if span > 0.0 else 0.0) or max(abs(signal.high), 1e-300)
+    """What a difference is measured by to rank cases: what the values of a span; finite."""
+    if signal.low > signal.high:
+        return 1.0
+    return min(signal.high - signal.low, LARGEST) or max(abs(signal.high), 1e-300)
 
 
-def _add(out: Signal, found: Difference) -> None:
-    out.largest = max(out.largest, found.largest)
+def _add(out: Signal, found: Difference, where: Place) -> None:
+    """One more difference. Those beyond a tolerance go before those within, of which none is told then."""
+    beyond = bool(found.beyond)
+    if out.place is None or (beyond and not out.beyond):
+        out.largest, out.most, out.place, out.beyond = found.largest, found.most, where, beyond
+    elif beyond == out.beyond:
+        out.largest = max(out.largest, found.largest)
+        if found.most > out.most:
+            out.most, out.place = found.most, where
     out.squares += found.squares
     out.values += found.values
     out.used = max(out.used, found.used)
@@ -248,17 +314,18 @@ def _add(out: Signal, found: Difference) -> None:
 
 
 def _signals(
-    a: Group, b: Group, matched: Cases, allowed: Tolerances, scores: _Scores, notes: list[str]
+    a: Group, b: Group, matched: Cases, allowed: Tolerances, scores: _Scores, about: Experiment
 ) -> Iterator[Signal]:
     names = matching.names([v.name for v in a.role("signal")], [v.name for v in b.role("signal")])
     if not names:
         return
-    places, ia, ib = _recorded(a, b, matched, notes)
+    places, ia, ib = _recorded(a, b, matched, about)
     time_a, time_b = (group.values("time") if "time" in group.variables else np.empty(0) for group in (a, b))
     rows_a, rows_b = matching.instants(time_a, time_b, allowed.time or 0.0)
     if len(rows_a) < max(len(time_a), len(time_b)) and len(time_a) and len(time_b):
         of = f"of {len(time_a):,} and {len(time_b):,}"
-        notes.append(f"signals are compared at the {len(rows_a):,} instants that both have, {of}")
+        about.notes.append(f"signals are compared at the {len(rows_a):,} instants that both have, {of}")
+        about.partial = True
     aligned = len(rows_a) == len(time_a) == len(time_b)
     whole = slice(None)
     at_a, at_b = (whole if np.array_equal(rows, np.arange(len(time))) else rows
@@ -267,10 +334,18 @@ def _signals(
     for name in names:
         unit = (a if name in a.variables else b).variables[name].unit
         out = Signal(name, unit, False, allowed.of(name))
-        out.why = _incomparable(a, b, name, "signal") or ("" if len(rows_a) else "the two have no instant in common")
+        out.why = _incomparable(a, b, name, "signal") or ("" if matched.count else NO_CASE)
+        if not out.why and not len(places):
+            out.why = "no case has its history in both"
+        if not out.why and not len(rows_a):
+            out.why = "the two have no instant in common"
+        worst: list[tuple[float, int, Place, float]] = []
         if not out.why:
             labels = _labels(a, a.variables[name])
+            out.deck_scale, out.deck_unit = deck_unit(b.variables[name])
+            joints = tuple(a.joints(a.variables[name]))
             out.by_joint = _by_joint(a, a.variables[name], allowed)
+            out.said = allowed.said({"": name, **dict(zip(joints, joint_parts(name, joints), strict=True))})
             absolute = _absolute(a, a.variables[name], out)
             together = max(1, BLOCK // (len(labels) * max(len(time_a), len(time_b))))
             for first in range(0, len(places), together):
@@ -279,11 +354,17 @@ def _signals(
                 which = unlike_bits(values_a, values_b) if aligned else np.ones(len(values_a), bool)
                 out.compared += len(which)
                 out.identical += int((~which).sum())
+                low, high = spans(values_a[:, at_a])
+                out.low, out.high = min(out.low, float(low.min())), max(out.high, float(high.max()))
                 if which.any():
-                    values_a, values_b = values_a[which][:, at_a], values_b[which][:, at_b]
-                    instants = time_a[rows_a]
-                    _cases(out, values_a, values_b, instants, labels, absolute, scores, places[some][which],
-                           numbers[some][which])  # fmt: skip
+                    passed = Passed(time_b[rows_b], time_a, values_a[which])
+                    values_b = values_b[which][:, at_b]
+                    worst += _cases(out, passed, values_b, rows_a, labels, absolute, scores, places[some][which],
+                                    numbers[some][which])  # fmt: skip
+                    worst = sorted(worst, key=lambda each: -each[0])[:WORST]
+            unit_of = _unit_of(out)
+            for most, place, where, largest in worst:
+                scores.take(place, most / unit_of, name, where, largest)
         yield out
 
 
@@ -294,10 +375,10 @@ def _histories(group: Group, name: str, places: np.ndarray) -> np.ndarray:
 
 
 def _by_joint(group: Group, signal: Stored, allowed: Tolerances) -> dict[str, float]:
-    """The joints of a signal for which something of their own is allowed."""
+    """The joints of a signal for which something of their own is allowed, be it nothing."""
     joints = tuple(group.joints(signal))
-    limits = [allowed.of(part).absolute for part in joint_parts(signal.name, joints)]
-    return {joint: limit for joint, limit in zip(joints, limits, strict=True) if limit}
+    parts = zip(joints, joint_parts(signal.name, joints), strict=True)
+    return {joint: allowed.of(part).absolute for joint, part in parts if part in allowed.absolute}
 
 
 def _absolute(group: Group, signal: Stored, found: Signal) -> np.ndarray | None:
@@ -309,43 +390,42 @@ def _absolute(group: Group, signal: Stored, found: Signal) -> np.ndarray | None:
 
 
 def _cases(
-    out: Signal, a: np.ndarray, b: np.ndarray, time: np.ndarray, labels: Sequence[str], absolute: np.ndarray | None,
+    out: Signal, passed: Passed, b: np.ndarray, rows: np.ndarray, labels: Sequence[str], absolute: np.ndarray | None,
     scores: _Scores, places: np.ndarray, numbers: np.ndarray,
-) -> None:  # fmt: skip
-    """Cases of a signal whose bits are not all the same, or may not be, [case, row, column]. places: of the cases among
-    those that are matched; numbers: in the case table of b."""
-    lows, highs = spans(a)
-    differences = compare_cases(a, b, out.tolerance, time, absolute)
-    together = zip(differences, places.tolist(), numbers.tolist(), lows.tolist(), highs.tolist(), strict=True)
-    for found, place, number, low, high in together:
-        out.low, out.high = min(out.low, low), max(out.high, high)
+) -> Iterator[tuple[float, int, Place, float]]:  # fmt: skip
+    """Cases of a signal whose bits are not all the same, or may not be. rows: of a, to which those of b belong; places:
+    of the cases among those that are matched; numbers: in the case table of b. Those beyond: how far, and where."""
+    time = passed.times[rows]
+    a = passed.values if len(rows) == len(passed.times) else passed.values[:, rows]
+    differences = compare_cases(a, b, out.tolerance, passed, absolute)
+    for found, place, number in zip(differences, places.tolist(), numbers.tolist(), strict=True):
         if found is None:
             out.identical += 1
             continue
         scores.unlike[place] = True
         where = Place(number, labels[found.column], float(time[found.row]), found.before, found.after)
-        if found.largest > out.largest or out.place is None:
-            out.place = where
-        _add(out, found)
+        _add(out, found, where)
         out.first = min(out.first, float(time[found.first]))
         if found.beyond:
             out.different += 1
             out.first_beyond = min(out.first_beyond, float(time[found.first_beyond]))
-            score = float("inf") if found.nan else found.largest / _unit_of(out)
-            scores.take(place, score, out.name, where, found.largest)
+            scores.beyond[place] = True
+            yield found.most, place, where, found.largest
         else:
             out.equivalent += 1
 
 
 def _recorded(
-    a: Group, b: Group, matched: Cases, notes: list[str]
+    a: Group, b: Group, matched: Cases, about: Experiment
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Matched cases whose histories both have: their places in `matched`, and along recorded_case of a and b."""
     has_a, has_b = np.isin(matched.a, a.recorded_positions), np.isin(matched.b, b.recorded_positions)
     for mine, theirs, path in ((has_a, has_b, a.path), (has_b, has_a, b.path)):
         alone = int((mine & ~theirs).sum())
         if alone:
-            notes.append(f"histories of {alone:,} cases are in {path} alone, and are not compared")
+            some = "the history of 1 case is" if alone == 1 else f"histories of {alone:,} cases are"
+            about.notes.append(f"{some} in {path} alone, and {some.split()[-1]} not compared")
+            about.partial = True
     both = np.flatnonzero(has_a & has_b)
     along_a = np.searchsorted(a.recorded_positions, matched.a[both])
     return both, along_a, np.searchsorted(b.recorded_positions, matched.b[both])

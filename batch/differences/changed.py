@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from batch.archive.read import ArchiveFile, Group
@@ -121,12 +121,23 @@ def _alone(plan: Plan, experiment: Experiment) -> Plan:
 
 
 def _decks(a: dict[str, str], b: dict[str, str]) -> list[str]:
+    """a, b: texts of the files by name, the deck itself first."""
     out = []
+    heads = next(iter(a), ""), next(iter(b), "")
+    if heads[0] != heads[1] and heads[0] not in b and heads[1] not in a:  # the deck has another name
+        out.append(_lines(f"{heads[0]}, now {heads[1]}", a[heads[0]], b[heads[1]]))
+        a, b = ({name: text for name, text in one.items() if name not in heads} for one in (a, b))
     for name in dict.fromkeys([*a, *b]):
         if name not in a or name not in b:
             out.append(f"{name} is {'new' if name in b else 'gone'}")
         elif a[name] != b[name]:
-            lines = list(difflib.ndiff(a[name].splitlines(), b[name].splitlines()))
-            new, gone = (sum(line.startswith(mark) for line in lines) for mark in ("+ ", "- "))
-            out.append(f"{name}: {new} line{'s' if new != 1 else ''} new, {gone} gone")
+            out.append(_lines(name, a[name], b[name]))
     return out
+
+
+def _lines(name: str, before: str, after: str) -> str:
+    """How many lines are others."""
+    old, now = (Counter(text.splitlines(keepends=True)) for text in (before, after))
+    new, gone = (now - old).total(), (old - now).total()
+    said = f"{new} line{'s' if new != 1 else ''} new, {gone} gone" if new or gone else "its lines are in another order"
+    return f"{name}: {said if before != after else 'the same lines'}"

@@ -21,7 +21,8 @@ class Difference:
     """Where two arrays [row, column] differ.
 
     beyond      how many values differ by more than is allowed;  nan: how many are not-a-number on one side alone
-    largest     the largest |b - a| of finite values, at row `row`, in column `column`, from `before` to `after`
+    largest     the largest |b - a|, of those that are beyond where any is, not-a-number apart
+    row, column where they differ most, from `before` to `after`: not-a-number on one side, else where it is largest
     squares     sum of the squares of finite differences;  values: how many there are
     first       the first row in which a bit differs;  first_beyond: by more than is allowed, -1 where none
     used        the largest share of what is allowed: 1 where all of it is needed, infinite where nothing is allowed
@@ -41,6 +42,11 @@ class Difference:
     used: float
 
     @property
+    def most(self) -> float:
+        """How far: not-a-number on one side alone is as infinite."""
+        return float("inf") if self.nan else self.largest
+
+    @property
     def verdict(self) -> str:
         return DIFFERENT if self.beyond else EQUIVALENT
 
@@ -51,7 +57,19 @@ def compare(
 ) -> Difference | None:  # fmt: skip
     """None where all bits are the same. time: s of each row, where `allowed` has a tolerance of time; absolute: of each
     column, where `allowed.absolute` is not for all."""
-    return compare_cases(a[None], b[None], allowed, time, absolute)[0]
+    return compare_cases(a[None], b[None], allowed, None if time is None else Passed(time, time, a[None]), absolute)[0]
+
+
+@frozen
+class Passed:
+    """What a passes through: `values`, [case, row, column], at `times` s, which may be more than what is compared.
+
+    instants   s, of the rows that are compared, as b has them
+    """
+
+    instants: np.ndarray
+    times: np.ndarray
+    values: np.ndarray
 
 
 def unlike_bits(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -79,10 +97,11 @@ def _flat(values: np.ndarray) -> np.ndarray:
 
 
 def compare_cases(
-    a: np.ndarray, b: np.ndarray, allowed: Tolerance, time: np.ndarray | None = None,
+    a: np.ndarray, b: np.ndarray, allowed: Tolerance, passed: Passed | None = None,
     absolute: np.ndarray | None = None,
 ) -> list[Difference | None]:  # fmt: skip
-    """As `compare`, of several cases at once, [case, row, column]: one result a case."""
+    """As `compare`, of several cases at once, [case, row, column]: one result a case. passed: where `allowed` has a
+    tolerance of time."""
     shape = a.shape
     a, b = (_flat(np.ascontiguousarray(array, dtype=np.float64)) for array in (a, b))
     unlike = a.view(np.int64) != b.view(np.int64)
@@ -100,46 +119,62 @@ def compare_cases(
         if allowed.relative:
             limit = limit + allowed.relative * magnitude(a, b)
         over = apart
-        if allowed.time and time is not None and shape[1] > 1:
-            outside = _flat(_outside(a.reshape(shape), b.reshape(shape), time, allowed.time))
-            over = np.where(finite, np.minimum(apart, outside), apart)
+        if allowed.time and passed is not None and len(passed.times) > 1:
+            outside = _flat(_outside(passed, b.reshape(shape), allowed.time))
+            over = np.where(finite, np.fmin(apart, outside), apart)
         beyond = unlike & ~(over <= limit)
         # where all have one limit, the largest share is the share of the largest
         tops = over if limit.ndim else np.fmax.reduce(over, axis=1, initial=0.0, keepdims=True)
         used = np.fmax.reduce(np.where(tops == 0.0, 0.0, tops / limit), axis=1, initial=0.0)
     used[nans > 0] = np.inf
-    sizes = apart if finite.all() else np.where(finite, apart, 0.0)
     each = np.arange(len(a))
-    firsts, places = unlike.argmax(axis=1), sizes.argmax(axis=1)
-    places = np.where(sizes[each, places] > 0.0, places, firsts)
     counts = beyond.sum(axis=1)
+    sizes = np.where(beyond | (counts == 0)[:, None], apart, 0.0) if counts.any() else apart
+    firsts, places = unlike.argmax(axis=1), sizes.argmax(axis=1)
+    places = np.where(sizes[each, places] == 0.0, firsts, places)
+    if nans.any():
+        lost = np.isnan(sizes)
+        places = np.where(nans > 0, lost.argmax(axis=1), places)
+        sizes = np.where(lost, 0.0, sizes)
+    with np.errstate(over="ignore"):
+        squares = np.square(apart if finite.all() else np.where(finite, apart, 0.0)).sum(axis=1)
     firsts_beyond = np.where(counts > 0, beyond.argmax(axis=1) // shape[2], -1)
     found = (
-        counts, nans, sizes[each, places], places // shape[2], places % shape[2], a[each, places], b[each, places],
-        np.square(sizes).sum(axis=1), finite.sum(axis=1), firsts // shape[2], firsts_beyond, used,
+        counts, nans, sizes.max(axis=1), places // shape[2], places % shape[2], a[each, places], b[each, places],
+        squares, finite.sum(axis=1), firsts // shape[2], firsts_beyond, used,
     )  # fmt: skip
     rows = zip(*(array.tolist() for array in found), strict=True)
     return [Difference(*row) if some else None for some, row in zip(unlike.any(axis=1).tolist(), rows, strict=True)]
 
 
-def _outside(a: np.ndarray, b: np.ndarray, time: np.ndarray, early: float) -> np.ndarray:
+def _outside(passed: Passed, b: np.ndarray, early: float) -> np.ndarray:
     """How far each value of b lies outside of what a passes through within `early` s of its instant; a is taken as
-    straight between its rows. [case, row, column]"""
-    shape = a.shape
-    a, b = (array.transpose(1, 0, 2).reshape(shape[1], -1) for array in (a, b))
-    low, high = a.copy(), a.copy()
+    straight between its rows, and an infinite value is none. [case, row, column]"""
+    shape = b.shape
+    a = np.where(np.isfinite(passed.values), passed.values, np.nan)
+    a, b = (array.transpose(1, 0, 2).reshape(array.shape[1], -1) for array in (a, b))
+    early += 1e-9 * early + 4.0 * float(np.spacing(np.abs(passed.times).max()))  # for rounding
+    instants = passed.instants
+    first = np.searchsorted(passed.times, instants - early, side="left")
+    last = np.searchsorted(passed.times, instants + early, side="right")
+    low, high = _lowest(a, first, last), -_lowest(-a, first, last)
     for column in range(a.shape[1]):
         for shift in (-early, early):
-            there = np.interp(time + shift, time, a[:, column])
+            there = np.interp(instants + shift, passed.times, a[:, column])
             low[:, column] = np.fmin(low[:, column], there)
             high[:, column] = np.fmax(high[:, column], there)
-    first = np.searchsorted(time, time - early, side="left")
-    last = np.searchsorted(time, time + early, side="right")
-    for steps in range(1, int((last - first).max(initial=1))):  # the rows within, for tolerances of several steps
-        for ahead in (steps, -steps):
-            rows = np.arange(len(a)) + ahead
-            inside = (rows >= first) & (rows < last)
-            low[inside] = np.fmin(low[inside], a[rows[inside]])
-            high[inside] = np.fmax(high[inside], a[rows[inside]])
     outside = np.maximum(np.maximum(low - b, b - high), 0.0)
     return np.asarray(outside.reshape(shape[1], shape[0], shape[2]).transpose(1, 0, 2))
+
+
+def _lowest(values: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Of each stretch of rows, `first` to `last`, not itself, the lowest; not-a-number of none. Of two stretches of a
+    power of two, which are doubled: O(n log n)."""
+    out = np.full((len(first), values.shape[1]), np.nan)
+    wide, steps = last - first, 1
+    while True:
+        some = np.flatnonzero((wide >= steps) & (wide < 2 * steps))
+        out[some] = np.fmin(values[first[some]], values[last[some] - steps])
+        if 2 * steps > wide.max(initial=0):
+            return out
+        values, steps = np.fmin(values[:-steps], values[steps:]), 2 * steps

@@ -33,7 +33,8 @@ def _experiment(found: Experiment) -> dict[str, Any]:
         "cases_different": found.cases_different, "only_a": found.only_a, "only_b": found.only_b,
         "ended": [dataclasses.asdict(each) for each in found.ended],
         "requirements": [
-            {"text": text, "met_a": before, "met_b": after} for text, before, after in found.requirements
+            {"text": each.now, "text_a": each.before, "met_a": each.met_before, "met_b": each.met_now}
+            for each in found.requirements
         ],
         "signals": [_signal(each) for each in found.signals],
         "worst": [dataclasses.asdict(each) for each in found.worst],

@@ -33,8 +33,11 @@ class Signal:
 
     verdict      of compare.VERDICTS;  why: of what is incomparable
     by_joint     what is allowed of single joints, in the stead of tolerance.absolute
+    said         the same and tolerance.absolute as they were written: by joint, "" for the whole
+    deck_unit    in which people read it, typeset; shown = SI value / deck_scale
     compared     cases that both have;  identical, equivalent, different: of these
-    largest      the largest |b - a|, at `place`;  rms of all finite differences;  span: of the values of a
+    largest      the largest |b - a|, of what is beyond its tolerance where anything is;  place: where they differ most
+    rms          of all finite differences;  span: of the values of a
     first        s, the earliest time of a difference, in whichever case; first_beyond: by more than is allowed
     used         the largest share of the tolerance that was needed
     nan          values that are not-a-number in one archive alone
@@ -45,6 +48,9 @@ class Signal:
     metric: bool
     tolerance: Tolerance
     by_joint: dict[str, float] = field(default_factory=dict)
+    said: dict[str, str] = field(default_factory=dict)
+    deck_unit: str = ""
+    deck_scale: float = 1.0
     compared: int = 0
     identical: int = 0
     equivalent: int = 0
@@ -59,6 +65,8 @@ class Signal:
     note: str = ""
     low: float = float("inf")
     high: float = float("-inf")
+    most: float = 0.0
+    beyond: bool = False
     squares: float = 0.0
     values: int = 0
 
@@ -105,19 +113,38 @@ class Ranked:
     score: float
     place: Place
     difference: float
+    deck_unit: str = ""
+    deck_scale: float = 1.0
+
+
+@frozen
+class Required:
+    """A requirement of both: its text in a and in b, which differ where its limit does; matched cases that meet it."""
+
+    before: str
+    now: str
+    met_before: int
+    met_now: int
+
+    @property
+    def told(self) -> bool:
+        """Whether it is another, or met by another number of cases."""
+        return self.before != self.now or self.met_before != self.met_now
 
 
 @dataclass
 class Experiment:
-    """Two matched experiments. tolerances: what the deck of b and the command line allow."""
+    """Two matched experiments. tolerances: what the deck of b and the command line allow; partial: whether one has
+    instants or histories that the other lacks, or something that is counted differs, so that they are not identical."""
 
     name_a: str
     name_b: str
     cases: Cases
     tolerances: Tolerances = field(default_factory=Tolerances)
     signals: list[Signal] = field(default_factory=list)
+    partial: bool = False
     ended: list[Ended] = field(default_factory=list)
-    requirements: list[tuple[str, int, int]] = field(default_factory=list)
+    requirements: list[Required] = field(default_factory=list)
     worst: list[Ranked] = field(default_factory=list)
     samples: list[Sample] = field(default_factory=list)
     only_a: list[int] = field(default_factory=list)
@@ -131,9 +158,11 @@ class Experiment:
         found = [signal.verdict for signal in self.signals]
         if self.ended or self.only_a or self.only_b:
             found.append(DIFFERENT)
-        if not self.cases.count:
+        if not any(signal.compared for signal in self.signals):
             found.append(INCOMPARABLE)
-        worst = max(found, key=VERDICTS.index, default=IDENTICAL)
+        worst = max(found, key=VERDICTS.index)
+        if worst == IDENTICAL and self.partial:
+            return EQUIVALENT
         return DIFFERENT if worst == INCOMPARABLE and DIFFERENT in found else worst
 
 

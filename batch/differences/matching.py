@@ -83,14 +83,22 @@ def _nth(keys: np.ndarray) -> np.ndarray:
 
 
 def instants(a: np.ndarray, b: np.ndarray, early: float) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of two time axes that belong to the same instants, within `early` s."""
+    """Rows of two time axes that belong to the same instants, within `early` s: each is the nearest of the other."""
     if len(a) == len(b) and np.array_equal(a, b):
         return np.arange(len(a)), np.arange(len(b))
-    nearest = np.clip(np.searchsorted(b, a), 0, len(b) - 1)
-    before = np.clip(nearest - 1, 0, len(b) - 1)
-    nearest = np.where(np.abs(b[before] - a) < np.abs(b[nearest] - a), before, nearest)
-    close = np.abs(b[nearest] - a) <= np.maximum(early, 1e-9 * np.maximum(np.abs(a), 1e-3))
-    return np.flatnonzero(close), nearest[close]
+    if not len(a) or not len(b):
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    there = _nearest(a, b)
+    close = np.abs(b[there] - a) <= np.maximum(early, 1e-9 * np.maximum(np.abs(a), 1e-3))
+    close &= _nearest(b, a)[there] == np.arange(len(a))
+    return np.flatnonzero(close), there[close]
+
+
+def _nearest(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Of each of a its nearest in b, which rises."""
+    after = np.clip(np.searchsorted(b, a), 0, len(b) - 1)
+    before = np.clip(after - 1, 0, len(b) - 1)
+    return np.where(np.abs(b[before] - a) < np.abs(b[after] - a), before, after)
 
 
 def names(a: Sequence[str], b: Sequence[str]) -> list[str]:

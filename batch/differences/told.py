@@ -43,9 +43,7 @@ def _experiment(found: Diff, experiment: Experiment) -> list[str]:
     out += _ended(experiment)
     out += [f"  note: {note}" for note in experiment.notes]
     out += [f"  {line}" for line in words.allowed(found, experiment)]
-    for text, before, after in experiment.requirements:
-        if before != after:
-            out.append(f"  require {text}  {words.requirement(before, after, experiment.cases.count)}")
+    out += [f"  {line}" for line in words.requirements(experiment)]
     out += _signals(experiment.signals)
     out += _samples(experiment)
     out += _worst(found, experiment)

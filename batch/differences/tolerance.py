@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 
 from batch.archive.read import Group
 from met import units
@@ -65,6 +65,15 @@ class Tolerances:
         time = deck.time if self.time is None else self.time
         return Tolerances(relative, time, {**deck.absolute, **self.absolute})
 
+    def within(self, known: Mapping[str, Sequence[str]]) -> Tolerances:
+        """Without those of something that has another unit here. known: as `check` has it."""
+        fit = {name: each for name, each in self.absolute.items() if name not in known or fits(each[1], known[name])}
+        return replace(self, absolute=fit)
+
+    def said(self, names: Mapping[str, str]) -> dict[str, str]:
+        """Those of some names as they were written, by what they are called here; names: by that."""
+        return {called: self.absolute[name][1] for called, name in names.items() if name in self.absolute}
+
     def words(self) -> list[str]:
         """Each in words."""
         of_all = (("rel", self.relative, ""), ("time", self.time, " s"))
@@ -117,6 +126,13 @@ def tolerances(texts: Iterable[str]) -> Tolerances:
     return Tolerances(of_all.get("rel"), of_all.get("time"), absolute, alone=NONE in words)
 
 
+def fits(written: str, known: Sequence[str]) -> bool:
+    """Whether a tolerance as it was written has the one unit of what it is of."""
+    wanted, *others = known
+    unit = written.partition(" ")[2]
+    return not others and units.same(units.parse_unit(unit or "1").dimension, units.parse_unit(wanted or "1").dimension)
+
+
 def check(found: Tolerances, known: Mapping[str, Sequence[str]], shown: Sequence[str]) -> None:
     """That every tolerance of the command line is of something, in its unit. known: SI units by the names of signals,
     joints' parts of them and metrics, several where a signal's joints have several. Raises E360."""
@@ -130,8 +146,8 @@ def check(found: Tolerances, known: Mapping[str, Sequence[str]], shown: Sequence
             raise _wrong(f"tolerance of `{name}`: it is in {' and in '.join(known[name])}",
                          f"give each joint its own: {', '.join(parts)}")  # fmt: skip
         [wanted] = known[name]
-        unit = written.partition(" ")[2]
-        if not units.same(units.parse_unit(unit or "1").dimension, units.parse_unit(wanted or "1").dimension):
+        if not fits(written, known[name]):
+            unit = written.partition(" ")[2]
             raise _wrong(f"tolerance of `{name}` is in `{unit or '1'}`, and `{name}` in `{wanted or '1'}`")
 
 

@@ -9,7 +9,7 @@ from batch.differences.found import Diff, Ended, Experiment, Ranked, Signal
 from batch.differences.samples import LEVEL, Sample
 from batch.failures import STATUS, ranges
 from batch.output import quoted
-from batch.signals import number_text, pretty_unit
+from batch.signals import number_text
 from met.frozen import frozen
 
 SAME = "made from the same: deck, parameters, models and versions"
@@ -18,10 +18,11 @@ SAME = "made from the same: deck, parameters, models and versions"
 def made(found: Diff) -> list[tuple[str, tuple[str, ...]]]:
     """What made the two and differs: its kind and what is said of it."""
     changed = found.changed
+    why = ": constants are part of it" if changed.meaning or changed.structure else ""
     said = [
         ("versions", changed.versions),
-        ("code", tuple(f"the program of `{name}` is another" for name in changed.code)),
-        ("structure", tuple(f"of `{name}` is another: bits cannot be expected to agree" for name in changed.structure)),
+        ("code", tuple(f"the program of `{name}` is another{why}" for name in changed.code)),
+        ("structure", tuple(f"that of `{name}` is another" for name in changed.structure)),
         ("deck", changed.decks),
         ("changed", changed.meaning),
         ("new", changed.defaults),
@@ -54,6 +55,16 @@ def allowed(found: Diff, experiment: Experiment) -> list[str]:
     mine, every = set(found.tolerances.words()), experiment.tolerances.words()
     both = (("the deck of b", [each for each in every if each not in mine]), ("--tol", sorted(mine & set(every))))
     return [f"{who} allows {', '.join(what)}" for who, what in both if what]
+
+
+def requirements(experiment: Experiment) -> list[str]:
+    """Those that are others, or are met by another number of cases."""
+    out = []
+    for each in experiment.requirements:
+        text = each.now if each.before == each.now else f"{each.now} (before: {each.before})"
+        if each.told:
+            out.append(f"require {text}  {requirement(each.met_before, each.met_now, experiment.cases.count)}")
+    return out
 
 
 def requirement(before: int, now: int, of: int) -> str:
@@ -127,7 +138,7 @@ def compared(signal: Signal) -> Compared:
         return Compared(signal.name, INCOMPARABLE, signal.why)
     if signal.verdict == IDENTICAL:
         return Compared(signal.name, IDENTICAL, f"{signal.compared:,}")
-    unit = pretty_unit(signal.unit).removesuffix("1") if signal.unit != "1" else ""
+    unit = signal.deck_unit if signal.largest < float("inf") else ""
     count = {DIFFERENT: signal.different, EQUIVALENT: signal.equivalent}.get(signal.verdict, signal.compared)
     place = signal.place
     where = first = ""
@@ -137,7 +148,9 @@ def compared(signal: Signal) -> Compared:
     begins = signal.first_beyond if signal.different else signal.first
     if begins < float("inf"):
         first = f"{begins:g} s"
-    largest = number_text(signal.largest) if signal.largest or not signal.nan else ""
+    largest = number_text(signal.largest / signal.deck_scale) if signal.largest or not signal.nan else ""
+    if signal.largest == float("inf"):
+        largest = "infinite on one side"
     share = f"{number_text(float(f'{100 * signal.share:.2g}'))} %" if 0.0 < signal.share < float("inf") else ""
     if signal.nan:
         where = f"{signal.nan:,} not-a-number on one side" + (f", {where}" if where else "")
@@ -148,18 +161,16 @@ def compared(signal: Signal) -> Compared:
 
 
 def _tolerance(signal: Signal) -> str:
-    given, unit = signal.tolerance, pretty_unit(signal.unit) if signal.unit not in ("", "1") else ""
-    if not given.given and not signal.by_joint:
-        return ""
-    words = [f"{given.absolute:g} {unit}".strip()] if given.absolute else []
-    if signal.by_joint:
-        words += [f"{joint} {size:g} {unit}".strip() for joint, size in signal.by_joint.items()]
+    given = signal.tolerance
+    words = [f"{joint} {text}".lstrip() for joint, text in signal.said.items()]
+    if len(words) > 1 or any(signal.said):
         words = [f"({', '.join(words)})"]
     if given.relative:
         words.append(f"rel {given.relative:g}")
+    of_size = bool(words)
     if given.time:
         words.append(f"time {given.time:g} s")
-    return " + ".join(words) + _used(signal.used)
+    return " + ".join(words) + (_used(signal.used) if of_size else "")
 
 
 def _used(share: float) -> str:
@@ -201,7 +212,8 @@ def most(each: Ranked) -> tuple[str, str, str]:
     """What differs most in a case, and where; its value before and now."""
     where = f" of {each.place.label}" if each.place.label else ""
     when = f" at {each.place.time:g} s" if each.place.time == each.place.time else ""
-    return (f"{each.signal}{where}{when}", *apart(each.place.before, each.place.after))
+    before, now = apart(each.place.before / each.deck_scale, each.place.after / each.deck_scale)
+    return f"{each.signal}{where}{when}", before, f"{now} {each.deck_unit}".rstrip()
 
 
 def again(found: Diff, experiment: Experiment, each: Ranked) -> tuple[str, str]:
@@ -233,6 +245,14 @@ def verdict(found: Diff) -> str:
         DIFFERENT: "different",
         INCOMPARABLE: "incomparable",
     }[found.verdict]
+    if found.verdict == EQUIVALENT and not any(
+        signal.equivalent for experiment in found.experiments for signal in experiment.signals
+    ):
+        return "equivalent: identical, to the bit, in what both have"
+    signals = [signal for experiment in found.experiments for signal in experiment.signals]
+    lost = sum(signal.verdict == INCOMPARABLE for signal in signals)
+    if found.verdict == INCOMPARABLE and lost < len(signals):
+        return f"incomparable: {lost} of {len(signals)} signals and metrics; no other is different"
     given = any(experiment.tolerances.given for experiment in found.experiments)
     if found.verdict in (EQUIVALENT, DIFFERENT) and not given:
         said += "; no tolerance was given"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
@@ -69,15 +69,16 @@ class Accessor(Generic[Data]):
         return self._whole(selection.selected(self._parts(), {**(wanted or {}), **more}))
 
     @told
-    def grid(self, *names: str) -> Any:
+    def grid(self, *names: str | Sequence[str]) -> Any:
         """Metrics, or other variables over cases, as a block with a dimension for each parameter that is varied.
 
-        One name gives a DataArray, several a Dataset, none all metrics. Parameters that are varied in step share a
-        dimension. Repeats are a dimension, and so is what decides the structure. Where there is no case it is
+        One name gives a DataArray; several, or a list, a Dataset; none all metrics. Parameters that are varied in step
+        share a dimension. Repeats are a dimension, and so is what decides the structure. Where there is no case it is
         not-a-number.
         """
-        block = grid.unfolded(list(self._parts().values()), names)
-        return block[names[0]] if len(names) == 1 else block
+        wanted = [each for name in names for each in ([name] if isinstance(name, str) else name)]
+        block = grid.unfolded(list(self._parts().values()), wanted)
+        return block[names[0]] if len(names) == 1 and isinstance(names[0], str) else block
 
     @told
     def frames(self, *links: str, case: Any = None) -> Data:

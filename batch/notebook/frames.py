@@ -13,7 +13,7 @@ from batch.archive.read import Group
 from batch.export.poses import POSITION, moved, parameters, world_poses
 from batch.notebook.quantities import number
 from batch.notebook.source import experiment, places
-from batch.notebook.table import CASE, RECORDED, asked, missing, path_of
+from batch.notebook.table import CASE, NO_HISTORIES, RECORDED, asked, missing, path_of
 from met.diagnostic import Problem, error
 from met.plan import Experiment
 
@@ -105,7 +105,10 @@ def _positions(data: xarray.Dataset, own: Experiment) -> tuple[xarray.DataArray,
     if lacking:
         which = POSITION if len(lacking) == len(found) else ", ".join(f"{joint}.{POSITION}" for joint in lacking)
         message = f"the links of `{asked(data)}` cannot be placed: {which} is not in this Dataset"
+        recorded = {channel for each in own.structure.record for channel in each.channels}
         helps = "`record = [q, ...]` in the run keeps where its joints are; then run it again"
+        if recorded.issuperset(f"{joint}.{POSITION}" for joint in lacking) and RECORDED not in data.coords:
+            helps = NO_HISTORIES
         raise Problem(error("E370", message, help=helps))
     alike: tuple[xarray.DataArray, ...] = xarray.broadcast(*(q for q in found.values() if q is not None))
     return tuple(q.transpose(RECORDED, ..., missing_dims="ignore") for q in alike)

@@ -15,6 +15,8 @@ REPEAT = "repeat"
 PREFIX = "recorded."
 """Of what is repeated along recorded_case."""
 
+NO_HISTORIES = "no signals of these cases were kept: `met run ... --histories all` keeps them"
+
 MOST_NAMES = 12
 """So many of what there is are listed where something is not."""
 
@@ -98,5 +100,7 @@ def missing(parts: Sequence[xarray.Dataset], name: str, what: str, known: Iterab
     helps = [*did_you_mean(name, names), f"there are: {some}" if names else "there are none"]
     if any(name in data.dims for data in parts):
         helps.insert(0, f"`{name}` is a dimension: `data.sel({name}=...)`")
+    if not any(RECORDED in data.coords for data in parts):
+        helps.append(NO_HISTORIES)
     where = ", ".join(dict.fromkeys(f"`{asked(data)}`" for data in parts if asked(data)))
     return Problem(error("E385", f"{what} `{name}`" + (f" in {where}" if where else ""), help=helps))

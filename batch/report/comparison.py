@@ -44,10 +44,7 @@ def _compared(found: Diff, experiment: Experiment, several: bool) -> Compared:
     """several: whether requirements are to be told of here, since the verdict has those of all structures together."""
     alone = words.missing(found, experiment)
     if several:
-        alone += [
-            f"require {text}: {words.requirement(before, now, experiment.cases.count)}"
-            for text, before, now in experiment.requirements if before != now
-        ]  # fmt: skip
+        alone += words.requirements(experiment)
     allowed = (line.replace("the deck of b ", f"the deck of {found.b} ") for line in words.allowed(found, experiment))
     ended = tuple(
         EndedAlike(

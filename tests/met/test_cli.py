@@ -175,7 +175,7 @@ def test_a_defect_is_owned_in_one_paragraph_with_the_traceback_in_a_file(
     (report,) = tmp_path.glob("met-defect-*.txt")
     assert err == (
         "met: this is a defect of MET, not of what you gave it: ZeroDivisionError: division by zero. "
-        f"The traceback is in {report}; with -v it is printed. "
+        f"The traceback is in {report}. "
         "Please report it together with the deck and the command, `met divide`.\n"
     )
     assert f"met {VERSION}, Python" in report.read_text()
