@@ -50,6 +50,7 @@ def plot(
     from batch.archive.read import ArchiveFile
     from batch.plotting.sheet import sheet
 
+    names, cases, over = ([each] if isinstance(each, str) else each for each in (names, cases, over))
     on = sheet(size, dpi)
     with contextlib.ExitStack() as files:
         archive = files.enter_context(ArchiveFile(Path(path)))

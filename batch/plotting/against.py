@@ -11,9 +11,13 @@ import numpy as np
 from batch.archive.read import ArchiveFile, Group
 from batch.differences import matching
 from batch.output import quoted
+from batch.report.markup import visible
 from batch.signals import Panel, pretty_unit
 from met.channel import channel_paths
 from met.diagnostic import Problem, error
+
+LONGEST = 40
+"""Letters of a file's name in a picture: of more, those in the middle are left out."""
 
 
 class Beside:
@@ -110,7 +114,10 @@ def file_names(a: Path, b: Path) -> tuple[str, str]:
 
 
 def _labelling(name: str) -> str:
-    """matplotlib leaves out of a legend what begins with `_`."""
+    """matplotlib leaves out of a legend what begins with `_`, and cannot draw every letter that a file may have."""
+    name = visible(name).replace("\n", "\\n").replace("\t", "\\t")
+    if len(name) > LONGEST:
+        name = f"{name[: LONGEST // 2]}…{name[-LONGEST // 2 :]}"
     return f"./{name}" if name.startswith("_") else name
 
 

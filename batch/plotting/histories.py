@@ -53,7 +53,7 @@ class Histories:
         if not signals:  # a command that is drawn where it belongs needs no panel of its own
             drawn = {(command.variable, command.column) for command in self.commands.values()}
             found = [panel for panel in found if not drawn.issuperset((panel.variable, c) for c in panel.columns)]
-        self.panels = found
+        self.panels, self.left = layout.several(found, bool(signals), "signals")
         self.pairs, self.theirs = self._against(bool(signals))
 
     def _against(self, asked: bool) -> tuple[dict[int, int], dict[int, list[int]]]:
@@ -100,7 +100,7 @@ class Histories:
             below = f"{count:,} cases" + (": median, nine in ten, and all" if self.fan else "")
         if self.other is not None and len(self.pairs) < count:
             below += f"; {len(self.pairs):,} of them also in {self.other.name}"
-        return below
+        return "; ".join(part for part in (below, self.left) if part)
 
     def _is_zero(self, row: Sequence[Cell | None]) -> bool:
         """Whether nothing of a row is ever other than zero."""
@@ -118,8 +118,8 @@ class Histories:
             if self.single:
                 thin = 0.75 if self.sheet.paper else 1.0
                 style = {"linewidth": thin * _width(line, len(panel.lines)), "linestyle": _dashes(line)}
-                y = history(self.group, panel, self.positions[0])[:, line]
-                _line(ax, self.time, y, color=colour, label=panel.lines[line] or None, **style)
+                y = layout.drawable(history(self.group, panel, self.positions[0])[:, line])
+                _line(ax, self.time, y, color=colour, label=layout.named(panel.lines[line]), **style)
             elif self.fan:
                 self._fan(ax, panel, line, colour)
             else:
@@ -137,7 +137,9 @@ class Histories:
 
     def _fan(self, ax: Any, panel: Panel, line: int, colour: str) -> None:
         """Median, nine in ten, all."""
-        values = np.stack([history(self.group, panel, position)[:, line] for position in spread(self.positions)])
+        values = layout.drawable(
+            np.stack([history(self.group, panel, position)[:, line] for position in spread(self.positions)])
+        )
         good = np.isfinite(values).any(axis=0)
         time, values = self.time[good], values[:, good]
         if not len(time):
@@ -145,16 +147,16 @@ class Histories:
         low, five, middle, ninety_five, high = np.nanpercentile(values, (0, 5, 50, 95, 100), axis=0)
         ax.fill_between(time, low, high, color=colour, alpha=0.15, linewidth=0)
         ax.fill_between(time, five, ninety_five, color=colour, alpha=0.30, linewidth=0)
-        ax.plot(time, middle, color=colour, label=panel.lines[line] or None)
+        ax.plot(time, middle, color=colour, label=layout.named(panel.lines[line]))
 
     def _overlay(self, ax: Any, panel: Panel, line: int, colour: str | None) -> None:
         """A line a case; where joints share the panel they have the colours, and cases are told apart by how faint."""
         count = len(self.positions)
         for index, position in enumerate(self.positions):
-            y = history(self.group, panel, position)[:, line]
+            y = layout.drawable(history(self.group, panel, position)[:, line])
             if colour is not None:
                 alpha = 1.0 - 0.7 * index / max(1, count - 1)
-                label = panel.lines[line] if index == 0 and panel.lines[line] else None
+                label = layout.named(panel.lines[line]) if index == 0 else None
                 _line(ax, self.time, y, color=colour, alpha=alpha, linewidth=1.0, label=label)
             else:
                 _line(ax, self.time, y, color=sequence(index, count), label=_case_label(self.group, position))
@@ -167,7 +169,9 @@ class Histories:
         style: dict[str, Any] = {"alpha": PALE, "solid_capstyle": "butt", "zorder": 1.8}
         if self.fan:
             places = list(self.pairs.values())
-            values = np.stack([other.history(panel, columns, place)[:, line] for place in spread(places)])
+            values = layout.drawable(
+                np.stack([other.history(panel, columns, place)[:, line] for place in spread(places)])
+            )
             good = np.isfinite(values).any(axis=0)
             if good.any():
                 five, middle, ninety_five = np.nanpercentile(values[:, good], (5, 50, 95), axis=0)
@@ -177,7 +181,7 @@ class Histories:
             return
         for index, position in enumerate(self.positions):
             if position in self.pairs:
-                y = other.history(panel, columns, self.pairs[position])[:, line]
+                y = layout.drawable(other.history(panel, columns, self.pairs[position])[:, line])
                 tone = colour or sequence(index, len(self.positions))
                 ax.plot(other.time, y, color=tone, linewidth=1.2 + WIDER, **style)
 

@@ -5,10 +5,16 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
 
 from batch.archive.read import ArchiveFile
 from batch.plotting.sheet import FAINT, INK, Sheet
+from batch.report.markup import visible
+from met.diagnostic import Problem, error
+
+T = TypeVar("T")
 
 PANEL_INCHES, TALL_INCHES = 1.85, (4.2, 2.9)
 FLAT = 0.3
@@ -54,6 +60,29 @@ def figure(
     if sheet.paper:  # its own choice of ticks counts on shorter numbers
         axes[0][0].locator_params(axis="x", nbins=max(2, int((width / columns - BESIDE_ON_PAPER) / TICK_INCHES)))
     return made, [list(row) for row in axes]
+
+
+DRAWABLE = 1e300
+"""What is larger counts as infinite: the span of an axis would be no number."""
+
+MOST_PANELS = 40
+"""Under one another: more are no picture any more."""
+
+
+def drawable(values: np.ndarray) -> np.ndarray:
+    """The values, those infinite that no axis has room for."""
+    return np.where(np.abs(values) > DRAWABLE, np.copysign(np.inf, values), values)
+
+
+def several(found: Sequence[T], asked: bool, what: str) -> tuple[Sequence[T], str]:
+    """As many panels as a picture has room for, and what to say of the others. asked: whether they were named. Raises
+    Problem E391."""
+    if len(found) <= MOST_PANELS:
+        return found, ""
+    if asked:
+        message = f"{len(found):,} {what} in one picture: {MOST_PANELS} at most"
+        raise Problem(error("E391", message, help="draw several pictures, each with a name of its own: `-o FILE`"))
+    return found[:MOST_PANELS], f"{MOST_PANELS} of {len(found):,} {what}, others by name"
 
 
 def letters(sheet: Sheet, inches: float) -> int:
@@ -103,6 +132,11 @@ def legend(
     figure.legend(found.values(), found.keys(), title=title, **style)
 
 
+def named(text: str) -> str | None:
+    """A line's label: matplotlib leaves out of a legend what begins with `_`, and draws a thin space as nothing."""
+    return f"\N{THIN SPACE}{text}" if text.startswith("_") else text or None
+
+
 def labelled(axes: Sequence[Sequence[Any]]) -> dict[str, Any]:
     """All that has a label in these panels: handle by text, each text once."""
     known: dict[str, Any] = {}
@@ -120,7 +154,7 @@ def title(figure: Any, archive: ArchiveFile, name: str, below: str, sheet: Sheet
             _grow(figure, sheet, text.count("\n") + 1)
             figure.suptitle(text, x=0.012, ha="left", fontsize=sheet.small, color=INK)
         return
-    line = f"{PurePath(archive.deck.strip('<>')).name} · {name}"
+    line = visible(f"{PurePath(archive.deck.strip('<>')).name} · {name}")
     lines = textwrap.wrap(below, letters(sheet, figure.get_figwidth() - 0.3)) if below else []
     spare = "\n" * len(lines)
     figure.suptitle(f"{line}{spare}", x=0.012, ha="left", fontsize=12, fontweight="bold", linespacing=1.5)

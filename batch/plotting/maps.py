@@ -27,6 +27,9 @@ STRAY = 5.0
 """Colours go to the extremes unless these lie so many times further apart than nine in ten of the values."""
 
 STRIPES, DOTTED = "/////", "....."
+RINGS = {STRIPES: "o", DOTTED: "s"}
+"""What is around a point in their stead."""
+
 WIDEST = 2.6
 """Inches of a map on paper: where there is more room, maps stand beside one another."""
 
@@ -217,12 +220,14 @@ def _cells(ax: Any, each: Measured, found: Plan, here: np.ndarray, norm: Any) ->
             _fill(ax, found, wanted & among, facecolors="none", edgecolors=tone, linewidth=0.0, hatch=hatch)
     size = _glyph(ax, found)
     centre_x, centre_y = (each_axis.ravel() for each_axis in np.meshgrid(found.x.centres, found.y.centres))
-    failed, infinite = _any(each.failed, cells, count), there & np.isinf(values)
+    failed = _any(each.failed, cells, count)
     if failed.any():
         ax.scatter(centre_x[failed], centre_y[failed], s=size, marker="x", color=INK, linewidths=0.8, zorder=3)
-    if infinite.any():
-        ax.scatter(centre_x[infinite], centre_y[infinite], s=4.0 * size, marker=_infinity(), color=INK, linewidths=0.0,
-                   zorder=3, path_effects=[withStroke(linewidth=2.5, foreground=GREY)])  # fmt: skip
+    for infinite, text in ((np.isposinf(values), "∞"), (np.isneginf(values), "−∞")):
+        if infinite.any():
+            ax.scatter(centre_x[infinite], centre_y[infinite], s=4.0 * len(text) ** 2 * size, marker=_infinity(text),
+                       color=INK, linewidths=0.0, zorder=3,
+                       path_effects=[withStroke(linewidth=2.5, foreground=GREY)])  # fmt: skip
     return mapped
 
 
@@ -259,12 +264,12 @@ def _glyph(ax: Any, found: Plan) -> float:
     return float(np.clip(0.5 * cell, 1.2, 5.0) ** 2)
 
 
-def _infinity() -> Any:
+def _infinity(text: str = "∞") -> Any:
     """A marker."""
     from matplotlib.textpath import TextPath
     from matplotlib.transforms import Affine2D
 
-    drawn = TextPath((0, 0), "∞", size=1)
+    drawn = TextPath((0, 0), text, size=1)
     box = drawn.get_extents()
     return drawn.transformed(Affine2D().translate(-(box.x0 + box.x1) / 2, -(box.y0 + box.y1) / 2))
 
@@ -272,20 +277,22 @@ def _infinity() -> Any:
 def _striped(each: Measured, found: Plan) -> list[tuple[np.ndarray, str]]:
     if found.other is None or each.theirs_missed is None:
         return [(each.missed, STRIPES)]
-    return [(each.missed & ~each.theirs_missed, STRIPES), (~each.missed & each.theirs_missed, DOTTED)]
+    both = each.both
+    return [(both & each.missed & ~each.theirs_missed, STRIPES), (both & ~each.missed & each.theirs_missed, DOTTED)]
 
 
 def _points(ax: Any, each: Measured, found: Plan, here: np.ndarray, norm: Any) -> Any:
     shown = _shown(each, found)
     x, y = found.x.of_cases(), found.y.of_cases()
     finite = here & np.isfinite(shown)
-    missed = _striped(each, found)[0][0]
     size = 22.0 if here.sum() < 400 else 8.0
     style: dict[str, Any] = {"s": size, "rasterized": int(here.sum()) > RASTERED}
     mapped = ax.scatter(x[finite], y[finite], c=shown[finite], cmap=_colours(found), norm=norm, linewidths=0, **style)
-    rings = finite & missed
-    ax.scatter(x[rings], y[rings], facecolors="none", edgecolors=INK, linewidths=0.8, **style)
-    for marked, marker in ((here & np.isnan(shown), "x"), (here & np.isinf(shown), _infinity())):
+    for marked, hatch in _striped(each, found):
+        rings = finite & marked
+        ax.scatter(x[rings], y[rings], marker=RINGS[hatch], facecolors="none", edgecolors=INK, linewidths=0.8, **style)
+    for marked, marker in ((here & np.isnan(shown), "x"), (here & np.isposinf(shown), _infinity()),
+                           (here & np.isneginf(shown), _infinity("−∞"))):  # fmt: skip
         if marked.any():
             ax.scatter(x[marked], y[marked], marker=marker, color=FAINT, linewidths=0.8, **style)
     ax.margins(0.04)
@@ -327,14 +334,16 @@ def _marks(metrics: Sequence[Measured], found: Plan) -> dict[str, Any]:
     texts = ["misses what is required"] if found.other is None else [f"missed in {name} alone" for name in found.other]
     for hatch, text in zip((STRIPES, DOTTED), texts, strict=False):
         if any(marked.any() for marked, which in stripes if which == hatch):
-            out[text] = patch(hatch) if found.filled else dot("o", markerfacecolor="none", markersize=5)
+            out[text] = patch(hatch) if found.filled else dot(RINGS[hatch], markerfacecolor="none", markersize=5)
     shown = [_shown(each, found) for each in metrics]
     if any(np.isinf(each).any() for each in shown):
-        out["infinite"] = dot(_infinity(), markersize=9, markeredgewidth=0.0)
+        down = not any(np.isposinf(each).any() for each in shown)
+        out["infinite"] = dot(_infinity("−∞" if down else "∞"), markersize=9, markeredgewidth=0.0)
     if any(each.failed.any() for each in metrics):
         out["failed"] = dot("x", markersize=4.5)
-    empty = len(np.unique(found.cells[found.cells >= 0])) < np.prod(found.shape)
-    if found.filled and (found.other is None or not empty) and any(_lacking(each, metrics) for each in shown):
+    both = metrics[0].both if metrics else True
+    empty = len(np.unique(found.cells[both & (found.cells >= 0)])) < np.prod(found.shape)
+    if found.filled and any(_lacking(values, each) for values, each in zip(shown, metrics, strict=True)):
         out["no value"] = Patch(facecolor=GREY)
     if found.filled and empty:
         tone = "white" if found.other is None else GREY
@@ -342,6 +351,6 @@ def _marks(metrics: Sequence[Measured], found: Plan) -> dict[str, Any]:
     return out
 
 
-def _lacking(shown: np.ndarray, metrics: Sequence[Measured]) -> bool:
-    """Whether a case that did not fail has no value."""
-    return bool(np.isnan(shown[~metrics[0].failed]).any())
+def _lacking(shown: np.ndarray, each: Measured) -> bool:
+    """Whether a case that is there and did not fail has no value."""
+    return bool(np.isnan(shown[each.both & ~each.failed]).any())

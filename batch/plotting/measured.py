@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from batch import requirements
 from batch.plotting.against import Beside, lacking, unlike
+from batch.plotting.layout import drawable
 from batch.report.content import Column
 from batch.report.pool import Pool
 from batch.signals import deck_unit
@@ -16,8 +18,9 @@ from met.run import DONE
 
 @frozen
 class Measured:
-    """values, theirs: of each case, theirs of the same case in another archive, none where there is no other; missed:
-    whether a requirement of the metric is."""
+    """values, theirs: of each case, theirs of the same case in another archive, none where there is no other; missed,
+    theirs_missed: whether a requirement of the metric is, of each archive its own; both: whether a case is in both,
+    True where there is no other."""
 
     column: Column
     values: np.ndarray
@@ -25,6 +28,7 @@ class Measured:
     failed: np.ndarray
     theirs: np.ndarray | None = None
     theirs_missed: np.ndarray | None = None
+    both: np.ndarray | bool = True
 
     @property
     def label(self) -> str:
@@ -59,7 +63,7 @@ class Measured:
 def measured(pool: Pool, names: Sequence[str], others: Mapping[int, Beside]) -> list[Measured]:
     """The metrics of these names, all for none. others: by number of a group that of another archive. Raises Problem
     E393 for a metric that it has in another unit, or which is named and not there."""
-    failed = pool.status != DONE
+    failed, both = pool.status != DONE, _both(pool, others)
     out = []
     for column in pool.metrics():
         name = column.key.partition(":")[2]
@@ -67,8 +71,8 @@ def measured(pool: Pool, names: Sequence[str], others: Mapping[int, Beside]) -> 
             missed = np.zeros(pool.count, bool)
             for limit in column.limits:
                 missed |= pool.outcomes[:, pool.requirements.index(limit.text)] == 0
-            theirs, theirs_missed = _theirs(pool, name, [limit.text for limit in column.limits], others, bool(names))
-            out.append(Measured(column, column.values, missed, failed, theirs, theirs_missed))
+            theirs, theirs_missed = _theirs(pool, name, others, bool(names))
+            out.append(Measured(column, drawable(column.values), missed, failed, theirs, theirs_missed, both))
     return sorted(out, key=lambda each: _place(names, each.column.key.partition(":")[2]))
 
 
@@ -76,10 +80,20 @@ def _place(names: Sequence[str], name: str) -> int:
     return list(names).index(name) if name in names else 0
 
 
+def _both(pool: Pool, others: Mapping[int, Beside]) -> np.ndarray | bool:
+    if not others:
+        return True
+    out = np.zeros(pool.count, bool)
+    for number, other in others.items():
+        here = pool.group_of == number
+        out[here] = other.places[pool.position_of[here]] >= 0
+    return out
+
+
 def _theirs(
-    pool: Pool, name: str, required: Sequence[str], others: Mapping[int, Beside], asked: bool
+    pool: Pool, name: str, others: Mapping[int, Beside], asked: bool
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Of each case the metric in the other archive, in the unit of the own, and whether it misses what is required."""
+    """Of each case the metric in the other archive, in the own unit, and whether it misses what that requires."""
     if not others:
         return None, None
     out, missed, found = np.full(pool.count, np.nan), np.zeros(pool.count, bool), False
@@ -98,9 +112,7 @@ def _theirs(
         here = np.flatnonzero(pool.group_of == number)
         places = other.places[pool.position_of[here]]
         here, places = here[places >= 0], places[places >= 0]
-        out[here] = other.group.values(name)[places] / deck_unit(mine)[0]
-        if "met" in other.group.variables:
-            texts = [str(text) for text in other.group.values("requirement")]
-            columns = [texts.index(text) for text in required if text in texts]
-            missed[here] = (other.group.values("met")[places][:, columns] == 0).any(axis=1)
+        out[here] = drawable(other.group.values(name)[places] / deck_unit(mine)[0])
+        columns = [each.place for each in requirements.required(other.group) if each.metric == name]
+        missed[here] = (requirements.outcomes(other.group)[places][:, columns] == 0).any(axis=1)
     return (out, missed) if found else (None, None)

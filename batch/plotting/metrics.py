@@ -33,7 +33,7 @@ def draw(
     if pool.count < 2:
         message = f"nothing to draw in `{pool.name}`: the metrics of one case are single numbers"
         raise Problem(error("E327", message, help=f"`met show {quoted(archive.path)}` tells them"))
-    metrics = measured(pool, names, others)
+    metrics, left = layout.several(measured(pool, names, others), bool(names), "metrics")
     files = file_names(archive.path, other.path) if other is not None else None
     count = f"{pool.count:,} cases"
     matched = sum(int((each.places >= 0).sum()) for each in others.values())
@@ -52,6 +52,7 @@ def draw(
         planned = maps.plan(found[0], found[1], third, files)
         figure, _ = maps.draw(sheet, planned, metrics, third)
         below = f"{count}: {maps.said(planned, metrics, third)}"
+    below = f"{below}; {left}" if left else below
     layout.title(figure, archive, pool.groups[0].name if len(pool.groups) == 1 else pool.name, below, sheet)
     return figure
 

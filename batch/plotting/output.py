@@ -10,6 +10,9 @@ from batch.output import quoted
 from met.diagnostic import Problem, error
 
 SOFTWARE = "MET"
+MOST_DOTS = 200_000_000
+"""Of a PNG: each takes four bytes while it is drawn."""
+
 HEAD_BYTES, TAIL_BYTES = 2000, 20_000
 
 # By ending: what is told of its making, without a date, and how that stands in the file.
@@ -19,7 +22,7 @@ METADATA: dict[str, dict[str, str | None]] = {
     ".pdf": {"Creator": SOFTWARE, "CreationDate": None},
 }
 MARKS = {
-    ".png": b"Software\0" + SOFTWARE.encode(),
+    ".png": b"\0\0\0\x0ctEXtSoftware\0" + SOFTWARE.encode(),  # with its length, for there are others that begin so
     ".svg": f"<dc:title>{SOFTWARE}</dc:title>".encode(),
     ".pdf": f"/Creator ({SOFTWARE})".encode(),
 }
@@ -65,6 +68,7 @@ def save(figure: Any, output: Path) -> None:
     import warnings
 
     kind = output.suffix.lower()
+    _check_dots(figure, kind)
     backend, canvas = {
         ".png": ("agg", "FigureCanvasAgg"), ".svg": ("svg", "FigureCanvasSVG"), ".pdf": ("pdf", "FigureCanvasPdf"),
     }[kind]  # fmt: skip
@@ -87,6 +91,14 @@ def save(figure: Any, output: Path) -> None:
         message = f"{wide} x {high} cm have no room for {len(figure.axes)} panels, with what is written on them"
         helps = ("a larger `--size`, or its width alone: the height is then what is needed", "name fewer to draw")
         raise Problem(error("E392", message, help=helps)) from reason
+
+
+def _check_dots(figure: Any, kind: str) -> None:
+    """Refuse a PNG that would take gigabytes to draw. Raises Problem E392."""
+    across, up = (round(side * figure.dpi) for side in figure.get_size_inches())
+    if kind == ".png" and across * up > MOST_DOTS:
+        message = f"{across:,} x {up:,} dots: a PNG has {MOST_DOTS:,} at most"
+        raise Problem(error("E392", message, help=("a smaller `--dpi` or `--size`", "an SVG or a PDF has no dots")))
 
 
 def _cannot_write(output: Path, reason: OSError) -> Problem:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from batch.grids import MOST_LEVELS, is_grid, levelled, levels
+from batch.plotting import layout
 from batch.plotting.measured import Measured
 from batch.plotting.sheet import COLOURS, FAINT, INK, Sheet, sequence
 from batch.plotting.sides import is_log
@@ -55,11 +56,13 @@ def scatter(ax: Any, each: Measured, x: Column, by: Column | None, sheet: Sheet)
             order = one.places[np.argsort(x.values[one.places])]
             y = np.where(np.isfinite(each.values[order]), each.values[order], np.nan)
             ax.plot(x.values[order], y, color=one.colour, linewidth=1.0)
-        ax.scatter(x.values[here], each.values[here], color=one.colour, label=one.text or None, **style)
+        ax.scatter(x.values[here], each.values[here], color=one.colour, label=layout.named(one.text), **style)
     if each.theirs is not None:
         _theirs(ax, each, x, sets, by)
+        _edge(ax, np.where(each.both, each.theirs, 0.0), x.values, 4.0 * max(12.0, size), hollow=True)
     _edge(ax, each.values, x.values, size)
     _limits(ax, each)
+    _reach(ax, x.values)
     return mapped
 
 
@@ -116,15 +119,25 @@ def _theirs(ax: Any, each: Measured, x: Column, sets: list[Set], by: Column | No
                    zorder=0.9, rasterized=len(drawn) > RASTERED)  # fmt: skip
 
 
-def _edge(ax: Any, values: np.ndarray, x: np.ndarray, size: float) -> None:
-    """What is no number, on the panel's edges: ▲ infinite, ▼ infinite below, × no value."""
+def _reach(ax: Any, x: np.ndarray) -> None:
+    """Room for all cases, those among them that stand on the panel's edges alone."""
+    finite = levels(x)
+    if len(finite):
+        ax.update_datalim([(finite[0], 0.0), (finite[-1], 0.0)], updatey=False)
+        ax.autoscale_view()
+
+
+def _edge(ax: Any, values: np.ndarray, x: np.ndarray, size: float, *, hollow: bool = False) -> None:
+    """What is no number, on the panel's edges: ▲ infinite, ▼ infinite below, × no value. hollow: of another archive."""
+    style = {"facecolors": "none", "edgecolors": INK, "zorder": 3.9} if hollow else {"color": INK, "zorder": 4}
     for there, marker, at in ((np.isposinf(values), "^", 1.0), (np.isneginf(values), "v", 0.0),
                               (np.isnan(values), "x", 1.0)):  # fmt: skip
         where = x[there & np.isfinite(x)]
         if len(where):
             where = where[_apart(where, np.zeros(len(where)))]
-            ax.scatter(where, np.full(len(where), at), marker=marker, s=max(12.0, size), color=INK, linewidths=0.8,
-                       transform=ax.get_xaxis_transform(), clip_on=False, zorder=4)  # fmt: skip
+            tone = {"color": INK, "zorder": 3.9} if hollow and marker == "x" else style  # a cross has no face
+            ax.scatter(where, np.full(len(where), at), marker=marker, s=max(12.0, size), linewidths=0.8,
+                       transform=ax.get_xaxis_transform(), clip_on=False, **tone)  # fmt: skip
 
 
 def lost(values: np.ndarray) -> str:

@@ -21,6 +21,13 @@ def default(archive: Path) -> Path:
 
 def check(output: Path) -> None:
     """Refuse a place before anything is computed. Raises Problem E380, or E381 where the name is not that of a page."""
+    try:
+        _check(output)
+    except OSError as reason:
+        raise cannot_write(output, reason) from reason
+
+
+def _check(output: Path) -> None:
     if output.is_dir():
         inside = quoted(output / "report.html")
         raise Problem(error("E380", f"cannot write {output}: it is a folder", help=f"name a file in it: `-o {inside}`"))
@@ -35,11 +42,7 @@ def check(output: Path) -> None:
         raise Problem(error("E380", f"cannot write {output}: {output.parent} {what}", help=helps))
     if output.exists() and not output.is_file():
         raise Problem(error("E380", f"cannot write {output}: it is not a regular file"))
-    try:
-        foreign = output.exists() and output.stat().st_size > 0 and not is_report(output)
-    except OSError as reason:
-        raise cannot_write(output, reason) from reason
-    if foreign:
+    if output.exists() and output.stat().st_size > 0 and not is_report(output):
         message = f"{output} exists and is no report of MET: it is not written over"
         raise Problem(error("E380", message, help="give another name with `-o`, or remove the file"))
 

@@ -53,6 +53,12 @@ const MET = (() => {
   // A change, with its sign.
   const signed = (value) => (value > 0 ? "+" : "") + number(value).replace("-", "−");
 
+  // From low to high; of values that differ by roundings alone, as wide as of one value, for ticks cannot be told apart.
+  function span(low, high) {
+    const far = Math.max(Math.abs(low), Math.abs(high));
+    return high - low > 1e-12 * far ? high - low : far * 0.1 || 1;
+  }
+
   const titled = (column) => (column.unit ? `${column.label} (${column.unit})` : column.label);
 
   // An element. Attributes that are functions are listeners; children are elements or texts.
@@ -93,7 +99,7 @@ const MET = (() => {
   // A colour for a share from 0 to 1; the end that the paper swallows is left out.
   function ramp(share) {
     const [low, high] = dark() ? [0.24, 1] : [0, 0.88];
-    const at = Math.min(Math.max(low + (high - low) * share, 0), 1) * (VIRIDIS.length - 1);
+    const at = Math.min(Math.max(low + (high - low) * (share || 0), 0), 1) * (VIRIDIS.length - 1);
     const first = Math.min(Math.floor(at), VIRIDIS.length - 2);
     const mixed = [1, 3, 5].map((c) => {
       const [a, b] = [channel(VIRIDIS[first], c), channel(VIRIDIS[first + 1], c)];
@@ -173,6 +179,6 @@ const MET = (() => {
     return made;
   }
 
-  return { unpack, number, ticks, quantity, titled, node, palette, ramp, diverging, signed, over, drawn, width, print, tip, pairs, model,
+  return { unpack, number, ticks, span, quantity, titled, node, palette, ramp, diverging, signed, over, drawn, width, print, tip, pairs, model,
     dark, isPrinting: () => printing };
 })();

@@ -259,7 +259,7 @@ MET.points = (() => {
       const room = (high / low) ** 0.05 || 1.1;
       return low === high ? [low / 2, high * 2] : [low / room, high * room];
     }
-    const span = high - low || Math.abs(high) * 0.1 || 1;
+    const span = MET.span(low, high);
     return [low - 0.05 * span, high + 0.07 * span];
   }
 

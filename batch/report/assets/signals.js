@@ -7,6 +7,7 @@ MET.signals = (() => {
   const DASHES = [[], [7, 4], [2, 3], [10, 3, 2, 3]];
   const MOST = DASHES.length;
   const READ = 8;
+  const CLOSEST = 1e-9;  // of all time, what is shown at least
   const WAS = 5;  // px, how wide a line of before is
 
   function make(root, model) {
@@ -136,7 +137,9 @@ MET.signals = (() => {
       const [first, last] = [all[0], all[all.length - 1]];
       const held = u.cursor.idx ?? Math.floor(all.length / 2);
       const middle = all[held] >= min && all[held] <= max ? all[held] : (min + max) / 2;
-      const to = (low, high) => u.setScale("x", { min: Math.max(first, low), max: Math.min(last, high) });
+      const to = (low, high) => {
+        if (high - low > CLOSEST * (last - first)) u.setScale("x", { min: Math.max(first, low), max: Math.min(last, high) });
+      };
       if (event.key === "+" || event.key === "=") to(middle - (middle - min) / 2, middle + (max - middle) / 2);
       else if (event.key === "-") to(middle - (middle - min) * 2, middle + (max - middle) * 2);
       else if (event.key === "Escape") to(first, last);
@@ -235,7 +238,7 @@ MET.signals = (() => {
   const wide = (at, count) => (count === 1 ? 1.75 : 2.2 - (0.8 * at) / (count - 1));
 
   function room(low, high) {
-    const span = high - low || Math.abs(high) * 0.1 || 1;
+    const span = MET.span(low, high);
     return [low - 0.07 * span, high + 0.07 * span];
   }
 
