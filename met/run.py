@@ -58,15 +58,20 @@ class Run:
 
 @frozen
 class Prepared:
-    """An experiment with its program; the kernel is compiled, or fetched from the cache, when first used."""
+    """An experiment with its program; the kernel is compiled, or fetched from the cache, when first used.
+
+    wire, late  for real beds, as `met.program.build.build` has them
+    """
 
     experiment: Experiment
     lanes: int | None = None
+    wire: bool = False
+    late: int = 0
     _cells: dict[str, object] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def program(self) -> Program:
-        return build(self.experiment)
+        return build(self.experiment, wire=self.wire, late=self.late)
 
     @cached_property
     def recording(self) -> Recording:
@@ -84,9 +89,11 @@ class Prepared:
         return hashlib.sha256(emit(self.recording, CANONICAL_LANES).encode()).hexdigest()
 
 
-def prepare(experiment: Experiment, *, lanes: int | None = None) -> Prepared:
+def prepare(
+    experiment: Experiment, *, lanes: int | None = None, wire: bool = False, late: int = 0
+) -> Prepared:
     """Make an experiment ready to run; lanes: cases a block, None for what suits the machine."""
-    return Prepared(experiment, lanes)
+    return Prepared(experiment, lanes, wire, late)
 
 
 def run(
@@ -150,7 +157,8 @@ def results(
 ) -> Run:
     """What came of these rows, of what `compute` gave of them. Writes not-a-number into `history` after a failure.
 
-    fates  of rows (by their place in `rows`) for which nothing was computed: TIMED_OUT or LOST, and why
+    fates  of rows (by their place in `rows`) for which nothing was computed: TIMED_OUT or LOST, and why; or FAILED, where
+           something else than the engine ended them at the tick that `failure.tick` says
     """
     experiment, program = prepared.experiment, prepared.program
     schedule = experiment.structure.schedule
@@ -162,7 +170,9 @@ def results(
         causes[case] = _cause(experiment, *outputs[case, :3].tolist())
     status = np.where(failed, FAILED, DONE).astype(np.int8)
     for fated, (ended, why) in (fates or {}).items():
-        status[fated], failed[fated], n_valid[fated], causes[fated] = ended, True, 0, why
+        status[fated], failed[fated], causes[fated] = ended, True, why
+        if ended != FAILED:
+            n_valid[fated] = 0
         for coordinate in experiment.cases.coordinates:
             out[COORDINATE + coordinate.path][fated] = coordinate.values[rows[fated]]
     for case, cause in _misapplied(experiment, rows, out).items():

@@ -29,25 +29,26 @@ COORDINATE, METRIC = "coordinate:", "metric:"
 """Prefixes of the outputs, and cells, that are named by a deck: no name of a deck's is one of the engine's."""
 
 
-def build(experiment: Experiment, *, wire: bool = False) -> Program:
+def build(experiment: Experiment, *, wire: bool = False, late: int = 0) -> Program:
     """The program of an experiment: inputs are its coordinates and what noise is a case's own, columns its recorded
     channels.
 
     wire  for real beds: no bed is in the program. The filtered rate that each has read is an input of every tick,
           `wire:<joint>.rate` (rad/s); what its amplifiers are told are outputs, `wire:<joint>.voltage` (V) and
           `wire:<joint>.current` (A)
+    late  ticks of a bed's `delay` that pass on the wire: what is told now is held from so many ticks later on
     """
-    return Builder(Machine(experiment), wire=wire).program()
+    return Builder(Machine(experiment), wire=wire, late=late).program()
 
 
 class Builder:
     """The phases of one machine. Every method that takes a tape is the body of a phase."""
 
-    def __init__(self, machine: Machine, *, wire: bool = False) -> None:
+    def __init__(self, machine: Machine, *, wire: bool = False, late: int = 0) -> None:
         self.machine = machine
         self.schedule = machine.structure.schedule
         self.joints = tuple(joint.name for joint in machine.joints)
-        self.step = Step(machine, wire=wire)
+        self.step = Step(machine, wire=wire, late=late)
 
     def program(self) -> Program:
         instant = self.schedule.dynamics

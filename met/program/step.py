@@ -39,9 +39,9 @@ FROM, STAGE = "from:", "stage:"
 class Step:
     """The phases of a step of one machine. Every method that takes a tape is the body of a phase."""
 
-    def __init__(self, machine: Machine, *, wire: bool = False) -> None:
+    def __init__(self, machine: Machine, *, wire: bool = False, late: int = 0) -> None:
         self.machine = machine
-        self.beds = Substituted(machine, self.loads, wire=wire)
+        self.beds = Substituted(machine, self.loads, wire=wire, late=late)
         self.schedule = machine.structure.schedule
         self.joints = tuple(joint.name for joint in machine.joints)
         self.states = state_names(machine)

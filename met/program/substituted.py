@@ -62,12 +62,14 @@ Loads = Callable[[Tape], tuple[list[list[Real]], list[Real]]]
 
 
 class Substituted:
-    """The phases of a machine's substituted joints, which tick together. wire: a real bed stands at the wire."""
+    """The phases of a machine's substituted joints, which tick together. wire: a real bed stands at the wire, which takes
+    `late` of the bed's ticks of delay by itself."""
 
-    def __init__(self, machine: Machine, loads: Loads, *, wire: bool = False) -> None:
+    def __init__(self, machine: Machine, loads: Loads, *, wire: bool = False, late: int = 0) -> None:
         self.machine = machine
         self.loads = loads
         self.wire = wire
+        self.late = late
         self.mounted = tuple(Mounted(a, machine.joints[a.index].name, bed, law) for a, bed, law in machine.mounted)
         self.dynamics = machine.structure.schedule.dynamics
         self.base_hz = machine.structure.schedule.base_hz
@@ -89,9 +91,9 @@ class Substituted:
     @property
     def wire_outputs(self) -> dict[str, str]:
         """What goes over the wires, by the cells that hold it."""
-        sent = (("voltage", "drive_voltage"), ("current", "load_current"))
         return {
-            f"wire:{each.joint}.{name}": f"{each.joint}.bed.{cell}" for each in self.mounted for name, cell in sent
+            f"wire:{each.joint}.{name}": f"{each.joint}:sent.{name}" for each in self.mounted
+            for name in ("voltage", "current")
         } if self.wire else {}  # fmt: skip
 
     # Control.
@@ -138,16 +140,20 @@ class Substituted:
         for each in self.mounted:
             motor = self.motor(tape, each)
             w = motor.ratio * tape.read(f"{each.joint}.qd")
-            begun = answer(self._owner(each), each.bed.begin, self._bed_values(tape, each), w)
-            returned(self._owner(each), "begin", begun, (memory.name for memory in each.bed.memory))
-            for name, value in begun.items():
-                tape.write(f"{each.joint}.bed.{name}", value)
+            self.begin_bed(tape, each, w)
             for name in ("read", "before", "w", "w_ref", "observer.w", "observer.y"):
                 tape.write(f"{each.joint}:{name}", w)
             tape.write(f"{each.joint}:angle", motor.ratio * tape.read(f"{each.joint}.q"))
             for i in range(4):
                 for j in range(i + 1):
                     tape.write(f"{each.joint}:P.{i}.{j}", _UNKNOWN[i] if i == j else 0.0)
+
+    def begin_bed(self, tape: Tape, each: Mounted, w: Real) -> None:
+        """The emulated bed of a shaft that has turned at w rad/s for long."""
+        begun = answer(self._owner(each), each.bed.begin, self._bed_values(tape, each), w)
+        returned(self._owner(each), "begin", begun, (memory.name for memory in each.bed.memory))
+        for name, value in begun.items():
+            tape.write(f"{each.joint}.bed.{name}", value)
 
     def covariance(self, tape: Tape) -> None:
         """One turn of the Riccati recursion."""
@@ -172,25 +178,32 @@ class Substituted:
         seed = tape.input(SEED) if SEED in cases.noise else float(cases.seed)
         repeat = tape.input(REPEAT) if REPEAT in cases.noise else 0.0
         for each in self.mounted:
-            p = self._bed_values(tape, each)
-            wire = Wire(tape.read(f"{each.joint}.bed.drive_voltage"), tape.read(f"{each.joint}.bed.load_current"))
+            self.advance_bed(tape, each, self.period, seed=seed, repeat=repeat, tick=tick)
 
-            def draw(name: str, each: Mounted = each) -> Real:
-                return normal(Stream(seed, repeat, f"{each.joint}.bed.{name}"), tick)
+    def advance_bed(
+        self, tape: Tape, each: Mounted, period: float, *, seed: Real, repeat: Real, tick: Real
+    ) -> None:
+        """One emulated bed, by period s under what its amplifiers hold; its noise is that of the number `tick`."""
+        p = self._bed_values(tape, each)
+        wire = Wire(tape.read(f"{each.joint}.bed.drive_voltage"), tape.read(f"{each.joint}.bed.load_current"))
 
-            new = answer(self._owner(each), each.bed.advance, p, self._bed(tape, each), wire, self.period, draw)
-            returned(self._owner(each), "advance", new, (memory.name for memory in each.bed.memory))
-            for name, value in new.items():
-                tape.write(f"{each.joint}.bed.{name}", value)
+        def draw(name: str) -> Real:
+            return normal(Stream(seed, repeat, f"{each.joint}.bed.{name}"), tick)
+
+        new = answer(self._owner(each), each.bed.advance, p, self._bed(tape, each), wire, period, draw)
+        returned(self._owner(each), "advance", new, (memory.name for memory in each.bed.memory))
+        for name, value in new.items():
+            tape.write(f"{each.joint}.bed.{name}", value)
+
+    def reading(self, tape: Tape, each: Mounted) -> Real:
+        """What the computer reads of an emulated bed: the filtered rate, rad/s."""
+        return answer(self._owner(each), each.bed.read, self._bed_values(tape, each), self._bed(tape, each))
 
     def read(self, tape: Tape) -> None:
         """The filtered rate, the observer's correction, and the shaft's angle."""
         for each in self.mounted:
             name = each.joint
-            rate = (
-                tape.input(f"wire:{name}.rate") if self.wire
-                else answer(self._owner(each), each.bed.read, self._bed_values(tape, each), self._bed(tape, each))
-            )  # fmt: skip
+            rate = tape.input(f"wire:{name}.rate") if self.wire else self.reading(tape, each)
             w: Real = rate
             if each.law.observer:
                 gain = tuple(tape.read(f"{name}:gain.{i}") for i in range(4))
@@ -307,6 +320,11 @@ class Substituted:
         late = self._queued(tape, each, delay)
         at_once = delay == 0.0
         applied = Wire(where(at_once, asked.voltage, late.voltage), where(at_once, asked.current, late.current))
+        if self.wire:
+            early = self._queued(tape, each, delay - float(self.late))
+            now = delay <= float(self.late)
+            tape.write(f"{name}:sent.voltage", where(now, asked.voltage, early.voltage))
+            tape.write(f"{name}:sent.current", where(now, asked.current, early.current))
         for i in reversed(range(1, QUEUE)):
             tape.write(f"{name}:queue.{i}.voltage", tape.read(f"{name}:queue.{i - 1}.voltage"))
             tape.write(f"{name}:queue.{i}.current", tape.read(f"{name}:queue.{i - 1}.current"))

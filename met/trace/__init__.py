@@ -2,7 +2,8 @@
 
 `graph` holds the record, `functions` what models call; both are here. `noise` draws random numbers. `program` has
 phases under a little control flow over a case's memory; `reference` runs a program over plain floats, `llvm` makes
-machine code of it: those are imported from their own modules, so that checking a deck does not load them.
+machine code of it, `c` writes it as C: those are imported from their own modules, so that checking a deck does not
+load them.
 """
 
 from met.trace.functions import (

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 # what words 0 and 2 of the counter are multiplied by, and what the key's words grow by each round (both of the paper)
-_MULTIPLIERS = (0xD2511F53, 0xCD9E8D57)
-_GROWTH = (0x9E3779B9, 0xBB67AE85)
-_ROUNDS = 10
+MULTIPLIERS = (0xD2511F53, 0xCD9E8D57)
+GROWTH = (0x9E3779B9, 0xBB67AE85)
+ROUNDS = 10
 
 _LOW = (1 << 32) - 1
 # the pattern of 2^52: added to it, a whole number below 2^52 stands in the lowest bits of the sum's pattern
@@ -28,8 +28,8 @@ def _rounds(words: Sequence[Any], kind: Callable[[int], Any]) -> tuple[Any, Any,
     """The four words, over Python's integers (`kind` is int) or over arrays of np.uint64."""
     c0, c1, c2, c3, k0, k1 = words
     low, half = kind(_LOW), kind(32)
-    multiplier, growth = ([kind(x) for x in pair] for pair in (_MULTIPLIERS, _GROWTH))
-    for _ in range(_ROUNDS):
+    multiplier, growth = ([kind(x) for x in pair] for pair in (MULTIPLIERS, GROWTH))
+    for _ in range(ROUNDS):
         p0, p1 = c0 * multiplier[0], c2 * multiplier[1]
         c0, c1, c2, c3 = (p1 >> half) ^ c1 ^ k0, p1 & low, (p0 >> half) ^ c3 ^ k1, p0 & low
         k0, k1 = (k0 + growth[0]) & low, (k1 + growth[1]) & low
@@ -103,11 +103,11 @@ class Written:
     def _rounds(self, c0: str, c1: str, c2: str, c3: str, k0: str, k1: str) -> tuple[str, str, str, str]:
         """The same rounds over vectors; high halves of words hold anything, and are taken off before a product."""
         bits, op = self.integers, self._op
-        for n in range(_ROUNDS):
+        for n in range(ROUNDS):
             if n:
-                k0, k1 = (op(f"add {bits} {k}, splat (i64 {by})") for k, by in ((k0, _GROWTH[0]), (k1, _GROWTH[1])))
+                k0, k1 = (op(f"add {bits} {k}, splat (i64 {by})") for k, by in ((k0, GROWTH[0]), (k1, GROWTH[1])))
             p0, p1 = (op(f"mul {bits} {self._low(c)}, splat (i64 {by})")
-                      for c, by in ((c0, _MULTIPLIERS[0]), (c2, _MULTIPLIERS[1])))
+                      for c, by in ((c0, MULTIPLIERS[0]), (c2, MULTIPLIERS[1])))
             h0, h1 = (op(f"lshr {bits} {p}, splat (i64 32)") for p in (p0, p1))
             c0, c2 = (op(f"xor {bits} {op(f'xor {bits} {h}, {c}')}, {k}") for h, c, k in ((h1, c1, k0), (h0, c3, k1)))
             c1, c3 = p1, p0

@@ -20,19 +20,23 @@ DECK = """
 run wired like nominal {{
     rates {{ dynamics = {dynamics} Hz;  servos = 500 Hz;  record = {record} Hz; }}  duration = 0.6 s;
     remove settle;  remove volts;  record = [q, qd, shoulder.bed.shaft_rate];
-    substitute shoulder {{ bed = emulated(converter_in = 0.02 rad/s, delay = 1); }}
+    substitute shoulder {{ bed = emulated(converter_in = 0.02 rad/s, delay = {delay}); }}
 }}
 """
 
 
 @pytest.mark.parametrize("dynamics", [500, 250])
-def test_a_bed_outside_the_kernel_makes_the_same_run_as_the_emulated_one_inside(tmp_path: Path, dynamics: int) -> None:
+@pytest.mark.parametrize(("late", "delay"), [(0, 0), (0, 1), (1, 1), (1, 2)])
+def test_a_bed_outside_the_kernel_makes_the_same_run_as_the_emulated_one_inside(
+    tmp_path: Path, dynamics: int, late: int, delay: int
+) -> None:
+    """late: the delay of one tick is the kernel's, or the wire's."""
     path = tmp_path / "wired.ic"
-    path.write_text(DECK.format(dynamics=dynamics, record=dynamics), encoding="utf-8")
+    path.write_text(DECK.format(dynamics=dynamics, record=dynamics, delay=delay), encoding="utf-8")
     experiment = ic.compile(path, select=["wired"]).experiments[0]
     inside = run(prepare(experiment))
 
-    split = build(experiment, wire=True)
+    split = build(experiment, wire=True, late=late)
     assert split.inputs == ("wire:shoulder.rate",)
     block = kernel.compile(split).block(np.zeros((1, 1)))
     told = {name: split.outputs.index(f"wire:shoulder.{name}") for name in ("voltage", "current")}
@@ -40,12 +44,12 @@ def test_a_bed_outside_the_kernel_makes_the_same_run_as_the_emulated_one_inside(
               for name, quantity in experiment.parameters.items() if name.startswith("shoulder.bed.")}  # fmt: skip
     p = SimpleNamespace(**values)
     held = SimpleNamespace(shaft_rate=0.0, shaft_angle=0.0, filtered=0.0, filtered_slope=0.0)
-    rows, shaft = [], []
+    rows, shaft, waiting = [], [], [Wire(0.0, 0.0)] * late
     step = experiment.structure.schedule.dynamics
     for k in range(experiment.structure.schedule.ticks + 1):
         if k:
-            wire = Wire(block.outputs[told["voltage"], 0], block.outputs[told["current"], 0])
-            held = SimpleNamespace(**emulated.advance(p, held, wire, 1.0 / 500.0, lambda name: 0.0))
+            waiting.append(Wire(block.outputs[told["voltage"], 0], block.outputs[told["current"], 0]))
+            held = SimpleNamespace(**emulated.advance(p, held, waiting.pop(0), 1.0 / 500.0, lambda name: 0.0))
         block.inputs[0, :] = emulated.read(p, held)
         at = block.recorded(k, k)
         if k % step == 0:
