@@ -157,8 +157,8 @@ def results(
 ) -> Run:
     """What came of these rows, of what `compute` gave of them. Writes not-a-number into `history` after a failure.
 
-    fates  of rows (by their place in `rows`) for which nothing was computed: TIMED_OUT or LOST, and why; or FAILED, where
-           something else than the engine ended them at the tick that `failure.tick` says
+    fates  of rows (by their place in `rows`) for which nothing was computed: TIMED_OUT or LOST, and why; or FAILED,
+           where something else than the engine ended them at the tick that `failure.tick` says
     """
     experiment, program = prepared.experiment, prepared.program
     schedule = experiment.structure.schedule

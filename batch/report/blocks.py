@@ -230,8 +230,7 @@ def metrics(section: Section) -> Html | None:
     if not section.metrics:
         return None
     compared = any(each.before for each in section.metrics)
-    medians = ["median before", "median now"] if compared else ["median"]
-    values = ["smallest", *medians, "largest"]
+    values = ["smallest", "median", "largest", *(["median before"] if compared else [])]
     if section.single:
         values = ["before", "now"] if compared else ["value"]
     heads = ["metric", *values, "unit"]
@@ -248,8 +247,8 @@ def metrics(section: Section) -> Html | None:
 
 
 def _metric(each: MetricRow, single: bool, remarks: bool, compared: bool) -> list[Html]:
-    values = [each.before, each.median] if compared else [each.median]
-    values = values if single else [each.minimum, *values, each.maximum]
+    before = [each.before] if compared else []
+    values = [*before, each.median] if single else [each.minimum, each.median, each.maximum, *before]
     cells = [el("th", el("code", each.name), el("span", each.about, cls="under"), scope="row")]
     cells += [el("td", value, cls="right") for value in values]
     cells.append(el("td", each.unit))

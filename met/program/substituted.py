@@ -62,7 +62,7 @@ Loads = Callable[[Tape], tuple[list[list[Real]], list[Real]]]
 
 
 class Substituted:
-    """The phases of a machine's substituted joints, which tick together. wire: a real bed stands at the wire, which takes
+    """The phases of a machine's substituted joints, which tick together. wire: a real bed is at the wire, which takes
     `late` of the bed's ticks of delay by itself."""
 
     def __init__(self, machine: Machine, loads: Loads, *, wire: bool = False, late: int = 0) -> None:
