@@ -33,6 +33,13 @@ OUTPUTS = 8
 
 
 @frozen
+class Wires:
+    """Real beds stand at the wires. late: ticks of their delay that pass on the wires."""
+
+    late: int
+
+
+@frozen
 class Part:
     """The cases of one experiment that are run.
 
@@ -40,6 +47,7 @@ class Part:
     kept    places in `rows` of the cases whose histories are kept whatever comes of them
     later   how many more may be chosen when all are done, at most
     single  whether histories are kept as numbers of four bytes
+    wires   whether its beds are real ones, and how late these are (met.program.build.build); None: they are emulated
     """
 
     experiment: Experiment
@@ -47,6 +55,13 @@ class Part:
     kept: np.ndarray
     later: int = 0
     single: bool = False
+    wires: Wires | None = None
+
+    def prepared(self) -> engine.Prepared:
+        """What runs it."""
+        if self.wires is None:
+            return engine.prepare(self.experiment)
+        return engine.prepare(self.experiment, wire=True, late=self.wires.late)
 
     @property
     def recorded(self) -> int:
@@ -113,6 +128,7 @@ def prepare(
     float32: bool = False,
     selected: Sequence[tuple[Experiment, np.ndarray]] | None = None,
     kept: Mapping[str, np.ndarray] | None = None,
+    wires: Wires | None = None,
 ) -> Campaign:
     """Settle what will be run; raises Problem for anything that would stop it later, and writes nothing.
 
@@ -123,6 +139,7 @@ def prepare(
     float32      keep histories as numbers of four bytes
     selected     experiments with rows of their case tables, in place of `experiments` and `cases`
     kept         rows whose histories are kept, by the experiment's name, in place of `histories`
+    wires        where it is run on real beds
     """
     all_of = None
     if selected is None:
@@ -148,6 +165,7 @@ def prepare(
             f"histories would take {size_text(whole)}, over {size_text(KEPT_BYTES)}: metrics only are kept "
             f"(`--histories all` keeps them; any case can be run again alone: `--case '#0'`)"
         )
+    parts = tuple(replace(part, wires=wires) for part in parts)
     kept_plan = replace(plan, experiments=tuple(part.experiment for part in parts), selected=())
     words = tuple("all" if word == "default" else word for word in words)
     campaign = Campaign(kept_plan, parts, wanted, words, target, tuple(notes))
@@ -183,7 +201,7 @@ def _parts(
 def values_sections(campaign: Campaign) -> list[Section]:
     """The first pass: all cases, with their histories where those of all are kept."""
     return [
-        Section(number, number, engine.prepare(part.experiment), part.rows, part.all_recorded, part.single)
+        Section(number, number, part.prepared(), part.rows, part.all_recorded, part.single)
         for number, part in enumerate(campaign.parts)
     ]
 

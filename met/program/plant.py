@@ -125,6 +125,14 @@ def plant_c(experiment: Experiment, joint: str, *, case: int = 0, period: float 
     ])  # fmt: skip
 
 
+def bed_values(experiment: Experiment, joint: str, case: int = 0) -> dict[str, float]:
+    """The numbers of a joint's bed in a case, SI, by the names of its parameters."""
+    head = f"{joint}.bed."
+    found = {path: quantity.value for path, quantity in experiment.parameters.items() if path.startswith(head)}
+    found |= _settled(experiment, joint, case)
+    return {path.removeprefix(head): value for path, value in found.items() if isinstance(value, float)}
+
+
 def _beds(experiment: Experiment) -> Substituted:
     """The experiment's beds; nothing is asked of its arm."""
 

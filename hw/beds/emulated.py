@@ -1,0 +1,214 @@
+"""A bed in this process: a simulated plant under the rules of a real one, and the counts of its wire.
+
+In lock-step: a tick is an exchange. What needs a line or a clock is not there: no deadman, no noise, no watchdog; nor
+is the tachometer watched, for the plant's is sound.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Protocol
+
+from hw import refusals
+from hw.bed import About, Bed, Capability, Fault, Limits, Sample, Scales, State
+from hw.beds import greeting
+from hw.protocol import messages
+
+FINE = 2.0**-20
+"""V, A and rad/s of a count where the bed's converter has no resolution: up to 2047 of each, and nothing to round in
+the product with it."""
+
+FINE_ANGLE = 2.0**-16
+"""rad of a count."""
+
+ARMING_RATE = 5.0
+"""rad/s: a shaft that no one would call turning, and ten times what typical noise of a tachometer comes to."""
+
+DEADMAN = 0.020
+"""s; told, though nothing waits for it."""
+
+
+class Plant(Protocol):
+    """A motor bed as simulated. period: s, of a tick; shaft_angle: rad."""
+
+    period: float
+
+    def start(self, rate: float, seed: float, repeat: float) -> float:
+        """A shaft that has turned at rate (rad/s) for long, noise from its beginning: the filtered rate, rad/s."""
+
+    def tick(self, voltage: float, current: float) -> float:
+        """One tick under what the amplifiers hold, V and A: the filtered rate after it, rad/s."""
+
+    @property
+    def shaft_angle(self) -> float: ...
+
+
+def scales(values: Mapping[str, float]) -> Scales:
+    """Of a bed with these parameters (met.substitution): a count is a step of its converters."""
+    volts, amperes, rate = (
+        values.get(name, 0.0) or FINE for name in ("converter_voltage", "converter_current", "converter_in")
+    )
+    return Scales(volts, amperes, rate, FINE_ANGLE, FINE, FINE)
+
+
+def limits(values: Mapping[str, float], period: float, *, voltage: float = 60.0, rate: float = 1000.0) -> Limits:
+    """Of a bed with these parameters: the current is that of its load's amplifier; what is not asked for (V, rad/s) is
+    wide, and within a tick of period s the whole of it may be commanded. It bears its largest current for ever."""
+    current = values["i_max"]
+    return Limits(voltage, current, rate, ARMING_RATE, 2.0 * voltage / period, 2.0 * current / period, current**2)
+
+
+class EmulatedBed(Bed):
+    """plant: at rest when the bed is made;  bears: A that its load motor bears for ever, its limit unless given.
+
+    voltage, current  what the amplifiers hold: V, A
+    """
+
+    def __init__(
+        self, plant: Plant, scales: Scales, limits: Limits, *, name: str = "emulated", bears: float | None = None
+    ) -> None:
+        self._plant, self._name, self._scales, self._limits = plant, name, scales, limits
+        self._bears = limits.current if bears is None else bears
+        self._about: About | None = None
+        self._rate = self._counted(plant.start(0.0, 0.0, 0.0))
+        self._state, self._faults, self._tick, self._heat = State.DISARMED, Fault(0), 0, 0.0
+        self._volts, self._amperes, self._since = 0, 0, 0
+        self.voltage, self.current = 0.0, 0.0
+
+    def connect(self) -> About:
+        capabilities = Capability.ENCODER | Capability.LOCK_STEP | Capability.SIMULATED
+        about = About(
+            self._name, messages.VERSION, "0" * 16, 1, capabilities, 1.0 / self._plant.period, DEADMAN, self._scales,
+            self._limits,
+        )  # fmt: skip
+        self.stop()
+        self._about, self._in_force = about, greeting.in_force(about)
+        return about
+
+    def limit(
+        self,
+        *,
+        voltage: float | None = None,
+        current: float | None = None,
+        rate: float | None = None,
+        voltage_slew: float | None = None,
+        current_slew: float | None = None,
+    ) -> None:
+        about = self._there()
+        asked = {"voltage": voltage, "current": current, "rate": rate, "voltage_slew": voltage_slew,
+                 "current_slew": current_slew}  # fmt: skip
+        tighter = greeting.tighter(about, asked)
+        if self._state != State.DISARMED:
+            raise refusals.refused(about, "take tighter limits", self._sample(refused=True))
+        own = greeting.in_force(about)
+        self._in_force = replace(
+            self._in_force, **{name: min(most, getattr(own, name)) for name, most in tighter.items()}
+        )
+
+    def arm(self) -> Sample:
+        about = self._there()
+        if self._state != State.DISARMED or not self._slow():
+            raise refusals.refused(about, "arm", self._sample(refused=True))
+        self._hold(0, 0)
+        self._state, self._since = State.ARMED, 0
+        return self._sample()
+
+    def exchange(self, voltage: float, current: float) -> Sample | None:
+        about, force, scales = self._there(), self._in_force, self._scales
+        volts = greeting.commanded(voltage, scales.voltage, force.voltage)
+        amperes = greeting.commanded(current, scales.current, force.current)
+        if volts is None or amperes is None:
+            self.stop()
+            if volts is None:
+                raise refusals.no_command(about, "a voltage", voltage, "V", force.voltage * scales.voltage)
+            raise refusals.no_command(about, "a current", current, "A", force.current * scales.current)
+        armed = self._state == State.ARMED
+        if armed:
+            since = max(self._since, 1)
+            if (
+                abs(volts - self._volts) > since * force.voltage_slew
+                or abs(amperes - self._amperes) > since * force.current_slew
+            ):
+                self._stopped(Fault.SLEW)
+            else:
+                self._hold(volts, amperes)
+                self._since = 0
+        self._advance()
+        return self._sample(refused=not armed)
+
+    def read(self) -> Sample:
+        self._there()
+        return self._sample()
+
+    def clear(self) -> Sample:
+        about = self._there()
+        if self._state == State.ARMED or (self._state == State.STOPPED and not self._slow()):
+            raise refusals.refused(about, "clear", self._sample(refused=True))
+        self._state, self._faults = State.DISARMED, Fault(0)
+        return self._sample()
+
+    def rest(self, time: float) -> Sample:
+        self._there()
+        self.stop()
+        for _ in range(math.ceil(time / self._plant.period - 1e-6)):
+            self._advance()
+        return self._sample()
+
+    def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> Sample:
+        about = self._there()
+        if self._state != State.DISARMED or not math.isfinite(rate):
+            raise refusals.refused(about, "start its plant anew", self._sample(refused=True))
+        self._rate = self._counted(self._plant.start(rate, float(seed), float(repeat)))
+        return self._sample()
+
+    def stop(self) -> bool:
+        self._hold(0, 0)
+        if self._state == State.ARMED:
+            self._state = State.DISARMED
+        return True
+
+    def close(self) -> None:
+        self.stop()
+        self._about = None
+
+    def _there(self) -> About:
+        if self._about is None:
+            raise refusals.not_connected(self._name)
+        return self._about
+
+    def _counted(self, rate: float) -> int:
+        """What cannot be read is faster than every limit."""
+        counts = rate / self._scales.rate
+        return round(counts) if abs(counts) < messages.MOST else messages.MOST
+
+    def _slow(self) -> bool:
+        return abs(self._rate) <= greeting.counts(self._limits.arming_rate, self._scales.rate)
+
+    def _hold(self, volts: int, amperes: int) -> None:
+        self._volts, self._amperes = volts, amperes
+        self.voltage, self.current = volts * self._scales.voltage, amperes * self._scales.current
+
+    def _stopped(self, faults: Fault) -> None:
+        self._hold(0, 0)
+        self._state = State.STOPPED
+        self._faults |= faults
+
+    def _advance(self) -> None:
+        """A tick of the plant, and what a bed watches at its end."""
+        self._rate = self._counted(self._plant.tick(self.voltage, self.current))
+        self._tick += 1
+        self._since += 1
+        gained = (self.current * self.current - self._bears * self._bears) * self._plant.period
+        self._heat = max(0.0, self._heat + gained)
+        if self._state == State.ARMED:
+            if abs(self._rate) > self._in_force.rate:
+                self._stopped(Fault.RATE)
+            if self._heat > self._limits.heat:
+                self._stopped(Fault.HEAT)
+
+    def _sample(self, *, refused: bool = False) -> Sample:
+        angle = round(self._plant.shaft_angle / self._scales.angle) * self._scales.angle
+        rate = self._rate * self._scales.rate
+        return Sample(self._state, True, self._faults, refused, self._tick, rate, angle)

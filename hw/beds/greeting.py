@@ -1,0 +1,117 @@
+"""What a bed says of itself when it is greeted, and whether that can be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from hw.bed import About, Capability, Limits, Scales
+from hw.protocol import messages
+from met.diagnostic import Problem, error
+
+DEADMAN = (0.010, 0.020)
+"""s, between which a bed's is: docs/protocol.md, States."""
+
+_UNITS = {
+    "voltage": "V", "current": "A", "rate": "rad/s", "angle": "rad", "drive_current": "A",
+    "acceleration": "rad/s^2", "arming_rate": "rad/s", "voltage_slew": "V/s", "current_slew": "A/s", "heat": "A^2 s",
+}  # fmt: skip
+
+
+def about(found: messages.Greeting) -> About:
+    """Of a bed that this MET can drive. Raises Problem E404."""
+    name = found.name.rstrip(b"\0").decode("latin-1").encode("unicode_escape").decode()
+    capabilities = Capability(found.capabilities & _KNOWN)
+    wrong = [*_scales(found.scales, capabilities), *_limits(found.limits, found.scales)]
+    if not name or name.encode() != found.name.rstrip(b"\0"):
+        wrong.append("its name is not printable ASCII")
+    if not (math.isfinite(found.tick_hz) and found.tick_hz > 0.0):
+        wrong.append(f"its ticks come at {found.tick_hz:g} Hz")
+    if not DEADMAN[0] <= found.deadman <= DEADMAN[1]:
+        wrong.append(f"its deadman is {found.deadman * 1e3:g} ms, which is not 10 to 20 ms")
+    if wrong:
+        helps = "correct the configuration in its firmware"
+        raise Problem([error("E404", f"bed `{name}` cannot be driven: {each}", help=helps) for each in wrong])
+    return About(
+        name, found.version, found.firmware.hex(), found.session, capabilities, found.tick_hz, found.deadman,
+        found.scales, found.limits,
+    )  # fmt: skip
+
+
+_KNOWN = sum(Capability)
+_SENSORS = dict(zip(("angle", "drive_current", "acceleration"), messages.SENSORS, strict=True))
+
+
+def in_force(about: About) -> messages.InForce:
+    """The bed's own limits in counts, slews in counts a tick."""
+    s, of = about.scales, about.limits
+    voltage, current, rate = counts(of.voltage, s.voltage), counts(of.current, s.current), counts(of.rate, s.rate)
+    slews = counts(of.voltage_slew / about.tick_hz, s.voltage), counts(of.current_slew / about.tick_hz, s.current)
+    return messages.InForce(voltage, current, rate, *slews)
+
+
+def tighter(about: About, asked: Mapping[str, float | None]) -> dict[str, int]:
+    """Limits that are asked for by their names in `InForce` (V, A, rad/s, V/s, A/s), in its counts and order; None for
+    one that is not asked for. Raises Problem E408."""
+    s, hz = about.scales, about.tick_hz
+    of = {"voltage": s.voltage, "current": s.current, "rate": s.rate, "voltage_slew": s.voltage * hz,
+          "current_slew": s.current * hz}  # fmt: skip
+    found = {}
+    for name, scale in of.items():
+        value = asked[name]
+        if value is None:
+            continue
+        if not 0.0 <= value < math.inf:
+            message = f"a limit of {_words(name)} of {value:g} {_UNITS[name]} for bed `{about.name}`"
+            raise Problem(error("E408", message, help="a limit is a number from 0 on"))
+        found[name] = counts(value, scale)
+    return found
+
+
+def commanded(value: float, scale: float, most: int) -> int | None:
+    """A command's counts, the nearest; None where it is no finite number, or beyond the limit in force."""
+    of = value / scale
+    if of - of != 0.0:
+        return None
+    nearest = round(of)
+    return nearest if -most <= nearest <= most else None
+
+
+def ticks(about: About, period: float) -> int:
+    """Of a bed in lock-step in a period of so many seconds. Raises Problem E405."""
+    found = period * about.tick_hz
+    whole = round(found)
+    if not 1 <= whole <= 255 or abs(found - whole) > 1e-6 * whole:
+        message = f"a period of {period * 1e3:.6g} ms is {found:.6g} ticks of bed `{about.name}`"
+        helps = f"its ticks come at {about.tick_hz:g} Hz: take a whole number of them, 1 to 255"
+        raise Problem(error("E405", message, help=helps))
+    return whole
+
+
+def counts(value: float, scale: float) -> int:
+    """The whole counts in a limit; what is off a count by rounding alone is that count."""
+    return math.floor(min(value / scale + 1e-6, messages.MOST))
+
+
+def _scales(scales: Scales, capabilities: Capability) -> list[str]:
+    missing = {name for name, sensor in _SENSORS.items() if sensor not in capabilities}
+    return [
+        f"a count of its {_words(name)} is {value:g} {_UNITS[name]}"
+        for name, value in scales.__dict__.items()
+        if name not in missing and not (math.isfinite(value) and value > 0.0)
+    ]
+
+
+def _limits(limits: Limits, scales: Scales) -> list[str]:
+    wrong = []
+    for name, value in limits.__dict__.items():
+        scale = getattr(scales, name, None)
+        if not (math.isfinite(value) and value > 0.0):
+            wrong.append(f"its limit of {_words(name)} is {value:g} {_UNITS[name]}")
+        elif scale is not None and scale > 0.0 and not 1.0 <= value / scale <= messages.MOST:
+            wrong.append(f"its limit of {_words(name)}, {value:g} {_UNITS[name]}, is {value / scale:.3g} counts")
+    return wrong
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")

@@ -1,0 +1,119 @@
+"""A bed that answers from a transcript what was answered then, and demands to be asked what was asked then."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hw.bed import Scales
+from hw.beds.wire import WireBed
+from hw.line import Line
+from hw.protocol import messages
+from hw.protocol.frames import Decoder, unframed
+from hw.transcript import LOST, OPENED, RECEIVED, SENT, Record, Transcript, read
+from met.diagnostic import Problem, error
+
+
+class ReplayBed(WireBed):
+    """path: of the transcript. Raises Problem E409; its methods E407 where what is asked is not what was asked.
+
+    transcript  the whole of it; header: as `SerialBed` wrote it
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.transcript = read(path)
+        header = self.transcript.header
+        try:
+            period, first = float(header["period"]), int(header["first"])
+        except (KeyError, TypeError, ValueError):
+            helps = "give the transcript of a bed on a serial line"
+            raise Problem(error("E409", f"{path} does not say how its bed was driven", help=helps)) from None
+        super().__init__(str(path), period, first)
+        self._line_then = _LineThen(self.transcript, str(path))
+
+    def open(self) -> Line:
+        self._line_then.open()
+        return self._line_then
+
+
+class _LineThen:
+    """The line as it was: its clock stands at what was last sent or received."""
+
+    def __init__(self, transcript: Transcript, name: str) -> None:
+        self._records, self._name, self._at = transcript.records, name, 0
+        self._decoder = Decoder()
+        self._scales: Scales | None = None
+        self._tick = -1
+
+    def open(self) -> None:
+        if self._next(OPENED) is None:
+            raise self._other("a line is opened")
+
+    def now(self) -> float:
+        return self._records[self._at - 1].time if self._at else 0.0
+
+    def send(self, frame: bytes) -> None:
+        at = self._at
+        record = self._next(SENT)
+        if record is None or record.data != frame:
+            self._at = at
+            raise self._other(f"{self._words(frame)} is asked")
+
+    def receive(self, until: float) -> bytes:
+        record = self._next(RECEIVED)
+        if record is not None:
+            self._note(record.data)
+            return record.data
+        if (lost := self._next(LOST)) is not None:
+            helps = "so it was when the transcript was made"
+            raise Problem(error("E401", lost.data.decode("utf-8", "replace"), help=helps))
+        if self._at == len(self._records):
+            raise self._other("an answer is waited for")
+        return b""  # then it did not come in time
+
+    def sleep(self, seconds: float) -> None:
+        """What came of it is in the records."""
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def _next(self, kind: int) -> Record | None:
+        if self._at == len(self._records) or self._records[self._at].kind != kind:
+            return None
+        self._at += 1
+        return self._records[self._at - 1]
+
+    def _note(self, data: bytes) -> None:
+        for payload in self._decoder.feed(data):
+            if payload[0] == messages.Reading.kind:
+                self._tick = int.from_bytes(payload[5:9], "little")
+            found = messages.answered(payload, 0)
+            if found is not None and isinstance(found[1], messages.Greeting):
+                self._scales = found[1].scales
+
+    def _other(self, asked: str) -> Problem:
+        if self._at == len(self._records):
+            then = "the transcript ends"
+        else:
+            record = self._records[self._at]
+            then = "then it was " + (
+                self._words(record.data) if record.kind == SENT else _KINDS.get(record.kind, "something else")
+            )
+        after = f"after tick {self._tick} of the bed" if self._tick >= 0 else "at the beginning"
+        helps = "a transcript is replayed by what made it: the same deck, case and version of MET"
+        return Problem(error("E407", f"{self._name}: {after} {asked}; {then}", help=helps))
+
+    def _words(self, frame: bytes) -> str:
+        payload = unframed(frame[:-1])
+        found = None if payload is None else messages.asked(payload)
+        if found is None:
+            return "no message"
+        number, message = found
+        name = type(message).__name__.upper()
+        if isinstance(message, messages.Drive | messages.Step) and self._scales is not None:
+            voltage, current = message.voltage * self._scales.voltage, message.current * self._scales.current
+            return f"{name} {number} of {voltage:.9g} V and {current:.9g} A"
+        said = ", ".join(f"{key} {value}" for key, value in message.__dict__.items())
+        return f"{name} {number}" + (f" ({said})" if said else "")
+
+
+_KINDS = {OPENED: "a line that was opened", RECEIVED: "an answer", LOST: "a line that was lost"}

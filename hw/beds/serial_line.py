@@ -1,0 +1,240 @@
+"""A bed on a serial line, or on what pyserial makes one of: a device, socket://, rfc2217://. And on unix://PATH, a
+socket of this machine, such as an emulator's.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import io
+import math
+import os
+import secrets
+import select
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from hw.bed import About, Capability
+from hw.beds.wire import WireBed
+from hw.line import Line
+from hw.protocol import messages
+from hw.transcript import Recorded, Writer
+from met.diagnostic import Diagnostic, Problem, error
+
+BAUD = 921600
+"""Bits a second, unless another number is asked for."""
+
+LONGEST_SHARE = 0.8
+"""Of a period that the bytes of an exchange may take; and what those are: docs/protocol.md, Timing."""
+_LEAST_BYTES, _SENSOR_BYTES, _BITS = 16 + 17, 4, 10
+
+_WRITE_TIMEOUT = 1.0
+"""s that 16 bytes may wait to be sent; then the line hangs. pyserial counts what a busy machine does as well."""
+
+_UNIX = "unix://"
+
+_SLICE = 0.001
+"""s between two looks at a line that cannot be waited for."""
+
+ADAPTERS = Path("/sys/bus/usb-serial/devices")
+_SLOW_ADAPTER = 2
+"""ms, the longest that a USB adapter may keep bytes back without a warning."""
+
+
+class SerialBed(WireBed):
+    """url: of pyserial's `serial_for_url`;  period: s, from one exchange to the next.
+
+    transcript  takes the bytes of each record of a transcript (hw/transcript.py)
+    warnings    what may make exchanges late, known once it is connected
+    """
+
+    def __init__(
+        self, url: str, *, period: float, baud: int = BAUD, transcript: Callable[[bytes], object] | None = None
+    ) -> None:
+        super().__init__(url, period, secrets.randbelow(messages.NUMBERS))
+        self.baud = baud
+        self.warnings: tuple[Diagnostic, ...] = ()
+        header = {"line": url, "baud": baud, "period": period, "first": self._number}
+        self._writer = None if transcript is None else Writer(transcript, header)
+
+    def connect(self) -> About:
+        about = super().connect()
+        waits = Capability.LOCK_STEP not in about.capabilities and urlsplit(self._name).scheme not in ("socket", "unix")
+        sensors = sum(each in about.capabilities for each in messages.SENSORS)
+        bits = _BITS * (_LEAST_BYTES + _SENSOR_BYTES * sensors)
+        share = bits / self.baud / self.period
+        if waits and share > LONGEST_SHARE:
+            self.close()
+            message = f"{self._name} at {self.baud} baud: an exchange takes {share:.0%} of its period of "
+            message += f"{self.period * 1e3:.4g} ms, and {LONGEST_SHARE:.0%} is the most"
+            least = math.ceil(bits / LONGEST_SHARE / self.period)
+            raise Problem(error("E405", message, help=f"at least {least} baud, or a lower rate of the servo"))
+        return about
+
+    def open(self) -> Line:
+        line = SerialLine(self._name, self.baud)
+        self.warnings = line.warnings
+        return line if self._writer is None else Recorded(line, self._writer)
+
+
+class SerialLine:
+    """Open from its making on. Raises Problem E400 then, E401 after it."""
+
+    def __init__(self, url: str, baud: int) -> None:
+        self._url = url
+        local = "://" not in url
+        try:
+            self._port: Any = _opened(url, baud)
+        except (OSError, ValueError) as reason:
+            raise _not_opened(url, reason) from None
+        try:
+            self._file: int | None = self._port.fileno()
+        except (AttributeError, io.UnsupportedOperation):
+            self._file = None  # such a port cannot be waited for
+            self._port.timeout = _SLICE
+        # a pseudo-terminal refuses it with ValueError, others have none
+        with contextlib.suppress(AttributeError, NotImplementedError, ValueError, OSError):
+            self._port.set_low_latency_mode(True)
+        self.warnings = latency(url) if local else ()
+
+    def now(self) -> float:
+        return time.perf_counter()
+
+    def send(self, frame: bytes) -> None:
+        try:
+            self._port.write(frame)
+        except OSError as reason:
+            raise self._lost(reason) from None
+
+    def receive(self, until: float) -> bytes:
+        port = self._port
+        try:
+            if self._file is not None:
+                select.select((self._file,), (), (), max(0.0, until - time.perf_counter()))
+                return bytes(port.read(4096))
+            while True:
+                data = bytes(port.read(1))
+                if data:
+                    return data + bytes(port.read(port.in_waiting))
+                if time.perf_counter() >= until:
+                    return b""
+        except OSError as reason:
+            raise self._lost(reason) from None
+
+    def sleep(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+    def close(self) -> None:
+        # pyserial does not close a socket whose other end has gone
+        connection = getattr(self._port, "_socket", None)
+        with contextlib.suppress(OSError):
+            self._port.close()
+        if connection is not None:
+            connection.close()
+
+    def _lost(self, reason: OSError) -> Problem:
+        helps = (
+            "the bed stops itself when it hears nothing for the time of its deadman",
+            "look at the cable and the bed's supply, then start again: nothing goes on by itself",
+        )
+        return Problem(error("E401", f"the line to the bed on {self._url} was lost: {_why(reason)}", help=helps))
+
+
+def _opened(url: str, baud: int) -> Any:
+    if url.startswith(_UNIX):
+        return _UnixSocket(url.removeprefix(_UNIX))
+    import serial  # only who drives a bed pays for it
+
+    own = {} if "://" in url else {"exclusive": True}
+    return serial.serial_for_url(url, baudrate=baud, timeout=0, write_timeout=_WRITE_TIMEOUT, **own)
+
+
+class _UnixSocket:
+    """What pyserial has no port for, with as much of one as is asked of it."""
+
+    def __init__(self, path: str) -> None:
+        self._line = socket.socket(socket.AF_UNIX)
+        try:
+            self._line.connect(path)
+        except OSError:
+            self._line.close()
+            raise
+        self._line.setblocking(False)
+
+    def fileno(self) -> int:
+        return self._line.fileno()
+
+    def write(self, data: bytes) -> None:
+        if not select.select((), (self._line,), (), _WRITE_TIMEOUT)[1]:
+            raise TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT))
+        self._line.sendall(data)
+
+    def read(self, size: int) -> bytes:
+        """Without waiting."""
+        try:
+            data = self._line.recv(size)
+        except BlockingIOError:
+            return b""
+        if not data:
+            raise ConnectionResetError(errno.ECONNRESET, os.strerror(errno.ECONNRESET))
+        return data
+
+    def close(self) -> None:
+        self._line.close()
+
+
+def _not_opened(url: str, reason: Exception) -> Problem:
+    number = _number(reason)
+    if isinstance(reason, ValueError):
+        helps = ["such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217://HOST:PORT"]
+    elif number == errno.EACCES:
+        helps = ["`sudo usermod -a -G dialout $USER` lets you use serial lines, once you have logged in again"]
+    elif number in (errno.EAGAIN, errno.EBUSY):
+        helps = [f"another program uses it; `fuser -v {url}` says which"]
+    elif "://" in url and not url.startswith(_UNIX):
+        helps = ["is there someone who listens at that address?"]
+    elif url.startswith(_UNIX):
+        helps = ["is there someone who made that socket, and listens?"]
+    else:
+        helps = [_ports()]
+    return Problem(error("E400", f"{url} cannot be opened: {_why(reason)}", help=helps))
+
+
+def _ports() -> str:
+    from serial.tools.list_ports import comports
+
+    found = [port.device for port in comports()]
+    return f"serial lines here: {', '.join(found)}" if found else "there is no serial line on this machine: plug it in"
+
+
+def latency(url: str) -> tuple[Diagnostic, ...]:
+    """A warning where a USB adapter keeps bytes back; it forgets its setting when it is plugged in again."""
+    file = ADAPTERS / Path(url).resolve().name / "latency_timer"
+    try:
+        ms = int(file.read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        return ()
+    if ms <= _SLOW_ADAPTER:
+        return ()
+    helps = (f"`echo 1 | sudo tee {file}`, after each time that it is plugged in",)
+    message = f"the adapter of {url} keeps bytes back for up to {ms} ms: exchanges will be late"
+    return (Diagnostic("E405", message, help=helps, severity="warning"),)
+
+
+def _why(reason: Exception) -> str:
+    """In the system's words where it has some."""
+    number = _number(reason)
+    return os.strerror(number).lower() if number else " ".join(str(reason).split())
+
+
+def _number(reason: BaseException | None) -> int | None:
+    """The system's, of an error that pyserial raised, or of what it raised it from."""
+    while reason is not None:
+        if isinstance(reason, OSError) and reason.errno:
+            return reason.errno
+        reason = reason.__context__
+    return None

@@ -1,0 +1,135 @@
+"""A bed whose firmware runs here: behind a pseudo-terminal, or in an emulator of a Cortex-M3. No motor turns."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import select
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal
+
+from hw import realtime
+from hw.beds.serial_line import BAUD, SerialLine
+from hw.beds.wire import WireBed
+from hw.build import Config, build, qemu
+from hw.line import Line
+from hw.protocol import messages
+from hw.transcript import Recorded, Writer
+from met.diagnostic import Problem, error
+
+WITHIN = 20.0
+"""s in which its process must be there."""
+
+
+class SimulatedBed(WireBed):
+    """kind: "firmware" or "qemu";  config, plant: as hw.build.build takes them;  period: s, from exchange to exchange.
+
+    The process begins when the bed is connected, and ends when it is closed. transcript: as of a `SerialBed`.
+    """
+
+    def __init__(
+        self, kind: Literal["firmware", "qemu"], config: Config, plant: str, *, period: float,
+        transcript: Callable[[bytes], object] | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(kind, period, secrets.randbelow(messages.NUMBERS))
+        self._kind = kind
+        self._built = build("arm" if kind == "qemu" else "host", config, plant)
+        header = {"line": kind, "baud": BAUD, "period": period, "first": self._number}
+        self._writer = None if transcript is None else Writer(transcript, header)
+        self._process: subprocess.Popen[str] | None = None
+
+    def open(self) -> Line:
+        line = self._behind_a_terminal() if self._kind == "firmware" else self._in_an_emulator()
+        return line if self._writer is None else Recorded(line, self._writer)
+
+    def close(self) -> None:
+        super().close()
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            for pipe in (self._process.stdin, self._process.stdout):
+                if pipe is not None:
+                    pipe.close()
+            self._process = None
+
+    def _behind_a_terminal(self) -> Line:
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(
+            [str(self._built), "--with-parent"], stdin=pipe, stdout=pipe, text=True, start_new_session=True
+        )
+        with contextlib.suppress(AttributeError, OSError):  # else its deadman speaks up on a busy machine
+            os.sched_setscheduler(self._process.pid, os.SCHED_FIFO, os.sched_param(realtime.PRIORITY + 1))
+        assert self._process.stdout is not None
+        terminal = self._process.stdout.readline().strip()
+        if not terminal:
+            raise _not_started(f"{self._built} ended with {self._process.wait()}")
+        return SerialLine(terminal, BAUD)
+
+    def _in_an_emulator(self) -> Line:
+        with tempfile.TemporaryDirectory(prefix="met-bed-") as folder:
+            path = Path(folder) / "line"
+            self._process = subprocess.Popen(
+                qemu(self._built, path), text=True, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )  # fmt: skip
+            end = time.monotonic() + WITHIN
+            while True:
+                connection = socket.socket(socket.AF_UNIX)
+                try:
+                    connection.connect(str(path))
+                    return SocketLine(connection)
+                except OSError:
+                    connection.close()
+                    if self._process.poll() is not None or time.monotonic() > end:
+                        raise _not_started(f"the emulator ended with {self._process.poll()}") from None
+                    time.sleep(0.01)
+
+
+class SocketLine:
+    """A line that is a connected socket."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        connection.setblocking(False)
+        self._connection = connection
+
+    def now(self) -> float:
+        return time.perf_counter()
+
+    def send(self, frame: bytes) -> None:
+        try:
+            self._connection.sendall(frame)
+        except OSError as reason:
+            raise _lost(reason.strerror) from None
+
+    def receive(self, until: float) -> bytes:
+        if not select.select((self._connection,), (), (), max(0.0, until - time.perf_counter()))[0]:
+            return b""
+        try:
+            data = self._connection.recv(4096)
+        except OSError as reason:
+            raise _lost(reason.strerror) from None
+        if not data:
+            raise _lost("it was closed")
+        return data
+
+    def sleep(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):
+            self._connection.close()
+
+
+def _lost(why: str | None) -> Problem:
+    return Problem(error("E401", f"the line to the bed's firmware was lost: {(why or 'it does not say why').lower()}",
+                         help="its process has ended: start again"))  # fmt: skip
+
+
+def _not_started(why: str) -> Problem:
+    return Problem(error("E402", f"the bed's firmware does not start: {why}", help="start it again"))

@@ -1,0 +1,254 @@
+"""A bed at the other end of a line: the host's side of docs/protocol.md, whatever the line is.
+
+What is safe to ask again is asked again, with a new number; a command never is. Nothing here connects anew by itself.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import TypeVar
+
+from hw import refusals
+from hw.bed import About, Bed, Capability, Fault, Sample, State, real_plant
+from hw.beds import greeting
+from hw.line import Line
+from hw.protocol import messages
+from hw.protocol.frames import Decoder
+from hw.protocol.messages import Asked, Greeting, InForce, OtherVersion, Reading
+from met.diagnostic import Problem, error
+
+_GREETED, _REFUSED = 1 << 2, 1 << 13
+_FAULTS = sum(Fault)
+
+_WAITS = (0.05, 0.15, 0.5)
+"""s for an answer, each time that it is asked for: first three times the latency of a slow USB adapter, then longer for
+a machine that is busy."""
+
+_BOOT = (0.05,) * 10 + (0.2,) * 5 + (0.5,) * 3
+"""The same of HELLO, for some boards boot when their line is opened: 3 s."""
+
+_STOP = (0.02,) * 10 + (0.05, 0.1, 0.2, 0.4)
+"""The same of STOP: 1 s. A bed's deadman has acted long before."""
+
+_SIMULATED = 0.01
+"""s that a tick of a simulated plant may take: in an emulator of a small controller a millisecond is usual."""
+
+_NONSENSE = 1024
+"""Bytes of a wait without the answer, after which it counts as missing: a line that babbles holds nobody up."""
+
+
+T = TypeVar("T", Greeting, InForce, Reading)
+
+
+class WireBed(Bed):
+    """period: s, from one exchange to the next;  first: the sequence number before the first one.
+
+    confirmed  whether the bed has confirmed that it is not armed, since it was last told to arm
+    """
+
+    def __init__(self, name: str, period: float, first: int) -> None:
+        self.period, self.confirmed = period, True
+        self._name, self._number = name, first
+        self._line: Line | None = None
+        self._about: About | None = None
+        self._decoder = Decoder()
+        self._in_force = InForce(0, 0, 0, 0, 0)
+        self._sensors: tuple[tuple[str, float], ...] = ()
+        self._step = 0
+        """Ticks that a bed in lock-step advances by at an exchange; 0 for one with a time of its own."""
+        self._angle: tuple[int, int] | None = None
+        """As it came, and as it is: without the jumps where it wraps around."""
+
+    @abstractmethod
+    def open(self) -> Line:
+        """A new line. Raises Problem E400, E405."""
+
+    def connect(self) -> About:
+        self.close()
+        self._line, self._decoder, self._angle = self.open(), Decoder(), None
+        try:
+            self._about = self._greet()
+        except BaseException:
+            self.close()
+            raise
+        return self._about
+
+    def _greet(self) -> About:
+        found = self._asked_again(messages.Hello(), Greeting, _BOOT)
+        if found is None:
+            helps = ("is the bed switched on, and this the line that it is on?", "does it expect this baud rate?")
+            raise Problem(error("E402", f"nobody answers HELLO on {self._name}", help=helps))
+        about = greeting.about(found)
+        scales: Mapping[Capability, tuple[str, float]] = {
+            Capability.ENCODER: ("angle", about.scales.angle),
+            Capability.DRIVE_CURRENT: ("drive_current", about.scales.drive_current),
+            Capability.ACCELEROMETER: ("acceleration", about.scales.acceleration),
+        }
+        self._sensors = tuple(scales[each] for each in messages.SENSORS if each in about.capabilities)
+        self._in_force = greeting.in_force(about)
+        self._step = greeting.ticks(about, self.period) if Capability.LOCK_STEP in about.capabilities else 0
+        return about
+
+    def limit(
+        self,
+        *,
+        voltage: float | None = None,
+        current: float | None = None,
+        rate: float | None = None,
+        voltage_slew: float | None = None,
+        current_slew: float | None = None,
+    ) -> None:
+        about = self._there()
+        asked = {"voltage": voltage, "current": current, "rate": rate, "voltage_slew": voltage_slew,
+                 "current_slew": current_slew}  # fmt: skip
+        for name, most in greeting.tighter(about, asked).items():
+            found = self._asked(messages.Limit(list(asked).index(name), most), InForce)
+            if getattr(found, name) > most:
+                message = f"bed `{about.name}` does not take a tighter limit of {name.replace('_', ' ')}"
+                raise Problem(error("E406", message, help="limits are set before it is armed"))
+            self._in_force = found
+
+    def arm(self) -> Sample:
+        about = self._there()
+        # so that a bed whose answer was lost is asked again before its deadman has it; or says that it has
+        waits = _WAITS if self._step else (*(about.deadman / 3,) * 3, _WAITS[-1])
+        self.confirmed = False
+        message = messages.Arm(about.session)
+        first = self._answer(message, Reading, waits[0])
+        sample = self._sample(first or self._asked(message, Reading, waits[1:]))
+        if sample.state != State.ARMED or (sample.refused and first is not None):
+            self.confirmed = sample.state != State.ARMED
+            raise refusals.refused(about, "arm", sample)
+        return sample
+
+    def exchange(self, voltage: float, current: float) -> Sample | None:
+        about = self._there()
+        volts = self._counts("a voltage", voltage, about.scales.voltage, self._in_force.voltage, "V")
+        amperes = self._counts("a current", current, about.scales.current, self._in_force.current, "A")
+        command = messages.Step(volts, amperes, self._step) if self._step else messages.Drive(volts, amperes)
+        found = self._answer(command, Reading, self.patience)
+        return None if found is None else self._sample(found)
+
+    def _counts(self, what: str, value: float, scale: float, most: int, unit: str) -> int:
+        counts = greeting.commanded(value, scale, most)
+        if counts is None:
+            self.stop()
+            raise refusals.no_command(self._there(), what, value, unit, most * scale)
+        return counts
+
+    def read(self) -> Sample:
+        self._there()
+        return self._sample(self._asked(messages.Read(), Reading))
+
+    def clear(self) -> Sample:
+        about = self._there()
+        sample = self._sample(self._asked(messages.Clear(), Reading))
+        if sample.state != State.DISARMED:
+            raise refusals.refused(about, "clear", sample)
+        return sample
+
+    def rest(self, time: float) -> Sample:
+        about = self._there()
+        self.stop()
+        if not self._step:
+            assert self._line is not None
+            self._line.sleep(time)
+            return self.read()
+        left = math.ceil(time * about.tick_hz - 1e-6)
+        sample = None if left else self.read()
+        while left:
+            ticks = min(left, 255)
+            found = self._answer(messages.Step(0, 0, ticks), Reading, _WAITS[-1] + ticks * _SIMULATED)
+            if found is None:
+                raise refusals.silent(about.name, "STEP")
+            sample, left = self._sample(found), left - ticks
+        assert sample is not None
+        return sample
+
+    def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> Sample:
+        about = self._there()
+        if Capability.SIMULATED not in about.capabilities:
+            raise real_plant()
+        for which, value in ((1, float(seed)), (2, float(repeat)), (0, rate)):
+            sample = self._sample(self._asked(messages.Preset(which, value), Reading))
+            if sample.refused:
+                raise refusals.refused(about, "start its plant anew", sample)
+        return sample
+
+    def stop(self) -> bool:
+        if self._line is None or self._about is None:
+            return self.confirmed
+        for _ in range(2):  # a transcript that cannot be written is in the way once
+            try:
+                found = self._asked_again(messages.Stop(), Reading, _STOP)
+                self.confirmed = found is not None and found.status & messages.STATE != State.ARMED
+                break
+            except Problem:
+                self.confirmed = False  # the line is dead: the bed's deadman stops it
+        return self.confirmed
+
+    def close(self) -> None:
+        self.stop()
+        line, self._line, self._about = self._line, None, None
+        if line is not None:
+            line.close()
+
+    # Questions and answers
+
+    def _there(self) -> About:
+        if self._about is None:
+            raise refusals.not_connected(self._name)
+        return self._about
+
+    def _asked(self, message: Asked, kind: type[T], waits: Sequence[float] = _WAITS) -> T:
+        found = self._asked_again(message, kind, waits)
+        if found is None:
+            raise refusals.silent(self._there().name, type(message).__name__.upper())
+        return found
+
+    def _asked_again(self, message: Asked, kind: type[T], waits: Sequence[float]) -> T | None:
+        for wait in waits:
+            found = self._answer(message, kind, wait)
+            if found is not None:
+                return found
+        return None
+
+    def _answer(self, message: Asked, kind: type[T], wait: float) -> T | None:
+        """The answer to a message, if it comes in time; what else comes is dropped."""
+        line = self._line
+        assert line is not None
+        self._number = number = (self._number + 1) % messages.NUMBERS
+        line.send(messages.sent(message, number))
+        until, nonsense = line.now() + wait, 0
+        while nonsense < _NONSENSE:
+            data = line.receive(until)
+            if not data:
+                return None
+            nonsense += len(data)
+            for payload in self._decoder.feed(data):
+                found = messages.answered(payload, len(self._sensors))
+                if found is None or found[0] != number:
+                    continue
+                if isinstance(found[1], kind):
+                    return found[1]
+                if isinstance(found[1], OtherVersion) and kind is Greeting:
+                    raise refusals.other_version(found[1].version)
+        return None
+
+    def _sample(self, found: Reading) -> Sample:
+        status, scale = found.status, self._there().scales.rate
+        read = dict[str, float]()
+        for (name, of), counts in zip(self._sensors, found.others, strict=True):
+            read[name] = (self._unwrapped(counts) if name == "angle" else counts) * of
+        return Sample(
+            State(status & messages.STATE), bool(status & _GREETED), Fault(status & _FAULTS), bool(status & _REFUSED),
+            found.tick, found.rate * scale, **read,
+        )  # fmt: skip
+
+    def _unwrapped(self, counts: int) -> int:
+        before, angle = self._angle or (counts, counts)
+        angle += (counts - before + messages.MOST + 1) % (2 * messages.MOST + 2) - messages.MOST - 1
+        self._angle = counts, angle
+        return angle

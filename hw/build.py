@@ -1,0 +1,413 @@
+"""The bed's firmware, built: for this machine behind a pseudo-terminal, as a library, for a Cortex-M3 under QEMU.
+
+The sources are in hw/firmware; what differs from bed to bed is a `Config` and, where the bed is simulated, the text of
+its plant.c (hw/firmware/plant.h). What was built once is kept in the user's cache folder, under the hash of everything
+that made it.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import hashlib
+import math
+import os
+import re
+import shutil
+import struct
+import subprocess
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Literal
+
+from hw.bed import Capability, Limits, Scales
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.trace import cache
+
+Kind = Literal["host", "library", "arm"]
+
+FIRMWARE = Path(__file__).with_name("firmware")
+"""Where the C sources are."""
+
+WARNINGS = ("-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror", "-ffp-contract=off")
+"""What every source is compiled with: all warnings are errors, and no multiply-add is formed that is not written."""
+
+CROSS_COMPILER, EMULATOR = "arm-none-eabi-gcc", "qemu-system-arm"
+
+LIMIT = 1 << 28
+"""Bytes above which the products longest unused are removed."""
+
+_PRODUCTS: Mapping[Kind, str] = {"host": "bed-host", "library": "libbed.so", "arm": "bed.elf"}
+
+_FLAGS: Mapping[Kind, tuple[str, ...]] = {
+    "host": ("-O2",),
+    "library": ("-O2", "-shared", "-fPIC"),
+    "arm": (
+        "-O2", "-mcpu=cortex-m3", "-mthumb", "-ffreestanding", "-nostdlib", "-static", "-ffunction-sections",
+        "-fdata-sections", "-fno-tree-loop-distribute-patterns", "-Wl,--gc-sections", "-Wl,--fatal-warnings",
+    ),
+}  # fmt: skip
+
+
+@frozen(kw_only=True)
+class Shaft:
+    """A bed's shaft as its data sheets have it: by these a tachometer is found dead or reversed.
+
+    kt, resistance, tau_max   of the drive motor, N m/A, ohm, N m;  kt_load: of the load motor, N m/A
+    inertia, f_c, f_v         of the shaft with both rotors, kg m^2, N m, N m s/rad
+    f_cut                     of the tachometer's filter, Hz
+    """
+
+    kt: float
+    resistance: float
+    tau_max: float
+    kt_load: float
+    inertia: float
+    f_c: float
+    f_v: float
+    f_cut: float
+
+
+@frozen(kw_only=True)
+class Config:
+    """One bed, in SI. What it counts with is whole counts of its scales, rounded to the safe side.
+
+    name                ASCII, at most 16 characters
+    tick_hz, deadman    the device's own ticks, Hz; s, 0.010 to 0.020
+    continuous_current  that the load bears for ever, A: above it `limits.heat` (A^2 s) is used up
+    trip                measured load current beyond which it is a fault, as a share of `limits.current`
+    drive_current       measured drive current beyond which it is a fault, A; where it is measured
+    shaft               None: nobody watches the tachometer
+    capabilities        ENCODER ... WATCHDOG as the port has them; LOCK_STEP of a simulated plant; SIMULATED is added
+    """
+
+    name: str
+    tick_hz: float
+    deadman: float = 0.015
+    scales: Scales
+    limits: Limits
+    continuous_current: float
+    trip: float = 1.1
+    drive_current: float = 0.0
+    shaft: Shaft | None = None
+    capabilities: Capability = Capability(0)
+
+
+# Of the numbers of hw/firmware/core/guard.h.
+
+FRICTION = 2.0
+"""Dry friction that may be there, over that of the data sheet: a shaft breaks away at more than it slides at."""
+
+TOLERANCE = 0.25
+"""Share by which a torque may be off: 10 % of a torque constant, and a winding hotter by 40 K, 0.39 % a kelvin."""
+
+CHANGE = 0.01
+"""Change of the rate that must be sure, over the rate's limit: above a tachometer's noise, below what does harm. At
+least 16 counts."""
+
+LAG = 3.0
+"""Time in which the tachometer's filter forgets, over its delay of sqrt(2)/(2 pi f_cut): a twentieth is left."""
+
+_ROOM = 1 << 60
+"""What no product of the guards' whole numbers may reach."""
+
+
+def build(
+    kind: Kind,
+    config: Config,
+    plant_c: str | None = None,
+    *,
+    sources: Sequence[Path] = (),
+    flags: Sequence[str] = (),
+) -> Path:
+    """The firmware of one bed: a program ("host"), a shared library, or an ELF file for lm3s6965evb ("arm").
+
+    plant_c   text of the simulated plant; None only for a library, whose port is in `sources`
+    flags     more words for the compiler
+
+    Problem E410, E411: there is no compiler, or it does not build this. ValueError: a config that cannot be counted.
+    """
+    if plant_c is None and kind != "library":
+        raise ValueError(f"firmware of kind {kind!r} needs a plant")
+    compiler = _compiler(kind)
+    texts = {"config.c": config_c(config, plant=plant_c is not None)}
+    if plant_c is not None:
+        texts["plant.c"] = plant_c
+    files = _sources(kind, plant=plant_c is not None) + [Path(path) for path in sources]
+    words = [*WARNINGS, *_FLAGS[kind], *(() if kind == "arm" else _fused()), *flags]
+    texts["config.c"] = texts["config.c"].replace(_NO_HASH, _bytes(firmware_hash(files, texts)))
+    version = subprocess.run([compiler, "--version"], capture_output=True, text=True).stdout
+    read = sorted(FIRMWARE.rglob("*.h"))
+    name = cache.key(
+        kind, compiler, version, *words, *(each for pair in sorted(texts.items()) for each in pair),
+        *(each for path in [*files, *read] for each in (path.name, path.read_text(encoding="utf-8"))),
+    )  # fmt: skip
+    return _kept(name, _PRODUCTS[kind], lambda folder: _compile(kind, compiler, words, files, texts, folder))
+
+
+def firmware_hash(files: Sequence[Path], texts: Mapping[str, str]) -> bytes:
+    """First eight bytes of the SHA-256 of what is built: files of the firmware, config (its hash zero) and plant."""
+    digest = hashlib.sha256()
+    for name, text in sorted([*((path.name, path.read_text(encoding="utf-8")) for path in files), *texts.items()]):
+        for part in (name, text):
+            digest.update(len(part.encode()).to_bytes(8, "little") + part.encode())
+    return digest.digest()[:8]
+
+
+def qemu(elf: Path, socket: Path) -> list[str]:
+    """The command that runs an ELF file of kind "arm", its line a UNIX socket that it makes; it starts once someone has
+    connected. Problem E412: there is no emulator."""
+    if shutil.which(EMULATOR) is None:
+        raise Problem(error("E412", f"there is no `{EMULATOR}`, which runs the firmware for ARM",
+                            help="on Debian or Ubuntu: apt-get install qemu-system-arm"))  # fmt: skip
+    line = f"socket,id=line,path={str(socket).replace(',', ',,')},server=on,wait=on"
+    return [EMULATOR, "-M", "lm3s6965evb", "-nodefaults", "-display", "none", "-monitor", "none",
+            "-chardev", line, "-serial", "chardev:line", "-kernel", str(elf)]  # fmt: skip
+
+
+# Counts.
+
+
+def counted(config: Config) -> tuple[dict[str, int], Limits, float]:
+    """What the device counts with, and the limits and deadman in SI that are just that.
+
+    Names are those of `bed_limit` in hw/firmware/core/bed.h, and arming_rate, load_trip, drive_trip, deadman (ticks),
+    heat, continuous. ValueError where something is out of range.
+    """
+    s, limits, hz = config.scales, config.limits, config.tick_hz
+    given = {**_fields(s, "scale of "), **_fields(limits, "limit of "), "tick rate": hz}
+    for what, value in given.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise ValueError(f"{what} is {value:g}, not a number above 0")
+    counts = {
+        "voltage": _whole(limits.voltage / s.voltage),
+        "current": _whole(limits.current / s.current),
+        "rate": _whole(limits.rate / s.rate),
+        "voltage_slew": _whole(limits.voltage_slew / (s.voltage * hz)),
+        "current_slew": _whole(limits.current_slew / (s.current * hz)),
+        "arming_rate": _whole(limits.arming_rate / s.rate),
+        "load_trip": _whole(config.trip * limits.current / s.current),
+        "drive_trip": _whole(config.drive_current / s.drive_current),
+        "deadman": _whole(config.deadman * hz),
+    }
+    for what, count in counts.items():
+        if not (0 if what == "drive_trip" else 1) <= count < 2**31 - 1:
+            raise ValueError(f"{what} is {count} counts, not 1 to 2147483646")
+    counts["heat"] = _whole(limits.heat / s.current**2 * hz)
+    counts["continuous"] = _whole((config.continuous_current / s.current) ** 2)
+    if max(counts["heat"], counts["continuous"]) >= _ROOM:
+        raise ValueError("the current's scale is too fine for the I2t of the load")
+    deadman = counts["deadman"] / hz
+    if not 0.010 - 1e-9 <= deadman <= 0.020 + 1e-9:
+        raise ValueError(f"a deadman of {deadman:g} s, in whole ticks, is not 0.010 to 0.020 s")
+    told = Limits(
+        voltage=counts["voltage"] * s.voltage,
+        current=counts["current"] * s.current,
+        rate=counts["rate"] * s.rate,
+        arming_rate=counts["arming_rate"] * s.rate,
+        voltage_slew=counts["voltage_slew"] * s.voltage * hz,
+        current_slew=counts["current_slew"] * s.current * hz,
+        heat=limits.heat,
+    )
+    return counts, told, deadman
+
+
+def _fields(of: Scales | Limits, what: str) -> dict[str, float]:
+    return {what + name.replace("_", " "): getattr(of, name) for name in type(of).__dataclass_fields__}
+
+
+def _whole(value: float) -> int:
+    """Down to a whole number, but for what rounding has left below one."""
+    return math.floor(value * (1.0 + 1e-12))
+
+
+def guard(config: Config) -> dict[str, int]:
+    """The fields of `guard_tachometer_config` (hw/firmware/core/guard.h); all zero without a shaft."""
+    names = ("voltage", "back_emf", "most", "current", "viscous", "friction", "tolerance", "change", "lag")
+    shaft, s = config.shaft, config.scales
+    if shaft is None:
+        return dict.fromkeys(names, 0)
+    per = 2.0**24 / (shaft.inertia * config.tick_hz * s.rate)  # of a torque, N m
+    armature = shaft.kt / shaft.resistance
+    limits, delay = counted(config)[0], math.sqrt(2.0) / (2.0 * math.pi * shaft.f_cut)
+    found = {
+        "voltage": round(armature * s.voltage * per),
+        "back_emf": round(armature * shaft.kt * s.rate * per),
+        "most": round(shaft.tau_max * per),
+        "current": round(shaft.kt_load * s.current * per),
+        "viscous": round(shaft.f_v * s.rate * per),
+        "friction": round(FRICTION * shaft.f_c * per),
+        "tolerance": round(TOLERANCE * 256.0),
+        "change": max(16, math.ceil(CHANGE * limits["rate"])),
+        "lag": math.ceil(LAG * delay * config.tick_hz),
+    }
+    largest = (
+        found["voltage"] * limits["voltage"],
+        found["back_emf"] * limits["rate"],
+        found["most"] * 256,
+        found["current"] * limits["current"] * 256,
+        found["viscous"] * limits["rate"],
+        found["friction"],
+    )
+    if max(largest) >= _ROOM // 8:
+        raise ValueError("the scales are too fine, or the shaft too light, for the tachometer's guard")
+    return found
+
+
+_NO_HASH = ", ".join(["0x00"] * 8)
+
+
+def _bytes(data: bytes) -> str:
+    return ", ".join(f"0x{byte:02x}" for byte in data)
+
+
+def _double(value: float) -> str:
+    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016x}u"
+
+
+def config_c(config: Config, *, plant: bool) -> str:
+    """The text of config.c: one bed's numbers, the firmware's hash left zero. plant: the bed is a simulated one."""
+    counts, limits, deadman = counted(config)
+    s, g = config.scales, guard(config)
+    name = config.name.encode("ascii", "replace")[:16].ljust(16, b"\0")
+    capabilities = config.capabilities | (Capability.SIMULATED if plant else Capability(0))
+    if Capability.LOCK_STEP in capabilities and not plant and Capability.SIMULATED not in capabilities:
+        raise ValueError("lock-step is for simulated plants")
+    announced = (
+        config.tick_hz, deadman, s.voltage, s.current, s.rate, s.angle, s.drive_current, s.acceleration, limits.voltage,
+        limits.current, limits.rate, limits.arming_rate, limits.voltage_slew, limits.current_slew, limits.heat,
+    )  # fmt: skip
+    in_force = ("voltage", "current", "rate", "voltage_slew", "current_slew")
+    lines = [
+        "/* One bed's numbers, written by hw/build.py. */",
+        '#include "board.h"' if plant else '#include "bed.h"',
+        "",
+        "extern const bed_config board_config;",
+        *([] if plant else ["extern const bed_plant board_plant;"]),
+        "const bed_config board_config = {",
+        f"    .capabilities = 0x{int(capabilities):04x}u,",
+        f"    .firmware = {{{_NO_HASH}}},",
+        f"    .name = {{{_bytes(name)}}},",
+        "    .announced = {",
+        *(f"        {_double(value)}, /* {value!r} */" for value in announced),
+        "    },",
+        f"    .limits = {{{', '.join(str(counts[each]) for each in in_force)}}},",
+        *(f"    .{each} = {counts[each]}," for each in ("arming_rate", "load_trip", "drive_trip")),
+        f"    .deadman = {counts['deadman']}u,",
+        f"    .heat = {{.most = {counts['heat']}, .continuous = {counts['continuous']}}},",
+        "    .tachometer = {",
+        *(f"        .{each} = {value}{'u' if each == 'lag' else ''}," for each, value in g.items()),
+        "    },",
+        f"    .plant = {'&board_plant' if Capability.SIMULATED in capabilities else '0'},",
+        "};",
+    ]
+    if plant:
+        scales = ", ".join(f".{each} = {getattr(s, each)!r}" for each in ("voltage", "current", "rate", "angle"))
+        lines += ["", f"const board_scales board_scale = {{{scales}}};"]
+    return "\n".join(lines) + "\n"
+
+
+# Compilers.
+
+
+def _sources(kind: Kind, *, plant: bool) -> list[Path]:
+    folders = ["core"]
+    if plant:
+        folders += ["plant", *(["arm"] if kind == "arm" else [])]
+    found = [path for folder in folders for path in sorted((FIRMWARE / folder).glob("*.c"))]
+    if plant and kind != "arm":
+        found.append(FIRMWARE / "host" / "port_host.c")
+    if kind == "host":
+        found.append(FIRMWARE / "host" / "bed_host.c")
+    return found
+
+
+def _compiler(kind: Kind) -> str:
+    if kind == "arm":
+        if shutil.which(CROSS_COMPILER) is None:
+            raise Problem(error("E411", f"there is no `{CROSS_COMPILER}`, which builds the firmware for ARM",
+                                help="on Debian or Ubuntu: apt-get install gcc-arm-none-eabi"))  # fmt: skip
+        return CROSS_COMPILER
+    wanted = [os.environ["CC"]] if os.environ.get("CC") else ["gcc", "clang"]
+    for each in wanted:
+        if shutil.which(each) is not None:
+            return each
+    if os.environ.get("CC"):
+        said = f"there is no C compiler `{wanted[0]}`, which $CC names, to build the firmware with"
+        raise Problem(error("E410", said, help="name one that is there, or unset CC"))
+    raise Problem(error("E410", "there is no C compiler to build the firmware with, neither `gcc` nor `clang`",
+                        help="on Debian or Ubuntu: apt-get install gcc libc6-dev"))  # fmt: skip
+
+
+def _compile(
+    kind: Kind, compiler: str, words: list[str], files: Sequence[Path], texts: Mapping[str, str], folder: Path
+) -> None:
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    include = [f"-I{FIRMWARE / each}" for each in (".", "core", "plant")]
+    ends = [f"-T{FIRMWARE / 'arm' / 'lm3s6965.ld'}", "-lgcc"] if kind == "arm" else []
+    made = [str(folder / name) for name in sorted(texts)]
+    command = [compiler, *words, *include, *map(str, files), *made, "-o", str(folder / _PRODUCTS[kind]), *ends]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode != 0:
+        first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip()[:200])
+        raise Problem(error("E411" if kind == "arm" else "E410", f"`{compiler}` does not build the firmware: {first}",
+                            help="a compiler of C11 is needed: gcc 10 or clang 12, or newer"))  # fmt: skip
+
+
+def _fused() -> tuple[str, ...]:
+    """The word by which a plant has this processor's fused multiply-add; without it, one in software: the same bits."""
+    with contextlib.suppress(OSError):
+        flags = re.search(r"^flags\s*:(.*)$", Path("/proc/cpuinfo").read_text(encoding="utf-8"), re.MULTILINE)
+        if flags is not None and "fma" in flags[1].split():
+            return ("-mfma",)
+    return ()
+
+
+# What was built before.
+
+
+def _kept(name: str, product: str, make: Callable[[Path], None]) -> Path:
+    """A product by the hash of what makes it; made, and kept, where it is not there.
+
+    Folders are made under another name and renamed, so that any number of processes may share them. Where the cache
+    cannot be written, the product is in a folder that lasts as long as this process.
+    """
+    root = cache.folder() / "firmware"
+    found = root / name[:32] / product
+    if found.is_file():
+        with contextlib.suppress(OSError):
+            os.utime(found.parent)
+        return found
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        made = Path(tempfile.mkdtemp(dir=root, prefix=".new-"))
+    except OSError:
+        made = Path(tempfile.mkdtemp(prefix="met-firmware-"))
+        atexit.register(shutil.rmtree, made, ignore_errors=True)
+        make(made)
+        return made / product
+    try:
+        make(made)
+        with contextlib.suppress(OSError):  # another process was faster
+            made.rename(found.parent)
+    finally:
+        shutil.rmtree(made, ignore_errors=True)
+    _trim(root, keep=found.parent)
+    return found
+
+
+def _trim(root: Path, keep: Path) -> None:
+    """Removes the folders longest unused while all are more than `LIMIT` bytes."""
+    with contextlib.suppress(OSError):
+        folders = [(path.stat().st_mtime, sum(each.stat().st_size for each in path.iterdir()), path)
+                   for path in root.iterdir() if not path.name.startswith(".")]  # fmt: skip
+        total = sum(size for _, size, _ in folders)
+        for _, size, path in sorted(folders):
+            if total <= LIMIT:
+                break
+            if path != keep:
+                shutil.rmtree(path, ignore_errors=True)
+                total -= size

@@ -1,0 +1,184 @@
+"""One case driven on beds, in a process of its own: `python -m hw.case`, told what to do in a line of JSON (`Asked`).
+
+It says how it goes on its standard output, a line of JSON each: {"said": words}, {"bed": joint, "about": ...},
+{"began": true}, at the end {"ended": ...} or {"wrong": diagnostics}. What came of each exchange is in the records.
+It stops its beds when it is interrupted, terminated, or its parent is no more.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import signal
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, field
+from pathlib import Path
+from typing import Any
+
+from hw import loop, realtime, ring
+from hw.bed import About, Bed, Capability
+from hw.driven import Driven, divisor, substituted
+from hw.pace import Pace, pace
+from hw.ports import Port, opened
+from hw.records import SIZE
+from hw.writer import Writer
+from met import plan_file
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.keys import case_seeds
+from met.plan import SEED, Experiment, Formula
+from met.render import to_json
+from met.run import prepare
+
+RING_BYTES = 64 << 20
+"""Of records that may wait for the disk: minutes of them."""
+
+LOCK_STEP_PATIENCE = 1.0
+"""s to wait for a bed that has no time of its own: an emulator may be slow."""
+
+_PR_SET_PDEATHSIG = 1
+
+
+@frozen
+class Asked:
+    """plan: of one experiment, as text (met.plan_file);  row: of its case table
+    ports: by joint;  lock_step: whether the beds have no time of their own;  baud: of serial lines
+    records: the file that they go to;  head: what else stands at its beginning;  rest: s of rest before the case
+    transcripts: by joint, files that what goes over the line is written to
+    """
+
+    plan: str
+    row: int
+    ports: Mapping[str, str]
+    records: str
+    lock_step: bool = False
+    baud: int = 921600
+    rest: float = 0.0
+    head: Mapping[str, Any] = field(default_factory=dict)
+    transcripts: Mapping[str, str] = field(default_factory=dict)
+
+    def text(self) -> str:
+        return json.dumps(asdict(self)) + "\n"
+
+
+def pace_of(experiment: Experiment) -> Pace:
+    """How often the beds of an experiment are spoken to."""
+    return pace(experiment.structure.schedule.base_hz / divisor(experiment))
+
+
+def run(asked: Asked) -> loop.Ended:
+    """Drive the case. Raises Problem."""
+    experiment = plan_file.loads(asked.plan).experiments[0]
+    of = pace_of(experiment)
+    stopping: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda which, _: stopping.append(which))
+    _end_with_parent()
+    joints = substituted(prepare(experiment, wire=True))
+    _check_start(experiment, joints, asked.row)
+    beds: list[Bed] = []
+    abouts: list[About] = []
+    try:
+        for joint in joints:
+            port = Port(asked.ports[joint], asked.baud, asked.lock_step, asked.transcripts.get(joint))
+            beds.append(opened(port, experiment, joint, asked.row, of.period))
+            abouts.append(_greeted(beds[-1], joint, experiment, asked.row))
+        lock_step = asked.lock_step
+        _check_time(abouts, lock_step)
+        driven = Driven(prepare(experiment, wire=True, late=of.late(lock_step)), asked.row, of.repeats)
+        _check_delay(driven, of, lock_step)
+        for refused in [] if lock_step else realtime.take_precedence():
+            _say(said=refused)
+        driven(0, [0.0] * len(beds), [[0.0, 0.0] for _ in beds])  # code and memory are there when time begins to count
+        for bed in beds:
+            if asked.rest > 0.0:
+                bed.rest(asked.rest)
+            bed.patience = LOCK_STEP_PATIENCE if lock_step else max(of.period, 0.002)
+        head = {**asked.head, "row": asked.row, "servo_hz": of.servo_hz, "repeats": of.repeats,
+                "lock_step": lock_step, "joints": list(joints), "tick_hz": abouts[0].tick_hz}  # fmt: skip
+        rows = min((driven.exchanges + 1) * len(beds), RING_BYTES // SIZE)
+        writer = Writer(ring.make(rows), Path(asked.records), json.dumps(head).encode())
+        try:
+            _say(began=True)
+            return loop.drive(
+                beds, driven, of, driven.exchanges, writer.put, lock_step=lock_step,
+                asked_to_stop=lambda: bool(stopping),
+            )  # fmt: skip
+        finally:
+            if wrong := writer.close():
+                raise Problem(error("E413", wrong, help="free the disk, or give another place with `-o`"))
+    finally:
+        for bed in beds:
+            bed.close()
+
+
+def _greeted(bed: Bed, joint: str, experiment: Experiment, row: int) -> About:
+    """Who the bed is; a simulated one begins anew, with the case's noise."""
+    about = bed.connect()
+    _say(bed=joint, about={**asdict(about), "capabilities": int(about.capabilities)})
+    for warning in getattr(bed, "warnings", ()):
+        _say(said=warning.message, help=list(warning.help))
+    if Capability.SIMULATED in about.capabilities:
+        cases = experiment.cases
+        seed = int(case_seeds(experiment, [row])[0]) if SEED in cases.noise else cases.seed
+        bed.preset(seed=seed, repeat=0 if cases.repeats is None else int(cases.repeats[row]))
+    return about
+
+
+def _check_time(abouts: Sequence[About], lock_step: bool) -> None:
+    """That the beds have a time of their own, or none, as is expected."""
+    for about in abouts:
+        if (Capability.LOCK_STEP in about.capabilities) != lock_step:
+            message = f"bed `{about.name}` has {'a' if lock_step else 'no'} time of its own"
+            helps = "leave out `--lock-step`" if lock_step else "`--lock-step` drives it"
+            raise Problem(error("E414", message, help=helps))
+
+
+def _check_delay(driven: Driven, of: Pace, lock_step: bool) -> None:
+    """That the law knows how late its commands are."""
+    least = of.late(lock_step)
+    for joint in driven.joints:
+        if driven.delay(joint) < least:
+            message = f"joint `{joint}`: its law takes the bed's delay for none, and over a wire it is a tick"
+            raise Problem(error("E415", message, help="`bed = emulated(delay = 1, ...)` in the deck says so"))
+
+
+def _check_start(experiment: Experiment, joints: Sequence[str], row: int) -> None:
+    """That the shafts begin at rest, as a bed's does."""
+    inputs = {coordinate.path: float(coordinate.values[row]) for coordinate in experiment.cases.coordinates}
+    outputs = experiment.formulas.replay(inputs)
+    for joint in joints:
+        value = experiment.parameters[f"initial.{joint}.qd"].value
+        if (outputs[value.output] if isinstance(value, Formula) else value) != 0.0:
+            message = f"joint `{joint}` begins with a rate, and a bed's shaft begins at rest"
+            raise Problem(error("E416", message, help=f"`initial {{ {joint}.qd = 0 rad/s; }}` in the run"))
+
+
+def _end_with_parent() -> None:
+    """Have the system terminate this process when its parent dies."""
+    try:
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    except (AttributeError, OSError):
+        return
+    if os.getppid() == 1:
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+def _say(**data: Any) -> None:
+    print(json.dumps(data), flush=True)
+
+
+def main() -> None:
+    """The process."""
+    try:
+        ended = run(Asked(**json.loads(sys.stdin.readline())))
+    except Problem as problem:
+        _say(wrong=json.loads(to_json(problem.diagnostics)))
+        sys.exit(1)
+    _say(ended={**asdict(ended), "faults": int(ended.faults)})
+
+
+if __name__ == "__main__":
+    main()

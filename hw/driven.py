@@ -1,0 +1,94 @@
+"""The simulated rest of an arm whose motors are on beds: the kernel with its wires open, stepped at the servos' ticks.
+
+What it computes follows from the rates that were read, so a run is made again, with all that is recorded of it, from
+those alone (`again`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from met.kernel import Block
+from met.plan import Experiment
+from met.program.plant import bed_values, servo_period
+from met.run import Prepared, inputs
+
+
+class Driven:
+    """One case. prepared: with its wires open (met.run.prepare, wire=True); row: of the case table; repeats: exchanges
+    a tick of the servos."""
+
+    def __init__(self, prepared: Prepared, row: int, repeats: int = 1) -> None:
+        self.prepared, self.row = prepared, row
+        program, schedule = prepared.program, prepared.experiment.structure.schedule
+        self.joints = substituted(prepared)
+        given = np.zeros((1, len(program.inputs)))
+        own = inputs(prepared.experiment, np.array([row]))
+        given[:, : own.shape[1]] = own
+        self.block: Block = prepared.kernel.block(given)
+        self.divisor = divisor(prepared.experiment)
+        self.ticks, self.repeats = schedule.ticks, repeats
+        self.last = schedule.ticks // self.divisor
+        """The servos' last tick."""
+        self._rates = [self.block.inputs[program.inputs.index(f"wire:{joint}.rate")] for joint in self.joints]
+        names = ("voltage", "current")
+        self._told = [[self.block.outputs[program.outputs.index(f"wire:{joint}.{name}")] for name in names]
+                      for joint in self.joints]  # fmt: skip
+
+    @property
+    def exchanges(self) -> int:
+        """After the first sample, until the servos' last tick."""
+        return self.last * self.repeats
+
+    def __call__(self, e: int, rates: Sequence[float], told: list[list[float]]) -> None:
+        """Steps to the instant of exchange e, where the servos tick then (`hw.loop.Compute`)."""
+        tick, between = divmod(e, self.repeats)
+        if between:
+            return
+        for lane, rate in zip(self._rates, rates, strict=True):
+            lane[:] = rate
+        at = tick * self.divisor
+        self.block.step(max(0, at - self.divisor + 1), at)
+        for b, (voltage, current) in enumerate(self._told):
+            told[b][0], told[b][1] = float(voltage[0]), float(current[0])
+
+    def delay(self, joint: str) -> float:
+        """The bed's delay as the law takes it to be, in the servo's ticks."""
+        return bed_values(self.prepared.experiment, joint, self.row)["delay"]
+
+    def again(self, rates: Iterable[Sequence[float]]) -> tuple[np.ndarray, np.ndarray, int]:
+        """Histories [row, column], outputs [output] and the last base tick of a run in which these rates were read at
+        the servos' ticks from 0 on; not-a-number after it."""
+        program, schedule = self.prepared.program, self.prepared.experiment.structure.schedule
+        rows = np.full((schedule.rows if program.columns else 0, program.columns), np.nan)
+        record = schedule.record
+        done = -1
+        for tick, read in enumerate(rates):
+            if tick > self.last:
+                break
+            for lane, rate in zip(self._rates, read, strict=True):
+                lane[:] = rate
+            done = self._recorded(rows, record, done + 1, tick * self.divisor)
+            if tick == self.last and done < self.ticks:
+                done = self._recorded(rows, record, done + 1, self.ticks)
+        return rows, self.block.outputs[:, 0].copy(), done
+
+    def _recorded(self, rows: np.ndarray, record: int, first: int, last: int) -> int:
+        made = self.block.recorded(first, last)[0]
+        if len(rows):
+            at = (first + record - 1) // record
+            rows[at : at + len(made)] = made
+        return last
+
+
+def substituted(prepared: Prepared) -> tuple[str, ...]:
+    """The joints whose motors are on beds, in the order of the program's wires."""
+    return tuple(name.removeprefix("wire:").removesuffix(".rate") for name in prepared.program.inputs
+                 if name.startswith("wire:"))  # fmt: skip
+
+
+def divisor(experiment: Experiment) -> int:
+    """Base ticks a tick of the servos whose motors are on beds."""
+    return round(servo_period(experiment) * experiment.structure.schedule.base_hz)

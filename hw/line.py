@@ -1,0 +1,22 @@
+"""A line to a bed: bytes go out, bytes come in. Beds over a wire know their line by these methods alone."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class Line(Protocol):
+    """Raises met.diagnostic.Problem E401 where it is lost."""
+
+    def now(self) -> float:
+        """Its clock, s."""
+
+    def send(self, frame: bytes) -> None: ...
+
+    def receive(self, until: float) -> bytes:
+        """What has come, at once; else what comes first until that time of its clock; else nothing."""
+
+    def sleep(self, seconds: float) -> None:
+        """Let its clock go on by so many."""
+
+    def close(self) -> None: ...

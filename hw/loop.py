@@ -1,0 +1,150 @@
+"""The loop that drives beds: wait, exchange, compute, at every period of the wire.
+
+    t_0       the beds are armed; their first sample
+    t_e       what was computed from sample e - 1 is told; sample e is answered; it is computed what to tell next
+
+A bed with a time of its own is spoken to at t_e = t_0 + e * period, so that what is computed from a sample is held one
+period later. A bed in lock-step advances by a period with each exchange, as fast as it can.
+
+Whatever ends the loop, every bed is told to stop before it returns or raises.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+from hw import records
+from hw.bed import Bed, Fault, Sample, State
+from hw.pace import MISSED, Pace
+from met.frozen import frozen
+
+SPIN = 60e-6
+"""s before an exchange is due at which the host wakes, and looks at the clock until then: a process that sleeps wakes
+some 50 us late. Never longer: who only looks at clocks is throttled."""
+
+
+class Compute(Protocol):
+    """What to tell the beds after exchange e. rates: rad/s, one a bed; told: [voltage V, current A] of each, changed in
+    place."""
+
+    def __call__(self, e: int, rates: Sequence[float], told: list[list[float]]) -> None: ...
+
+
+@frozen
+class Ended:
+    """How a loop ended.
+
+    exchanges  that were done and answered by all beds, the first sample counted
+    why        it ended early, in words; "" where it did not
+    bed        the number of the bed on which it ended; -1 for none
+    faults     that this bed had latched
+    """
+
+    exchanges: int
+    why: str = ""
+    bed: int = -1
+    faults: Fault = Fault(0)
+
+
+Put = Callable[[bytes], None]
+"""Takes a record (hw/records.py)."""
+
+
+def drive(
+    beds: Sequence[Bed], compute: Compute, pace: Pace, exchanges: int, put: Put, *, lock_step: bool,
+    asked_to_stop: Callable[[], bool] = lambda: False,
+) -> Ended:  # fmt: skip
+    """Arm the beds, drive them through so many exchanges after the first sample, and stop them.
+
+    lock_step      whether they have no time of their own
+    asked_to_stop  looked at before each exchange
+    """
+    try:
+        return _driven(beds, compute, pace, exchanges, put, lock_step, asked_to_stop)
+    finally:
+        for bed in beds:
+            bed.stop()
+
+
+def _driven(
+    beds: Sequence[Bed], compute: Compute, pace: Pace, exchanges: int, put: Put, lock_step: bool,
+    asked_to_stop: Callable[[], bool],
+) -> Ended:  # fmt: skip
+    clock, packed = time.perf_counter_ns, records.packed
+    period = round(pace.period * 1e9)
+    told = [[0.0, 0.0] for _ in beds]
+    rates = [0.0] * len(beds)
+    missed = [0] * len(beds)
+    for b, bed in enumerate(beds):
+        sample = bed.arm()
+        rates[b] = sample.rate
+        put(packed(0, b, 0, (0, 0, 0, 0), 0.0, 0.0, sample))
+        if ending := _ending(0, b, replace(sample, refused=False)):  # it may have been armed by the first of two asks
+            return ending
+    compute(0, rates, told)
+    origin, computed, ended = clock(), 0, 0
+    for e in range(1, exchanges + 1):
+        if asked_to_stop():
+            return Ended(e, "the host was asked to stop")
+        due, flags = e * period, 0
+        if lock_step:
+            due = clock() - origin
+        else:
+            woken = _waited(origin + due)
+            late = woken - origin - due
+            if late >= period:
+                flags = records.LATE_WOKEN
+                if computed > due:
+                    flags = records.LATE_ANSWERED if ended > due else records.LATE_COMPUTED
+                if late >= MISSED * period:
+                    return Ended(e, f"the host is {late * 1e-6:.3g} ms behind: {_LATE[flags]}")
+        for b, bed in enumerate(beds):
+            voltage, current = told[b]
+            began = clock() - origin
+            answer = bed.exchange(voltage, current)
+            ended = clock() - origin
+            put(packed(e, b, flags, (due, began, ended, computed), voltage, current, answer))
+            if answer is None:
+                missed[b] += 1
+                if missed[b] >= MISSED:
+                    return Ended(e, f"no answer for {MISSED} exchanges", b)
+                continue
+            missed[b] = 0
+            rates[b] = answer.rate
+            if ending := _ending(e, b, answer):
+                return ending
+        compute(e, rates, told)
+        computed = clock() - origin
+    return Ended(exchanges + 1)
+
+
+_LATE = {
+    records.LATE_COMPUTED: "it computed too long", records.LATE_WOKEN: "it was not woken in time",
+    records.LATE_ANSWERED: "it waited for answers",
+}  # fmt: skip
+
+
+def _waited(due: int) -> int:
+    """Sleeps until a time of the clock, ns; the time then."""
+    clock = time.perf_counter_ns
+    left = (due - clock()) * 1e-9 - SPIN
+    if left > 0.0:
+        time.sleep(left)
+    while (now := clock()) < due:
+        pass
+    return now
+
+
+def _ending(e: int, b: int, sample: Sample) -> Ended | None:
+    """Whether a bed takes commands no more, and why."""
+    if sample.state == State.ARMED and sample.greeted and not sample.refused:
+        return None
+    if not sample.greeted:
+        return Ended(e, "the bed was reset", b)
+    if sample.state == State.STOPPED:
+        names = ", ".join(fault.name.lower().replace("_", " ") for fault in Fault if fault in sample.faults)  # type: ignore[union-attr]
+        return Ended(e, f"the bed stopped itself: {names or 'it does not say why'}", b, sample.faults)
+    return Ended(e, "the bed is not armed any more" if not sample.refused else "the bed refused a command", b)

@@ -1,0 +1,42 @@
+"""How often a bed is spoken to: at the servo's rate, or the smallest multiple of it that is at least 500 Hz.
+
+A bed stops itself when it hears nothing for 10 to 20 ms, so that a slow servo's command is repeated on the wire.
+"""
+
+from __future__ import annotations
+
+import math
+
+from met.frozen import frozen
+
+SLOWEST_HZ = 500.0
+MISSED = 5
+"""Exchanges in a row without an answer, or periods that the host is behind, after which it stops."""
+
+
+@frozen
+class Pace:
+    """servo_hz: rate of the substituted joints' servos, Hz;  repeats: exchanges a tick of theirs."""
+
+    servo_hz: float
+    repeats: int
+
+    @property
+    def hz(self) -> float:
+        """Of the wire."""
+        return self.servo_hz * self.repeats
+
+    @property
+    def period(self) -> float:
+        """From exchange to exchange, s."""
+        return 1.0 / self.hz
+
+    def late(self, lock_step: bool) -> int:
+        """Ticks of the servo that pass between reading a rate and acting on it, at least: a bed with a time of its own
+        is told at the next exchange, one in lock-step at once."""
+        return 0 if lock_step or self.repeats > 1 else 1
+
+
+def pace(servo_hz: float) -> Pace:
+    """Of servos that tick at this rate, Hz."""
+    return Pace(servo_hz, max(1, math.ceil(SLOWEST_HZ / servo_hz - 1e-9)))

@@ -1,0 +1,1 @@
+"""The wire to a bed (docs/protocol.md): frames, and the messages in them."""

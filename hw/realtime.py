@@ -1,0 +1,51 @@
+"""What the host can do so that it wakes in time, where it is allowed: a process that is scheduled first, memory that is
+not swapped, and no collection of garbage. It is not hard real time: what was late is counted.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import os
+
+PRIORITY = 50
+"""Among processes of SCHED_FIFO: above the kernel's threaded interrupts of most systems no further is needed."""
+
+_MCL_CURRENT, _MCL_FUTURE = 1, 2
+
+
+def take_precedence() -> list[str]:
+    """Do it for this process; what was not allowed, in words, with its remedy."""
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    refused = []
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
+    except (AttributeError, OSError) as reason:
+        refused.append(
+            f"no precedence over other processes ({_why(reason)}): exchanges may be late; "
+            f"`{_allow('rtprio', PRIORITY)}` allows it"
+        )
+    if _locked() != 0:
+        refused.append(
+            f"memory may be swapped out ({os.strerror(ctypes.get_errno()).lower()}): exchanges may be late; "
+            f"`{_allow('memlock', 'unlimited')}` allows it"
+        )
+    return refused
+
+
+def _locked() -> int:
+    try:
+        library = ctypes.CDLL(None, use_errno=True)
+        return int(library.mlockall(_MCL_CURRENT | _MCL_FUTURE))
+    except (AttributeError, OSError):
+        return -1
+
+
+def _allow(what: str, how: object) -> str:
+    return f"@GROUP - {what} {how}"
+
+
+def _why(reason: Exception) -> str:
+    return (getattr(reason, "strerror", None) or "not on this system").lower()

@@ -1,0 +1,95 @@
+"""What is said where a bed cannot be reached, or says no: E400 to E409, each with its remedy."""
+
+from __future__ import annotations
+
+from hw.bed import About, Fault, Sample, State
+from hw.protocol.messages import VERSION
+from met.diagnostic import Problem, error
+
+_FAULTS = {
+    Fault.DEADMAN: (
+        "no new command came within the deadman's time",
+        "the computer or the line was late: leave the computer less to do, or exchange at a lower rate",
+    ),
+    Fault.RANGE: (
+        "a command was beyond a limit",
+        "limits that the host knows are checked before: it has others than the bed; greet the bed anew",
+    ),
+    Fault.SLEW: (
+        "a command changed faster than a limit",
+        "command it more smoothly, or give the bed a wider limit of slew where it can bear it",
+    ),
+    Fault.RATE: (
+        "the shaft was faster than its limit",
+        "look whether the load drives the shaft; lower the rate that is asked for",
+    ),
+    Fault.CURRENT: ("a current was beyond its limit", "look for a short circuit or a shaft that is held"),
+    Fault.HEAT: ("the load motor was loaded for too long", "let it cool, and load it less, or for less time"),
+    Fault.TACHOMETER_DEAD: (
+        "torque did not change the measured rate",
+        "look whether the tachometer is connected, and whether the shaft is free",
+    ),
+    Fault.TACHOMETER_REVERSED: (
+        "the measured rate changed against the torque",
+        "exchange the two wires of the tachometer, or of the motor",
+    ),
+    Fault.NOISE: (
+        "too many frames did not decode",
+        "look at the line's cable, its shield and its ground; try a lower baud rate",
+    ),
+    Fault.WATCHDOG: (
+        "it was reset by its watchdog",
+        "its firmware hung or its supply dipped: find out before going on",
+    ),
+}
+
+
+def words(faults: Fault) -> str:
+    """What happened, in words."""
+    return "; ".join(_FAULTS[fault][0] for fault in Fault if fault in faults)
+
+
+def remedies(faults: Fault) -> list[str]:
+    return [_FAULTS[fault][1] for fault in Fault if fault in faults]
+
+
+def refused(about: About, what: str, sample: Sample) -> Problem:
+    """The bed did not do what was asked (`arm`, `clear` ...), as its answer says."""
+    latched = sample.faults & ~Fault.WATCHDOG
+    slow = about.limits.arming_rate
+    if not sample.greeted:
+        why, helps = "it was reset since it was greeted", ["look at its supply, then begin anew"]
+    elif sample.state == State.STOPPED and latched and what != "clear":
+        why, helps = f"it stopped itself: {words(latched)}", remedies(latched)
+    elif abs(sample.rate) > slow:
+        why = f"its shaft turns at {sample.rate:.3g} rad/s, and {slow:.3g} rad/s is the most for that"
+        helps = ["wait until it has come to rest; a shaft that does not is driven by something"]
+    elif sample.state == State.ARMED:
+        why, helps = "it is armed", ["stop it first"]
+    else:
+        why, helps = "it does not say why", ["switch it off and on, and begin anew"]
+    return Problem(error("E406", f"bed `{about.name}` does not {what}: {why}", help=helps))
+
+
+def not_connected(name: str) -> Problem:
+    helps = "connect to it first; a line that was lost is not taken up again by itself"
+    return Problem(error("E401", f"there is no line to a bed on {name}", help=helps))
+
+
+def other_version(version: int) -> Problem:
+    message = f"the bed speaks version {version} of the protocol, and this MET {VERSION}"
+    helps = "put the firmware of this version of MET on it, or take the MET that its firmware came with"
+    return Problem(error("E403", message, help=helps))
+
+
+def silent(name: str, asked: str) -> Problem:
+    """No answer to what is safe to ask again, and was; or to a STEP, which is not."""
+    message = f"bed `{name}` does not answer {asked}"
+    return Problem(error("E402", message, help="it was there before: look at its supply and at the line"))
+
+
+def no_command(about: About, what: str, value: float, unit: str, most: float) -> Problem:
+    """A voltage or a current that is not sent."""
+    said = "no finite number" if value - value != 0.0 else f"beyond the limit of {most:.6g} {unit}"
+    message = f"{what} of {value:.6g} {unit} for bed `{about.name}` is {said}; the bed was stopped"
+    return Problem(error("E408", message, help="the simulation diverges, or asks more than the bed may give"))

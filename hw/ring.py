@@ -1,0 +1,67 @@
+"""Records on their way from the loop to the disk: memory that two processes share, so that the loop never waits.
+
+The loop puts records in, the writer takes them out. The count is written after the record, and a record proves itself,
+so the writer takes none that is half there.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import struct
+import zlib
+from collections.abc import Iterator
+
+from hw.records import SIZE
+
+_COUNT = struct.Struct("<Q")
+_HEAD = 64
+"""Bytes before the records: how many were put in, in a cache line of their own; how many were taken out, in another."""
+
+
+class Full(Exception):
+    """The writer is a whole ring behind: the disk has stalled."""
+
+
+class Ring:
+    """file: of the shared memory (`make`);  room: records."""
+
+    def __init__(self, file: int, room: int) -> None:
+        self.file, self.room = file, room
+        self._memory = mmap.mmap(file, 2 * _HEAD + room * SIZE)
+        self._put = _COUNT.unpack_from(self._memory, 0)[0]
+        self._taken = _COUNT.unpack_from(self._memory, _HEAD)[0]
+
+    def put(self, record: bytes) -> None:
+        """One more. Raises Full."""
+        if self._put - self._taken >= self.room:
+            self._taken = _COUNT.unpack_from(self._memory, _HEAD)[0]
+            if self._put - self._taken >= self.room:
+                raise Full
+        at = 2 * _HEAD + self._put % self.room * SIZE
+        self._memory[at : at + SIZE] = record
+        self._put += 1
+        _COUNT.pack_into(self._memory, 0, self._put)
+
+    def take(self) -> Iterator[bytes]:
+        """Those that are there, each once; it counts as taken when the next is asked for."""
+        there = _COUNT.unpack_from(self._memory, 0)[0]
+        while self._taken < there:
+            at = 2 * _HEAD + self._taken % self.room * SIZE
+            record = self._memory[at : at + SIZE]
+            if zlib.crc32(record[:-4]) != int.from_bytes(record[-4:], "little"):
+                return  # not all of it is to be seen from here yet
+            yield record
+            self._taken += 1
+            _COUNT.pack_into(self._memory, _HEAD, self._taken)
+
+    def close(self) -> None:
+        self._memory.close()
+        os.close(self.file)
+
+
+def make(room: int) -> Ring:
+    """Of so many records, in memory that has no name: it is gone with the last process that has it open."""
+    file = os.memfd_create("met-bed-records")
+    os.ftruncate(file, 2 * _HEAD + room * SIZE)
+    return Ring(file, room)

@@ -1,0 +1,87 @@
+"""How well a loop kept its time, from its records: lateness, round trips, misses and why, and how clocks drift."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hw.records import ANSWERED, LATE_ANSWERED, LATE_COMPUTED, LATE_WOKEN
+from met.frozen import frozen
+
+TICK = 1 << 32
+"""A bed counts its ticks modulo this."""
+
+
+@frozen
+class Spread:
+    """Of times, s: median, 99th percentile, largest; and how many there are in each of `EDGES`' stretches."""
+
+    median: float
+    high: float
+    largest: float
+    counts: tuple[int, ...]
+
+
+EDGES = tuple(1e-6 * step * 10**power for power in range(5) for step in (1, 2, 5))
+"""s: where one stretch of a histogram ends and the next begins; the first is all below, the last all above."""
+
+
+@frozen
+class Timing:
+    """Of one bed, or of all where they are taken together.
+
+    lateness    from when an exchange was due to when it began;  trip: from there to its answer
+    computing   from an answer to when the next command was known
+    unanswered  exchanges without an answer
+    woken, computed, waited  exchanges that began a period late or more, for the host woke too late, computed too long,
+                or waited for the answer before
+    drift       of the bed's clock against the host's, as a share; not-a-number where that is not known
+    """
+
+    exchanges: int
+    lateness: Spread
+    trip: Spread
+    computing: Spread
+    unanswered: int
+    woken: int
+    computed: int
+    waited: int
+    drift: float
+
+
+def timing(rows: np.ndarray, tick_hz: float) -> Timing:
+    """Of the records of one bed, the first sample left out. tick_hz: rate of the bed's ticks."""
+    rows = rows[rows["exchange"] > 0]
+    answered = (rows["flags"] & ANSWERED) != 0
+    trip = rows["ended"] - rows["began"]
+    computing = rows["computed"][1:] - rows["ended"][:-1]
+    woken, computed, waited = (int(((rows["flags"] & flag) != 0).sum())
+                               for flag in (LATE_WOKEN, LATE_COMPUTED, LATE_ANSWERED))  # fmt: skip
+    return Timing(
+        len(rows), spread(rows["began"] - rows["due"]), spread(trip[answered]), spread(computing[computing >= 0]),
+        int((~answered).sum()), woken, computed, waited, _drift(rows[answered], tick_hz),
+    )  # fmt: skip
+
+
+def spread(times: np.ndarray | Sequence[int]) -> Spread:
+    """Of times in ns."""
+    seconds = np.asarray(times, dtype=np.float64) * 1e-9
+    if not len(seconds):
+        return Spread(float("nan"), float("nan"), float("nan"), (0,) * (len(EDGES) + 1))
+    median, high, largest = np.percentile(seconds, (50, 99, 100)).tolist()
+    counts = np.bincount(np.searchsorted(EDGES, seconds, side="right"), minlength=len(EDGES) + 1)
+    return Spread(median, high, largest, tuple(counts.tolist()))
+
+
+def _drift(rows: np.ndarray, tick_hz: float) -> float:
+    """By a straight line through the host's times over the bed's ticks: its slope, but for one."""
+    if len(rows) < 10:
+        return float("nan")
+    ticks = np.unwrap(rows["tick"].astype(np.float64), period=float(TICK))
+    host = 0.5e-9 * (rows["began"] + rows["ended"])
+    bed = (ticks - ticks[0]) / tick_hz
+    if not bed[-1] > 0.0:
+        return float("nan")
+    slope = np.polyfit(host - host[0], bed, 1)[0]
+    return float(slope - 1.0)

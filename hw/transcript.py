@@ -1,0 +1,159 @@
+"""Transcripts: every byte that went over a line, either way, when, and in its order with the others.
+
+    line       MET bed transcript 1
+    header     a record whose bytes are JSON
+    records    kind u8, time f64, length u16, bytes, CRC-32 u32, little-endian
+
+time is that of the line's clock, s. The CRC is of the record, from the CRC of the one before it, so that none can be
+missing. A record is written with one call: a crash loses at most the last one.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import zlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from hw.line import Line
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+
+MAGIC = b"MET bed transcript 1\n"
+
+HEADER, OPENED, SENT, RECEIVED, LOST = range(5)
+"""Kinds of records. OPENED: the line was, without bytes; LOST: it was, and why, in words."""
+
+_HEAD = struct.Struct("<BdH")
+_MOST = 0xFFFF
+
+
+@frozen
+class Record:
+    kind: int
+    time: float
+    data: bytes
+
+
+@frozen
+class Transcript:
+    """What a file holds. cut: bytes at its end that are no whole record."""
+
+    header: Mapping[str, Any]
+    records: tuple[Record, ...]
+    cut: int
+
+
+class Writer:
+    """Makes records. put: takes the bytes of one, or of the beginning of a file; called once for each."""
+
+    def __init__(self, put: Callable[[bytes], object], header: Mapping[str, Any]) -> None:
+        self._put, self._crc = put, 0
+        self._put(MAGIC + self._record(HEADER, 0.0, json.dumps(header).encode()))
+
+    def add(self, kind: int, time: float, data: bytes) -> None:
+        for at in range(0, len(data) or 1, _MOST):
+            self._put(self._record(kind, time, data[at : at + _MOST]))
+
+    def _record(self, kind: int, time: float, data: bytes) -> bytes:
+        body = _HEAD.pack(kind, time, len(data)) + data
+        self._crc = zlib.crc32(body, self._crc)
+        return body + self._crc.to_bytes(4, "little")
+
+
+class File:
+    """A new file, written without a buffer of this process, so that what was put outlives it."""
+
+    def __init__(self, path: str | Path) -> None:
+        try:
+            self._file = open(path, "xb", buffering=0)  # noqa: SIM115
+        except FileExistsError:
+            helps = "give another name: what was said to a bed is not overwritten"
+            raise Problem(error("E409", f"{path} is there already", help=helps)) from None
+        except OSError as reason:
+            message = f"{path} cannot be written: {reason.strerror}"
+            raise Problem(error("E409", message, help="give another place")) from None
+
+    def __call__(self, data: bytes) -> None:
+        self._file.write(data)
+
+    def close(self) -> None:
+        """All of it is on the disk then."""
+        os.fsync(self._file.fileno())
+        self._file.close()
+
+
+class Recorded:
+    """A line, and a transcript of it. A transcript that cannot be written goes on without more; it is said once."""
+
+    def __init__(self, line: Line, writer: Writer) -> None:
+        self._line, self._writer = line, writer
+        self._writing = True
+        self._add(OPENED, b"")
+
+    def now(self) -> float:
+        return self._line.now()
+
+    def send(self, frame: bytes) -> None:
+        try:
+            self._line.send(frame)
+        except Problem as lost:
+            self._add(SENT, frame)
+            self._lost(lost)
+            raise
+        self._add(SENT, frame)
+
+    def receive(self, until: float) -> bytes:
+        try:
+            data = self._line.receive(until)
+        except Problem as lost:
+            self._lost(lost)
+            raise
+        if data:
+            self._add(RECEIVED, data)
+        return data
+
+    def sleep(self, seconds: float) -> None:
+        self._line.sleep(seconds)
+
+    def close(self) -> None:
+        self._line.close()
+
+    def _lost(self, lost: Problem) -> None:
+        self._add(LOST, lost.diagnostics[0].message.encode())
+
+    def _add(self, kind: int, data: bytes) -> None:
+        if not self._writing:
+            return
+        try:
+            self._writer.add(kind, self._line.now(), data)
+        except OSError as reason:
+            self._writing = False
+            message = f"the transcript of the bed cannot be written: {reason.strerror}"
+            raise Problem(error("E409", message, help="make room for it, or give another place")) from None
+
+
+def read(path: str | Path) -> Transcript:
+    """All records up to the first that is not sound. Raises Problem E409."""
+    try:
+        data = Path(path).read_bytes()
+    except OSError as reason:
+        helps = "give the file that a run with a bed wrote"
+        raise Problem(error("E409", f"{path} cannot be read: {reason.strerror}", help=helps)) from None
+    records = list[Record]()
+    at, crc = len(MAGIC), 0
+    while len(data) - at >= _HEAD.size + 4:
+        kind, time, length = _HEAD.unpack_from(data, at)
+        end = at + _HEAD.size + length
+        crc = zlib.crc32(data[at:end], crc)
+        if end + 4 > len(data) or crc != int.from_bytes(data[end : end + 4], "little") or kind > LOST:
+            break
+        records.append(Record(kind, time, data[at + _HEAD.size : end]))
+        at = end + 4
+    if not data.startswith(MAGIC) or not records or records[0].kind != HEADER:
+        helps = "give the file that a run with a bed wrote"
+        raise Problem(error("E409", f"{path} is no transcript of a bed", help=helps))
+    return Transcript(json.loads(records[0].data), tuple(records[1:]), len(data) - at)

@@ -1,0 +1,78 @@
+"""The process that puts records on the disk while the loop runs, and outlives it: what was recorded is never lost.
+
+    python -m hw.writer RING ROOM PIPE PATH < head
+
+RING and PIPE are files that are open already: the ring's memory, and the reading end of a pipe whose other end the loop
+has. When the loop is done, or is no more, the pipe ends; then what is left in the ring is written, and synced.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from hw import records
+from hw.ring import Ring
+
+PAUSE = 0.005
+"""s between looks into the ring."""
+
+
+def write(ring: Ring, pipe: int, path: Path, head: bytes) -> None:
+    """Write what comes through the ring, until the pipe ends. head: JSON, as it stands before the records."""
+    with path.open("xb", buffering=0) as file:
+        file.write(records.MAGIC + len(head).to_bytes(8, "little") + head)
+        ended = False
+        while not ended:
+            ended = bool(select.select([pipe], [], [], PAUSE)[0]) and not os.read(pipe, 1)
+            waiting = b"".join(ring.take())
+            while waiting:
+                waiting = waiting[file.write(waiting) :]
+        os.fsync(file.fileno())
+
+
+class Writer:
+    """The writer of one run, from the loop's side. put: takes a record."""
+
+    def __init__(self, ring: Ring, path: Path, head: bytes) -> None:
+        self._ring = ring
+        self.put = ring.put
+        read, self._alive = os.pipe()
+        os.set_inheritable(self._alive, False)
+        command = [sys.executable, "-m", "hw.writer", str(ring.file), str(ring.room), str(read), str(path)]
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, pass_fds=[ring.file, read], start_new_session=True
+        )
+        os.close(read)
+        assert self._process.stdin is not None
+        self._process.stdin.write(head)
+        self._process.stdin.close()
+
+    def close(self) -> str:
+        """Have all of it on the disk; why it is not, in words, "" where it is."""
+        os.close(self._alive)
+        assert self._process.stderr is not None
+        told = self._process.stderr.read().decode("utf-8", "replace").strip()
+        self._process.wait()
+        self._ring.close()
+        return told
+
+
+def main() -> None:
+    """The process."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)  # it ends with the loop
+    ring, room, pipe = map(int, sys.argv[1:4])
+    path = Path(sys.argv[4])
+    try:
+        write(Ring(ring, room), pipe, path, sys.stdin.buffer.read())
+    except OSError as reason:
+        sys.exit(f"cannot write {path}: {(reason.strerror or str(reason)).lower()}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,240 @@
+"""What the firmware is built with: counts of a config, compilers, the cache, and what is said where one is missing."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from hw import build as building
+from hw.bed import Capability
+from hw.build import Config, build, config_c, counted, guard, qemu
+from met.diagnostic import Problem
+from met.render import render
+from tests.hw.firmware.device import PLAIN, SHAFT
+from tests.hw.firmware.line import FREE, PLANT, STEPPED, behind_a_terminal
+
+
+@pytest.fixture
+def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache."""
+    monkeypatch.setenv("MET_CACHE_DIR", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "firmware"
+
+
+# Counts
+
+
+def test_limits_are_counted_down_and_told_as_counted() -> None:
+    odd = replace(PLAIN, limits=replace(PLAIN.limits, voltage=20.009, rate=349.99, voltage_slew=3999.0), deadman=0.0159)
+    counts, told, deadman = counted(odd)
+    assert (counts["voltage"], counts["rate"], counts["voltage_slew"], counts["deadman"]) == (2000, 3499, 399, 15)
+    assert (told.voltage, told.voltage_slew, deadman) == (20.0, 3990.0, 0.015)
+    assert told.rate == 3499 * 0.1
+
+
+def test_a_limit_that_is_a_whole_count_loses_none() -> None:
+    for scale in (0.1, 0.3, 1e-3, 40 / 4096, 1 / 3):
+        for count in (1, 7, 2047, 10**6):
+            odd = replace(PLAIN, scales=replace(PLAIN.scales, rate=scale),
+                          limits=replace(PLAIN.limits, rate=count * scale, arming_rate=scale))  # fmt: skip
+            assert counted(odd)[0]["rate"] == count
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"deadman": 0.0095}, "a deadman of 0.009 s, in whole ticks, is not 0.010 to 0.020 s"),
+        ({"deadman": 0.0211}, "a deadman of 0.021 s, in whole ticks, is not 0.010 to 0.020 s"),
+        ({"tick_hz": 0.0}, "tick rate is 0, not a number above 0"),
+        ({"tick_hz": math.nan}, "tick rate is nan, not a number above 0"),
+        ({"scales": replace(PLAIN.scales, rate=-1.0)}, "scale of rate is -1, not a number above 0"),
+        ({"limits": replace(PLAIN.limits, heat=math.inf)}, "limit of heat is inf, not a number above 0"),
+        ({"limits": replace(PLAIN.limits, voltage_slew=9.0)}, "voltage_slew is 0 counts, not 1 to 2147483646"),
+        ({"scales": replace(PLAIN.scales, voltage=1e-9)}, "voltage is 20000000000 counts, not 1 to 2147483646"),
+        ({"limits": replace(PLAIN.limits, heat=1e12)}, "the current's scale is too fine for the I2t of the load"),
+        ({"shaft": replace(SHAFT, inertia=1e-14)},
+         "the scales are too fine, or the shaft too light, for the tachometer's guard"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_counted_is_said(change: dict[str, object], said: str) -> None:
+    with pytest.raises(ValueError) as found:
+        config_c(replace(PLAIN, **change), plant=False)  # type: ignore[arg-type]
+    assert str(found.value) == said
+
+
+def test_lock_step_is_for_simulated_plants() -> None:
+    with pytest.raises(ValueError, match=r"^lock-step is for simulated plants$"):
+        config_c(replace(PLAIN, capabilities=Capability.LOCK_STEP), plant=False)
+    with pytest.raises(ValueError, match=r"^firmware of kind 'host' needs a plant$"):
+        build("host", PLAIN)
+
+
+def test_the_guard_s_numbers_are_those_of_the_shaft() -> None:
+    g, one = guard(replace(PLAIN, shaft=SHAFT)), 2.0**24
+    rate = 0.1  # rad/s a count
+    assert g["voltage"] / one * rate == pytest.approx(0.061 / 2.05 * 0.01 / 6.38e-5 * 1e-3, rel=1e-5)
+    assert g["current"] / one * rate == pytest.approx(0.072 * 0.002 / 6.38e-5 * 1e-3, rel=1e-5)
+    assert g["most"] / one * rate == pytest.approx(0.144 / 6.38e-5 * 1e-3, rel=1e-5)
+    assert g["back_emf"] / one == pytest.approx(0.061**2 / 2.05 / 6.38e-5 * 1e-3, rel=1e-5)
+    assert g["viscous"] / one == pytest.approx(2.58e-5 / 6.38e-5 * 1e-3, rel=1e-4)
+    assert g["friction"] / one * rate == pytest.approx(2 * 0.0205 / 6.38e-5 * 1e-3, rel=1e-5)
+    assert (g["tolerance"], g["change"], g["lag"]) == (64, 35, 14)
+    assert set(guard(PLAIN).values()) == {0}
+
+
+# The cache
+
+
+def test_what_was_built_is_there_the_next_time(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = build("library", FREE, PLANT)
+    made = first.stat().st_mtime_ns
+    monkeypatch.setattr(building, "_compile", None)
+    again = build("library", FREE, PLANT)
+    assert again == first and again.stat().st_mtime_ns == made
+    assert [path.name for path in fresh.iterdir()] == [first.parent.name]
+    assert sorted(path.name for path in first.parent.iterdir()) == ["config.c", "libbed.so", "plant.c"]
+
+
+def test_another_config_plant_kind_or_flag_is_another_build(fresh: Path) -> None:
+    paths = {
+        build("library", FREE, PLANT),
+        build("library", replace(FREE, name="another"), PLANT),
+        build("library", FREE, PLANT + "\n"),
+        build("library", FREE, PLANT, flags=("-g",)),
+        build("host", FREE, PLANT),
+    }
+    assert len(paths) == 5
+
+
+def test_the_firmware_of_hello_is_that_of_sources_config_and_plant(fresh: Path) -> None:
+    def told(config: Config, plant: str) -> bytes:
+        with behind_a_terminal(config, plant=plant) as (line, _):
+            return line.greet().firmware
+
+    assert told(STEPPED, PLANT) == told(STEPPED, PLANT)
+    assert len({told(STEPPED, PLANT), told(STEPPED, PLANT + "\n"), told(replace(STEPPED, trip=1.2), PLANT)}) == 3
+
+
+def test_the_longest_unused_are_removed(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(building, "LIMIT", 100_000)
+    names = [f"bed {k}" for k in range(8)]
+    paths = [build("library", replace(FREE, name=name), PLANT) for name in names]
+    assert paths[-1].exists()
+    assert 0 < sum(path.exists() for path in paths) < 8
+
+
+def test_without_a_cache_it_is_built_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("MET_CACHE_DIR", str(tmp_path / "file"))
+    assert build("library", FREE, PLANT).is_file()
+
+
+# Who is missing
+
+
+def without(monkeypatch: pytest.MonkeyPatch, *missing: str) -> None:
+    which = shutil.which
+    monkeypatch.setattr(shutil, "which", lambda name: None if name in missing else which(name))
+
+
+def test_no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("CC", raising=False)
+    without(monkeypatch, "gcc", "clang")
+    with pytest.raises(Problem) as found:
+        build("host", FREE, PLANT)
+    assert render(found.value.diagnostics, {}) == (
+        "error[E410]: there is no C compiler to build the firmware with, neither `gcc` nor `clang`\n"
+        " = help: on Debian or Ubuntu: apt-get install gcc libc6-dev\n\n"
+        "1 error\n"
+    )
+
+
+def test_the_compiler_that_cc_names_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "gcc-of-nobody")
+    with pytest.raises(Problem) as found:
+        build("host", FREE, PLANT)
+    assert render(found.value.diagnostics, {}) == (
+        "error[E410]: there is no C compiler `gcc-of-nobody`, which $CC names, to build the firmware with\n"
+        " = help: name one that is there, or unset CC\n\n"
+        "1 error\n"
+    )
+
+
+def test_a_compiler_that_does_not_build_it(monkeypatch: pytest.MonkeyPatch, fresh: Path) -> None:
+    monkeypatch.setenv("CC", "gcc")
+    with pytest.raises(Problem) as found:
+        build("host", FREE, PLANT, flags=("-std=c89", "-DBED_ARMED=no"))
+    assert found.value.diagnostics[0].code == "E410"
+    assert found.value.diagnostics[0].message.startswith("`gcc` does not build the firmware: ")
+    assert found.value.diagnostics[0].help == ("a compiler of C11 is needed: gcc 10 or clang 12, or newer",)
+    assert list(fresh.iterdir()) == []
+
+
+def test_no_cross_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    without(monkeypatch, "arm-none-eabi-gcc")
+    with pytest.raises(Problem) as found:
+        build("arm", FREE, PLANT)
+    assert render(found.value.diagnostics, {}) == (
+        "error[E411]: there is no `arm-none-eabi-gcc`, which builds the firmware for ARM\n"
+        " = help: on Debian or Ubuntu: apt-get install gcc-arm-none-eabi\n\n"
+        "1 error\n"
+    )
+
+
+def test_no_emulator(monkeypatch: pytest.MonkeyPatch) -> None:
+    without(monkeypatch, "qemu-system-arm")
+    with pytest.raises(Problem) as found:
+        qemu(Path("bed.elf"), Path("line"))
+    assert render(found.value.diagnostics, {}) == (
+        "error[E412]: there is no `qemu-system-arm`, which runs the firmware for ARM\n"
+        " = help: on Debian or Ubuntu: apt-get install qemu-system-arm\n\n"
+        "1 error\n"
+    )
+
+
+# Compilers
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("level", ["-O0", "-O3"])
+def test_it_builds_without_a_warning(compiler: str, level: str, monkeypatch: pytest.MonkeyPatch, fresh: Path) -> None:
+    if shutil.which(compiler) is None:
+        pytest.skip(f"no {compiler}; on Debian or Ubuntu: apt-get install {compiler}")
+    monkeypatch.setenv("CC", compiler)
+    more = ("-Wsign-conversion", "-Wcast-qual", "-Wstrict-prototypes", "-Wmissing-prototypes", "-Wundef", level)
+    with behind_a_terminal(STEPPED, flags=more) as (line, _):
+        assert line.greet().version == 1
+
+
+def test_a_header_stands_by_itself(tmp_path: Path) -> None:
+    for header in sorted(building.FIRMWARE.rglob("*.h")):
+        (tmp_path / "one.c").write_text(f'#include "{header.name}"\nextern int some;\n')
+        folders = [f"-I{path}" for path in (building.FIRMWARE, *building.FIRMWARE.iterdir()) if path.is_dir()]
+        words = ["gcc", *building.WARNINGS, *folders, "-fsyntax-only", str(tmp_path / "one.c")]
+        done = subprocess.run(words, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+
+
+def test_the_core_takes_nothing_from_a_library_and_no_floating_point() -> None:
+    for path in sorted((building.FIRMWARE / "core").glob("*.[ch]")):
+        text = path.read_text(encoding="utf-8")
+        included = {line.split()[1] for line in text.splitlines() if line.startswith("#include <")}
+        assert included <= {"<stdbool.h>", "<stddef.h>", "<stdint.h>"}, path.name
+        for each in ("IEEE 754 double", "HELLO's doubles"):
+            text = text.replace(each, "")
+        assert not set(re.findall(r"\w+", text)) & {"double", "float", "malloc", "goto"}, path.name
+
+
+def test_the_example_of_the_readme_is_a_bed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (building.FIRMWARE / "README.md").read_text(encoding="utf-8")
+    exec(re.findall(r"```python\n(.*?)```", text, re.DOTALL)[0], {})
+    words = ["gcc", *building.WARNINGS, f"-I{building.FIRMWARE / 'core'}", "-c", "config.c"]
+    done = subprocess.run(words, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,73 @@
+"""The core under a fuzzer: any bytes, ticks and sensors, with the sanitizers on (fuzz_frames.c says what must hold)."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import struct
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from hw.bed import Capability
+from hw.build import FIRMWARE, WARNINGS, config_c
+from tests.hw.firmware import wire
+from tests.hw.firmware.device import HERE, LOCK_STEP, PLAIN, SENSORS, SHAFT
+
+pytestmark = pytest.mark.slow
+
+SECONDS = int(os.environ.get("MET_FUZZ_SECONDS", "30"))
+"""For each of two beds: a minute together. An hour: MET_FUZZ_SECONDS=1800."""
+
+FUZZED = ("-g", "-O1", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all")
+
+
+def seeds() -> list[bytes]:
+    """Scripts of fuzz_frames.c that get to where it matters: armed, with outputs, and out again."""
+
+    def ask(kind: int, body: bytes = b"") -> bytes:
+        payload = bytes([kind, 0, 0]) + body
+        return bytes([0x60 | len(payload)]) + payload
+
+    begun = ask(wire.HELLO, b"\1") + ask(wire.ARM, bytes(4))
+    drive, step = (ask(kind, struct.pack("<iiB", 100, -50, last)) for kind, last in ((wire.DRIVE, 0), (wire.STEP, 3)))
+    fast = b"\xc0" + struct.pack(">i", 4000) + b"\x80"
+    return [
+        begun + drive + b"\x85" + drive + ask(wire.STOP),
+        begun + step + step + ask(wire.READ) + b"\x9f" + ask(wire.CLEAR),
+        begun + fast + drive,
+        ask(wire.HELLO, b"\1") + ask(wire.LIMIT, struct.pack("<Bi", 3, 50)) + ask(wire.ARM, bytes(4)) + drive,
+        begun + b"\x03\5\5\0" * 16,
+        ask(wire.PRESET, bytes([0]) + struct.pack("<d", 1.0)) + ask(wire.PRESET, bytes([9]) + bytes(8)),
+    ]
+
+
+@pytest.fixture(scope="module")
+def clang() -> str:
+    if shutil.which("clang") is None:
+        pytest.skip("no clang, whose libFuzzer this needs; on Debian or Ubuntu: apt-get install clang libclang-rt-dev")
+    return "clang"
+
+
+@pytest.mark.parametrize("capabilities", [SENSORS, SENSORS | LOCK_STEP], ids=["free", "lock-step"])
+def test_nothing_that_comes_over_the_line_breaks_a_bed(
+    clang: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], capabilities: Capability
+) -> None:
+    (tmp_path / "config.c").write_text(config_c(replace(PLAIN, capabilities=capabilities, shaft=SHAFT), plant=False))
+    sources = [*sorted((FIRMWARE / "core").glob("*.c")), HERE / "fuzz_frames.c", tmp_path / "config.c"]
+    words = [clang, *WARNINGS, *FUZZED, f"-I{FIRMWARE / 'core'}", *map(str, sources), "-o", str(tmp_path / "fuzz")]
+    built = subprocess.run(words, capture_output=True, text=True)
+    assert built.returncode == 0, f"{built.stderr}\non Debian or Ubuntu: apt-get install clang libclang-rt-14-dev"
+    corpus = tmp_path / "corpus"
+    corpus.mkdir()
+    for k, seed in enumerate(seeds()):
+        (corpus / str(k)).write_bytes(seed)
+    words = [str(tmp_path / "fuzz"), f"-max_total_time={SECONDS}", "-max_len=600", "-print_final_stats=1", str(corpus)]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr[-4000:]
+    runs = next(line.split()[-1] for line in done.stderr.splitlines() if "number_of_executed_units" in line)
+    with capsys.disabled():
+        print(f"\nfuzzed: {runs} runs in {SECONDS} s, {len(list(corpus.iterdir()))} kept")
+    assert int(runs) > 100 * SECONDS
