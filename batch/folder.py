@@ -64,6 +64,16 @@ class Folder:
         """Whether jobs of a queue have it, which may not have begun."""
         return (self.path / "jobs.json").exists()
 
+    @property
+    def beds(self) -> Path:
+        """Where records of cases on motor beds are."""
+        return self.path / "beds"
+
+    @property
+    def recorded(self) -> bool:
+        """Whether there are some: what was driven is not driven again."""
+        return any(self.beds.glob("*.records"))
+
     def exists(self) -> bool:
         return (self.path / "campaign.json").exists()
 

@@ -111,7 +111,7 @@ def take_up(folder: Folder, campaign: Campaign, values: Sequence[Section], key: 
         folder.empty()
         yield f"starts over: {held:,} cases that were done before are removed"
         return
-    if not held and not folder.submitted:  # whoever began it had done nothing
+    if not held and not folder.submitted and not folder.recorded:  # whoever began it had done nothing
         folder.empty()
         return
     told = folder.described()

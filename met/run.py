@@ -22,6 +22,9 @@ from met.trace.program import Program, Recording, record
 DONE, FAILED, TIMED_OUT, LOST = range(4)
 """How a case ended: at its end; by its own numbers; cut off for taking too long; with whatever ran it, each time."""
 
+STOPPED = 3.0
+"""Of the output `failure`, beside the engine's own: something else ended the case, and a fate says why."""
+
 CANONICAL_LANES = 8
 """Of the code that `Prepared.code_key` is made from; what runs has those that suit the machine."""
 
@@ -166,7 +169,7 @@ def results(
     failed = out["failure"] != 0.0
     n_valid = np.where(failed, np.ceil(out["failure.tick"] / schedule.record), schedule.rows).astype(np.int64)
     causes = [""] * len(rows)
-    for case in np.flatnonzero(failed).tolist():
+    for case in np.flatnonzero(failed & (out["failure"] != STOPPED)).tolist():
         causes[case] = _cause(experiment, *outputs[case, :3].tolist())
     status = np.where(failed, FAILED, DONE).astype(np.int8)
     for fated, (ended, why) in (fates or {}).items():

@@ -31,12 +31,6 @@ from met.frozen import frozen
 from met.plan import Plan
 from met.run import FAILED
 
-FOLDER = "beds"
-"""In a campaign's folder: the records of its cases."""
-
-WAIT = 0.2
-"""s from one look at how far a case is to the next."""
-
 
 @frozen
 class Ports:
@@ -62,7 +56,9 @@ class OnBeds:
         self.about = ", ".join(dict.fromkeys(ports.by_joint.values()))
         self.exchanges: dict[tuple[int, int], tuple[np.ndarray, ...]] = {}
         """Records by section's experiment and row, of each bed, of the cases that were driven or taken up."""
-        self.tick_hz: dict[tuple[int, int], float] = {}
+        self.joints = tuple(ports.by_joint)
+        self.lock_step = ports.lock_step
+        self.tick_hz = float("nan")
 
     @property
     def under_way(self) -> int:
@@ -70,7 +66,7 @@ class OnBeds:
 
     def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
         self._folder, self._sections, self._tell = folder, sections, tell
-        (folder.path / FOLDER).mkdir(exist_ok=True)
+        folder.beds.mkdir(exist_ok=True)
 
     def submit(self, task: Task) -> None:
         self._waiting.append(task)
@@ -101,7 +97,7 @@ class OnBeds:
 
     def _case(self, section: Section, row: int) -> tuple[Made, str]:
         """What came of a case, and why it ended early, "" where it did not."""
-        path = self._folder.path / FOLDER / f"{section.experiment}-{row}.records"
+        path = self._folder.beds / f"{section.experiment}-{row}.records"
         told = path.with_suffix(".ended")
         if not path.exists():
             self._drive(section, row, path, told)
@@ -141,15 +137,17 @@ class OnBeds:
             process.stdin.close()
         ended: dict[str, Any] | None = None
         interrupted = False
-        while True:
-            try:
-                for line in process.stdout:
-                    ended = self._heard(json.loads(line)) or ended
-                process.wait()
-                break
-            except KeyboardInterrupt:  # which its process hears too, and stops the beds
-                interrupted = True
-        process.stdout.close()
+        try:
+            while True:
+                try:
+                    for line in process.stdout:
+                        ended = self._heard(json.loads(line)) or ended
+                    break
+                except KeyboardInterrupt:  # which its process hears too, and stops the beds
+                    interrupted = True
+        finally:
+            process.stdout.close()
+            process.wait()
         if ended is not None:
             told.write_text(json.dumps(ended), encoding="utf-8")
         if interrupted:
@@ -167,5 +165,6 @@ class OnBeds:
             self._say(" ".join([data["said"], *(f"({each})" for each in data.get("help", ()))]))
         if "about" in data:
             about = data["about"]
+            self.tick_hz = float(about["tick_hz"])
             self._say(f"{data['bed']}: bed `{about['name']}`, firmware {about['firmware']}")
         return data.get("ended")

@@ -14,12 +14,9 @@ from hw.driven import Driven
 from hw.records import ANSWERED
 from met.frozen import frozen
 from met.program.build import OUTPUTS
-from met.run import Prepared
+from met.run import STOPPED, Prepared
 
 FAILURE, TICK = OUTPUTS.index("failure"), OUTPUTS.index("failure.tick")
-STOPPED = 3.0
-"""Of `failure`: not the engine ended the case (met.run.results)."""
-
 
 @frozen
 class Made:

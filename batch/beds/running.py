@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
+
+from batch.archive.read import ArchiveFile
 from batch.beds.executor import OnBeds, Ports
 from batch.campaign import Campaign, Wires, prepare
 from batch.choosing import experiments_named
-from batch.performing import Performed, perform
-from batch.running import read_plan
+from batch.performing import perform
+from batch.running import first_picture, read_plan
+from batch.summary import summarise
+from batch.verdict import announcement, told, worst_cases, writing
 from hw.case import pace_of
 from hw.ports import in_lock_step
+from hw.timing import timing
 from met.diagnostic import Problem, error
 from met.margin import margins
 from met.plan import Experiment, Plan
@@ -33,8 +39,8 @@ def ports_of(given: Sequence[str], experiments: Sequence[Experiment]) -> dict[st
         found[joint] = port
     missing = [joint for joint in joints if joint not in found]
     if missing:
-        helps = "`--port JOINT=PORT`: a serial line, `emulated`, `firmware`, `qemu`, or a transcript"
-        raise Problem(error("E418", f"no port for the bed of joint `{missing[0]}`", help=helps))
+        kinds = "`--port JOINT=PORT`: a serial line, `emulated`, `firmware`, `qemu`, or a transcript"
+        raise Problem(error("E418", f"no port for the bed of joint `{missing[0]}`", help=kinds))
     return found
 
 
@@ -51,8 +57,8 @@ def campaign_of(
     by_joint = ports_of(ports, asked)
     steps = {in_lock_step(port, lock_step) for port in by_joint.values()}
     if len(steps) > 1:
-        helps = "give all beds ports of one kind"
-        raise Problem(error("E414", "some of the beds have a time of their own, and some have none", help=helps))
+        one = "give all beds ports of one kind"
+        raise Problem(error("E414", "some of the beds have a time of their own, and some have none", help=one))
     [stepped] = steps
     late = max(pace_of(each).late(stepped) for each in asked)
     found = prepare(
@@ -79,9 +85,70 @@ def check_margins(campaign: Campaign, *, force: bool) -> list[str]:
     return list(dict.fromkeys(said))
 
 
-def run(campaign: Campaign, executor: OnBeds, *, fresh: bool = False) -> Performed:
-    """Drive it into its archive."""
-    return perform(campaign, executor=executor, fresh=fresh)
+def run_and_tell(
+    source: str,
+    names: tuple[str, ...],
+    *,
+    ports: Sequence[str],
+    baud: int,
+    lock_step: bool = False,
+    rest: float | None = None,
+    force: bool = False,
+    transcripts: str | None = None,
+    output: str | None = None,
+    cases: Sequence[str] = (),
+    fresh: bool = False,
+    no_picture: bool = False,
+    defines: tuple[str, ...] = (),
+    include_dirs: tuple[str, ...] = (),
+    settings: tuple[str, ...] = (),
+    quiet: bool = False,
+    verbose: bool = False,
+) -> bool:
+    """Drive a deck's run or sweep; True where every case reached its end and met its requirements."""
+    say: Callable[[str], None] = (lambda _: None) if quiet else print
+    plan = read_plan(
+        source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=quiet
+    )
+    campaign, by_joint, stepped = campaign_of(
+        plan, names or None, ports, lock_step=lock_step, output=output, cases=cases or None
+    )
+    say("\n".join(announcement(campaign, verbose)))
+    for line in check_margins(campaign, force=force):
+        say(f"  {line}")
+    folder = None if transcripts is None else Path(transcripts)
+    executor = OnBeds(Ports(by_joint, baud, stepped, rest or 0.0, folder), lambda line: say(f"  {line}"))
+    performed = perform(campaign, executor=executor, fresh=fresh, ready=lambda: say(writing(campaign)), say=say)
+    if performed.whole:
+        say(f"nothing is missing: {campaign.output} has all of it (`--fresh` drives it again)")
+    with ArchiveFile(campaign.output) as file:
+        summaries, worst = summarise(file), worst_cases(file)
+        picture, excuse = (None, "") if no_picture else first_picture(file)
+    for line in kept_time(executor):
+        say(line)
+    ok = all(summary.ok for summary in summaries)
+    say("\n".join(told(source, campaign, summaries, worst, picture, excuse, None, performed.seconds, ok, ())))
+    return ok
 
 
-__all__ = ["OnBeds", "Ports", "campaign_of", "check_margins", "ports_of", "read_plan", "run"]
+def kept_time(executor: OnBeds) -> list[str]:
+    """How well the loop kept its time, over all cases that were driven."""
+    lines = []
+    for number, name in enumerate(executor.joints):
+        rows = [found[number] for found in executor.exchanges.values() if number < len(found)]
+        if not rows or executor.lock_step:
+            continue
+        found = timing(np.concatenate(rows), executor.tick_hz)
+        late = found.woken + found.computed + found.waited
+        parts = [("late by", found.lateness), ("answered in", found.trip), ("computed in", found.computing)]
+        spreads = "; ".join(f"{what} {_us(each.median)}, p99 {_us(each.high)}" for what, each in parts)
+        lines.append(f"{name}: {found.exchanges:,} exchanges; {spreads}")
+        lines.append(
+            f"  a period late: {late:,} (woken too late {found.woken:,}, computing {found.computed:,}, waiting "
+            f"{found.waited:,}); unanswered: {found.unanswered:,}; the bed's clock: {1e6 * found.drift:+.3g} ppm"
+        )
+    return lines
+
+
+def _us(seconds: float) -> str:
+    return f"{1e6 * seconds:.3g} us"
