@@ -69,7 +69,7 @@ def draw(
     from batch.plotting.against import beside
     from batch.plotting.asked import asked
     from batch.plotting.sheet import Sheet
-    from batch.report.pool import pools
+    from batch.pool import pools
     from batch.show import chosen
 
     target, sheet = Path(output), sheet or Sheet()

@@ -11,8 +11,8 @@ import numpy as np
 from batch.archive.read import ArchiveFile, Group
 from batch.differences import matching
 from batch.output import quoted
-from batch.report.markup import visible
 from batch.signals import Panel, pretty_unit
+from batch.visible import visible
 from met.channel import channel_paths
 from met.diagnostic import Problem, error
 

@@ -9,8 +9,7 @@ import numpy as np
 from batch.archive.read import ArchiveFile, Group, Stored
 from batch.grids import is_grid, levels
 from batch.output import quoted
-from batch.report.content import Column
-from batch.report.pool import Pool
+from batch.pool import Column, Pool
 from batch.signals import number_text, panels
 from met.diagnostic import Problem, did_you_mean, error
 from met.frozen import frozen

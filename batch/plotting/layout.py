@@ -11,7 +11,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile
 from batch.plotting.sheet import FAINT, INK, Sheet
-from batch.report.markup import visible
+from batch.visible import visible
 from met.diagnostic import Problem, error
 
 T = TypeVar("T")

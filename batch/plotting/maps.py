@@ -18,7 +18,7 @@ from batch.plotting.measured import Measured
 from batch.plotting.points import RASTERED
 from batch.plotting.sheet import FAINT, INK, Sheet
 from batch.plotting.sides import Side
-from batch.report.content import Column
+from batch.pool import Column
 from met.frozen import frozen
 
 RISING, PARTING = "viridis", "RdBu_r"

@@ -9,8 +9,7 @@ import numpy as np
 from batch import requirements
 from batch.plotting.against import Beside, lacking, unlike
 from batch.plotting.layout import drawable
-from batch.report.content import Column
-from batch.report.pool import Pool
+from batch.pool import Column, Pool
 from batch.signals import deck_unit
 from met.frozen import frozen
 from met.run import DONE

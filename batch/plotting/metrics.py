@@ -14,8 +14,7 @@ from batch.plotting.against import Beside, file_names
 from batch.plotting.asked import coloured, free, over
 from batch.plotting.measured import Measured, measured
 from batch.plotting.sheet import Sheet
-from batch.report.content import Column
-from batch.report.pool import Pool
+from batch.pool import Column, Pool
 from met.diagnostic import Problem, error
 
 

@@ -12,7 +12,7 @@ from batch.plotting import layout
 from batch.plotting.measured import Measured
 from batch.plotting.sheet import COLOURS, FAINT, INK, Sheet, sequence
 from batch.plotting.sides import is_log
-from batch.report.content import Column
+from batch.pool import Column
 from batch.signals import number_text
 from met.frozen import frozen
 

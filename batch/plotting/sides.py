@@ -9,7 +9,7 @@ import numpy as np
 from batch.grids import Levels, levelled, levels
 from batch.plotting.layout import LETTER
 from batch.plotting.sheet import Sheet
-from batch.report.content import Column
+from batch.pool import Column
 from met.frozen import frozen
 
 EVEN, EVEN_LOG = 0.02, 0.15

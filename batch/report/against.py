@@ -12,8 +12,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, Group
 from batch.differences.found import Diff, Experiment
-from batch.report.content import ENDED, Column
-from batch.report.pool import Pool
+from batch.pool import ENDED, Column, Pool
 from batch.signals import deck_unit
 from met.frozen import frozen
 

@@ -10,10 +10,10 @@ from batch.differences import words
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, VERDICTS
 from batch.differences.found import Diff, Experiment
 from batch.failures import ranges
+from batch.pool import Pool, shown
 from batch.report.against import GOOD, Against, Before
 from batch.report.changes import ChangedCase, Compared, Comparison, EndedAlike, EndedCase, Made, SignalRow
 from batch.report.content import Flow, Part, Table, Verdict
-from batch.report.pool import Pool, shown
 from batch.signals import pretty_unit
 
 MOST_LINES, MOST_ENDED = 200, 20

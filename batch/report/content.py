@@ -6,20 +6,15 @@ are numbered through, and what decides the structure is a column of words.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from batch.pool import Column
 from met.frozen import frozen
 
 if TYPE_CHECKING:
     from batch.report.changes import Compared, Comparison
-
-Role = Literal["case", "choice", "parameter", "repeat", "metric", "change"]
-Ended = Literal["met", "missed", "unknown", "done", "failed", "timed out", "lost"]
-
-ENDED: tuple[Ended, ...] = ("met", "missed", "unknown", "done", "failed", "timed out", "lost")
-"""How a case came out; its number stands in `Overview.ended`. `done`: it reached its end and nothing was required."""
 
 
 @frozen
@@ -196,34 +191,6 @@ class ParameterRow:
 
 
 @frozen
-class Limit:
-    """A requirement as a line in a plot: its text, its limit in the metric's unit, `<` or `>`."""
-
-    text: str
-    value: float
-    sense: str
-
-
-@frozen
-class Column:
-    """A number a case: a metric, or what it may be drawn against. words: of a choice, what its numbers stand for.
-
-    before  of a metric, what it is in the other archive, where one is compared with; not a number where it has no such
-            case. A column of role "change" holds values less before; its key is that of the metric after "change:"
-    """
-
-    key: str
-    label: str
-    unit: str
-    role: Role
-    values: np.ndarray
-    words: tuple[str, ...] = ()
-    limits: tuple[Limit, ...] = ()
-    about: str = ""
-    before: np.ndarray | None = None
-
-
-@frozen
 class Map:
     """Two parameters that make a grid, and of each metric what its cells hold.
 
@@ -249,7 +216,7 @@ class Overview:
     """The cases as points. Not all of many: those left out lie on a dot with one that is here.
 
     cases, ids   number in the case table, and first letters of the id, of each point
-    ended        how it came out: place in `ENDED`
+    ended        how it came out: place in `pool.ENDED`
     causes       by place among the points: why a case failed; of the first ones
     start        keys of what is drawn first: against, metric, colour ("" for none)
     """

@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from batch.archive.read import ArchiveFile, Group
+from batch.pool import Pool, pools
 from batch.report import comparison
 from batch.report.against import Against, Before, narrowed
 from batch.report.comparison import compared
@@ -16,7 +17,6 @@ from batch.report.content import Fact, Report, Section, SourceText, Stability
 from batch.report.histories import MOST_VALUES, no_signals, signals
 from batch.report.overview import overview
 from batch.report.parameters import parameters, varied
-from batch.report.pool import Pool, pools
 from batch.report.stability import stability
 from batch.report.tables import replay, structures, worst
 from batch.report.verdicts import metric_rows, verdict

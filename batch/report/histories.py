@@ -8,10 +8,10 @@ import numpy as np
 
 from batch.archive.read import Group
 from batch.arrange import joints_of, overlaid
+from batch.pool import Pool
 from batch.report.against import Before
 from batch.report.content import History, Line, SignalPanel, Signals
 from batch.report.earlier import Earlier
-from batch.report.pool import Pool
 from batch.report.thinning import stretch, thin, thin_clock
 from batch.signals import Panel, history, panels
 

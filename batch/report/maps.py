@@ -8,8 +8,8 @@ from itertools import combinations
 import numpy as np
 
 from batch.grids import cells_of, is_grid, levelled, standing
-from batch.report.content import Column, Map
-from batch.report.pool import Pool
+from batch.pool import Column, Pool
+from batch.report.content import Map
 
 MOST_MAPS = 6
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from batch.differences.compare import VERDICTS
+from batch.pool import ENDED, Column, Pool
 from batch.report.against import GOOD, Before, change
-from batch.report.content import ENDED, Column, Overview
+from batch.report.content import Overview
 from batch.report.maps import maps
-from batch.report.pool import Pool
 
 MOST_POINTS = 12_000
 """Cases that a page holds. Of more, those go that lie on a dot with another one."""

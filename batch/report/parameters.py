@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from batch.grids import levels
+from batch.pool import Pool, shown
 from batch.report.content import ParameterRow, Spot, Varied
-from batch.report.pool import Pool, shown
 from batch.signals import pretty_unit
 from ic.printing.columns import number
 from ic.printing.settings import settings

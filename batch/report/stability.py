@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from batch.failures import ranges
-from batch.report.content import Bed, Column, Stability
-from batch.report.pool import Pool
+from batch.pool import Column, Pool
+from batch.report.content import Bed, Stability
 from met.margin import Margin, margins
 from met.plan import Experiment
 

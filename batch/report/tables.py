@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from batch.output import quoted
+from batch.pool import ENDED, Column, Pool, shown
 from batch.report.against import GOOD, Before
-from batch.report.content import ENDED, Column, Table, Worst
-from batch.report.pool import Pool, shown
+from batch.report.content import Table, Worst
 
 MOST_CASES = 20
 """Rows of the table of worst cases."""

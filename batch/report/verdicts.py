@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from batch.failures import failures, ranges
+from batch.pool import ENDED, Column, Pool, shown
 from batch.report.against import Before
-from batch.report.content import ENDED, Column, Demand, Failing, MetricRow, Part, Verdict
-from batch.report.pool import Pool, shown
+from batch.report.content import Demand, Failing, MetricRow, Part, Verdict
 from batch.summary import median
 from ic.printing.columns import count as counted
 from met.run import DONE

@@ -160,7 +160,7 @@ class TestMaps:
     def test_have_colours_for_the_many_where_a_few_stray(self) -> None:
         from batch.plotting import maps
         from batch.plotting.measured import Measured
-        from batch.report.content import Column
+        from batch.pool import Column
 
         values = np.concatenate([np.linspace(1.0, 2.0, 99), [1e6]])
         every = np.zeros(100, bool)
@@ -180,7 +180,7 @@ class TestMaps:
 
 def test_colours_of_words_are_those_that_eyes_tell_apart() -> None:
     from batch.plotting.points import _sets
-    from batch.report.content import Column
+    from batch.pool import Column
 
     by = Column("choice:a", "a", "", "choice", np.array([0.0, 1.0, 0.0, 1.0]), ("one", "two"))
     x = Column("parameter:x", "x", "", "parameter", np.array([0.0, 0.0, 1.0, 1.0]))

@@ -14,9 +14,10 @@ import pytest
 import batch
 from batch.archive.read import ArchiveFile
 from batch.differences.told import told
+from batch.pool import Column
 from batch.report import against as sides
 from batch.report import report
-from batch.report.content import Column, Report
+from batch.report.content import Report
 from batch.report.data import gather
 from batch.report.page import page
 from met import cli

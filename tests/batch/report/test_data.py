@@ -11,10 +11,10 @@ import pytest
 import batch
 from batch import cases
 from batch.archive.read import ArchiveFile
+from batch.pool import ENDED, Pool, pools
 from batch.report import histories, overview, stability
-from batch.report.content import ENDED, Part, Report
+from batch.report.content import Part, Report
 from batch.report.data import gather
-from batch.report.pool import Pool, pools
 from batch.report.thinning import thin, thin_clock
 from met.margin import margins
 from tests.batch import plans

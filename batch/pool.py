@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -11,9 +12,43 @@ from batch import requirements
 from batch.archive.read import Group, Stored
 from batch.failures import STATUS
 from batch.grids import levels
-from batch.report.content import ENDED, Column, Limit, Role
 from batch.signals import deck_unit, number_text
+from met.frozen import frozen
 from met.run import DONE
+
+Role = Literal["case", "choice", "parameter", "repeat", "metric", "change"]
+Ended = Literal["met", "missed", "unknown", "done", "failed", "timed out", "lost"]
+
+ENDED: tuple[Ended, ...] = ("met", "missed", "unknown", "done", "failed", "timed out", "lost")
+"""How a case came out; its number stands in an array of them. `done`: it reached its end and nothing was required."""
+
+
+@frozen
+class Limit:
+    """A requirement as a line in a plot: its text, its limit in the metric's unit, `<` or `>`."""
+
+    text: str
+    value: float
+    sense: str
+
+
+@frozen
+class Column:
+    """A number a case: a metric, or what it may be drawn against. words: of a choice, what its numbers stand for.
+
+    before  of a metric, what it is in the other archive, where one is compared with; not a number where it has no such
+            case. A column of role "change" holds values less before; its key is that of the metric after "change:"
+    """
+
+    key: str
+    label: str
+    unit: str
+    role: Role
+    values: np.ndarray
+    words: tuple[str, ...] = ()
+    limits: tuple[Limit, ...] = ()
+    about: str = ""
+    before: np.ndarray | None = None
 
 
 class Pool:
