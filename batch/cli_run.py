@@ -16,16 +16,8 @@ class Seconds(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """In seconds."""
-        import re
-
-        from met import units
-
-        split = re.fullmatch(r"([-+.\deE]*\d\.?)\s*(\D*)", str(value).strip())
-        number, unit = split.groups() if split else ("", "")
         try:
-            seconds = float(number) * (units.parse_unit(unit).scale if unit else 1.0)
-            if unit and not units.same(units.parse_unit(unit).dimension, units.parse_unit("s").dimension):
-                raise ValueError
+            seconds = measured(value, "s")
         except ValueError:
             self.fail(f"`{value}` is no time: write `90 s`, `5 min` or `1.5 h`", param, ctx)
         if not 0.0 < seconds < float("inf"):
@@ -34,6 +26,21 @@ class Seconds(click.ParamType):
 
 
 SECONDS = Seconds()
+
+
+def measured(value: Any, si: str) -> float:
+    """A number with or without a unit, in SI. si: the unit that is meant without one. Raises ValueError."""
+    import re
+
+    from met import units
+
+    split = re.fullmatch(r"([-+.\deE]*\d\.?)\s*(\D*)", str(value).strip())
+    number, unit = split.groups() if split else ("", "")
+    found = float(number) * (units.parse_unit(unit).scale if unit else 1.0)
+    if unit and not units.same(units.parse_unit(unit).dimension, units.parse_unit(si).dimension):
+        raise ValueError
+    return found
+
 
 @click.command(short_help="Run the cases of a deck or a plan into an archive.")
 @click.argument("source", metavar="DECK|PLAN.json|ARCHIVE.h5")

@@ -62,6 +62,7 @@ def perform(
     progress: Progress | None = None,
     ready: Callable[[], None] | None = None,
     say: Callable[[str], None] = lambda _: None,
+    more: Callable[[], Mapping[str, Any]] = dict,
 ) -> Performed:
     """Run a campaign into its archive. Raises Problem. An interrupt passes through, with words of what is kept and how
     to go on; without any where nothing is.
@@ -72,6 +73,7 @@ def perform(
     together      put together what others have done; it cannot go on where cases are missing
     ready         called once the first kernel is there, so that something will be written
     say           told, as it comes, what is found of an earlier run
+    more          what else stands beside the archive, asked when all cases are done
     """
     values = values_sections(campaign)
     key = resuming.campaign_key(values)
@@ -95,7 +97,7 @@ def perform(
         return Performed({}, whole=True)
     if there == resuming.DAMAGED and not fresh:
         say(f"{campaign.output} is not as it was written: it is made again")
-    work = _Work(campaign, folder, values, key, max_failures, progress, say)
+    work = _Work(campaign, folder, values, key, max_failures, progress, say, more)
     try:
         work.begin(fresh)
         if ready is not None:
@@ -127,9 +129,9 @@ class _Work:
 
     def __init__(
         self, campaign: Campaign, folder: Folder, values: list[Section], key: str, max_failures: int | None,
-        progress: Progress | None, say: Callable[[str], None],
+        progress: Progress | None, say: Callable[[str], None], more: Callable[[], Mapping[str, Any]],
     ) -> None:  # fmt: skip
-        self.campaign, self.folder, self.key, self.say = campaign, folder, key, say
+        self.campaign, self.folder, self.key, self.say, self.more = campaign, folder, key, say, more
         self.sections = {section.number: section for section in values}
         self.values = values
         self.notes: list[str] = []
@@ -245,6 +247,7 @@ class _Work:
                 "workers": self.driver.executor.about if self.driver else "",
                 "experiments": self._timings(),
                 "notes": self.notes,
+                **self.more(),
                 **resuming.proof(self.campaign, self.key, temporary),
                 **machine(),
             }

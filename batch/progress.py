@@ -40,8 +40,8 @@ class Bar:
         self._next = self._began + (FIRST_SECONDS if self._live else LINE_SECONDS)
         self._drawn = False
 
-    def advance(self, done: int, failed: int = 0) -> None:
-        """So many of its cases are done, and so many of these failed."""
+    def advance(self, done: float, failed: int = 0, more: str = "") -> None:
+        """So many of its cases are done, parts of one counted, and so many of these failed. more: what else is told."""
         now = self._now()
         if now < self._next or done >= self._cases:
             return
@@ -49,7 +49,7 @@ class Bar:
         self._next = now + (BAR_SECONDS if self._live else min(max(LINE_SECONDS, 0.2 * elapsed), SELDOM))
         line = status(
             self._name, done, self._cases, elapsed, bar=self._live, first=self._first, failed=failed,
-            workers=self._workers,
+            workers=self._workers, more=more,
         )  # fmt: skip
         if self._live:
             width = shutil.get_terminal_size().columns
@@ -67,9 +67,11 @@ class Bar:
 
 
 def status(
-    name: str, done: int, cases: int, seconds: float, *, bar: bool, first: int = 0, failed: int = 0, workers: str = ""
-) -> str:
-    """One line: share, cases, failed ones, rate, time left, workers. first: cases that were done when it began."""
+    name: str, done: float, cases: int, seconds: float, *, bar: bool, first: int = 0, failed: int = 0,
+    workers: str = "", more: str = "",
+) -> str:  # fmt: skip
+    """One line: share, cases, failed ones, what else is told, rate, time left, workers. first: cases that were done
+    when it began."""
     share = done / cases
     drawn = ""
     if bar:
@@ -77,9 +79,11 @@ def status(
         full, rest = divmod(eighths, 8)
         drawn = "█" * full + (" ▏▎▍▌▋▊▉"[rest] if rest else "")
         drawn = drawn.ljust(WIDTH) + "▏ "
-    text = f"{name}  {drawn}{100 * share:3.0f} %  {done:,} of {cases:,} cases"
+    text = f"{name}  {drawn}{100 * share:3.0f} %  {int(done):,} of {cases:,} cases"
     if failed:
         text += f", {failed:,} failed"
+    if more:
+        text += f", {more}"
     if done > first and seconds > 0.0:
         rate = (done - first) / seconds
         text += f"  {rate:,.3g} cases/s" if rate < 1000 else f"  {rate:,.0f} cases/s"

@@ -160,6 +160,10 @@ class Bed(ABC):
     def read(self) -> Sample:
         """The sensors, with no effect on anything: no deadman is fed."""
 
+    def look(self) -> Sample | None:
+        """The same, asked once: None where no answer comes within `patience`."""
+        return self.read()
+
     @abstractmethod
     def clear(self) -> Sample:
         """Unlatch faults, once the shaft is slow: disarmed again."""

@@ -7,6 +7,7 @@ It stops its beds when it is interrupted, terminated, or its parent is no more.
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import json
 import os
@@ -19,7 +20,7 @@ from typing import Any
 
 from hw import loop, realtime, ring
 from hw.bed import About, Bed, Capability
-from hw.driven import Driven, divisor, substituted
+from hw.driven import LANES, Driven, divisor, substituted
 from hw.pace import Pace, pace
 from hw.ports import Port, opened
 from hw.records import SIZE
@@ -75,7 +76,7 @@ def run(asked: Asked) -> loop.Ended:
     stopping: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda which, _: stopping.append(which))
-    _end_with_parent()
+    end_with_parent()
     joints = substituted(prepare(experiment, wire=True))
     _check_start(experiment, joints, asked.row)
     beds: list[Bed] = []
@@ -87,7 +88,8 @@ def run(asked: Asked) -> loop.Ended:
             abouts.append(_greeted(beds[-1], joint, experiment, asked.row))
         lock_step = asked.lock_step
         _check_time(abouts, lock_step)
-        driven = Driven(prepare(experiment, wire=True, late=of.late(lock_step)), asked.row, of.repeats)
+        prepared = prepare(experiment, wire=True, late=of.late(lock_step), lanes=LANES)
+        driven = Driven(prepared, asked.row, of.repeats)
         _check_delay(driven, of, lock_step)
         for refused in [] if lock_step else realtime.take_precedence():
             _say(said=refused)
@@ -97,7 +99,8 @@ def run(asked: Asked) -> loop.Ended:
                 bed.rest(asked.rest)
             bed.patience = LOCK_STEP_PATIENCE if lock_step else max(of.period, 0.002)
         head = {**asked.head, "row": asked.row, "servo_hz": of.servo_hz, "repeats": of.repeats,
-                "lock_step": lock_step, "joints": list(joints), "tick_hz": abouts[0].tick_hz}  # fmt: skip
+                "lock_step": lock_step, "joints": list(joints), "tick_hz": abouts[0].tick_hz,
+                "beds": [{"name": each.name, "firmware": each.firmware} for each in abouts]}  # fmt: skip
         rows = min((driven.exchanges + 1) * len(beds), RING_BYTES // SIZE)
         writer = Writer(ring.make(rows), Path(asked.records), json.dumps(head).encode())
         try:
@@ -156,7 +159,7 @@ def _check_start(experiment: Experiment, joints: Sequence[str], row: int) -> Non
             raise Problem(error("E416", message, help=f"`initial {{ {joint}.qd = 0 rad/s; }}` in the run"))
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
     """Have the system terminate this process when its parent dies."""
     try:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
@@ -167,7 +170,8 @@ def _end_with_parent() -> None:
 
 
 def _say(**data: Any) -> None:
-    print(json.dumps(data), flush=True)
+    with contextlib.suppress(BrokenPipeError):  # who started it is no more: the beds are stopped all the same
+        os.write(sys.stdout.fileno(), (json.dumps(data) + "\n").encode())
 
 
 def main() -> None:

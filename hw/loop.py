@@ -6,6 +6,9 @@
 A bed with a time of its own is spoken to at t_e = t_0 + e * period, so that what is computed from a sample is held one
 period later. A bed in lock-step advances by a period with each exchange, as fast as it can.
 
+The same loop looks at beds that are not armed, to measure how well it keeps its time: it reads them and tells them
+nothing. It then goes on through whatever would end a run, for that is what is to be counted.
+
 Whatever ends the loop, every bed is told to stop before it returns or raises.
 """
 
@@ -55,15 +58,17 @@ Put = Callable[[bytes], None]
 
 def drive(
     beds: Sequence[Bed], compute: Compute, pace: Pace, exchanges: int, put: Put, *, lock_step: bool,
-    asked_to_stop: Callable[[], bool] = lambda: False,
+    asked_to_stop: Callable[[], bool] = lambda: False, armed: bool = True,
 ) -> Ended:  # fmt: skip
     """Arm the beds, drive them through so many exchanges after the first sample, and stop them.
 
     lock_step      whether they have no time of their own
+    armed          False: they are only read. Where the host is as far behind as would end a run, or a bed as silent,
+                   it leaves out the periods that are gone, and goes on
     asked_to_stop  looked at before each exchange
     """
     try:
-        return _driven(beds, compute, pace, exchanges, put, lock_step, asked_to_stop)
+        return _driven(beds, compute, pace, exchanges, put, lock_step, asked_to_stop, armed)
     finally:
         for bed in beds:
             bed.stop()
@@ -71,7 +76,7 @@ def drive(
 
 def _driven(
     beds: Sequence[Bed], compute: Compute, pace: Pace, exchanges: int, put: Put, lock_step: bool,
-    asked_to_stop: Callable[[], bool],
+    asked_to_stop: Callable[[], bool], armed: bool,
 ) -> Ended:  # fmt: skip
     clock, packed = time.perf_counter_ns, records.packed
     period = round(pace.period * 1e9)
@@ -79,17 +84,18 @@ def _driven(
     rates = [0.0] * len(beds)
     missed = [0] * len(beds)
     for b, bed in enumerate(beds):
-        sample = bed.arm()
+        sample = bed.arm() if armed else bed.read()
         rates[b] = sample.rate
         put(packed(0, b, 0, (0, 0, 0, 0), 0.0, 0.0, sample))
-        if ending := _ending(0, b, replace(sample, refused=False)):  # it may have been armed by the first of two asks
+        # it may have been armed by the first of two asks
+        if ending := _ending(0, b, replace(sample, refused=False), armed):
             return ending
     compute(0, rates, told)
-    origin, computed, ended = clock(), 0, 0
+    origin, computed, ended, gone = clock(), 0, 0, 0
     for e in range(1, exchanges + 1):
         if asked_to_stop():
             return Ended(e, "the host was asked to stop")
-        due, flags = e * period, 0
+        due, flags = e * period + gone, 0
         if lock_step:
             due = clock() - origin
         else:
@@ -100,21 +106,23 @@ def _driven(
                 if computed > due:
                     flags = records.LATE_ANSWERED if ended > due else records.LATE_COMPUTED
                 if late >= MISSED * period:
-                    return Ended(e, f"the host is {late * 1e-6:.3g} ms behind: {_LATE[flags]}")
+                    if armed:
+                        return Ended(e, f"the host is {late * 1e-6:.3g} ms behind: {_LATE[flags]}")
+                    gone += late
         for b, bed in enumerate(beds):
             voltage, current = told[b]
             began = clock() - origin
-            answer = bed.exchange(voltage, current)
+            answer = bed.exchange(voltage, current) if armed else bed.look()
             ended = clock() - origin
             put(packed(e, b, flags, (due, began, ended, computed), voltage, current, answer))
             if answer is None:
                 missed[b] += 1
-                if missed[b] >= MISSED:
+                if armed and missed[b] >= MISSED:
                     return Ended(e, f"no answer for {MISSED} exchanges", b)
                 continue
             missed[b] = 0
             rates[b] = answer.rate
-            if ending := _ending(e, b, answer):
+            if ending := _ending(e, b, answer, armed):
                 return ending
         compute(e, rates, told)
         computed = clock() - origin
@@ -138,9 +146,10 @@ def _waited(due: int) -> int:
     return now
 
 
-def _ending(e: int, b: int, sample: Sample) -> Ended | None:
-    """Whether a bed takes commands no more, and why."""
-    if sample.state == State.ARMED and sample.greeted and not sample.refused:
+def _ending(e: int, b: int, sample: Sample, armed: bool) -> Ended | None:
+    """Whether a bed takes commands no more, and why; of one that is not to take any, whether it is another than was
+    greeted."""
+    if sample.greeted and (not armed or (sample.state == State.ARMED and not sample.refused)):
         return None
     if not sample.greeted:
         return Ended(e, "the bed was reset", b)

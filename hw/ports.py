@@ -27,7 +27,8 @@ from met.frozen import frozen
 from met.plan import Experiment
 from met.program.plant import Plant, bed_values, plant_c
 
-EMULATED, FIRMWARE, QEMU = "emulated", "firmware", "qemu"
+SIMULATED = EMULATED, FIRMWARE, QEMU = "emulated", "firmware", "qemu"
+"""Ports that simulate a deck's bed."""
 
 
 @frozen
@@ -41,8 +42,14 @@ class Port:
     transcript: str | None = None
 
 
-def opened(port: Port, experiment: Experiment, joint: str, row: int, period: float) -> Bed:
-    """The bed of a joint of a case. period: s, from exchange to exchange. Raises Problem."""
+def opened(port: Port, experiment: Experiment | None, joint: str, row: int, period: float) -> Bed:
+    """The bed of a joint of a case. period: s, from exchange to exchange; infinite for one that is only read. Without
+    an experiment, only what is there without one. Raises Problem."""
+    if experiment is None:
+        if port.name in SIMULATED:
+            helps = "give a deck, and the name of a run in it that substitutes a joint"
+            raise Problem(error("E425", f"port `{port.name}` simulates a deck's bed, and there is no deck", help=helps))
+        return SerialBed(port.name, period=period, baud=port.baud)
     if port.name == EMULATED and port.transcript is not None:
         helps = "`--port firmware` has one; with `--lock-step` it gives the same bits"
         raise Problem(error("E409", "an emulated bed has no line whose transcript could be kept", help=helps))

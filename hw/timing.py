@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hw.pace import MISSED
 from hw.records import ANSWERED, LATE_ANSWERED, LATE_COMPUTED, LATE_WOKEN
 from met.frozen import frozen
 
@@ -15,10 +16,11 @@ TICK = 1 << 32
 
 @frozen
 class Spread:
-    """Of times, s: median, 99th percentile, largest; and how many there are in each of `EDGES`' stretches."""
+    """Of times, s: median, 99th and 99.9th percentiles, largest; and how many are in each of `EDGES`' stretches."""
 
     median: float
     high: float
+    highest: float
     largest: float
     counts: tuple[int, ...]
 
@@ -64,14 +66,24 @@ def timing(rows: np.ndarray, tick_hz: float) -> Timing:
     )  # fmt: skip
 
 
+def stops(rows: np.ndarray, period: float) -> int:
+    """How often a run would have been stopped by lateness or silence, of the records of one bed that was only looked
+    at. period: s, of the wire."""
+    rows = rows[rows["exchange"] > 0]
+    silent = ((rows["flags"] & ANSWERED) == 0).astype(int)
+    long = np.convolve(silent, np.ones(MISSED, int), "valid") == MISSED if len(rows) >= MISSED else np.zeros(0, bool)
+    fell_silent = int((np.diff(long.astype(int), prepend=0) == 1).sum())
+    return fell_silent + int((rows["began"] - rows["due"] >= MISSED * period * 1e9).sum())
+
+
 def spread(times: np.ndarray | Sequence[int]) -> Spread:
     """Of times in ns."""
     seconds = np.asarray(times, dtype=np.float64) * 1e-9
     if not len(seconds):
-        return Spread(float("nan"), float("nan"), float("nan"), (0,) * (len(EDGES) + 1))
-    median, high, largest = np.percentile(seconds, (50, 99, 100)).tolist()
+        return Spread(*(float("nan"),) * 4, (0,) * (len(EDGES) + 1))
+    median, high, highest, largest = np.percentile(seconds, (50, 99, 99.9, 100)).tolist()
     counts = np.bincount(np.searchsorted(EDGES, seconds, side="right"), minlength=len(EDGES) + 1)
-    return Spread(median, high, largest, tuple(counts.tolist()))
+    return Spread(median, high, highest, largest, tuple(counts.tolist()))
 
 
 def _drift(rows: np.ndarray, tick_hz: float) -> float:

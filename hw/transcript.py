@@ -68,7 +68,9 @@ class File:
     """A new file, written without a buffer of this process, so that what was put outlives it."""
 
     def __init__(self, path: str | Path) -> None:
+        """Its folder is made where it is not there."""
         try:
+            Path(path).parent.mkdir(parents=True, exist_ok=True)
             self._file = open(path, "xb", buffering=0)  # noqa: SIM115
         except FileExistsError:
             helps = "give another name: what was said to a bed is not overwritten"

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
+import select
 import subprocess
 import sys
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +26,7 @@ from batch.executors import Outcome
 from batch.folder import Folder
 from batch.tasks import Done, Section, Task
 from hw import records
-from hw.case import Asked
+from hw.case import Asked, pace_of
 from met import plan_file
 from met.diagnostic import Problem, error
 from met.frozen import frozen
@@ -44,6 +46,27 @@ class Ports:
     transcripts: Path | None = None
 
 
+PAUSE = 0.1
+"""s between looks at how far a case is."""
+
+
+@frozen
+class Driving:
+    """A case that is being driven. exchange_hz: with all its beds together;  seconds: that it lasts"""
+
+    records: Path
+    exchange_hz: float
+    seconds: float
+
+    @property
+    def done(self) -> float:
+        """s of it that are on the disk."""
+        try:
+            return min(self.records.stat().st_size / records.SIZE / self.exchange_hz, self.seconds)
+        except OSError:
+            return 0.0
+
+
 class OnBeds:
     """The executor. say: takes what is told of a bed, as it comes."""
 
@@ -54,10 +77,13 @@ class OnBeds:
         self._waiting: deque[Task] = deque()
         self._driven = 0
         self.about = ", ".join(dict.fromkeys(ports.by_joint.values()))
-        self.exchanges: dict[tuple[int, int], tuple[np.ndarray, ...]] = {}
-        """Records by section's experiment and row, of each bed, of the cases that were driven or taken up."""
-        self.joints = tuple(ports.by_joint)
-        self.lock_step = ports.lock_step
+        self.exchanges: dict[tuple[int, int], dict[str, np.ndarray]] = {}
+        """Records by section's experiment and row, and joint, of the cases that were driven, taken up, or known."""
+        self.beds: dict[str, list[dict[str, str]]] = {joint: [] for joint in ports.by_joint}
+        """By joint, name and firmware of the beds that it was on."""
+        self.driving: Driving | None = None
+        self.ports = ports.by_joint
+        self.lock_step, self.baud = ports.lock_step, ports.baud
         self.tick_hz = float("nan")
 
     @property
@@ -104,8 +130,9 @@ class OnBeds:
         try:
             found = made(path, section.prepared, row)
         except (records.Unsound, OSError) as reason:
-            raise Problem(error("E413", f"the records of case #{row} {reason}", help=f"remove {path}")) from None
-        self.exchanges[section.experiment, row] = found.exchanges
+            message = f"the file of records of case #{row} {reason}"
+            raise Problem(error("E413", message, help=f"remove {path}")) from None
+        self._know(section.experiment, row, found.head, found.exchanges)
         if found.whole:
             return found, ""
         why = "the host was gone"
@@ -114,6 +141,25 @@ class OnBeds:
         ticks = section.prepared.experiment.structure.schedule
         at = float(found.outputs[2]) / ticks.base_hz
         return found, f"t = {at:g} s: {why}"
+
+    def _know(self, experiment: int, row: int, head: Mapping[str, Any], exchanges: Sequence[np.ndarray]) -> None:
+        """Keep what a case's records say of its beds."""
+        self.exchanges[experiment, row] = dict(zip(head["joints"], exchanges, strict=True))
+        self.tick_hz = float(head["tick_hz"])
+        for joint, about in zip(head["joints"], head["beds"], strict=True):
+            if about not in self.beds[joint]:
+                self.beds[joint].append(about)
+
+    def know_all(self) -> None:
+        """Know of the cases, too, that an earlier run of the campaign has done."""
+        for path in sorted(self._folder.beds.glob("*.records")):
+            experiment, _, row = path.stem.partition("-")
+            if (int(experiment), int(row)) in self.exchanges:
+                continue
+            with contextlib.suppress(records.Unsound, OSError):
+                found = records.read(path)
+                rows = [found.rows[found.rows["bed"] == bed] for bed in range(len(found.head["joints"]))]
+                self._know(int(experiment), int(row), found.head, rows)
 
     def _drive(self, section: Section, row: int, path: Path, told: Path) -> None:
         """Raises Problem, and KeyboardInterrupt when the case's process has stopped the beds."""
@@ -129,32 +175,55 @@ class OnBeds:
             transcripts=transcripts,
         )  # fmt: skip
         process = subprocess.Popen(
-            [sys.executable, "-m", "hw.case"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            [sys.executable, "-m", "hw.case"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
         )
         assert process.stdin is not None and process.stdout is not None
         with contextlib.suppress(BrokenPipeError):
-            process.stdin.write(asked.text())
+            process.stdin.write(asked.text().encode())
             process.stdin.close()
+        structure, schedule = experiment.structure, experiment.structure.schedule
+        exchange_hz = pace_of(experiment).hz * len(structure.substitutions)
+        self.driving = Driving(path, exchange_hz, schedule.ticks / schedule.base_hz)
         ended: dict[str, Any] | None = None
-        interrupted = False
+        interrupted: KeyboardInterrupt | None = None
+        lines = self._lines(process.stdout.fileno())
         try:
             while True:
                 try:
-                    for line in process.stdout:
-                        ended = self._heard(json.loads(line)) or ended
+                    for line in lines:
+                        ended = self._heard(line) or ended
                     break
-                except KeyboardInterrupt:  # which its process hears too, and stops the beds
-                    interrupted = True
+                except KeyboardInterrupt as reason:
+                    interrupted = reason
+                    process.terminate()  # which hears an interrupt of a terminal, but not what this one alone was sent
+                    lines = self._lines(process.stdout.fileno())
+        except Problem as problem:
+            ended = {"why": problem.diagnostics[0].message}
+            raise
         finally:
+            self.driving = None
             process.stdout.close()
             process.wait()
-        if ended is not None:
-            told.write_text(json.dumps(ended), encoding="utf-8")
-        if interrupted:
-            raise KeyboardInterrupt
+            if ended is not None:
+                told.write_text(json.dumps(ended), encoding="utf-8")
+        if interrupted is not None:
+            raise interrupted
         if not path.exists():
             raise Problem(error("E417", f"the process that drives the beds ended with {process.returncode}",
                                 help="the beds stop themselves; run it again"))  # fmt: skip
+
+    def _lines(self, file: int) -> Iterator[dict[str, Any]]:
+        """What comes from a case's process, as it comes; meanwhile it is told how far the case is."""
+        rest = b""
+        while True:
+            if not select.select([file], [], [], PAUSE)[0]:
+                self._tell()
+                continue
+            data = os.read(file, 1 << 16)
+            if not data:
+                return
+            *whole, rest = (rest + data).split(b"\n")
+            yield from map(json.loads, whole)
 
     def _heard(self, data: dict[str, Any]) -> dict[str, Any] | None:
         """Takes a line of the case's process; how it ended, when it says so. Raises Problem for what is wrong."""
@@ -165,6 +234,5 @@ class OnBeds:
             self._say(" ".join([data["said"], *(f"({each})" for each in data.get("help", ()))]))
         if "about" in data:
             about = data["about"]
-            self.tick_hz = float(about["tick_hz"])
             self._say(f"{data['bed']}: bed `{about['name']}`, firmware {about['firmware']}")
         return data.get("ended")

@@ -5,7 +5,9 @@ So nothing but the exchanges has to outlive a crash, and an archive follows from
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,13 +23,14 @@ FAILURE, TICK = OUTPUTS.index("failure"), OUTPUTS.index("failure.tick")
 @frozen
 class Made:
     """rows: histories [row, column];  outputs: [output];  whole: whether the case reached its end
-    seconds: how long it was driven;  exchanges: the records, by bed"""
+    seconds: how long it was driven;  exchanges: the records, by bed;  head: what stands before them"""
 
     rows: np.ndarray
     outputs: np.ndarray
     whole: bool
     seconds: float
     exchanges: tuple[np.ndarray, ...]
+    head: Mapping[str, Any]
 
 
 def read_rates(found: records.Records, beds: int) -> np.ndarray:
@@ -53,4 +56,4 @@ def made(path: Path, prepared: Prepared, row: int) -> Made:
         outputs[FAILURE], outputs[TICK] = STOPPED, float(done + 1)
     last = found.rows["ended"][-1] if len(found.rows) else 0
     return Made(rows, outputs, whole, float(last) * 1e-9,
-                tuple(found.rows[found.rows["bed"] == bed] for bed in range(beds)))  # fmt: skip
+                tuple(found.rows[found.rows["bed"] == bed] for bed in range(beds)), found.head)  # fmt: skip

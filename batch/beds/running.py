@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from batch.archive.read import ArchiveFile
+from batch.beds.asking import on_beds
 from batch.beds.executor import OnBeds, Ports
+from batch.beds.telling import Telling, beside, kept_time
 from batch.campaign import Campaign, Wires, prepare
-from batch.choosing import experiments_named
 from batch.performing import perform
 from batch.running import first_picture, read_plan
 from batch.summary import summarise
 from batch.verdict import announcement, told, worst_cases, writing
 from hw.case import pace_of
 from hw.ports import in_lock_step
-from hw.timing import timing
 from met.diagnostic import Problem, error
 from met.margin import margins
 from met.plan import Experiment, Plan
@@ -49,11 +47,7 @@ def campaign_of(
     output: str | Path | None = None, cases: Sequence[str] | None = None,
 ) -> tuple[Campaign, dict[str, str], bool]:  # fmt: skip
     """What will be run; by joint its ports; whether the beds have no time of their own. Raises Problem."""
-    experiments = experiments_named(plan, names)
-    asked = [each for each in experiments if each.structure.substitutions]
-    if not asked:
-        helps = ["a run says so: `substitute JOINT { }`", "name the run or sweep that does, if it is another one"]
-        raise Problem(error("E333", "no joint is on a bed here", help=helps))
+    asked = on_beds(plan, names)
     by_joint = ports_of(ports, asked)
     steps = {in_lock_step(port, lock_step) for port in by_joint.values()}
     if len(steps) > 1:
@@ -117,8 +111,12 @@ def run_and_tell(
     for line in check_margins(campaign, force=force):
         say(f"  {line}")
     folder = None if transcripts is None else Path(transcripts)
-    executor = OnBeds(Ports(by_joint, baud, stepped, rest or 0.0, folder), lambda line: say(f"  {line}"))
-    performed = perform(campaign, executor=executor, fresh=fresh, ready=lambda: say(writing(campaign)), say=say)
+    executor = OnBeds(Ports(by_joint, baud, stepped, rest or 0.0, folder), lambda line: telling.say(f"  {line}"))
+    telling = Telling(executor, quiet=quiet)
+    performed = perform(
+        campaign, executor=executor, fresh=fresh, progress=telling, ready=lambda: say(writing(campaign)),
+        say=telling.say, more=lambda: beside(executor),
+    )  # fmt: skip
     if performed.whole:
         say(f"nothing is missing: {campaign.output} has all of it (`--fresh` drives it again)")
     with ArchiveFile(campaign.output) as file:
@@ -129,26 +127,3 @@ def run_and_tell(
     ok = all(summary.ok for summary in summaries)
     say("\n".join(told(source, campaign, summaries, worst, picture, excuse, None, performed.seconds, ok, ())))
     return ok
-
-
-def kept_time(executor: OnBeds) -> list[str]:
-    """How well the loop kept its time, over all cases that were driven."""
-    lines = []
-    for number, name in enumerate(executor.joints):
-        rows = [found[number] for found in executor.exchanges.values() if number < len(found)]
-        if not rows or executor.lock_step:
-            continue
-        found = timing(np.concatenate(rows), executor.tick_hz)
-        late = found.woken + found.computed + found.waited
-        parts = [("late by", found.lateness), ("answered in", found.trip), ("computed in", found.computing)]
-        spreads = "; ".join(f"{what} {_us(each.median)}, p99 {_us(each.high)}" for what, each in parts)
-        lines.append(f"{name}: {found.exchanges:,} exchanges; {spreads}")
-        lines.append(
-            f"  a period late: {late:,} (woken too late {found.woken:,}, computing {found.computed:,}, waiting "
-            f"{found.waited:,}); unanswered: {found.unanswered:,}; the bed's clock: {1e6 * found.drift:+.3g} ppm"
-        )
-    return lines
-
-
-def _us(seconds: float) -> str:
-    return f"{1e6 * seconds:.3g} us"

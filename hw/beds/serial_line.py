@@ -64,8 +64,7 @@ class SerialBed(WireBed):
     def connect(self) -> About:
         about = super().connect()
         waits = Capability.LOCK_STEP not in about.capabilities and urlsplit(self._name).scheme not in ("socket", "unix")
-        sensors = sum(each in about.capabilities for each in messages.SENSORS)
-        bits = _BITS * (_LEAST_BYTES + _SENSOR_BYTES * sensors)
+        bits = _BITS * exchanged(about.capabilities)
         share = bits / self.baud / self.period
         if waits and share > LONGEST_SHARE:
             self.close()
@@ -79,6 +78,16 @@ class SerialBed(WireBed):
         line = SerialLine(self._name, self.baud)
         self.warnings = line.warnings
         return line if self._writer is None else Recorded(line, self._writer)
+
+
+def exchanged(capabilities: Capability) -> int:
+    """Bytes of an exchange, both ways together."""
+    return _LEAST_BYTES + _SENSOR_BYTES * sum(each in capabilities for each in messages.SENSORS)
+
+
+def needed(capabilities: Capability, baud: int) -> float:
+    """s that an exchange takes on a serial line."""
+    return _BITS * exchanged(capabilities) / baud
 
 
 class SerialLine:

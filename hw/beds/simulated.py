@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Literal
 
 from hw import realtime
+from hw.bed import Capability
 from hw.beds.serial_line import BAUD, SerialLine
 from hw.beds.wire import WireBed
 from hw.build import Config, build, qemu
@@ -38,7 +39,7 @@ class SimulatedBed(WireBed):
         transcript: Callable[[bytes], object] | None = None,
     ) -> None:  # fmt: skip
         super().__init__(kind, period, secrets.randbelow(messages.NUMBERS))
-        self._kind = kind
+        self._kind, self._lock_step = kind, Capability.LOCK_STEP in config.capabilities
         self._built = build("arm" if kind == "qemu" else "host", config, plant)
         header = {"line": kind, "baud": BAUD, "period": period, "first": self._number}
         self._writer = None if transcript is None else Writer(transcript, header)
@@ -63,8 +64,7 @@ class SimulatedBed(WireBed):
         self._process = subprocess.Popen(
             [str(self._built), "--with-parent"], stdin=pipe, stdout=pipe, text=True, start_new_session=True
         )
-        with contextlib.suppress(AttributeError, OSError):  # else its deadman speaks up on a busy machine
-            os.sched_setscheduler(self._process.pid, os.SCHED_FIFO, os.sched_param(realtime.PRIORITY + 1))
+        _put_first(self._process.pid)
         assert self._process.stdout is not None
         terminal = self._process.stdout.readline().strip()
         if not terminal:
@@ -78,6 +78,8 @@ class SimulatedBed(WireBed):
                 qemu(self._built, path), text=True, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                 start_new_session=True,
             )  # fmt: skip
+            if not self._lock_step:
+                _put_first(self._process.pid)
             end = time.monotonic() + WITHIN
             while True:
                 connection = socket.socket(socket.AF_UNIX)
@@ -124,6 +126,13 @@ class SocketLine:
     def close(self) -> None:
         with contextlib.suppress(OSError):
             self._connection.close()
+
+
+def _put_first(process: int) -> None:
+    """Have a process, with threads that it will start, go before others, where that is allowed: else its deadman speaks
+    up on a busy machine."""
+    with contextlib.suppress(AttributeError, OSError):
+        os.sched_setscheduler(process, os.SCHED_FIFO, os.sched_param(realtime.PRIORITY + 1))
 
 
 def _lost(why: str | None) -> Problem:

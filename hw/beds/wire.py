@@ -43,7 +43,8 @@ T = TypeVar("T", Greeting, InForce, Reading)
 
 
 class WireBed(Bed):
-    """period: s, from one exchange to the next;  first: the sequence number before the first one.
+    """period: s, from one exchange to the next, infinite where none are made;  first: the sequence number before the
+    first one.
 
     confirmed  whether the bed has confirmed that it is not armed, since it was last told to arm
     """
@@ -88,7 +89,8 @@ class WireBed(Bed):
         }
         self._sensors = tuple(scales[each] for each in messages.SENSORS if each in about.capabilities)
         self._in_force = greeting.in_force(about)
-        self._step = greeting.ticks(about, self.period) if Capability.LOCK_STEP in about.capabilities else 0
+        steps = Capability.LOCK_STEP in about.capabilities and math.isfinite(self.period)
+        self._step = greeting.ticks(about, self.period) if steps else 0
         return about
 
     def limit(
@@ -141,6 +143,11 @@ class WireBed(Bed):
     def read(self) -> Sample:
         self._there()
         return self._sample(self._asked(messages.Read(), Reading))
+
+    def look(self) -> Sample | None:
+        self._there()
+        found = self._answer(messages.Read(), Reading, self.patience)
+        return None if found is None else self._sample(found)
 
     def clear(self) -> Sample:
         about = self._there()

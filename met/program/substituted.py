@@ -141,6 +141,9 @@ class Substituted:
             motor = self.motor(tape, each)
             w = motor.ratio * tape.read(f"{each.joint}.qd")
             self.begin_bed(tape, each, w)
+            if self.wire:  # what is inside a real one nobody knows
+                for memory in each.bed.memory:
+                    tape.write(f"{each.joint}.bed.{memory.name}", math.nan)
             for name in ("read", "before", "w", "w_ref", "observer.w", "observer.y"):
                 tape.write(f"{each.joint}:{name}", w)
             tape.write(f"{each.joint}:angle", motor.ratio * tape.read(f"{each.joint}.q"))

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 from benchmarks import (
     arms,
+    bed,
     campaigns,
     compiling,
     differences,
@@ -25,7 +26,7 @@ from benchmarks.machine import machine, told
 RATIOS = SimpleNamespace(
     TITLE="ratios of throughput over many cases, each on one core and in the same turns", BENCHMARKS=evaluation.RATIOS
 )
-SUBJECTS = (RATIOS, evaluation, stepping, hybrid, compiling, whole_process, campaigns, differences)
+SUBJECTS = (RATIOS, evaluation, stepping, hybrid, bed, compiling, whole_process, campaigns, differences)
 """In the order of the report: ratios first, since they change least with machine and load."""
 
 TURNS, QUICK = 15, 3

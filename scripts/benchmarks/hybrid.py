@@ -62,7 +62,7 @@ def _hybrid(mounted: str) -> Callable[[], float]:
 BENCHMARKS: tuple[Benchmark | Derived, ...] = (
     *(Benchmark(f"hybrid.{name}", doc, "ns", partial(_hybrid, text)) for name, (text, doc) in MOUNTED.items()),
     *(
-        Derived(f"bed.{name}", f"what the bed adds: {doc}", "ns", (f"hybrid.{name}", "hybrid.pure"),
+        Derived(f"hybrid.bed.{name}", f"what the bed adds: {doc}", "ns", (f"hybrid.{name}", "hybrid.pure"),
                 lambda with_bed, without: with_bed - without)
         for name, (_, doc) in MOUNTED.items() if name != "pure"
     ),

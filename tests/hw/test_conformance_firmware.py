@@ -16,6 +16,8 @@ from hw.beds.serial_line import SerialBed
 from hw.build import Config, build, qemu
 from tests.hw.firmware.line import FREE, PLANT, STEPPED
 
+pytestmark = pytest.mark.alone
+
 
 class BehindATerminal(conformance.Conformance):
     config: Config

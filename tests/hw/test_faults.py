@@ -1,6 +1,7 @@
 """Lines do to frames what lines do: no wrong answer is taken, and every bed ends where docs/protocol.md says.
 
-`python -m tests.hw.test_faults` prints what became of 10,000 exchanges of each kind.
+At the other end is the model of tests/hw/device.py, or the firmware. `python -m tests.hw.test_faults` prints what
+became of 10,000 exchanges of each kind.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,7 @@ from met.diagnostic import Problem
 from tests.hw import device as model
 from tests.hw.conftest import LineBed
 from tests.hw.device import Device
+from tests.hw.firmware.board import Board
 from tests.hw.relay import KINDS, Faults, VirtualLine
 
 PERIOD, MISSED = 1e-3, 5
@@ -35,13 +38,15 @@ SHARES = {"cut": 0.004, "reboot": 0.004, "version": 0.004, "stall": 0.004}
 EPISODE = 400
 """Exchanges from arming to a stop, where nothing goes wrong before."""
 
+DEVICES: dict[str, Callable[..., Device | Board]] = {"model": Device, "firmware": Board}
 
-def answers_of(device: Device, number: int) -> list[tuple[int, int, int]]:
+
+def answers_of(device: Device | Board, number: int) -> list[tuple[int, int, int]]:
     """Status, tick and rate in counts of all SAMPLEs that the device gave to a number."""
     return [struct.unpack_from("<HIi", answer, 3) for answer in device.answers.get(number, []) if answer[0] == 0x84]
 
 
-def is_true(device: Device, number: int, sample: Sample) -> bool:
+def is_true(device: Device | Board, number: int, sample: Sample) -> bool:
     """Whether the device did answer so."""
     status = sample.state | sample.greeted << 2 | sample.faults | sample.refused << 13
     return (status, sample.tick, round(sample.rate / device.scales[2])) in answers_of(device, number)
@@ -83,9 +88,11 @@ def drive(bed: WireBed, then: Callable[[Sample | None], None]) -> str:
     return "done"
 
 
-def endings(kind: str, *, lock_step: bool, exchanges: int, folder: Path, seed: int = 0) -> Counter[str]:
+def endings(
+    kind: str, *, lock_step: bool, exchanges: int, folder: Path, seed: int = 0, of: str = "model"
+) -> Counter[str]:
     """How so many exchanges ended, under faults of one kind; what must hold is asserted."""
-    device = Device(lock_step=lock_step)
+    device = DEVICES[of](lock_step=lock_step)
     faults = Faults(kind, SHARES.get(kind, 0.05), seed, device)
     lines = [VirtualLine(device, faults)]
     found, logged = Counter[str](), Counter[str]()
@@ -168,8 +175,8 @@ MUST = {
 }
 
 
-def judged(kind: str, lock_step: bool, exchanges: int, folder: Path) -> None:
-    found = endings(kind, lock_step=lock_step, exchanges=exchanges, folder=folder)
+def judged(kind: str, lock_step: bool, exchanges: int, folder: Path, of: str) -> None:
+    found = endings(kind, lock_step=lock_step, exchanges=exchanges, folder=folder, of=of)
     ends = {end for end in found if end in {"done", "five missed", "reset seen", "disarmed"} or ":" in end}
     assert ends <= ALWAYS | ENDS.get(kind, set())
     assert ends >= MUST.get(kind, {"done"})
@@ -179,17 +186,19 @@ def judged(kind: str, lock_step: bool, exchanges: int, folder: Path) -> None:
         assert found["deadman"] >= 1
 
 
+@pytest.mark.parametrize("of", ["model", pytest.param("firmware", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("lock_step", [True, False], ids=["lock-step", "free"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_line_with_faults(kind: str, lock_step: bool, tmp_path: Path) -> None:
-    judged(kind, lock_step, 2000, tmp_path)
+def test_a_line_with_faults(kind: str, lock_step: bool, of: str, tmp_path: Path) -> None:
+    judged(kind, lock_step, 2000, tmp_path, of)
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("of", DEVICES)
 @pytest.mark.parametrize("lock_step", [True, False], ids=["lock-step", "free"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_ten_thousand_exchanges(kind: str, lock_step: bool, tmp_path: Path) -> None:
-    judged(kind, lock_step, 10_000, tmp_path)
+def test_ten_thousand_exchanges(kind: str, lock_step: bool, of: str, tmp_path: Path) -> None:
+    judged(kind, lock_step, 10_000, tmp_path, of)
 
 
 def test_without_a_look_at_the_numbers_wrong_answers_would_be_taken(
@@ -230,8 +239,7 @@ def test_faults_among_real_bytes(kind: str, on_pty: Callable[..., str]) -> None:
 
 
 if __name__ == "__main__":
-    for lock_step in (True, False):
-        for kind in sys.argv[1:] or KINDS:
-            with tempfile.TemporaryDirectory() as folder:
-                found = endings(kind, lock_step=lock_step, exchanges=10_000, folder=Path(folder))
-            print("lock-step" if lock_step else "free", kind, dict(found), flush=True)
+    for of, lock_step, kind in product(DEVICES, (True, False), sys.argv[1:] or KINDS):
+        with tempfile.TemporaryDirectory() as folder:
+            found = endings(kind, lock_step=lock_step, exchanges=10_000, folder=Path(folder), of=of)
+        print(of, "lock-step" if lock_step else "free", kind, dict(found), flush=True)

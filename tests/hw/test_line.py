@@ -23,6 +23,8 @@ from tests.hw.conftest import LineBed, said
 from tests.hw.device import Device
 from tests.hw.relay import Faults, VirtualLine
 
+pytestmark = pytest.mark.alone
+
 
 def refusal(do: Callable[[], object]) -> str:
     with pytest.raises(Problem) as caught:

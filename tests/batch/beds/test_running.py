@@ -15,6 +15,7 @@ import pytest
 
 import batch
 import ic
+from batch.beds.executor import OnBeds
 from hw import records
 from met import cli
 
@@ -176,3 +177,31 @@ def test_killed_midway_everything_up_to_then_is_in_the_archive(here: Path) -> No
     assert abs(rows - (len(found.rows) - 1) // 10) <= 1
     batch.run(ic.compile("deck.ic", select=["wired"]), output="sim.h5")
     assert np.array_equal(data.q.values[0, :rows], batch.open("sim.h5").q.values[0, :rows])
+
+
+def test_a_file_that_holds_no_records_is_told(
+    bed: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(OnBeds, "_drive", lambda self, section, row, path, told: path.write_bytes(b"no records"))
+    status, _, complaint = bed("wired", "--port", "emulated", "-o", "a.h5")
+    assert status == cli.BAD_INPUT
+    assert complaint.endswith("""\
+error[E413]: the file of records of case #0 holds no records of a bed
+ = help: remove a.h5.campaign/beds/0-0.records
+
+1 error
+""")
+
+
+def test_a_process_that_ends_without_a_word_is_told(
+    bed: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("batch.beds.executor.sys.executable", "/bin/false")
+    status, _, complaint = bed("wired", "--port", "emulated", "-o", "a.h5")
+    assert status == cli.BAD_INPUT
+    assert complaint.endswith("""\
+error[E417]: the process that drives the beds ended with 1
+ = help: the beds stop themselves; run it again
+
+1 error
+""")

@@ -18,7 +18,7 @@ from tests.hw.firmware import wire
 from tests.hw.firmware.line import FREE, STEPPED, Line, behind_a_terminal, under_qemu
 from tests.substitution.hybrid import compiled, deck
 
-pytestmark = pytest.mark.firmware
+pytestmark = [pytest.mark.firmware, pytest.mark.alone]
 
 
 @pytest.fixture(scope="module", autouse=True)

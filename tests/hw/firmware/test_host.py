@@ -16,6 +16,8 @@ from hw.build import build
 from tests.hw.firmware import wire
 from tests.hw.firmware.line import FREE, PLANT, STEPPED, Line, behind_a_terminal
 
+pytestmark = pytest.mark.alone
+
 
 def logged(path: Path, since: int = 0) -> list[tuple[int, str, int]]:
     """Outputs that changed: ns, i or v, counts."""

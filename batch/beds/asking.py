@@ -1,0 +1,63 @@
+"""Which bed a user means who asks of one alone: a port, and the deck's joint where the bed is simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from batch.choosing import experiments_named
+from batch.running import read_plan
+from hw.ports import SIMULATED, is_transcript
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.plan import Experiment, Plan
+
+
+@frozen
+class Meant:
+    """port: without its joint;  experiment: None where no deck was given;  joint: of it"""
+
+    port: str
+    experiment: Experiment | None = None
+    joint: str = ""
+
+    @property
+    def simulated(self) -> Experiment | None:
+        """The experiment whose bed the port simulates; None where it does not."""
+        return self.experiment if self.port in SIMULATED else None
+
+
+def on_beds(plan: Plan, names: Sequence[str] | None) -> list[Experiment]:
+    """Those of a plan's experiments that have motors on beds. Raises Problem E310, E333."""
+    found = [each for each in experiments_named(plan, names) if each.structure.substitutions]
+    if not found:
+        helps = ["a run says so: `substitute JOINT { }`", "name the run or sweep that does, if it is another one"]
+        raise Problem(error("E333", "no joint is on a bed here", help=helps))
+    return found
+
+
+def meant(
+    word: str, source: str | None, names: tuple[str, ...], *, defines: tuple[str, ...] = (),
+    include_dirs: tuple[str, ...] = (), settings: tuple[str, ...] = (), quiet: bool = False,
+) -> Meant:  # fmt: skip
+    """Of `PORT`, or `JOINT=PORT` of a deck; its first case counts. Raises Problem."""
+    found = _meant(word, None if source is None else read_plan(
+        source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=quiet
+    ), names)  # fmt: skip
+    if is_transcript(found.port):
+        helps = "give the line that it was made on; `met bed run --port FILE` replays it"
+        raise Problem(error("E428", f"{found.port} is a transcript, and no bed that could be asked", help=helps))
+    return found
+
+
+def _meant(word: str, plan: Plan | None, names: tuple[str, ...]) -> Meant:
+    if plan is None:
+        return Meant(word)
+    experiment = on_beds(plan, names or None)[0]
+    joints = [each.joint for each in experiment.structure.substitutions]
+    joint, equals, port = word.partition("=")
+    if equals and joint in joints:
+        return Meant(port, experiment, joint)
+    if len(joints) > 1:
+        each = " or ".join(f"`--port {joint}={word}`" for joint in joints)
+        raise Problem(error("E418", f"port `{word}`: of which joint?", help=f"say {each}"))
+    return Meant(word, experiment, joints[0])

@@ -1,0 +1,303 @@
+"""`met bed identify`: a bed's parameters from guided moves, with what they are sure to, as a deck to include."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import re
+import subprocess
+import sys
+import textwrap
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from batch.beds.asking import meant
+from hw.bed import About, Capability, Limits, Scales
+from hw.identify.driving import Asked
+from ic.printing.columns import columns
+from met import plan_file
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.plan import Experiment, Formula, Plan
+from met.program.plant import bed_values
+
+if TYPE_CHECKING:
+    from hw.identify.fit import Estimate, Found
+
+UNITS = {
+    "kt": "N*m/A", "resistance": "ohm", "tau_max": "N*m", "f_c": "N*m", "f_v": "N*m*s/rad", "inertia": "kg*m^2",
+    "kt_load": "N*m/A", "f_cut": "Hz",
+}  # fmt: skip
+"""Of what is found or given, in the order in which it is told."""
+
+OF_SERVO = {"kt": "kt", "resistance": "resistance", "tau_max": "tau_max", "f_c": "f_c", "f_v": "f_v", "inertia": "j_m"}
+"""What the data sheet says of it is the servo's parameter of this name."""
+
+MEASURED_BY = ("resistance", "tau_max", "f_c", "f_v", "inertia")
+"""What is as wrong as the load motor's torque constant, where that is given: all torques are measured by it."""
+
+UNEXPLAINED = 0.1
+"""Share of what was read, rms, that may be left of it: a bed of which more is left is another thing than the model."""
+
+
+@frozen
+class Sheet:
+    """values: what is believed of the bed before, SI, by the names of `UNITS`, and `v_max`, V, where the servo has it
+    said: whether `kt_load` is said by the deck, or by who asks"""
+
+    values: Mapping[str, float]
+    said: bool
+
+
+def sheet_of(experiment: Experiment, joint: str, kt_load: float | None) -> Sheet:
+    """The motor as its servo has it, the rest as the bed has it, in the first case."""
+    inputs = {each.path: float(each.values[0]) for each in experiment.cases.coordinates}
+    outputs = experiment.formulas.replay(inputs)
+
+    def servo(name: str) -> float:
+        value = experiment.parameters[f"{joint}.servo.{name}"].value
+        return float(outputs[value.output] if isinstance(value, Formula) else value)  # type: ignore[arg-type]
+
+    bed = bed_values(experiment, joint)
+    values = {name: servo(own) for name, own in OF_SERVO.items()}
+    values |= {"kt_load": bed["kt_load"] if kt_load is None else kt_load, "f_cut": bed["f_cut"]}
+    if f"{joint}.servo.v_max" in experiment.parameters:
+        values["v_max"] = servo("v_max")
+    origin = experiment.parameters[f"{joint}.bed.kt_load"].origin
+    return Sheet(values, kt_load is not None or origin.place is not None)
+
+
+def identify_and_tell(
+    word: str, source: str, names: tuple[str, ...], *, baud: int, lock_step: bool, kt_load: float | None,
+    kt_load_error: float, voltage: float | None, current: float | None, rate: float | None, output: str | None,
+    form: str, quiet: bool = False, verbose: bool = False, **options: Any,
+) -> None:  # fmt: skip
+    """The command. Raises Problem."""
+    say: Callable[[str], None] = (lambda _: None) if quiet or form == "json" else print
+    which = meant(word, source, names, quiet=quiet, **options)
+    assert which.experiment is not None
+    sheet = sheet_of(which.experiment, which.joint, kt_load)
+    deck = Path(output or f"{which.joint}.identified.ic")
+    records = deck.with_suffix(".records")
+    if which.simulated is None and not sheet.said:
+        message = f"joint `{which.joint}`: the load motor's constant, by which torques are measured, is nowhere said"
+        helps = "`--kt-load '0.072 N*m/A'`, from its data sheet; or `bed = emulated(kt_load = ..., ...)` in the deck"
+        raise Problem(error("E424", message, help=helps))
+    asked = Asked(
+        plan=plan_file.dumps(Plan("", (which.experiment,))), row=0, joint=which.joint, port=which.port,
+        records=str(records), sheet=dict(sheet.values), baud=baud, lock_step=lock_step, voltage=voltage,
+        current=current, rate=rate,
+    )  # fmt: skip
+    with contextlib.suppress(FileNotFoundError):
+        records.unlink()
+    about, ended = _driven(asked, say)
+    found = _fitted(records, about, ended, sheet)
+    check(found, about)
+    estimates = widened(found.parameters, kt_load_error / 100.0)
+    origin = origin_of(about, ended, estimates)
+    deck.write_text(included(deck, which.joint, estimates, origin), encoding="utf-8")
+    if form == "json":
+        print(json.dumps(as_data(found, estimates, sheet, deck, records), indent=2))
+        return
+    for line in told(found, estimates, sheet):
+        say(line)
+    say(f"{deck} is a deck to include; what was told and read is in {records}")
+
+
+def check(found: Found, about: About) -> None:
+    """Raises Problem E423 where the bed is not what the model is."""
+    left = float((found.residual**2).mean() ** 0.5)
+    worst = int(found.residual.argmax())
+    if not found.settled:
+        message = f"bed `{about.name}`: no parameters were settled on in the time that the search is given"
+        raise Problem(error("E423", message, help="begin nearer: the servo's motor in the deck is where it begins"))
+    if not left < UNEXPLAINED * found.rate:
+        message = (f"bed `{about.name}` does not do what a motor bed does: {left:.3g} of {found.rate:.3g} rad/s, rms, "
+                   f"are left unexplained, most in move {worst + 1}")  # fmt: skip
+        helps = ("look whether voltage, current and rate have their signs and scales, and whether the servo's motor in "
+                 "the deck is the one on the bed")  # fmt: skip
+        raise Problem(error("E423", message, help=helps))
+
+
+def widened(found: Mapping[str, Estimate], kt_load_error: float) -> dict[str, Estimate]:
+    """With the interval of the load motor's constant, where that is given: a share of it."""
+    from hw.identify.fit import Estimate
+
+    if found["kt_load"].found or not kt_load_error:
+        return dict(found)
+    out = {}
+    for name, each in found.items():
+        half = math.log(each.high / each.value)
+        if (each.found and name in MEASURED_BY) or name == "kt_load":
+            half = math.hypot(half, math.log1p(kt_load_error))
+        out[name] = Estimate(each.value, each.value * math.exp(-half), each.value * math.exp(half), each.found)
+    return out
+
+
+def told(found: Found, estimates: Mapping[str, Estimate], sheet: Sheet) -> list[str]:
+    """For people."""
+    rows = [["", "found", "95 % interval", "", "data sheet", "off by"]]
+    for name, unit in UNITS.items():
+        each, believed = estimates[name], sheet.values[name]
+        share = f"{100.0 * math.log(each.high / each.value):.2g} %"
+        off = "given"
+        if each.found:
+            off = f"{math.log(each.value / believed) / math.log(each.high / each.value):+.3g}"
+        interval = f"{digits(each, each.low)} to {digits(each, each.high)}" if each.high > each.low else ""
+        rows.append([name, f"{digits(each, each.value)} {unit}", interval, share if interval else "",
+                     f"{believed:.6g}", off])  # fmt: skip
+    left = float((found.residual**2).mean() ** 0.5)
+    out = columns(rows, right=(3, 4, 5))
+    out.append("`off by`: found less the data sheet's, in halves of the interval")
+    out += [f"given, not found: {each}" for each in reasons(found)]
+    out.append(
+        f"left unexplained: {left:.3g} of {found.rate:.3g} rad/s, rms; misalignment {found.ripple[0]:.2g} N m once a "
+        f"turn and {found.ripple[1]:.2g} N m twice, rms; at its largest torque {found.limited:.0%} of the time"
+    )
+    return out
+
+
+def reasons(found: Found) -> list[str]:
+    """Why parameters were not found, in words."""
+    missing = [name for name, each in found.parameters.items() if not each.found]
+    out = []
+    if "kt_load" in missing:
+        out.append("kt_load, by which torques are measured, for the bed does not measure its drive's current; kt, "
+                   "found as back-EMF, does not depend on it")  # fmt: skip
+    rest = [name for name in missing if name != "kt_load"]
+    if rest:
+        out.append(f"{' and '.join(rest)}, which the moves do not tell: the drive was at its largest torque "
+                   f"{found.limited:.0%} of the time (`--voltage` more); what is found holds for what is "
+                   "given")  # fmt: skip
+    return out
+
+
+def digits(each: Estimate, value: float) -> str:
+    """To two digits of half its interval; six where it is given."""
+    half = each.high - each.value
+    if half <= 0.0:
+        return f"{value:.6g}"
+    after = max(1, math.floor(math.log10(each.value)) - math.floor(math.log10(half)) + 2)
+    return f"{value:#.{after}g}".removesuffix(".")
+
+
+def origin_of(about: About, ended: Mapping[str, Any], estimates: Mapping[str, Estimate]) -> list[str]:
+    """What the deck says of where its numbers are from."""
+    reference = "drive current as the bed measures it" if estimates["kt_load"].found else (
+        f"the load motor's {digits(estimates['kt_load'], estimates['kt_load'].value)} N m/A, which was given"
+    )  # fmt: skip
+    return [
+        f"Found by `met bed identify` on bed `{about.name}`, firmware {about.firmware}, in {len(ended['began'])} moves",
+        f"of {ended['seconds']:.3g} s altogether, with the 95 % interval of each. Torques are measured by",
+        f"{reference}.",
+    ]
+
+
+def included(deck: Path, joint: str, estimates: Mapping[str, Estimate], origin: Sequence[str]) -> str:
+    """The deck to include, laid out as `met fmt` does."""
+    from ic.formatting.formatter import formatted
+
+    head = re.sub(r"\W", "_", joint)
+    bed = ", ".join(f"{name} = {head}_{name}" for name in UNITS)
+    servo = "  ".join(f"{own} = {head}_{name};" for name, own in OF_SERVO.items())
+    uses = [f"substitute {joint} {{ bed = emulated({bed}); }}", f"servo found like believed {{ {servo} }}"]
+    lines = [
+        "#pragma once",
+        f"// {deck.name}: the motor bed of joint {joint}",
+        "//",
+        *(f"// {line}" for line in origin),
+        "//",
+        "// The bed in a run, and its motor in a servo that is like another:",
+        "//",
+        *(f"//     {line}" for use in uses for line in textwrap.wrap(use, 105, subsequent_indent="    ")),
+        "",
+    ]
+    wide = max(map(len, UNITS))
+    for name, unit in UNITS.items():
+        each = estimates[name]
+        remark = f"{digits(each, each.low)} to {digits(each, each.high)}" if each.high > each.low else ""
+        if not each.found:
+            remark = f"given, not found; {remark}".removesuffix("; ")
+        said = f"{digits(each, each.value)} {unit};"
+        lines.append(f"let {head}_{name:<{wide}} = {said:<26} // {remark}")
+    return formatted(str(deck), "\n".join(lines) + "\n")
+
+
+def as_data(found: Found, estimates: Mapping[str, Estimate], sheet: Sheet, deck: Path, records: Path) -> dict[str, Any]:
+    """For programs; SI."""
+    return {
+        "deck": str(deck), "records": str(records),
+        "parameters": {
+            name: {"value": each.value, "low": each.low, "high": each.high, "found": each.found, "unit": UNITS[name],
+                   "data_sheet": sheet.values[name]}
+            for name in UNITS for each in [estimates[name]]
+        },
+        "residual": float((found.residual**2).mean() ** 0.5), "rate": found.rate,
+        "misalignment": list(found.ripple), "limited": found.limited,
+    }  # fmt: skip
+
+
+def _driven(asked: Asked, say: Callable[[str], None]) -> tuple[About, dict[str, Any]]:
+    """Who the bed is, and how its moves ended. Raises Problem, and KeyboardInterrupt when the bed was stopped by it."""
+    about: About | None = None
+    for line in _lines(asked):
+        if "wrong" in line:
+            raise Problem([error(each["code"], each["message"], help=each["help"])
+                           for each in line["wrong"]["diagnostics"]])  # fmt: skip
+        if "said" in line:
+            say("  " + " ".join([line["said"], *(f"({each})" for each in line.get("help", ()))]))
+        if "about" in line:
+            about, most = _about(line["about"]), line["peaks"]
+            say(f"bed `{about.name}`, firmware {about.firmware}: moves up to {most['voltage']:.3g} V, "
+                f"{most['current']:.3g} A and {most['rate']:.3g} rad/s, a minute or so")  # fmt: skip
+        if "ended" in line and about is not None:
+            return about, line["ended"]
+    raise Problem(error("E417", "the process that drives the bed ended without a word", help="run it again"))
+
+
+def _about(data: Mapping[str, Any]) -> About:
+    return About(**{
+        **data, "capabilities": Capability(data["capabilities"]), "scales": Scales(**data["scales"]),
+        "limits": Limits(**data["limits"]),
+    })  # fmt: skip
+
+
+def _lines(asked: Asked) -> Iterator[dict[str, Any]]:
+    """What the process says, as it says it."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hw.identify.driving"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdin is not None and process.stdout is not None
+    interrupted = False
+    try:
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.write(asked.text())
+            process.stdin.close()
+        while True:
+            try:
+                for line in process.stdout:
+                    yield json.loads(line)
+                break
+            except KeyboardInterrupt:  # which its process hears too, and stops the bed
+                interrupted = True
+    finally:
+        process.stdout.close()
+        process.wait()
+    if interrupted:
+        raise KeyboardInterrupt
+
+
+def _fitted(path: Path, about: About, ended: Mapping[str, Any], sheet: Sheet) -> Found:
+    from hw import records
+    from hw.identify.fit import fitted
+    from hw.identify.moves import groups, guided
+    from hw.identify.series import series
+
+    try:
+        rows = records.read(path).rows
+    except (records.Unsound, OSError) as reason:
+        raise Problem(error("E413", f"the records of the moves {reason}", help="run it again")) from None
+    what = series(rows, about, ended["began"], lock_step=ended["lock_step"])
+    return fitted(what, groups(guided(1.0)), sheet.values)

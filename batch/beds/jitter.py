@@ -1,0 +1,153 @@
+"""`met bed jitter`: how late exchanges with a bed begin and how long they take, as histograms. Never arms."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from batch.beds.asking import Meant, meant
+from hw.case import pace_of
+from hw.jitter import Asked
+from hw.ports import EMULATED
+from hw.timing import EDGES
+from ic.printing.columns import columns
+from met import plan_file
+from met.diagnostic import Problem, error
+from met.plan import Plan
+
+HZ, SECONDS = 1000.0, 10.0
+"""What is measured where nothing else is asked for, nor a deck has a rate."""
+
+WIDTH = 40
+"""Characters of the longest bar."""
+
+_SPREADS = (("lateness", "late"), ("trip", "answered in"))
+_FIGURES = (("median", "median"), ("high", "p99"), ("highest", "p99.9"), ("largest", "max"))
+
+
+def measured(
+    asked: Meant, baud: int, hz: float | None, seconds: float, joints: int
+) -> tuple[dict[str, Any], list[str]]:
+    """The figures, for programs, and what is told of the measurement. Raises Problem."""
+    if asked.port == EMULATED:
+        message = "an emulated bed has no time of its own, so that nothing can be late"
+        raise Problem(error("E426", message, help="`--port firmware` has one, over a pseudo-terminal"))
+    rate = hz or (HZ if asked.experiment is None else pace_of(asked.experiment).hz)
+    simulated = asked.simulated
+    plan = "" if simulated is None else plan_file.dumps(Plan("", (simulated,)))
+    question = Asked(asked.port, rate, seconds, joints, baud, plan, asked.joint)
+    said, about, kept = [], dict[str, Any](), None
+    for line in _lines(question):
+        if "wrong" in line:
+            raise Problem([error(each["code"], each["message"], help=each["help"])
+                           for each in line["wrong"]["diagnostics"]])  # fmt: skip
+        if "said" in line:
+            said.append(" ".join([line["said"], *(f"({each})" for each in line.get("help", ()))]))
+        about = line.get("about", about)
+        kept = line.get("kept", kept)
+    if kept is None:
+        raise Problem(error("E417", "the process that asks the bed ended without a word", help="run it again"))
+    timing = kept["timing"]
+    return {
+        "port": asked.port, **about, "rate_hz": rate, "joints": joints, "seconds": kept["seconds"],
+        "exchanges": timing["exchanges"],
+        **{name: _spread(timing[name]) for name, _ in _SPREADS},
+        "misses": {name: timing[name] for name in ("woken", "computed", "waited", "unanswered")},
+        "stops": kept["stops"], "clock": timing["drift"] if math.isfinite(timing["drift"]) else None,
+    }, said  # fmt: skip
+
+
+def jitter_and_tell(
+    word: str, source: str | None, names: tuple[str, ...], *, baud: int, rate: float | None, duration: float,
+    joints: int, form: str, quiet: bool = False, verbose: bool = False, **options: Any,
+) -> bool:  # fmt: skip
+    """The command; True where no run would have been stopped. Raises Problem."""
+    asked = meant(word, source, names, quiet=quiet, **options)
+    data, said = measured(asked, baud, rate, duration, joints)
+    if form == "json":
+        print(json.dumps({**data, "warnings": said}, indent=2))
+    elif not quiet:
+        print("\n".join([*lines(data), *(f"  {each}" for each in said)]))
+    return not data["stops"]
+
+
+def lines(data: Mapping[str, Any]) -> list[str]:
+    """For people."""
+    misses = data["misses"]
+    each = "" if data["joints"] == 1 else f" in {data['joints']} each period"
+    out = [f"bed `{data['name']}` at {data['port']}, not armed: {data['exchanges']:,} exchanges{each} at "
+           f"{data['rate_hz']:g} Hz in {data['seconds']:.3g} s"]  # fmt: skip
+    for name, words in _SPREADS:
+        spread = data[name]
+        figures = ", ".join(f"{told} {duration(spread[figure])}" for figure, told in _FIGURES)
+        out += ["", f"{words}: {figures}", *histogram(spread["histogram"])]
+    late = sum(misses[name] for name in ("woken", "computed", "waited"))
+    out += ["", f"a period late: {late:,} (woken too late {misses['woken']:,}, computing {misses['computed']:,}, "
+            f"waiting {misses['waited']:,}); unanswered: {misses['unanswered']:,}"]  # fmt: skip
+    times = "never" if not data["stops"] else "once" if data["stops"] == 1 else f"{data['stops']:,} times"
+    out.append(f"a run would have been stopped {times}, by five periods of lateness or silence")
+    if data["clock"] is not None:
+        out.append(f"the bed's clock against the computer's: {1e6 * data['clock']:+.3g} ppm")
+    return out
+
+
+def histogram(stretches: Sequence[Mapping[str, Any]]) -> list[str]:
+    """A bar for each stretch from the first that is not empty to the last; what is there at all can be seen."""
+    full = [at for at, each in enumerate(stretches) if each["count"]]
+    if not full:
+        return ["  (none)"]
+    shown = stretches[full[0] : full[-1] + 1]
+    most = max(each["count"] for each in shown)
+    rows = []
+    for each in shown:
+        eighths = max(round(8 * WIDTH * each["count"] / most), 1) if each["count"] else 0
+        whole, rest = divmod(eighths, 8)
+        upto = f">= {duration(each['from'])}" if each["to"] is None else f"< {duration(each['to'])}"
+        rows.append([upto, f"{each['count']:,}", "█" * whole + " ▏▎▍▌▋▊▉"[rest].strip()])
+    return columns(rows, right=(0, 1))
+
+
+def duration(seconds: float | None) -> str:
+    """`2.5 us`, `1.2 ms`, `3 s`; three digits."""
+    if seconds is None:
+        return "-"
+    for scale, unit in ((1e-6, "us"), (1e-3, "ms")):
+        if float(f"{seconds:.3g}") < 1000.0 * scale * (1.0 - 1e-12):
+            return f"{seconds / scale:.3g} {unit}"
+    return f"{seconds:.3g} s"
+
+
+def _spread(found: Mapping[str, Any]) -> dict[str, Any]:
+    edges = [0.0, *EDGES, None]
+    return {
+        **{name: found[name] if math.isfinite(found[name]) else None for name, _ in _FIGURES},
+        "histogram": [{"from": edges[at], "to": edges[at + 1], "count": count}
+                      for at, count in enumerate(found["counts"])],
+    }  # fmt: skip
+
+
+def _lines(question: Asked) -> list[dict[str, Any]]:
+    """What the process says. An interrupt, which it hears too, ends the measurement before its time."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hw.jitter"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdin is not None and process.stdout is not None
+    found = []
+    try:
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.write(question.text())
+            process.stdin.close()
+        while True:
+            try:
+                found += [json.loads(line) for line in process.stdout]
+                return found
+            except KeyboardInterrupt:
+                continue
+    finally:
+        process.stdout.close()
+        process.wait()

@@ -1,0 +1,179 @@
+"""`met bed probe`: who is at a port, what its sensors say, and for which rates the line is fast enough. Never arms."""
+
+from __future__ import annotations
+
+import json
+import math
+import statistics
+import time
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from batch.beds.asking import Meant, meant
+from hw import refusals
+from hw.bed import About, Bed, Capability, Fault, Sample
+from hw.beds.serial_line import LONGEST_SHARE, exchanged, needed
+from hw.beds.wire import WireBed
+from hw.case import pace_of
+from hw.ports import Port, opened
+from ic.printing.columns import columns, number, quantity
+from met.diagnostic import Diagnostic
+from met.frozen import frozen
+
+ASKED = 32
+"""Times that the sensors are read, for the time that an answer takes."""
+
+RATES = (500.0, 1000.0, 2000.0, 4000.0)
+"""Hz, of which it is said whether the line is fast enough."""
+
+_SENSORS = (("rate", "rad/s"), ("angle", "rad"), ("drive_current", "A"), ("acceleration", "rad/s^2"))
+
+
+@frozen
+class Found:
+    """trips: s from question to answer, as often as there was one of `ASKED`; empty where there is no line
+    needed: s that the bytes of an exchange take, 0 where the line has no baud rate"""
+
+    port: str
+    about: About
+    sample: Sample
+    warnings: tuple[Diagnostic, ...]
+    baud: int
+    needed: float
+    trips: tuple[float, ...]
+
+    @property
+    def fastest(self) -> float:
+        """Hz, of which an exchange takes the largest share of a period that it may; infinite in lock-step."""
+        longest = max(self.needed, statistics.median(self.trips) if self.trips else 0.0)
+        stepped = Capability.LOCK_STEP in self.about.capabilities
+        return math.inf if stepped or longest == 0.0 else LONGEST_SHARE / longest
+
+
+def probe(asked: Meant, baud: int) -> Found:
+    """Greet the bed, and read its sensors. Raises Problem."""
+    simulated = asked.simulated
+    period = math.inf if simulated is None else pace_of(simulated).period
+    with opened(Port(asked.port, baud), simulated, asked.joint, 0, period) as bed:
+        about = bed.connect()
+        sample = bed.read()
+        trips = _trips(bed) if isinstance(bed, WireBed) else ()
+        bytes_take = needed(about.capabilities, baud) if simulated is None and "://" not in asked.port else 0.0
+        warnings = tuple(getattr(bed, "warnings", ()))
+        return Found(asked.port, about, sample, warnings, baud, bytes_take, trips)
+
+
+def probe_and_tell(
+    word: str, source: str | None, names: tuple[str, ...], *, baud: int, form: str, quiet: bool = False,
+    verbose: bool = False, **options: Any,
+) -> None:  # fmt: skip
+    """The command. Raises Problem."""
+    found = probe(meant(word, source, names, quiet=quiet, **options), baud)
+    if form == "json":
+        print(json.dumps(data(found), indent=2))
+    elif not quiet:
+        print("\n".join(lines(found)))
+
+
+def lines(found: Found) -> list[str]:
+    """For people."""
+    about, sample, limits = found.about, found.sample, found.about.limits
+    out = [f"bed `{about.name}` at {found.port}"]
+    sensors = (f"{name.replace('_', ' ')} {quantity(value, unit)}" for name, value, unit in _read(sample))
+    rows = [
+        ["firmware", f"{about.firmware}, version {about.version} of the protocol, session {about.session}"],
+        ["has", ", ".join(["drive voltage", "load current", "tachometer", *capabilities(about)])],
+        ["ticks", f"{number(about.tick_hz)} Hz; stops itself after {number(1e3 * about.deadman)} ms without a command"],
+        ["limits", f"{number(limits.voltage)} V, {number(limits.voltage_slew)} V/s; {number(limits.current)} A, "
+         f"{number(limits.current_slew)} A/s, I2t {number(limits.heat)} A^2 s; {number(limits.rate)} rad/s, armed "
+         f"below {number(limits.arming_rate)} rad/s"],
+        ["a count", ", ".join(quantity(value, unit) for value, unit in _scales(about))],
+        ["sensors", ", ".join(sensors)],
+        ["state", sample.state.name.lower()],
+        *_line(found),
+    ]  # fmt: skip
+    out += columns(rows)
+    for fault in Fault:
+        if fault in sample.faults:
+            out.append(f"  fault: {refusals.words(fault)}")
+            out += [f"    = help: {each}" for each in refusals.remedies(fault)]
+    for warning in found.warnings:
+        out.append(f"  warning: {warning.message}")
+        out += [f"    = help: {each}" for each in warning.help]
+    return out
+
+
+def data(found: Found) -> dict[str, Any]:
+    """The same for programs, SI."""
+    about, sample = found.about, found.sample
+    return {
+        "port": found.port,
+        **{name: value for name, value in asdict(about).items() if name not in ("capabilities", "scales")},
+        "capabilities": [str(each.name).lower() for each in Capability if each in about.capabilities],
+        "scales": asdict(about.scales),
+        "state": sample.state.name.lower(),
+        "sensors": {name: value for name, value, _ in _read(sample)},
+        "faults": [{"name": str(fault.name).lower(), "message": refusals.words(fault), "help": refusals.remedies(fault)}
+                   for fault in Fault if fault in sample.faults],
+        "warnings": [{"code": each.code, "message": each.message, "help": list(each.help)} for each in found.warnings],
+        "line": {
+            "bytes": exchanged(about.capabilities),
+            "bytes_take": found.needed or None,
+            "answered_in": statistics.median(found.trips) if found.trips else None,
+            "answered_in_at_most": max(found.trips, default=None),
+            "fastest_hz": found.fastest if math.isfinite(found.fastest) else None,
+        },
+    }  # fmt: skip
+
+
+def capabilities(about: About) -> list[str]:
+    """In words: those that not every bed has."""
+    words = {
+        Capability.WATCHDOG: "a watchdog of its own", Capability.LOCK_STEP: "no time of its own",
+        Capability.SIMULATED: "no motor: it is simulated",
+    }  # fmt: skip
+    return [words.get(each, str(each.name).lower().replace("_", " "))
+            for each in Capability if each in about.capabilities]  # fmt: skip
+
+
+def _trips(bed: Bed) -> tuple[float, ...]:
+    bed.patience = 0.1
+    trips = []
+    for _ in range(ASKED):
+        begun = time.perf_counter()
+        if bed.look() is not None:
+            trips.append(time.perf_counter() - begun)
+    return tuple(trips)
+
+
+def _scales(about: About) -> list[tuple[float, str]]:
+    s, has = about.scales, about.capabilities
+    found = [(s.voltage, "V"), (s.current, "A"), (s.rate, "rad/s")]
+    others = ((Capability.ENCODER, s.angle, "rad"), (Capability.DRIVE_CURRENT, s.drive_current, "A of the drive"),
+              (Capability.ACCELEROMETER, s.acceleration, "rad/s^2"))  # fmt: skip
+    return found + [(value, unit) for each, value, unit in others if each in has]
+
+
+def _read(sample: Sample) -> list[tuple[str, float, str]]:
+    return [(name, getattr(sample, name), unit) for name, unit in _SENSORS if getattr(sample, name) is not None]
+
+
+def _line(found: Found) -> list[Sequence[str]]:
+    """What is said of the line, and of the rates that it is fast enough for."""
+    if not found.trips and not found.needed:
+        return [["line", "none: the bed is in this process"]]
+    said = []
+    if found.needed:
+        bytes_ = exchanged(found.about.capabilities)
+        said.append(f"{found.baud} baud: {bytes_} bytes an exchange take {1e3 * found.needed:.3g} ms")
+    if found.trips:
+        lost = ASKED - len(found.trips)
+        median, longest = statistics.median(found.trips), max(found.trips)
+        said.append(f"answered in {1e3 * median:.3g} ms, at most {1e3 * longest:.3g} ms, {ASKED} times asked"
+                    + (f", {lost} times without an answer" if lost else ""))  # fmt: skip
+    if not math.isfinite(found.fastest):
+        return [["line", "; ".join(said)], ["rates", "all: the bed waits for the computer"]]
+    words = [f"{hz:g} Hz {'yes' if hz <= found.fastest else 'no'}" for hz in RATES]
+    rates = f"{', '.join(words)}; up to {found.fastest:.3g} Hz, where an exchange takes {LONGEST_SHARE:.0%} of a period"
+    return [["line", "; ".join(said)], ["rates", rates]]

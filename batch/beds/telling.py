@@ -1,0 +1,104 @@
+"""What is told of cases on beds: how far they are while they are driven, then how well the loop kept its time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from batch.beds.executor import OnBeds
+from batch.progress import Bar
+from hw.timing import Spread, Timing, timing
+
+
+class Telling:
+    """The progress of a campaign on beds (batch.drive.Progress), in which a case counts by the time that is driven."""
+
+    def __init__(self, executor: OnBeds, *, quiet: bool, bar: Bar | None = None) -> None:
+        self._executor, self._quiet = executor, quiet
+        self._bar = bar or Bar()
+
+    def begin(self, name: str, cases: int, done: int, failed: int, workers: str) -> None:
+        if not self._quiet:
+            self._bar.begin(name, cases, done, failed, workers)
+
+    def advance(self, done: int, failed: int) -> None:
+        if self._quiet:
+            return
+        driving = self._executor.driving
+        if driving is None:
+            self._bar.advance(done, failed)
+            return
+        seconds = driving.done
+        self._bar.advance(done + seconds / driving.seconds, failed, f"{seconds:.3g} of {driving.seconds:.6g} s")
+
+    def end(self) -> None:
+        if not self._quiet:
+            self._bar.end()
+
+    def say(self, line: str) -> None:
+        """A line, where the bar was."""
+        if not self._quiet:
+            self._bar.end()
+            print(line)
+
+
+def timings(executor: OnBeds) -> dict[str, Timing]:
+    """By joint, over all cases that were driven or taken up; nothing of beds in lock-step, which have no time."""
+    found = {}
+    for joint in executor.ports:
+        cases = [rows[joint] for rows in executor.exchanges.values() if joint in rows]
+        if cases and not executor.lock_step:
+            # a bed's ticks, and the host's clock, begin anew with a case
+            drifts = [timing(rows, executor.tick_hz).drift for rows in cases]
+            known = [drift for drift in drifts if math.isfinite(drift)]
+            drift = float(np.median(known)) if known else math.nan
+            found[joint] = replace(timing(np.concatenate(cases), executor.tick_hz), drift=drift)
+    return found
+
+
+def kept_time(executor: OnBeds) -> list[str]:
+    """How well the loop kept its time, in words."""
+    lines = []
+    for joint, found in timings(executor).items():
+        late = found.woken + found.computed + found.waited
+        parts = [("late by", found.lateness), ("answered in", found.trip), ("computed in", found.computing)]
+        spreads = "; ".join(f"{what} {_us(each.median)}, p99 {_us(each.high)}" for what, each in parts)
+        lines.append(f"{joint}: {found.exchanges:,} exchanges; {spreads}")
+        lines.append(
+            f"  a period late: {late:,} (woken too late {found.woken:,}, computing {found.computed:,}, waiting "
+            f"{found.waited:,}); unanswered: {found.unanswered:,}; the bed's clock: {1e6 * found.drift:+.3g} ppm"
+        )
+    return lines
+
+
+def beside(executor: OnBeds) -> Mapping[str, Any]:
+    """What stands beside the archive: which beds they were, and how well time was kept; s."""
+    executor.know_all()
+    kept = timings(executor)
+    return {"beds": [
+        {"joint": joint, "port": port, "baud": executor.baud, "lock_step": executor.lock_step,
+         "beds": executor.beds[joint], "timing": _figures(kept[joint]) if joint in kept else None}
+        for joint, port in executor.ports.items()
+    ]}  # fmt: skip
+
+
+def _figures(found: Timing) -> dict[str, Any]:
+    spreads = {"lateness": found.lateness, "trip": found.trip, "computing": found.computing}
+    return {
+        "exchanges": found.exchanges, **{name: _spread(each) for name, each in spreads.items()},
+        "woken_late": found.woken, "computed_late": found.computed, "answered_late": found.waited,
+        "unanswered": found.unanswered, "clock": found.drift if math.isfinite(found.drift) else None,
+    }  # fmt: skip
+
+
+def _spread(found: Spread) -> dict[str, float | None]:
+    values = {"median": found.median, "p99": found.high, "p99.9": found.highest, "largest": found.largest}
+    return {name: round(value, 9) if math.isfinite(value) else None for name, value in values.items()}
+
+
+def _us(seconds: float) -> str:
+    return f"{1e6 * seconds:.3g} us"

@@ -1,0 +1,166 @@
+"""A bed led through the moves, in a process of its own: `python -m hw.identify.driving`, told what to do in a line of
+JSON (`Asked`).
+
+It says how it goes on its standard output, a line of JSON each: {"said": words}, {"about": ..., "peaks": ...}, at the
+end {"ended": ...} (`Ended`) or {"wrong": diagnostics}. What came of each exchange is in the records. It stops the bed
+when it is interrupted, terminated, or its parent is no more.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+
+from hw import loop, realtime, refusals, ring
+from hw.bed import Capability, Limits
+from hw.case import LOCK_STEP_PATIENCE, RING_BYTES, end_with_parent, pace_of
+from hw.identify.moves import Guide, Peaks, guided
+from hw.ports import Port, opened
+from hw.records import SIZE
+from hw.writer import Writer
+from met import plan_file
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.render import to_json
+
+SHARE = 0.8
+"""Of a bed's own limit of current and rate, that the moves go to at most."""
+
+TURNS = 4.0
+"""Times the dry friction of the data sheet, that the moves' voltage must come to in torque."""
+
+
+@frozen
+class Asked:
+    """plan: of one experiment, as text (met.plan_file);  row: of its case table;  joint: whose motor is on the bed
+    port, baud, lock_step, transcript: as of hw.ports.Port;  records: the file that they go to
+    sheet: what is believed of the bed, by the names of hw.identify.model.MOTOR, and `v_max`, V
+    voltage, current, rate: the most that the moves may ask for, V, A, rad/s; None: what bed and sheet allow
+    """
+
+    plan: str
+    row: int
+    joint: str
+    port: str
+    records: str
+    sheet: Mapping[str, float]
+    baud: int = 921600
+    lock_step: bool = False
+    transcript: str | None = None
+    voltage: float | None = None
+    current: float | None = None
+    rate: float | None = None
+
+    def text(self) -> str:
+        return json.dumps(asdict(self)) + "\n"
+
+
+@frozen
+class Ended:
+    """began: of each move, the exchange at which the bed was at rest;  lock_step: whether the bed has no time of its
+    own;  seconds: that it took"""
+
+    began: tuple[int, ...]
+    lock_step: bool
+    seconds: float
+
+
+def peaks(limits: Limits, sheet: Mapping[str, float], asked: Asked) -> tuple[Peaks, float]:
+    """What the moves may ask for, and the rate, rad/s, up to which those go that are to reach the drive's largest
+    torque. Raises Problem E421."""
+    for name, value, most, unit in (("voltage", asked.voltage, limits.voltage, "V"),
+                                    ("current", asked.current, limits.current, "A"),
+                                    ("rate", asked.rate, limits.rate, "rad/s")):  # fmt: skip
+        if value is not None and value > most:
+            message = f"a {name} of {value:.6g} {unit} is beyond the bed's limit, {most:.6g} {unit}"
+            raise Problem(error("E421", message, help=f"give `--{name}` less, or leave it out"))
+    voltage = min(limits.voltage, sheet.get("v_max", limits.voltage)) if asked.voltage is None else asked.voltage
+    current = asked.current
+    if current is None:
+        current = min(SHARE * limits.current, sheet["tau_max"] / sheet["kt_load"])
+    rate = SHARE * limits.rate if asked.rate is None else asked.rate
+    kt, resistance = sheet["kt"], sheet["resistance"]
+    if kt / resistance * voltage < TURNS * sheet["f_c"]:
+        least = TURNS * sheet["f_c"] * resistance / kt
+        message = f"{voltage:.3g} V is too little for the moves: the shaft's friction takes {least / TURNS:.3g} V"
+        raise Problem(error("E421", message, help=f"`--voltage`, or the bed's own limit, of {least:.3g} V at least"))
+    free = (voltage - sheet["tau_max"] * resistance / kt) / kt
+    top = 0.75 * free if free > 0.0 else 0.6 * voltage / kt
+    return Peaks(voltage, current, rate), min(top, SHARE * rate)
+
+
+def run(asked: Asked) -> Ended:
+    """Lead the bed through the moves. Raises Problem."""
+    experiment = plan_file.loads(asked.plan).experiments[0]
+    of = pace_of(experiment)
+    stopping: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda which, _: stopping.append(which))
+    end_with_parent()
+    port = Port(asked.port, asked.baud, asked.lock_step, asked.transcript)
+    with opened(port, experiment, asked.joint, asked.row, of.period) as bed:
+        about = bed.connect()
+        for warning in getattr(bed, "warnings", ()):
+            _say(said=warning.message, help=list(warning.help))
+        if Capability.SIMULATED in about.capabilities:
+            bed.preset(seed=experiment.cases.seed)
+        lock_step = Capability.LOCK_STEP in about.capabilities
+        most, top = peaks(about.limits, asked.sheet, asked)
+        scales = about.scales
+        # a command is a whole count, the nearest
+        bed.limit(voltage=most.voltage + scales.voltage, current=most.current + scales.current)
+        # a change of command is of whole counts too
+        slews = [SHARE * slew for slew in (about.limits.voltage_slew, about.limits.current_slew)]
+        guide = Guide(guided(top), most, of.period, (slews[0], slews[1]))
+        _say(about={**asdict(about), "capabilities": int(about.capabilities)}, peaks={**asdict(most), "top": top})
+        for refused in [] if lock_step else realtime.take_precedence():
+            _say(said=refused)
+        bed.patience = LOCK_STEP_PATIENCE if lock_step else max(of.period, 0.002)
+        head = {"joint": asked.joint, "hz": of.hz, "lock_step": lock_step, "tick_hz": about.tick_hz,
+                "bed": about.name, "firmware": about.firmware}  # fmt: skip
+        writer = Writer(ring.make(min(guide.exchanges + 1, RING_BYTES // SIZE)), Path(asked.records),
+                        json.dumps(head).encode())  # fmt: skip
+        try:
+            ended = loop.drive(
+                [bed], guide, of, guide.exchanges, writer.put, lock_step=lock_step,
+                asked_to_stop=lambda: bool(stopping) or guide.done or guide.stuck,
+            )  # fmt: skip
+        finally:
+            if wrong := writer.close():
+                raise Problem(error("E413", wrong, help="free the disk, or give another place with `-o`"))
+        seconds = ended.exchanges * of.period
+        if guide.stuck:
+            when = f"after move {len(guide.began)}" if guide.began else "before the first move"
+            message = f"bed `{about.name}` does not come to rest {when}, at 0 V and 0 A"
+            helps = "look what drives its shaft, and whether its tachometer reads 0 at rest"
+            raise Problem(error("E422", message, help=helps))
+        if not guide.done:
+            remedies = refusals.remedies(ended.faults) or ["run it again, with less else to do for this computer"]
+            remedies.append("`--voltage`, `--current` and `--rate` make the moves smaller")
+            count = len(guide.began)
+            where = f"in move {count} ({guided(top)[count - 1].name})" if count else "before the first move"
+            message = f"bed `{about.name}` at {seconds:.3g} s, {where}: {ended.why}"
+            raise Problem(error("E420", message, help=remedies))
+        return Ended(tuple(guide.began), lock_step, seconds)
+
+
+def _say(**data: object) -> None:
+    print(json.dumps(data), flush=True)
+
+
+def main() -> None:
+    """The process."""
+    try:
+        found = run(Asked(**json.loads(sys.stdin.readline())))
+    except Problem as problem:
+        _say(wrong=json.loads(to_json(problem.diagnostics)))
+        sys.exit(1)
+    _say(ended=asdict(found))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,214 @@
+"""The parameters under which the model does what a bed did, by least squares of what was read, and how sure they are.
+
+Intervals come from groups of moves, not from the residual's variance: what is left is neither white nor of one size,
+and as a shaft that stops does so between two substeps, the sum of squares has many small valleys. So each group is
+fitted by itself, and how far the groups' answers lie apart says how sure all of them are (batch means; Schmeiser,
+Operations Research 30, 1982), with Student's factor for so few.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.special import stdtrit
+
+from hw.identify.model import LANES, MOTOR, PARAMETERS, RIPPLE, simulated
+from hw.identify.series import Series
+from met.frozen import frozen
+
+STEP = 1e-3
+"""Of a logarithm, to take a derivative with: over the moves the times at which the shaft stops average out."""
+
+FLOOR = 1e-3
+"""Half an interval is at least this share of its value, and added to in squares: what the model leaves out, such as a
+torque that is uneven under load, moves all groups alike (by 0.1 % with typical faults)."""
+
+LIMITED = 0.01
+"""Share of the time at which the drive must be at its largest torque, for that to be found."""
+
+VAGUE = 1.0
+"""Half an interval of the logarithm, from which on a parameter counts as not found."""
+
+AWAY = 0.01
+"""Of a logarithm: from so far away each group is fitted, so that no two are caught in the same small valley."""
+
+FIRST = 2
+"""Groups that are fitted together first, from what is believed."""
+
+_TURNS = 30
+_DAMPINGS = 10.0 ** np.arange(-6.0, 4.0)
+
+
+@frozen
+class Estimate:
+    """value: SI;  low, high: ends of the 95 % interval, or the value itself where it is given"""
+
+    value: float
+    low: float
+    high: float
+    found: bool
+
+
+@frozen
+class Found:
+    """parameters: by name, of the motor and the bed;  ripple: rms of the misalignment's torque, N m, once, twice a turn
+    residual   rms of what was read less what is simulated, rad/s, by move;  rate: rms of what was read, rad/s
+    limited    share of the time at which the drive was at its largest torque
+    settled    whether the search came to an end
+    """
+
+    parameters: Mapping[str, Estimate]
+    ripple: tuple[float, float]
+    residual: np.ndarray
+    rate: float
+    limited: float
+    settled: bool
+
+
+def fitted(series: Series, groups: Sequence[int], start: Mapping[str, float]) -> Found:
+    """groups: of each move, from 0 on;  start: parameters to begin with, of `MOTOR`. One that the moves do not tell
+    stays what it is there: `kt_load`, unless the drive motor's current was measured; `tau_max` and `f_v`, where the
+    drive was never at its largest torque.
+    """
+    measured = series.drive_current is not None
+    told = [name for name in MOTOR if name != "kt_load" or measured]
+    parts = [series.of([move for move, its in enumerate(groups) if its == group]) for group in range(max(groups) + 1)]
+    some = series.of([move for move, its in enumerate(groups) if its < FIRST])
+    search = _Search(some, start)
+    search.settle(told)
+    search.settle([*told, *RIPPLE])
+    limited = search.limited()
+    unseen: list[str] = []
+    if limited < LIMITED:
+        unseen = ["tau_max"] if measured else ["tau_max", "f_v"]
+    while True:
+        if unseen:
+            told = [name for name in told if name not in unseen]
+            search.put(unseen, start)
+            search.settle([*told, *RIPPLE])
+        settled, chance = True, np.random.default_rng(0)
+        places = []
+        for part in parts:
+            one = search.over(part, chance.uniform(-AWAY, AWAY, len(PARAMETERS)), [*told, *RIPPLE])
+            settled = one.settle([*told, *RIPPLE]) and settled
+            places.append(one.place)
+        factor = stdtrit(len(parts) - 1, 0.975) / math.sqrt(len(parts))
+        half = dict(zip(PARAMETERS, (factor * np.std(places, axis=0, ddof=1)).tolist(), strict=True))
+        unseen = [name for name in told if not half[name] < VAGUE]
+        if not unseen:
+            break
+    search = search.over(series, np.mean(places, axis=0) - search.place, [*told, *RIPPLE])
+    values = search.values()
+    estimates = {}
+    for name in MOTOR:
+        value, wide = start[name], 1.0
+        if name in told:
+            value, wide = values[name], math.exp(math.hypot(half[name], FLOOR))
+        estimates[name] = Estimate(value, value / wide, value * wide, name in told)
+    ripple = [math.hypot(values[f"sin_{n}"], values[f"cos_{n}"]) / math.sqrt(2.0) for n in (1, 2)]
+    residual = search.residual()
+    counts = np.bincount(series.move, ~np.isnan(series.rate), minlength=series.moves)
+    by_move = np.sqrt(np.bincount(series.move, residual**2, minlength=series.moves) / counts)
+    rate = float(np.sqrt(np.nanmean(series.rate**2)))
+    return Found(estimates, (ripple[0], ripple[1]), by_move, rate, limited, settled)
+
+
+class _Search:
+    """At a place among the parameters: logarithms of `MOTOR`, and `RIPPLE` as shares of the friction to begin with."""
+
+    def __init__(self, series: Series, start: Mapping[str, float]) -> None:
+        self._series = series
+        self._unit = start["f_c"]
+        self.place = np.array([*(math.log(start[name]) for name in MOTOR), *(0.0 for _ in RIPPLE)])
+        self._weights = [1.0, 0.0]
+        self._free: list[int] = []
+
+    def values(self) -> dict[str, float]:
+        return dict(zip(PARAMETERS, self._sets(self.place[None, :])[0].tolist(), strict=True))
+
+    def put(self, names: Sequence[str], values: Mapping[str, float]) -> None:
+        for name in names:
+            self.place[PARAMETERS.index(name)] = math.log(values[name])
+
+    def settle(self, names: Sequence[str]) -> bool:
+        """To the nearest least sum of squares over these parameters, by Levenberg's and Marquardt's method; whether it
+        is one."""
+        self._free = [PARAMETERS.index(name) for name in names]
+        self._weigh()
+        for _ in range(_TURNS):
+            residual, slopes = self._linear()
+            square, pull = slopes.T @ slopes, slopes.T @ residual
+            scale = np.maximum(np.diag(square), 1e-12 * np.diag(square).max())
+            steps = [-np.linalg.solve(square + np.diag(damping * scale), pull) for damping in _DAMPINGS]
+            steps = [step * min(1.0, 0.5 / max(np.abs(step).max(), 1e-300)) for step in steps]
+            places = np.repeat(self.place[None, :], len(steps), axis=0)
+            places[:, self._free] += steps
+            sums = (self._residuals(places) ** 2).sum(axis=0)
+            best = int(np.argmin(sums))
+            before = float(residual @ residual)
+            if not sums[best] < before:
+                return True
+            self.place = places[best]
+            if before - sums[best] < 1e-3 * before or np.abs(steps[best]).max() < 0.1 * FLOOR:
+                return True
+        return False
+
+    def over(self, series: Series, away: np.ndarray, names: Sequence[str]) -> _Search:
+        """Over other steps, from a place that is so far away in these parameters."""
+        found = copy.copy(self)
+        free = [PARAMETERS.index(name) for name in names]
+        found._series, found.place = series, self.place.copy()
+        found.place[free] += away[free]
+        return found
+
+    def residual(self) -> np.ndarray:
+        """Of the rate at each step, rad/s."""
+        read = simulated(self._series, self._sets(self.place[None, :]))
+        return _off(read[0, :, :1], self._series.rate)[:, 0]
+
+    def limited(self) -> float:
+        """Share of the time at which the drive is at its largest torque."""
+        read = simulated(self._series, self._sets(self.place[None, :]))
+        values = self.values()
+        drive = np.abs(read[1, :, 0]) * values["kt"]
+        return float(np.mean(drive > values["tau_max"] * (1.0 - 1e-9)))
+
+    def _sets(self, places: np.ndarray) -> np.ndarray:
+        count = len(MOTOR)
+        return np.column_stack([np.exp(places[:, :count]), places[:, count:] * self._unit])
+
+    def _weigh(self) -> None:
+        """So that rate and current count as what is left of them is large."""
+        if self._series.drive_current is None:
+            return
+        read = simulated(self._series, self._sets(self.place[None, :]))[:, :, 0]
+        measured = (self._series.rate, self._series.drive_current)
+        spreads = [float(np.std(_off(one[:, None], each))) for one, each in zip(read, measured, strict=True)]
+        self._weights = [1.0 / max(spread, 1e-9) for spread in spreads]
+
+    def _residuals(self, places: np.ndarray) -> np.ndarray:
+        """[channel and step, place]."""
+        read = simulated(self._series, self._sets(places))
+        found = [self._weights[0] * _off(read[0], self._series.rate)]
+        if self._series.drive_current is not None:
+            found.append(self._weights[1] * _off(read[1], self._series.drive_current))
+        return np.concatenate(found)
+
+    def _linear(self) -> tuple[np.ndarray, np.ndarray]:
+        """The residual here, and its slopes by each free parameter."""
+        count = len(self._free)
+        assert 2 * count < LANES
+        places = np.repeat(self.place[None, :], 2 * count + 1, axis=0)
+        for n, parameter in enumerate(self._free):
+            places[1 + 2 * n, parameter] += STEP
+            places[2 + 2 * n, parameter] -= STEP
+        found = self._residuals(places)
+        return found[:, 0], (found[:, 1::2] - found[:, 2::2]) / (2.0 * STEP)
+
+
+def _off(read: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """What is simulated less what was read, [step, set]; 0 where nothing was."""
+    return np.nan_to_num(read - measured[:, None], nan=0.0)

@@ -1,0 +1,192 @@
+"""The moves that a bed is led through: each begins at rest and ends at rest, so that each stands by itself.
+
+    steps      of the voltage, both ways, at several levels, and back to 0 V: inertia, and what brakes the shaft
+    loaded     the same under steps of the load's current: the torque that all others are measured by
+    slow       ramps of voltage, and of current, through rest: dry friction, misalignment
+    limited    the largest voltage and 0 V by turns, as the rate goes up and down: the drive's largest torque, and with
+               it what of the braking is friction and what back-EMF
+    mixed      three sines of the voltage and two of the current
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from met.frozen import frozen
+
+SLOW = 2.0
+"""rad/s: a shaft that has been slower for `STILL` s without voltage and current is at rest."""
+STILL = 0.08
+PATIENCE = 3.0
+"""s to wait for that."""
+REST = -1
+"""The number of no move: what was told after the last."""
+
+
+@frozen
+class Peaks:
+    """What the moves may ask for. voltage V, current A;  rate: rad/s, above which a move is over"""
+
+    voltage: float
+    current: float
+    rate: float
+
+
+Profile = Callable[[float, float], tuple[float, float]]
+"""(time from the move's beginning s, rate rad/s) -> voltage and current, as shares of the peaks."""
+
+
+@frozen
+class Move:
+    """name: its kind;  time: s, before it comes to rest"""
+
+    name: str
+    time: float
+    profile: Callable[[], Profile]
+
+
+def guided(top: float) -> tuple[Move, ...]:
+    """All of them. top: rad/s, up to which the `limited` ones go."""
+    return (*_steps(), *_loaded(), *_slow(), *_limited(top), *_mixed())
+
+
+GROUPS = 8
+
+
+def groups(moves: Sequence[Move]) -> list[int]:
+    """The group of each: each of the `GROUPS` has moves of every kind, and tells all by itself."""
+    seen: dict[str, int] = {}
+    found = []
+    for move in moves:
+        found.append(seen.get(move.name, 0) % GROUPS)
+        seen[move.name] = seen.get(move.name, 0) + 1
+    return found
+
+
+def _levels(every: float, *levels: tuple[float, float]) -> Callable[[], Profile]:
+    return lambda: lambda t, w: levels[min(int(t / every), len(levels) - 1)]
+
+
+def _steps() -> list[Move]:
+    pairs = [(0.15, 0.4), (0.3, -0.3), (0.6, 0.2), (0.5, -0.15), (0.25, 0.7), (0.1, -0.12), (0.2, -0.5), (0.35, 0.12)]
+    return [
+        Move("steps", 0.6, _levels(0.3, (sign * a, 0.0), (sign * b, 0.0))) for a, b in pairs for sign in (1.0, -1.0)
+    ]
+
+
+def _loaded() -> list[Move]:
+    found = []
+    for volts, amperes in [(0.3, 0.5), (0.5, -0.6), (0.15, 0.35), (0.4, 0.25)]:
+        for sign in (1.0, -1.0):
+            v, a = sign * volts, sign * amperes
+            found.append(Move("loaded", 0.8, _levels(0.2, (v, 0.0), (v, a), (v, -a), (v, 0.5 * a))))
+    return found
+
+
+def _slow() -> list[Move]:
+    def ramps(volts: float, amperes: float, time: float) -> Callable[[], Profile]:
+        def profile(t: float, w: float) -> tuple[float, float]:
+            turn = math.sin(2.0 * math.pi * t / time)
+            return volts * turn, amperes * turn
+
+        return lambda: profile
+
+    found = []
+    for share in (1.0, -1.0):
+        found += [Move("slow", 1.6, ramps(share * 0.12, 0.0, 1.6)),
+                  Move("slow", 1.6, ramps(share * 0.25, 0.0, 0.8)),
+                  Move("slow", 1.6, ramps(0.0, share * 0.6, 1.6)),
+                  Move("slow", 1.2, ramps(0.0, share * 0.9, 0.6))]  # fmt: skip
+    return found
+
+
+def _limited(top: float) -> list[Move]:
+    def relay(sign: float, load: float, low: float, high: float) -> Callable[[], Profile]:
+        def made() -> Profile:
+            up = True
+
+            def profile(t: float, w: float) -> tuple[float, float]:
+                nonlocal up
+                up = sign * w < (high if up else low)
+                return (sign if up else 0.0), sign * load
+
+            return profile
+
+        return made
+
+    return [
+        Move("limited", 0.8, relay(sign, load, low * top, high * top))
+        for load, low, high in [(0.0, 0.4, 1.0), (0.35, 0.5, 0.9), (-0.35, 0.3, 0.9), (0.0, 0.6, 0.95)]
+        for sign in (1.0, -1.0)
+    ]
+
+
+def _mixed() -> list[Move]:
+    def sines(volts: Sequence[float], amperes: Sequence[float], hertz: Sequence[float]) -> Callable[[], Profile]:
+        def profile(t: float, w: float) -> tuple[float, float]:
+            waves = [math.sin(2.0 * math.pi * f * t) for f in hertz]
+            return (
+                sum(a * wave for a, wave in zip(volts, waves[:3], strict=True)),
+                sum(a * wave for a, wave in zip(amperes, waves[3:], strict=True)),
+            )
+
+        return lambda: profile
+
+    tones = [(1.3, 3.1, 7.9, 2.3, 5.7), (0.9, 2.7, 11.3, 1.7, 8.3), (1.9, 4.3, 13.7, 3.7, 6.1),
+             (2.9, 5.3, 9.1, 1.1, 10.7)]  # fmt: skip
+    return [
+        Move("mixed", 1.2, sines((sign * 0.3, 0.2, sign * 0.15), (0.3, sign * 0.3), each))
+        for each in tones for sign in (1.0, -1.0)
+    ]  # fmt: skip
+
+
+class Guide:
+    """Leads a bed through the moves (`hw.loop.Compute`). period: s, from exchange to exchange; slews: V/s, A/s.
+
+    began  of each move, the exchange whose answer found the bed at rest, from which on it was told the move
+    done   whether all were made, and the bed is at rest
+    stuck  whether a move was not over in time: the bed does not come to rest
+    """
+
+    def __init__(self, moves: Sequence[Move], peaks: Peaks, period: float, slews: tuple[float, float]) -> None:
+        self._moves, self._peaks, self._period = moves, peaks, period
+        self._most = tuple(slew * period for slew in slews)
+        self.began: list[int] = []
+        self.done = self.stuck = False
+        self._profile: Profile | None = None
+        self._since = self._waited = 0  # exchanges: of rest, or of the move; since the last move
+
+    @property
+    def exchanges(self) -> int:
+        """At most."""
+        return sum(math.ceil((move.time + PATIENCE) / self._period) + 1 for move in self._moves) + 1
+
+    def __call__(self, e: int, rates: Sequence[float], told: list[list[float]]) -> None:
+        rate, wanted = rates[0], (0.0, 0.0)
+        if self._profile is None:
+            self._rest(e, rate, told[0])
+        if self._profile is not None:
+            time = self._since * self._period
+            if time >= self._moves[len(self.began) - 1].time - 1e-9 or abs(rate) > self._peaks.rate:
+                self._profile, self._since, self._waited = None, 0, 0
+            else:
+                volts, amperes = self._profile(time, rate)
+                wanted = volts * self._peaks.voltage, amperes * self._peaks.current
+                self._since += 1
+        for n, (value, most) in enumerate(zip(wanted, self._most, strict=True)):
+            told[0][n] += min(max(value - told[0][n], -most), most)
+
+    def _rest(self, e: int, rate: float, told: Sequence[float]) -> None:
+        """Begins the next move where the bed has been at rest for long enough."""
+        still = abs(rate) <= SLOW and told[0] == 0.0 and told[1] == 0.0
+        self._since = self._since + 1 if still else 0
+        self._waited += 1
+        if self._since * self._period >= STILL:
+            if len(self.began) == len(self._moves):
+                self.done = True
+            else:
+                self._profile, self._since = self._moves[len(self.began)].profile(), 0
+                self.began.append(e)
+        elif self._waited * self._period >= PATIENCE:
+            self.stuck = True

@@ -1,0 +1,127 @@
+"""How well this computer and a line keep time, measured with a bed that is not armed, in a process of its own:
+`python -m hw.jitter`, told what to do in a line of JSON (`Asked`).
+
+It runs the loop of `hw.loop` as a run has it, but that the bed is read and told nothing. On its standard output is a
+line of JSON each: {"said": words}, {"about": ...}, at the end {"kept": ...} (`Kept`) or {"wrong": diagnostics}.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from hw import loop, realtime
+from hw.bed import Capability
+from hw.case import end_with_parent, pace_of
+from hw.pace import Pace
+from hw.ports import Port, opened
+from hw.records import ANSWERED, LAYOUT
+from hw.timing import Timing, spread, stops, timing
+from met import plan_file
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.render import to_json
+
+SHORTEST_PATIENCE = 0.002
+"""s to wait for an answer at least, as a run does."""
+
+
+@frozen
+class Asked:
+    """port, baud: where the bed is;  plan, joint: of a simulated one: an experiment, as text (met.plan_file)
+    hz: exchanges a second, 1 a joint each time;  seconds: for so long;  joints: as many as if there were
+    """
+
+    port: str
+    hz: float
+    seconds: float
+    joints: int = 1
+    baud: int = 921600
+    plan: str = ""
+    joint: str = ""
+
+    def text(self) -> str:
+        return json.dumps(asdict(self)) + "\n"
+
+
+@frozen
+class Kept:
+    """seconds: that it took;  timing: lateness of the first exchange of a period, trips of all
+    stops: where a run would have been stopped"""
+
+    seconds: float
+    timing: Timing
+    stops: int
+
+
+def measure(asked: Asked) -> Kept:
+    """Raises Problem."""
+    stopping: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda which, _: stopping.append(which))
+    end_with_parent()
+    experiment = plan_file.loads(asked.plan).experiments[0] if asked.plan else None
+    period = 1.0 / (asked.hz * asked.joints) if experiment is None else pace_of(experiment).period
+    rows: list[bytes] = []
+    with opened(Port(asked.port, asked.baud), experiment, asked.joint, 0, period) as bed:
+        about = bed.connect()
+        _say(about={"name": about.name, "firmware": about.firmware})
+        for warning in getattr(bed, "warnings", ()):
+            _say(said=warning.message, help=list(warning.help))
+        if Capability.LOCK_STEP in about.capabilities:
+            message = f"bed `{about.name}` has no time of its own, so that nothing can be late"
+            raise Problem(error("E426", message, help="a line, or `--port firmware`, has one; `met bed run` drives it"))
+        for refused in realtime.take_precedence():
+            _say(said=refused)
+        bed.patience = max(1.0 / asked.hz, SHORTEST_PATIENCE)
+        begun = time.perf_counter()
+        ended = loop.drive(
+            [bed] * asked.joints, _nothing, Pace(asked.hz, 1), math.ceil(asked.seconds * asked.hz), rows.append,
+            lock_step=False, armed=False,
+            asked_to_stop=lambda: bool(stopping) or time.perf_counter() - begun > asked.seconds,
+        )  # fmt: skip
+        if ended.bed >= 0:
+            message = f"bed `{about.name}` was reset while it was measured"
+            raise Problem(error("E427", message, help="look at its supply, and whether its watchdog resets it"))
+    return kept(np.frombuffer(b"".join(rows), LAYOUT), about.tick_hz, asked.hz)
+
+
+def kept(rows: np.ndarray, tick_hz: float, hz: float) -> Kept:
+    """Of the records of one bed that was looked at once for each joint, at so many Hz."""
+    first = rows[rows["bed"] == 0]
+    own = rows[rows["exchange"] > 0]
+    answered = (own["flags"] & ANSWERED) != 0
+    found = replace(
+        timing(first, tick_hz), exchanges=len(own), trip=spread((own["ended"] - own["began"])[answered]),
+        unanswered=int((~answered).sum()),
+    )  # fmt: skip
+    return Kept(float(rows["ended"][-1]) * 1e-9, found, stops(first, 1.0 / hz))
+
+
+def _nothing(e: int, rates: Sequence[float], told: list[list[float]]) -> None:
+    """What is computed."""
+
+
+def _say(**data: object) -> None:
+    print(json.dumps(data), flush=True)
+
+
+def main() -> None:
+    """The process."""
+    try:
+        found = measure(Asked(**json.loads(sys.stdin.readline())))
+    except Problem as problem:
+        _say(wrong=json.loads(to_json(problem.diagnostics)))
+        sys.exit(1)
+    _say(kept=asdict(found))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,119 @@
+"""What `met bed run` tells of a case while it is driven, and writes beside the archive."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import pytest
+
+import batch
+import ic
+from batch.beds.executor import Driving, OnBeds, Ports
+from batch.beds.telling import Telling, timings
+from batch.beds.telling import beside as written_beside
+from batch.folder import Folder
+from batch.progress import Bar
+from hw import records
+from hw.bed import Fault, Sample, State
+from hw.records import SIZE
+from met import cli
+from tests.batch.beds.test_jitter import rows_of
+from tests.batch.beds.test_probe import DECK
+
+FIGURES = {"median", "p99", "p99.9", "largest"}
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "deck.ic").write_text(DECK)
+    return tmp_path
+
+
+def beside(*words: str) -> object:
+    """What the run wrote of its beds."""
+    assert cli.main(["bed", "run", "deck.ic", *words, "-o", "a.h5", "--no-picture", "-q"]) in (cli.YES, cli.NO)
+    return json.loads(Path("a.h5.run.json").read_text())["beds"]
+
+
+def test_beds_stand_beside_the_archive(here: Path) -> None:
+    [found] = beside("wired", "--port", "firmware")  # type: ignore[misc]
+    timing, beds = found.pop("timing"), found.pop("beds")
+    assert found == {"joint": "shoulder", "port": "firmware", "baud": 921600, "lock_step": False}
+    assert [each["name"] for each in beds] == ["simulated"] and len(beds[0]["firmware"]) == 16
+    assert 0 < timing["exchanges"] <= 1000
+    assert set(timing["lateness"]) == set(timing["trip"]) == set(timing["computing"]) == FIGURES
+    assert 0.0 < timing["trip"]["median"] <= timing["trip"]["p99"] <= timing["trip"]["largest"] < 1.0
+
+
+def test_beds_in_lock_step_have_no_timing(here: Path) -> None:
+    assert beside("wired", "--port", "emulated") == [
+        {"joint": "shoulder", "port": "emulated", "baud": 921600, "lock_step": True,
+         "beds": [{"name": "emulated", "firmware": "0" * 16}], "timing": None},
+    ]  # fmt: skip
+
+
+def test_cases_of_an_earlier_run_count_as_well(here: Path) -> None:
+    executor, folder = OnBeds(Ports({"elbow": "a", "shoulder": "b"}, 921600)), Folder(here / "a.h5.campaign")
+    folder.path.mkdir()
+    executor.open(folder, {}, lambda: None)
+    head = {"joints": ["shoulder", "elbow"], "tick_hz": 1000.0,
+            "beds": [{"name": each, "firmware": "00"} for each in ("one", "two")]}  # fmt: skip
+    sample = Sample(State.ARMED, True, Fault(0), False, 7, 0.0)
+    with (folder.beds / "0-3.records").open("wb") as file:
+        records.begin(file, head)
+        for e in range(3):
+            for bed in range(2):
+                file.write(records.packed(e, bed, 0, (0, 1000, 6000 * (bed + 1), 0), 0.0, 0.0, sample))
+    (folder.beds / "0-4.records").write_bytes(b"nothing")
+    found = {each["joint"]: each for each in written_beside(executor)["beds"]}
+    assert [found[joint]["beds"][0]["name"] for joint in ("shoulder", "elbow")] == ["one", "two"]
+    assert [found[joint]["timing"]["exchanges"] for joint in ("shoulder", "elbow")] == [2, 2]
+    assert [found[joint]["timing"]["trip"]["median"] for joint in ("shoulder", "elbow")] == [5e-6, 11e-6]
+
+
+def test_nothing_of_beds_stands_beside_other_archives(here: Path) -> None:
+    batch.run(ic.compile("deck.ic", select=["wired"]), output="a.h5")
+    assert "beds" not in json.loads(Path("a.h5.run.json").read_text())
+
+
+def test_a_case_is_told_by_the_time_that_is_on_the_disk(here: Path) -> None:
+    stream, now = io.StringIO(), [0.0]
+    executor = OnBeds(Ports({"shoulder": "emulated"}, 921600))
+    telling = Telling(executor, quiet=False, bar=Bar(stream, lambda: now[0]))
+    telling.begin("wired", 4, 1, 0, "emulated")
+    path = here / "0-0.records"
+    path.write_bytes(bytes(15_000 * SIZE))
+    executor.driving = Driving(path, 1000.0, 30.0)
+    now[0] = 10.0
+    telling.advance(1, 0)
+    assert stream.getvalue() == (
+        "wired   38 %  1 of 4 cases, 15 of 30 s  0.05 cases/s  50 s left  emulated\n"
+    )
+    executor.driving = Driving(here / "none", 1000.0, 30.0)
+    assert executor.driving.done == 0.0
+
+
+def test_a_quiet_run_tells_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    telling = Telling(OnBeds(Ports({}, 921600)), quiet=True)
+    telling.begin("wired", 4, 1, 0, "emulated")
+    telling.advance(1, 0)
+    telling.say("anything")
+    telling.end()
+    assert capsys.readouterr() == ("", "")
+
+
+def test_the_clock_of_a_bed_goes_on_from_case_to_case() -> None:
+    """And the host's begins anew: each case has a drift of its own."""
+    executor = OnBeds(Ports({"shoulder": "/dev/ttyUSB0"}, 921600))
+    executor.tick_hz = 1000.0
+    first, second = rows_of(200), rows_of(200)
+    second["tick"] += 54_321
+    second["due"] = second["due"] * (1.0 + 1e-4)
+    second["began"], second["ended"] = second["due"], second["due"]
+    executor.exchanges = {(0, 0): {"shoulder": first}, (0, 1): {"shoulder": second}}
+    found = timings(executor)["shoulder"]
+    assert found.exchanges == 398
+    assert found.drift == pytest.approx(-0.5e-4, rel=1e-3)
