@@ -166,7 +166,10 @@ def test_killed_midway_everything_up_to_then_is_in_the_archive(here: Path) -> No
         time.sleep(0.01)
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
-    time.sleep(0.2)  # the writer, in a session of its own, puts the rest on the disk
+    size = -1
+    while size != path.stat().st_size:  # the writer, in a session of its own, puts the rest on the disk
+        size = path.stat().st_size
+        time.sleep(1.0)
     found = records.read(path)
     assert len(found.rows) > 200 and found.rows["exchange"].tolist() == list(range(len(found.rows)))
     done = subprocess.run(command, capture_output=True, text=True)
