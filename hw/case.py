@@ -7,39 +7,23 @@ It stops its beds when it is interrupted, terminated, or its parent is no more.
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
-import json
-import os
-import signal
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, field
 from pathlib import Path
 from typing import Any
 
-from hw import loop, realtime, ring
+from hw import loop, process
 from hw.bed import About, Bed, Capability
 from hw.driven import LANES, Driven, divisor, substituted
 from hw.pace import Pace, pace
 from hw.ports import Port, opened
-from hw.records import SIZE
-from hw.writer import Writer
+from hw.writer import recording
 from met import plan_file
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.keys import case_seeds
 from met.plan import SEED, Experiment, Formula
-from met.render import to_json
 from met.run import prepare
-
-RING_BYTES = 64 << 20
-"""Of records that may wait for the disk: minutes of them."""
-
-LOCK_STEP_PATIENCE = 1.0
-"""s to wait for a bed that has no time of its own: an emulator may be slow."""
-
-_PR_SET_PDEATHSIG = 1
 
 
 @frozen
@@ -60,9 +44,6 @@ class Asked:
     head: Mapping[str, Any] = field(default_factory=dict)
     transcripts: Mapping[str, str] = field(default_factory=dict)
 
-    def text(self) -> str:
-        return json.dumps(asdict(self)) + "\n"
-
 
 def pace_of(experiment: Experiment) -> Pace:
     """How often the beds of an experiment are spoken to."""
@@ -73,10 +54,7 @@ def run(asked: Asked) -> loop.Ended:
     """Drive the case. Raises Problem."""
     experiment = plan_file.loads(asked.plan).experiments[0]
     of = pace_of(experiment)
-    stopping: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda which, _: stopping.append(which))
-    end_with_parent()
+    asked_to_stop = process.listening()
     joints = substituted(prepare(experiment, wire=True))
     _check_start(experiment, joints, asked.row)
     beds: list[Bed] = []
@@ -91,27 +69,21 @@ def run(asked: Asked) -> loop.Ended:
         prepared = prepare(experiment, wire=True, late=of.late(lock_step), lanes=LANES)
         driven = Driven(prepared, asked.row, of.repeats)
         _check_delay(driven, of, lock_step)
-        for refused in [] if lock_step else realtime.take_precedence():
-            _say(said=refused)
+        if not lock_step:
+            process.precedence()
         driven(0, [0.0] * len(beds), [[0.0, 0.0] for _ in beds])  # code and memory are there when time begins to count
         for bed in beds:
             if asked.rest > 0.0:
                 bed.rest(asked.rest)
-            bed.patience = LOCK_STEP_PATIENCE if lock_step else max(of.period, 0.002)
+            bed.patience = of.patience(lock_step)
         head = {**asked.head, "row": asked.row, "servo_hz": of.servo_hz, "repeats": of.repeats,
                 "lock_step": lock_step, "joints": list(joints), "tick_hz": abouts[0].tick_hz,
                 "beds": [{"name": each.name, "firmware": each.firmware} for each in abouts]}  # fmt: skip
-        rows = min((driven.exchanges + 1) * len(beds), RING_BYTES // SIZE)
-        writer = Writer(ring.make(rows), Path(asked.records), json.dumps(head).encode())
-        try:
-            _say(began=True)
+        with recording(Path(asked.records), head, (driven.exchanges + 1) * len(beds)) as put:
+            process.say(began=True)
             return loop.drive(
-                beds, driven, of, driven.exchanges, writer.put, lock_step=lock_step,
-                asked_to_stop=lambda: bool(stopping),
+                beds, driven, of, driven.exchanges, put, lock_step=lock_step, asked_to_stop=asked_to_stop
             )  # fmt: skip
-        finally:
-            if wrong := writer.close():
-                raise Problem(error("E413", wrong, help="free the disk, or give another place with `-o`"))
     finally:
         for bed in beds:
             bed.close()
@@ -120,9 +92,8 @@ def run(asked: Asked) -> loop.Ended:
 def _greeted(bed: Bed, joint: str, experiment: Experiment, row: int) -> About:
     """Who the bed is; a simulated one begins anew, with the case's noise."""
     about = bed.connect()
-    _say(bed=joint, about={**asdict(about), "capabilities": int(about.capabilities)})
-    for warning in getattr(bed, "warnings", ()):
-        _say(said=warning.message, help=list(warning.help))
+    process.say(bed=joint, about=process.told(about))
+    process.warnings(bed)
     if Capability.SIMULATED in about.capabilities:
         cases = experiment.cases
         seed = int(case_seeds(experiment, [row])[0]) if SEED in cases.noise else cases.seed
@@ -159,30 +130,10 @@ def _check_start(experiment: Experiment, joints: Sequence[str], row: int) -> Non
             raise Problem(error("E416", message, help=f"`initial {{ {joint}.qd = 0 rad/s; }}` in the run"))
 
 
-def end_with_parent() -> None:
-    """Have the system terminate this process when its parent dies."""
-    try:
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-    except (AttributeError, OSError):
-        return
-    if os.getppid() == 1:
-        os.kill(os.getpid(), signal.SIGTERM)
-
-
-def _say(**data: Any) -> None:
-    with contextlib.suppress(BrokenPipeError):  # who started it is no more: the beds are stopped all the same
-        os.write(sys.stdout.fileno(), (json.dumps(data) + "\n").encode())
-
-
-def main() -> None:
-    """The process."""
-    try:
-        ended = run(Asked(**json.loads(sys.stdin.readline())))
-    except Problem as problem:
-        _say(wrong=json.loads(to_json(problem.diagnostics)))
-        sys.exit(1)
-    _say(ended={**asdict(ended), "faults": int(ended.faults)})
+def _driven(asked: Asked) -> dict[str, Any]:
+    ended = run(asked)
+    return {"ended": {**asdict(ended), "faults": int(ended.faults)}}
 
 
 if __name__ == "__main__":
-    main()
+    process.answer(Asked, _driven)

@@ -7,19 +7,16 @@ line of JSON each: {"said": words}, {"about": ...}, at the end {"kept": ...} (`K
 
 from __future__ import annotations
 
-import json
 import math
-import signal
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 
 import numpy as np
 
-from hw import loop, realtime
+from hw import loop, process
 from hw.bed import Capability
-from hw.case import end_with_parent, pace_of
+from hw.case import pace_of
 from hw.pace import Pace
 from hw.ports import Port, opened
 from hw.records import ANSWERED, LAYOUT
@@ -27,10 +24,6 @@ from hw.timing import Timing, spread, stops, timing
 from met import plan_file
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.render import to_json
-
-SHORTEST_PATIENCE = 0.002
-"""s to wait for an answer at least, as a run does."""
 
 
 @frozen
@@ -47,9 +40,6 @@ class Asked:
     plan: str = ""
     joint: str = ""
 
-    def text(self) -> str:
-        return json.dumps(asdict(self)) + "\n"
-
 
 @frozen
 class Kept:
@@ -63,29 +53,25 @@ class Kept:
 
 def measure(asked: Asked) -> Kept:
     """Raises Problem."""
-    stopping: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda which, _: stopping.append(which))
-    end_with_parent()
+    asked_to_stop = process.listening()
     experiment = plan_file.loads(asked.plan).experiments[0] if asked.plan else None
     period = 1.0 / (asked.hz * asked.joints) if experiment is None else pace_of(experiment).period
     rows: list[bytes] = []
     with opened(Port(asked.port, asked.baud), experiment, asked.joint, 0, period) as bed:
         about = bed.connect()
-        _say(about={"name": about.name, "firmware": about.firmware})
-        for warning in getattr(bed, "warnings", ()):
-            _say(said=warning.message, help=list(warning.help))
+        process.say(about={"name": about.name, "firmware": about.firmware})
+        process.warnings(bed)
         if Capability.LOCK_STEP in about.capabilities:
             message = f"bed `{about.name}` has no time of its own, so that nothing can be late"
             raise Problem(error("E426", message, help="a line, or `--port firmware`, has one; `met bed run` drives it"))
-        for refused in realtime.take_precedence():
-            _say(said=refused)
-        bed.patience = max(1.0 / asked.hz, SHORTEST_PATIENCE)
+        process.precedence()
+        of = Pace(asked.hz, 1)
+        bed.patience = of.patience(False)
         begun = time.perf_counter()
         ended = loop.drive(
-            [bed] * asked.joints, _nothing, Pace(asked.hz, 1), math.ceil(asked.seconds * asked.hz), rows.append,
+            [bed] * asked.joints, _nothing, of, math.ceil(asked.seconds * asked.hz), rows.append,
             lock_step=False, armed=False,
-            asked_to_stop=lambda: bool(stopping) or time.perf_counter() - begun > asked.seconds,
+            asked_to_stop=lambda: asked_to_stop() or time.perf_counter() - begun > asked.seconds,
         )  # fmt: skip
         if ended.bed >= 0:
             message = f"bed `{about.name}` was reset while it was measured"
@@ -109,19 +95,5 @@ def _nothing(e: int, rates: Sequence[float], told: list[list[float]]) -> None:
     """What is computed."""
 
 
-def _say(**data: object) -> None:
-    print(json.dumps(data), flush=True)
-
-
-def main() -> None:
-    """The process."""
-    try:
-        found = measure(Asked(**json.loads(sys.stdin.readline())))
-    except Problem as problem:
-        _say(wrong=json.loads(to_json(problem.diagnostics)))
-        sys.exit(1)
-    _say(kept=asdict(found))
-
-
 if __name__ == "__main__":
-    main()
+    process.answer(Asked, lambda asked: {"kept": asdict(measure(asked))})

@@ -10,6 +10,7 @@ import math
 from met.frozen import frozen
 
 SLOWEST_HZ = 500.0
+LOCK_STEP_PATIENCE, SHORTEST_PATIENCE = 1.0, 0.002
 MISSED = 5
 """Exchanges in a row without an answer, or periods that the host is behind, after which it stops."""
 
@@ -30,6 +31,10 @@ class Pace:
     def period(self) -> float:
         """From exchange to exchange, s."""
         return 1.0 / self.hz
+
+    def patience(self, lock_step: bool) -> float:
+        """How long to wait for an answer, s: an emulator that has no time of its own may be slow."""
+        return LOCK_STEP_PATIENCE if lock_step else max(self.period, SHORTEST_PATIENCE)
 
     def late(self, lock_step: bool) -> int:
         """Ticks of the servo that pass between reading a rate and acting on it, at least: a bed with a time of its own

@@ -2,7 +2,7 @@
 
     /dev/ttyUSB0, socket://HOST:PORT   a line, or any other URL of pyserial's
     emulated                           the deck's bed in this process, in lock-step
-    firmware                           the bed's firmware with the deck's bed as its plant, behind a pseudo-terminal
+    firmware                           the bed's firmware with the deck's bed as its plant, a program of its own
     qemu                               the same as it runs on a Cortex-M3, in an emulator
     FILE                               a transcript: what was answered then
 """

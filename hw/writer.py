@@ -8,28 +8,36 @@ has. When the loop is done, or is no more, the pipe ends; then what is left in t
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import select
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
-from hw import records
+from hw import records, ring
 from hw.ring import Ring
+from met.diagnostic import Problem, error
+
+RING_BYTES = 64 << 20
+"""Of records that may wait for the disk: minutes of them."""
 
 PAUSE = 0.005
 """s between looks into the ring."""
 
 
-def write(ring: Ring, pipe: int, path: Path, head: bytes) -> None:
+def write(through: Ring, pipe: int, path: Path, head: bytes) -> None:
     """Write what comes through the ring, until the pipe ends. head: JSON, as it stands before the records."""
     with path.open("xb", buffering=0) as file:
         file.write(records.MAGIC + len(head).to_bytes(8, "little") + head)
         ended = False
         while not ended:
             ended = bool(select.select([pipe], [], [], PAUSE)[0]) and not os.read(pipe, 1)
-            waiting = b"".join(ring.take())
+            waiting = b"".join(through.take())
             while waiting:
                 waiting = waiting[file.write(waiting) :]
         os.fsync(file.fileno())
@@ -38,15 +46,16 @@ def write(ring: Ring, pipe: int, path: Path, head: bytes) -> None:
 class Writer:
     """The writer of one run, from the loop's side. put: takes a record."""
 
-    def __init__(self, ring: Ring, path: Path, head: bytes) -> None:
-        self._ring = ring
-        self.put = ring.put
+    def __init__(self, through: Ring, path: Path, head: bytes) -> None:
+        self._ring = through
+        self.put = through.put
         read, self._alive = os.pipe()
         os.set_inheritable(self._alive, False)
-        command = [sys.executable, "-m", "hw.writer", str(ring.file), str(ring.room), str(read), str(path)]
+        command = [sys.executable, "-m", "hw.writer", str(through.file), str(through.room), str(read), str(path)]
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, pass_fds=[ring.file, read], start_new_session=True
-        )
+            command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, pass_fds=[through.file, read],
+            start_new_session=True,
+        )  # fmt: skip
         os.close(read)
         assert self._process.stdin is not None
         self._process.stdin.write(head)
@@ -62,14 +71,25 @@ class Writer:
         return told
 
 
+@contextlib.contextmanager
+def recording(path: Path, head: Mapping[str, Any], most: int) -> Iterator[Callable[[bytes], None]]:
+    """What takes records, so many at most; all are in the file at the end. Raises Problem E413."""
+    writer = Writer(ring.make(min(most, RING_BYTES // records.SIZE)), path, json.dumps(head).encode())
+    try:
+        yield writer.put
+    finally:
+        if wrong := writer.close():
+            raise Problem(error("E413", wrong, help="free the disk, or give another place with `-o`"))
+
+
 def main() -> None:
     """The process."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # it ends with the loop
-    ring, room, pipe = map(int, sys.argv[1:4])
+    memory, room, pipe = map(int, sys.argv[1:4])
     path = Path(sys.argv[4])
     try:
-        write(Ring(ring, room), pipe, path, sys.stdin.buffer.read())
+        write(Ring(memory, room), pipe, path, sys.stdin.buffer.read())
     except OSError as reason:
         sys.exit(f"cannot write {path}: {(reason.strerror or str(reason)).lower()}")
 

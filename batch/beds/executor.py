@@ -8,12 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
-import select
-import subprocess
-import sys
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +23,7 @@ from batch.folder import Folder
 from batch.tasks import Done, Section, Task
 from hw import records
 from hw.case import Asked, pace_of
+from hw.process import talk
 from met import plan_file
 from met.diagnostic import Problem, error
 from met.frozen import frozen
@@ -44,10 +41,6 @@ class Ports:
     lock_step: bool = False
     rest: float = 0.0
     transcripts: Path | None = None
-
-
-PAUSE = 0.1
-"""s between looks at how far a case is."""
 
 
 @frozen
@@ -174,65 +167,20 @@ class OnBeds:
             baud=ports.baud, rest=ports.rest if self.exchanges else 0.0, head={"key": section.key()},
             transcripts=transcripts,
         )  # fmt: skip
-        process = subprocess.Popen(
-            [sys.executable, "-m", "hw.case"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-        )
-        assert process.stdin is not None and process.stdout is not None
-        with contextlib.suppress(BrokenPipeError):
-            process.stdin.write(asked.text().encode())
-            process.stdin.close()
         structure, schedule = experiment.structure, experiment.structure.schedule
         exchange_hz = pace_of(experiment).hz * len(structure.substitutions)
         self.driving = Driving(path, exchange_hz, schedule.ticks / schedule.base_hz)
         ended: dict[str, Any] | None = None
-        interrupted: KeyboardInterrupt | None = None
-        lines = self._lines(process.stdout.fileno())
         try:
-            while True:
-                try:
-                    for line in lines:
-                        ended = self._heard(line) or ended
-                    break
-                except KeyboardInterrupt as reason:
-                    interrupted = reason
-                    process.terminate()  # which hears an interrupt of a terminal, but not what this one alone was sent
-                    lines = self._lines(process.stdout.fileno())
+            for line in talk("hw.case", asked, self._say, until="began", idle=self._tell):
+                if "about" in line:
+                    about = line["about"]
+                    self._say(f"{line['bed']}: bed `{about['name']}`, firmware {about['firmware']}")
+                ended = line.get("ended", ended)
         except Problem as problem:
             ended = {"why": problem.diagnostics[0].message}
             raise
         finally:
             self.driving = None
-            process.stdout.close()
-            process.wait()
             if ended is not None:
                 told.write_text(json.dumps(ended), encoding="utf-8")
-        if interrupted is not None:
-            raise interrupted
-        if not path.exists():
-            raise Problem(error("E417", f"the process that drives the beds ended with {process.returncode}",
-                                help="the beds stop themselves; run it again"))  # fmt: skip
-
-    def _lines(self, file: int) -> Iterator[dict[str, Any]]:
-        """What comes from a case's process, as it comes; meanwhile it is told how far the case is."""
-        rest = b""
-        while True:
-            if not select.select([file], [], [], PAUSE)[0]:
-                self._tell()
-                continue
-            data = os.read(file, 1 << 16)
-            if not data:
-                return
-            *whole, rest = (rest + data).split(b"\n")
-            yield from map(json.loads, whole)
-
-    def _heard(self, data: dict[str, Any]) -> dict[str, Any] | None:
-        """Takes a line of the case's process; how it ended, when it says so. Raises Problem for what is wrong."""
-        if "wrong" in data:
-            found = data["wrong"]["diagnostics"]
-            raise Problem([error(each["code"], each["message"], help=each["help"]) for each in found])
-        if "said" in data:
-            self._say(" ".join([data["said"], *(f"({each})" for each in data.get("help", ()))]))
-        if "about" in data:
-            about = data["about"]
-            self._say(f"{data['bed']}: bed `{about['name']}`, firmware {about['firmware']}")
-        return data.get("ended")

@@ -6,16 +6,15 @@ import contextlib
 import json
 import math
 import re
-import subprocess
-import sys
 import textwrap
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from batch.beds.asking import meant
 from hw.bed import About, Capability, Limits, Scales
 from hw.identify.driving import Asked
+from hw.process import talk
 from ic.printing.columns import columns
 from met import plan_file
 from met.diagnostic import Problem, error
@@ -242,19 +241,15 @@ def as_data(found: Found, estimates: Mapping[str, Estimate], sheet: Sheet, deck:
 def _driven(asked: Asked, say: Callable[[str], None]) -> tuple[About, dict[str, Any]]:
     """Who the bed is, and how its moves ended. Raises Problem, and KeyboardInterrupt when the bed was stopped by it."""
     about: About | None = None
-    for line in _lines(asked):
-        if "wrong" in line:
-            raise Problem([error(each["code"], each["message"], help=each["help"])
-                           for each in line["wrong"]["diagnostics"]])  # fmt: skip
-        if "said" in line:
-            say("  " + " ".join([line["said"], *(f"({each})" for each in line.get("help", ()))]))
+    found = dict[str, Any]()
+    for line in talk("hw.identify.driving", asked, lambda words: say(f"  {words}"), until="ended"):
         if "about" in line:
             about, most = _about(line["about"]), line["peaks"]
             say(f"bed `{about.name}`, firmware {about.firmware}: moves up to {most['voltage']:.3g} V, "
                 f"{most['current']:.3g} A and {most['rate']:.3g} rad/s, a minute or so")  # fmt: skip
-        if "ended" in line and about is not None:
-            return about, line["ended"]
-    raise Problem(error("E417", "the process that drives the bed ended without a word", help="run it again"))
+        found = line.get("ended", found)
+    assert about is not None
+    return about, found
 
 
 def _about(data: Mapping[str, Any]) -> About:
@@ -262,31 +257,6 @@ def _about(data: Mapping[str, Any]) -> About:
         **data, "capabilities": Capability(data["capabilities"]), "scales": Scales(**data["scales"]),
         "limits": Limits(**data["limits"]),
     })  # fmt: skip
-
-
-def _lines(asked: Asked) -> Iterator[dict[str, Any]]:
-    """What the process says, as it says it."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "hw.identify.driving"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    assert process.stdin is not None and process.stdout is not None
-    interrupted = False
-    try:
-        with contextlib.suppress(BrokenPipeError):
-            process.stdin.write(asked.text())
-            process.stdin.close()
-        while True:
-            try:
-                for line in process.stdout:
-                    yield json.loads(line)
-                break
-            except KeyboardInterrupt:  # which its process hears too, and stops the bed
-                interrupted = True
-    finally:
-        process.stdout.close()
-        process.wait()
-    if interrupted:
-        raise KeyboardInterrupt
 
 
 def _fitted(path: Path, about: About, ended: Mapping[str, Any], sheet: Sheet) -> Found:

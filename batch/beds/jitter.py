@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
-import subprocess
-import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,6 +11,7 @@ from batch.beds.asking import Meant, meant
 from hw.case import pace_of
 from hw.jitter import Asked
 from hw.ports import EMULATED
+from hw.process import talk
 from hw.timing import EDGES
 from ic.printing.columns import columns
 from met import plan_file
@@ -41,17 +39,11 @@ def measured(
     simulated = asked.simulated
     plan = "" if simulated is None else plan_file.dumps(Plan("", (simulated,)))
     question = Asked(asked.port, rate, seconds, joints, baud, plan, asked.joint)
-    said, about, kept = [], dict[str, Any](), None
-    for line in _lines(question):
-        if "wrong" in line:
-            raise Problem([error(each["code"], each["message"], help=each["help"])
-                           for each in line["wrong"]["diagnostics"]])  # fmt: skip
-        if "said" in line:
-            said.append(" ".join([line["said"], *(f"({each})" for each in line.get("help", ()))]))
+    said = list[str]()
+    about, kept = dict[str, Any](), dict[str, Any]()
+    for line in talk("hw.jitter", question, said.append, until="kept", goes_on=True):
         about = line.get("about", about)
         kept = line.get("kept", kept)
-    if kept is None:
-        raise Problem(error("E417", "the process that asks the bed ended without a word", help="run it again"))
     timing = kept["timing"]
     return {
         "port": asked.port, **about, "rate_hz": rate, "joints": joints, "seconds": kept["seconds"],
@@ -129,25 +121,3 @@ def _spread(found: Mapping[str, Any]) -> dict[str, Any]:
         "histogram": [{"from": edges[at], "to": edges[at + 1], "count": count}
                       for at, count in enumerate(found["counts"])],
     }  # fmt: skip
-
-
-def _lines(question: Asked) -> list[dict[str, Any]]:
-    """What the process says. An interrupt, which it hears too, ends the measurement before its time."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "hw.jitter"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    assert process.stdin is not None and process.stdout is not None
-    found = []
-    try:
-        with contextlib.suppress(BrokenPipeError):
-            process.stdin.write(question.text())
-            process.stdin.close()
-        while True:
-            try:
-                found += [json.loads(line) for line in process.stdout]
-                return found
-            except KeyboardInterrupt:
-                continue
-    finally:
-        process.stdout.close()
-        process.wait()

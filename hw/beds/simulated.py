@@ -1,4 +1,4 @@
-"""A bed whose firmware runs here: behind a pseudo-terminal, or in an emulator of a Cortex-M3. No motor turns."""
+"""A bed whose firmware runs here, as a program of this machine or in an emulator of a Cortex-M3. No motor turns."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import Literal
 
 from hw import realtime
 from hw.bed import Capability
-from hw.beds.serial_line import BAUD, SerialLine
+from hw.beds.serial_line import BAUD
 from hw.beds.wire import WireBed
 from hw.build import Config, build, qemu
 from hw.line import Line
@@ -43,10 +43,10 @@ class SimulatedBed(WireBed):
         self._built = build("arm" if kind == "qemu" else "host", config, plant)
         header = {"line": kind, "baud": BAUD, "period": period, "first": self._number}
         self._writer = None if transcript is None else Writer(transcript, header)
-        self._process: subprocess.Popen[str] | None = None
+        self._process: subprocess.Popen[bytes] | None = None
 
     def open(self) -> Line:
-        line = self._behind_a_terminal() if self._kind == "firmware" else self._in_an_emulator()
+        line = self._here() if self._kind == "firmware" else self._in_an_emulator()
         return line if self._writer is None else Recorded(line, self._writer)
 
     def close(self) -> None:
@@ -54,28 +54,23 @@ class SimulatedBed(WireBed):
         if self._process is not None:
             self._process.kill()
             self._process.wait()
-            for pipe in (self._process.stdin, self._process.stdout):
-                if pipe is not None:
-                    pipe.close()
             self._process = None
 
-    def _behind_a_terminal(self) -> Line:
-        pipe = subprocess.PIPE
-        self._process = subprocess.Popen(
-            [str(self._built), "--with-parent"], stdin=pipe, stdout=pipe, text=True, start_new_session=True
-        )
+    def _here(self) -> Line:
+        ours, theirs = socket.socketpair()
+        with theirs:
+            number = theirs.fileno()
+            self._process = subprocess.Popen(
+                [str(self._built), "--line", str(number)], pass_fds=[number], start_new_session=True
+            )
         _put_first(self._process.pid)
-        assert self._process.stdout is not None
-        terminal = self._process.stdout.readline().strip()
-        if not terminal:
-            raise _not_started(f"{self._built} ended with {self._process.wait()}")
-        return SerialLine(terminal, BAUD)
+        return SocketLine(ours)
 
     def _in_an_emulator(self) -> Line:
         with tempfile.TemporaryDirectory(prefix="met-bed-") as folder:
             path = Path(folder) / "line"
             self._process = subprocess.Popen(
-                qemu(self._built, path), text=True, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                qemu(self._built, path), stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                 start_new_session=True,
             )  # fmt: skip
             if not self._lock_step:

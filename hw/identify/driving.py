@@ -8,24 +8,19 @@ when it is interrupted, terminated, or its parent is no more.
 
 from __future__ import annotations
 
-import json
-import signal
-import sys
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
-from hw import loop, realtime, refusals, ring
+from hw import loop, process, refusals
 from hw.bed import Capability, Limits
-from hw.case import LOCK_STEP_PATIENCE, RING_BYTES, end_with_parent, pace_of
+from hw.case import pace_of
 from hw.identify.moves import Guide, Peaks, guided
 from hw.ports import Port, opened
-from hw.records import SIZE
-from hw.writer import Writer
+from hw.writer import recording
 from met import plan_file
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.render import to_json
 
 SHARE = 0.8
 """Of a bed's own limit of current and rate, that the moves go to at most."""
@@ -54,9 +49,6 @@ class Asked:
     voltage: float | None = None
     current: float | None = None
     rate: float | None = None
-
-    def text(self) -> str:
-        return json.dumps(asdict(self)) + "\n"
 
 
 @frozen
@@ -97,15 +89,11 @@ def run(asked: Asked) -> Ended:
     """Lead the bed through the moves. Raises Problem."""
     experiment = plan_file.loads(asked.plan).experiments[0]
     of = pace_of(experiment)
-    stopping: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda which, _: stopping.append(which))
-    end_with_parent()
+    asked_to_stop = process.listening()
     port = Port(asked.port, asked.baud, asked.lock_step, asked.transcript)
     with opened(port, experiment, asked.joint, asked.row, of.period) as bed:
         about = bed.connect()
-        for warning in getattr(bed, "warnings", ()):
-            _say(said=warning.message, help=list(warning.help))
+        process.warnings(bed)
         if Capability.SIMULATED in about.capabilities:
             bed.preset(seed=experiment.cases.seed)
         lock_step = Capability.LOCK_STEP in about.capabilities
@@ -116,22 +104,17 @@ def run(asked: Asked) -> Ended:
         # a change of command is of whole counts too
         slews = [SHARE * slew for slew in (about.limits.voltage_slew, about.limits.current_slew)]
         guide = Guide(guided(top), most, of.period, (slews[0], slews[1]))
-        _say(about={**asdict(about), "capabilities": int(about.capabilities)}, peaks={**asdict(most), "top": top})
-        for refused in [] if lock_step else realtime.take_precedence():
-            _say(said=refused)
-        bed.patience = LOCK_STEP_PATIENCE if lock_step else max(of.period, 0.002)
+        process.say(about=process.told(about), peaks={**asdict(most), "top": top})
+        if not lock_step:
+            process.precedence()
+        bed.patience = of.patience(lock_step)
         head = {"joint": asked.joint, "hz": of.hz, "lock_step": lock_step, "tick_hz": about.tick_hz,
                 "bed": about.name, "firmware": about.firmware}  # fmt: skip
-        writer = Writer(ring.make(min(guide.exchanges + 1, RING_BYTES // SIZE)), Path(asked.records),
-                        json.dumps(head).encode())  # fmt: skip
-        try:
+        with recording(Path(asked.records), head, guide.exchanges + 1) as put:
             ended = loop.drive(
-                [bed], guide, of, guide.exchanges, writer.put, lock_step=lock_step,
-                asked_to_stop=lambda: bool(stopping) or guide.done or guide.stuck,
+                [bed], guide, of, guide.exchanges, put, lock_step=lock_step,
+                asked_to_stop=lambda: asked_to_stop() or guide.done or guide.stuck,
             )  # fmt: skip
-        finally:
-            if wrong := writer.close():
-                raise Problem(error("E413", wrong, help="free the disk, or give another place with `-o`"))
         seconds = ended.exchanges * of.period
         if guide.stuck:
             when = f"after move {len(guide.began)}" if guide.began else "before the first move"
@@ -148,19 +131,5 @@ def run(asked: Asked) -> Ended:
         return Ended(tuple(guide.began), lock_step, seconds)
 
 
-def _say(**data: object) -> None:
-    print(json.dumps(data), flush=True)
-
-
-def main() -> None:
-    """The process."""
-    try:
-        found = run(Asked(**json.loads(sys.stdin.readline())))
-    except Problem as problem:
-        _say(wrong=json.loads(to_json(problem.diagnostics)))
-        sys.exit(1)
-    _say(ended=asdict(found))
-
-
 if __name__ == "__main__":
-    main()
+    process.answer(Asked, lambda asked: {"ended": asdict(run(asked))})

@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import asdict
 from functools import cache, partial
 from pathlib import Path
 
@@ -84,7 +85,8 @@ def _kept() -> tuple[Timing, int]:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "one.records"
             asked = Asked(plan=plan, row=0, ports={"joint2": "firmware"}, records=str(path))
-            done = subprocess.run([sys.executable, "-m", "hw.case"], input=asked.text(), capture_output=True, text=True)
+            command = [sys.executable, "-m", "hw.case"]
+            done = subprocess.run(command, input=json.dumps(asdict(asked)), capture_output=True, text=True)
             last = json.loads(done.stdout.splitlines()[-1]) if done.stdout else {}
             if "ended" not in last:
                 why = last.get("wrong", {}).get("diagnostics", [{"message": done.stderr[-200:]}])[0]["message"]

@@ -1,12 +1,13 @@
-/* bed-host: the firmware on this machine, with a simulated plant, behind a pseudo-terminal.
+/* bed-host: the firmware on this machine, with a simulated plant, behind a pseudo-terminal or a socket.
 
-       bed-host [--log FILE] [--with-parent]
+       bed-host [--log FILE] [--line NUMBER]
 
    Prints the terminal's name as its first line; whoever opens it talks to the bed. Free-running ticks are the plant's
    periods on CLOCK_MONOTONIC; those that were missed are made up for. A client may come and go.
 
    --log FILE      every output that changes: time ns (CLOCK_MONOTONIC), tick, i or v, counts
-   --with-parent   ends when its standard input does, so with the program that started it
+   --line NUMBER   no terminal: the line is this connected socket, inherited from the program that started it; the bed
+                   ends when nobody holds the other end
    SIGHUP          a reboot: power gone and come back
    SIGUSR1         a reset by the watchdog
    SIGTERM         ends */
@@ -14,6 +15,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -74,10 +76,7 @@ static int open_terminal(void)
         return -1;
     }
     cfmakeraw(&mode);
-    if ((tcsetattr(theirs, TCSANOW, &mode) != 0) || (fcntl(ours, F_SETFL, O_NONBLOCK) != 0)) {
-        return -1;
-    }
-    return ours;
+    return (tcsetattr(theirs, TCSANOW, &mode) == 0) ? ours : -1;
 }
 
 /* What waits in the bed goes out as far as the terminal takes it; what it does not take waits in `left`. */
@@ -97,13 +96,13 @@ static void send(int line, uint8_t *left, size_t room, size_t *held)
     }
 }
 
-static int run(int line, bool with_parent)
+static int run(int line)
 {
     const int64_t period = (int64_t)((plant_period * 1e9) + 0.5);
     int64_t due = now_ns() + period;
     uint8_t left[BED_WAITING];
     size_t held = 0u;
-    struct pollfd watched[2] = {{.fd = line}, {.fd = with_parent ? STDIN_FILENO : -1, .events = POLLIN}};
+    struct pollfd watched = {.fd = line};
     sigset_t none;
     (void)sigemptyset(&none);
     for (;;) {
@@ -130,17 +129,20 @@ static int run(int line, bool with_parent)
             rest.tv_sec = ahead / 1000000000;
             rest.tv_nsec = ahead % 1000000000;
         }
-        watched[0].events = (held > 0u) ? (POLLIN | POLLOUT) : POLLIN;
-        const int ready = ppoll(watched, 2u, board_is_in_lock_step() ? NULL : &rest, &none);
+        watched.events = (held > 0u) ? (POLLIN | POLLOUT) : POLLIN;
+        const int ready = ppoll(&watched, 1u, board_is_in_lock_step() ? NULL : &rest, &none);
         if ((ready < 0) && (errno != EINTR)) {
             return fail("ppoll");
         }
         if (ready <= 0) {
             continue;
         }
-        uint8_t bytes[256];
-        if ((watched[0].revents & POLLIN) != 0) {
+        if ((watched.revents & (POLLIN | POLLHUP)) != 0) {
+            uint8_t bytes[256];
             const ssize_t came = read(line, bytes, sizeof bytes);
+            if ((came == 0) || ((came < 0) && (errno == ECONNRESET))) { /* a socket's; a terminal is held open here */
+                return 0;
+            }
             for (ssize_t at = 0; at < came; at++) { /* each answer goes out before the next is made */
                 board_receive(&bytes[at], 1u);
                 if (bytes[at] == 0u) {
@@ -149,18 +151,22 @@ static int run(int line, bool with_parent)
             }
         }
         send(line, left, sizeof left, &held);
-        if ((watched[1].revents != 0) && (read(STDIN_FILENO, bytes, sizeof bytes) <= 0)) {
-            return 0;
-        }
     }
 }
 
 int main(int count, char **words)
 {
-    bool with_parent = false;
+    int line = -1;
     for (int k = 1; k < count; k++) {
-        if (strcmp(words[k], "--with-parent") == 0) {
-            with_parent = true;
+        char *end = NULL;
+        if ((strcmp(words[k], "--line") == 0) && (k + 1 < count) && (line < 0)) {
+            k++;
+            const long number = strtol(words[k], &end, 10);
+            line = ((end == words[k]) || (*end != '\0') || (number < 0) || (number > INT_MAX)) ? -1 : (int)number;
+            if ((line < 0) || (fcntl(line, F_GETFD) < 0)) {
+                errno = EBADF;
+                return fail(words[k]);
+            }
         } else if ((strcmp(words[k], "--log") == 0) && (k + 1 < count) && (log_file == NULL)) {
             k++;
             log_file = fopen(words[k], "w");
@@ -170,7 +176,7 @@ int main(int count, char **words)
             (void)setvbuf(log_file, NULL, _IOLBF, 0u);
             board_listener = log_output;
         } else {
-            (void)fprintf(stderr, "usage: bed-host [--log FILE] [--with-parent]\n");
+            (void)fprintf(stderr, "usage: bed-host [--log FILE] [--line NUMBER]\n");
             return 2;
         }
     }
@@ -187,13 +193,15 @@ int main(int count, char **words)
     (void)signal(SIGPIPE, SIG_IGN);
 
     board_boot(BED_POWER);
-    const int line = open_terminal();
     if (line < 0) {
-        return fail("no pseudo-terminal");
+        line = open_terminal();
+        if (line < 0) {
+            return fail("no pseudo-terminal");
+        }
+        (void)printf("%s\n", ptsname(line));
+        if (fflush(stdout) != 0) {
+            return fail("standard output");
+        }
     }
-    (void)printf("%s\n", ptsname(line));
-    if (fflush(stdout) != 0) {
-        return fail("standard output");
-    }
-    return run(line, with_parent);
+    return (fcntl(line, F_SETFL, O_NONBLOCK) == 0) ? run(line) : fail("the line");
 }

@@ -199,7 +199,7 @@ error[E413]: the file of records of case #0 holds no records of a bed
 def test_a_process_that_ends_without_a_word_is_told(
     bed: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("batch.beds.executor.sys.executable", "/bin/false")
+    monkeypatch.setattr("hw.process.sys.executable", "/bin/false")
     status, _, complaint = bed("wired", "--port", "emulated", "-o", "a.h5")
     assert status == cli.BAD_INPUT
     assert complaint.endswith("""\

@@ -47,8 +47,8 @@ run wired like hybrid {
 }
 """
 NS = 1e-9
-SLACK = 0.040
-"""s, for a machine that is busy."""
+SLACK = 0.010
+"""s between a signal that is sent and the process's end, and from the tick that is due to its log."""
 
 # ns, i or v, counts: outputs that changed.
 Log = list[tuple[int, str, int]]
@@ -86,12 +86,21 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@contextlib.contextmanager
+def begun(here: Path) -> Iterator[BedHost]:
+    """It lives as long as the block."""
+    found = BedHost(ic.compile("deck.ic", select=["wired"]).experiments[0], here / "log")
+    try:
+        yield found
+    finally:
+        found.process.kill()
+        found.process.communicate()
+
+
 @pytest.fixture
 def host(here: Path) -> Iterator[BedHost]:
-    found = BedHost(ic.compile("deck.ic", select=["wired"]).experiments[0], here / "log")
-    yield found
-    found.process.kill()
-    found.process.communicate()
+    with begun(here) as found:
+        yield found
 
 
 def command(terminal: str) -> list[str]:
@@ -103,7 +112,7 @@ def running(terminal: str, here: Path, *words: str) -> subprocess.Popen[str]:
     """`met bed run`, once it has exchanged 300 times and the drive turns. A machine that is busy for 10 ms ends a run,
     which then is begun anew."""
     path = here / "a.h5.campaign" / "beds" / "0-0.records"
-    for _ in range(10):
+    for _ in range(30):
         process = subprocess.Popen([*command(terminal), *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                    text=True, start_new_session=True)  # fmt: skip
         while not path.exists() or path.stat().st_size < 300 * records.SIZE:
@@ -119,19 +128,36 @@ def running(terminal: str, here: Path, *words: str) -> subprocess.Popen[str]:
     raise AssertionError("this machine is too busy for exchanges at 500 Hz")
 
 
-def test_a_host_that_is_killed_leaves_safe_outputs_and_all_of_its_records(host: BedHost, here: Path) -> None:
+def test_a_host_that_is_killed_leaves_safe_outputs_and_all_of_its_records(here: Path) -> None:
+    """Within the deadman's time; where the bed's own process was not woken then, once more."""
+    for _ in range(5):
+        with begun(here) as host:
+            late = killed(host, here)
+            if late < emulated.DEADMAN + PERIOD + SLACK:
+                break
+        for left in (here / "a.h5", here / "a.h5.run.json", here / "log"):
+            left.unlink()
+    else:
+        raise AssertionError(f"safe {late:.3f} s after the kill")
+
+
+def killed(host: BedHost, here: Path) -> float:
+    """s from the kill to the last output that changed."""
     process = running(host.terminal, here)
-    killed = time.monotonic_ns()
+    path = here / "a.h5.campaign" / "beds" / "0-0.records"
+    at = time.monotonic_ns()
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
-    time.sleep(0.3)  # the writer, in a session of its own, puts the rest on the disk
+    size = -1
+    while size != path.stat().st_size:  # the writer, in a session of its own, puts the rest on the disk
+        size = path.stat().st_size
+        time.sleep(0.5)
     log = host.log()
     assert [each[1:] for each in log[-2:]] == [("i", 0), ("v", 0)]
-    assert (log[-1][0] - killed) * NS < emulated.DEADMAN + PERIOD + SLACK
     assert host.faults() == (State.STOPPED, Fault.DEADMAN)
 
-    found = records.read(here / "a.h5.campaign" / "beds" / "0-0.records")
-    assert found.rows["exchange"].tolist() == list(range(len(found.rows))) and len(found.rows) >= 300
+    found = records.read(path)
+    assert found.rows["exchange"].tolist() == list(range(len(found.rows))) and len(found.rows) >= 290  # and a head
     # of the commands that reached an output the last is recorded, or was under way
     told = [counts for _, output, counts in log[:-2] if output == "v"]
     assert round(float(found.rows["voltage"][-1]) / host.values["converter_voltage"]) in told[-2:]
@@ -144,6 +170,7 @@ def test_a_host_that_is_killed_leaves_safe_outputs_and_all_of_its_records(host: 
     assert len(host.log()) == len(log)  # it was not driven again
     held = data["shoulder.bed.load_current"].values[0, : int(data.n_valid[0])]
     assert np.isfinite(held).all() and np.abs(held).max() > 0.01
+    return (log[-1][0] - at) * NS
 
 
 @pytest.mark.parametrize(("how", "status"), [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import struct
 import subprocess
 import time
@@ -14,7 +15,7 @@ import pytest
 
 from hw.build import build
 from tests.hw.firmware import wire
-from tests.hw.firmware.line import FREE, PLANT, STEPPED, Line, behind_a_terminal
+from tests.hw.firmware.line import FREE, PLANT, STEPPED, Line, behind_a_terminal, ended
 
 pytestmark = pytest.mark.alone
 
@@ -188,23 +189,33 @@ def test_frames_at_once_are_answered_one_by_one() -> None:
         assert [wire.told(each).number for each in wire.payloads(came)] == list(range(1, 101))
 
 
-@pytest.mark.parametrize("how", ["its parent's end", "SIGTERM"])
-def test_it_ends(how: str) -> None:
-    with behind_a_terminal(FREE, "--with-parent") as (line, process):
+def test_it_ends_when_it_is_told() -> None:
+    with behind_a_terminal(FREE) as (line, process):
         line.greet()
-        assert process.stdin is not None
-        if how == "SIGTERM":
-            process.terminate()
-        else:
-            process.stdin.close()
+        process.terminate()
         assert process.wait(5.0) == 0
 
 
-@pytest.mark.parametrize("words", [["--log"], ["--lock-step"], ["--log", "/nowhere/at/all"]])
+def test_on_a_socket_it_answers_and_ends_when_nobody_is_at_the_other_end() -> None:
+    ours, theirs = socket.socketpair()
+    with ours:
+        number = theirs.fileno()
+        process = subprocess.Popen([build("host", FREE, PLANT), "--line", str(number)], pass_fds=[number])
+        with ended(process):
+            theirs.close()
+            Line(ours.fileno()).greet()
+            ours.close()
+            assert process.wait(5.0) == 0
+
+
+@pytest.mark.parametrize("words", [
+    ["--log"], ["--lock-step"], ["--line"], ["--log", "/nowhere/at/all"], ["--line", "77"], ["--line", "0x3"],
+])  # fmt: skip
 def test_what_it_does_not_understand_it_says(words: list[str]) -> None:
     program = build("host", FREE, PLANT)
     done = subprocess.run([program, *words], capture_output=True, text=True, stdin=subprocess.DEVNULL)
-    if words[-1].startswith("/"):
-        assert (done.returncode, done.stderr) == (1, "bed-host: /nowhere/at/all: No such file or directory\n")
+    why = {"/nowhere/at/all": "No such file or directory", "77": "Bad file descriptor", "0x3": "Bad file descriptor"}
+    if words[-1] in why:
+        assert (done.returncode, done.stderr) == (1, f"bed-host: {words[-1]}: {why[words[-1]]}\n")
     else:
-        assert (done.returncode, done.stderr) == (2, "usage: bed-host [--log FILE] [--with-parent]\n")
+        assert (done.returncode, done.stderr) == (2, "usage: bed-host [--log FILE] [--line NUMBER]\n")

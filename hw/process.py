@@ -1,0 +1,149 @@
+"""A process of its own that speaks to beds, and who started it: what is told it, and what it says.
+
+It is asked one thing, a frozen dataclass, in a line of JSON on its standard input, and answers in lines of JSON:
+{"said": words, "help": [...]} for people, {"wrong": diagnostics} where it cannot go on, and what else it has to say.
+It hears when it is interrupted or terminated, and is terminated when who started it is no more: its beds are stopped.
+
+    in the process     listening, say, warnings, precedence; answer
+    who started it     talk
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict
+from typing import Any, TypeVar
+
+from hw import realtime
+from hw.bed import About, Bed
+from met.diagnostic import Problem, error
+from met.render import to_json
+
+PAUSE = 0.1
+"""s between two looks at how far it is, while nothing is said."""
+
+_PR_SET_PDEATHSIG = 1
+
+Question = TypeVar("Question")
+
+
+# In the process
+
+
+def listening() -> Callable[[], bool]:
+    """Hear signals from here on; whether one has asked to stop."""
+    heard: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda which, _: heard.append(which))
+    with contextlib.suppress(AttributeError, OSError):
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+        if os.getppid() == 1:  # who started it was gone before
+            os.kill(os.getpid(), signal.SIGTERM)
+    return lambda: bool(heard)
+
+
+def say(**data: Any) -> None:
+    """A line, whoever still reads it."""
+    with contextlib.suppress(BrokenPipeError):
+        os.write(sys.stdout.fileno(), (json.dumps(data) + "\n").encode())
+
+
+def told(about: About) -> dict[str, Any]:
+    """Who a bed is, to be said."""
+    return {**asdict(about), "capabilities": int(about.capabilities)}
+
+
+def warnings(bed: Bed) -> None:
+    """Say what may make exchanges with a bed late."""
+    for warning in getattr(bed, "warnings", ()):
+        say(said=warning.message, help=list(warning.help))
+
+
+def precedence() -> None:
+    """Take precedence over other processes, and say what was not allowed."""
+    for refused in realtime.take_precedence():
+        say(said=refused)
+
+
+def answer(question: Callable[..., Question], do: Callable[[Question], Mapping[str, Any]]) -> None:
+    """All of the process: read what is asked, do it, and say what came of it or what is wrong."""
+    try:
+        found = do(question(**json.loads(sys.stdin.readline())))
+    except Problem as problem:
+        say(wrong=json.loads(to_json(problem.diagnostics)))
+        sys.exit(1)
+    say(**found)
+
+
+# Who started it
+
+
+def talk(
+    module: str,
+    question: Any,
+    hear: Callable[[str], None],
+    *,
+    until: str = "",
+    idle: Callable[[], None] = lambda: None,
+    goes_on: bool = False,
+) -> Iterator[dict[str, Any]]:
+    """Start `python -m MODULE`, ask it, and give what it says, line by line. Raises Problem for what it says is wrong.
+
+    hear     takes what is for people
+    until    a word that must come; where the process ends without it, that is Problem E417
+    idle     called now and then while it says nothing
+    goes_on  whether an interrupt, which ends the process, ends no more than that; else it is raised in the end
+    """
+    process = subprocess.Popen([sys.executable, "-m", module], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert process.stdin is not None and process.stdout is not None
+    interrupted: KeyboardInterrupt | None = None
+    came = False
+    try:
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.write((json.dumps(asdict(question)) + "\n").encode())
+            process.stdin.close()
+        rest, file = b"", process.stdout.fileno()
+        while True:
+            try:
+                if not select.select([file], [], [], PAUSE)[0]:
+                    idle()
+                    continue
+                data = os.read(file, 1 << 16)
+            except KeyboardInterrupt as reason:
+                interrupted = reason
+                process.terminate()  # it hears an interrupt of the terminal, but not one that this alone was sent
+                continue
+            if not data:
+                break
+            *whole, rest = (rest + data).split(b"\n")
+            for line in map(json.loads, whole):
+                if "wrong" in line:
+                    found = line["wrong"]["diagnostics"]
+                    raise Problem([error(each["code"], each["message"], help=each["help"]) for each in found])
+                if "said" in line:
+                    hear(" ".join([line["said"], *(f"({each})" for each in line.get("help", ()))]))
+                came = came or until in line
+                yield line
+    except BaseException:  # also of whoever reads the lines
+        process.terminate()
+        raise
+    finally:
+        process.stdout.close()
+        process.wait()
+    if interrupted is not None and not goes_on:
+        raise interrupted
+    if until and not came:
+        raise ended(process.returncode)
+
+
+def ended(status: int) -> Problem:
+    message = f"the process that drives the beds ended with {status}"
+    return Problem(error("E417", message, help="the beds stop themselves; run it again"))
