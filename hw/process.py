@@ -107,8 +107,9 @@ def talk(
     interrupted: KeyboardInterrupt | None = None
     came = False
     try:
-        with contextlib.suppress(BrokenPipeError):
+        with contextlib.suppress(BrokenPipeError):  # it may have ended already
             process.stdin.write((json.dumps(asdict(question)) + "\n").encode())
+        with contextlib.suppress(BrokenPipeError):
             process.stdin.close()
         rest, file = b"", process.stdout.fileno()
         while True:

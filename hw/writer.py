@@ -65,7 +65,8 @@ class Writer:
         """Have all of it on the disk; why it is not, in words, "" where it is."""
         os.close(self._alive)
         assert self._process.stderr is not None
-        told = self._process.stderr.read().decode("utf-8", "replace").strip()
+        with self._process.stderr as stderr:
+            told = stderr.read().decode("utf-8", "replace").strip()
         self._process.wait()
         self._ring.close()
         return told

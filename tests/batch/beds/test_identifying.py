@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -149,8 +148,7 @@ def test_moves_that_are_cut_short(
     bed = Driven(Plant(of, "shoulder", period=1e-3), emulated.scales(values), limits)
     bed.driven = rate is None
     monkeypatch.setattr(driving, "opened", lambda *_: bed)
-    monkeypatch.setattr(driving, "end_with_parent", lambda: None)
-    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    monkeypatch.setattr("hw.process.listening", lambda: lambda: False)
     sheet = dict(sheet_of(of, "shoulder", None).values)
     asked = Asked(plan=plan_file.dumps(Plan("", (of,))), row=0, joint="shoulder", port="emulated",
                   records=str(here / "a.records"), sheet=sheet, rate=rate)  # fmt: skip
