@@ -83,16 +83,19 @@ class Unsound(Exception):
 
 
 def read(path: Path) -> Records:
-    """All records up to the first that is not sound. Raises Unsound, OSError."""
+    """All records up to the first that is not sound; none, and no head, of a file that ends before the first. Raises
+    Unsound, OSError."""
     data = path.read_bytes()
-    if not data.startswith(MAGIC) or len(data) < len(MAGIC) + 8:
+    if not data.startswith(MAGIC[: len(data)]):
         raise Unsound("holds no records of a bed")
     at = len(MAGIC) + 8
     end = at + int.from_bytes(data[len(MAGIC) : at], "little")
+    if len(data) < max(at, end):
+        return Records({}, np.empty(0, LAYOUT), len(data))
     try:
         head = json.loads(data[at:end])
     except ValueError as reason:
-        raise Unsound("is cut short, before the first record") from reason
+        raise Unsound("has a head that is damaged") from reason
     count = (len(data) - end) // SIZE
     rows = np.frombuffer(data, LAYOUT, count, end)
     for n in range(count):

@@ -1,7 +1,7 @@
 """Cases on motor beds, one after another: each in a process of its own, its records made into a shard at its end.
 
 A case whose records are there already, because whoever drove it was killed, is not driven again: what was recorded is
-what came of it.
+what came of it. Where a bed was never armed, nothing came of it.
 """
 
 from __future__ import annotations
@@ -29,6 +29,9 @@ from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Plan
 from met.run import FAILED
+
+FATES = ("E401", "E408")
+"""What may come of a bed that is armed: its line is lost, a command is no number or beyond a limit."""
 
 
 @frozen
@@ -68,7 +71,7 @@ class OnBeds:
     def __init__(self, ports: Ports, say: Callable[[str], None] = lambda _: None) -> None:
         self._ports, self._say = ports, say
         self._waiting: deque[Task] = deque()
-        self._driven = 0
+        self._told: dict[str, str] = {}
         self.about = ", ".join(dict.fromkeys(ports.by_joint.values()))
         self.exchanges: dict[tuple[int, int], dict[str, np.ndarray]] = {}
         """Records by section's experiment and row, and joint, of the cases that were driven, taken up, or known."""
@@ -118,13 +121,17 @@ class OnBeds:
         """What came of a case, and why it ended early, "" where it did not."""
         path = self._folder.beds / f"{section.experiment}-{row}.records"
         told = path.with_suffix(".ended")
-        if not path.exists():
-            self._drive(section, row, path, told)
         try:
+            if not _recorded(path):
+                path.unlink(missing_ok=True)
+                self._drive(section, row, path, told)
             found = made(path, section.prepared, row)
-        except (records.Unsound, OSError) as reason:
+        except records.Unsound as reason:
             message = f"the file of records of case #{row} {reason}"
             raise Problem(error("E413", message, help=f"remove {path}")) from None
+        except OSError as reason:
+            message = f"the records of case #{row}, {reason.filename or path}: {reason.strerror or reason}"
+            raise Problem(error("E413", message, help="is the disk full? who may write there?")) from None
         self._know(section.experiment, row, found.head, found.exchanges)
         if found.whole:
             return found, ""
@@ -155,7 +162,7 @@ class OnBeds:
                 self._know(int(experiment), int(row), found.head, rows)
 
     def _drive(self, section: Section, row: int, path: Path, told: Path) -> None:
-        """Raises Problem, and KeyboardInterrupt when the case's process has stopped the beds."""
+        """Raises Problem, OSError, and KeyboardInterrupt when the case's process has stopped the beds."""
         ports = self._ports
         experiment = section.prepared.experiment
         plan = plan_file.dumps(Plan("", (replace(experiment, notes=()),)))
@@ -174,13 +181,24 @@ class OnBeds:
         try:
             for line in talk("hw.case", asked, self._say, until="began", idle=self._tell):
                 if "about" in line:
-                    about = line["about"]
-                    self._say(f"{line['bed']}: bed `{about['name']}`, firmware {about['firmware']}")
+                    self._greeted(line["bed"], f"bed `{line['about']['name']}`, firmware {line['about']['firmware']}")
                 ended = line.get("ended", ended)
         except Problem as problem:
             ended = {"why": problem.diagnostics[0].message}
-            raise
+            if problem.diagnostics[0].code not in FATES or not _recorded(path):
+                raise
         finally:
             self.driving = None
             if ended is not None:
                 told.write_text(json.dumps(ended), encoding="utf-8")
+
+    def _greeted(self, joint: str, bed: str) -> None:
+        """Say which bed it is, where it is not the one of the case before."""
+        if self._told.get(joint) != bed:
+            self._told[joint] = bed
+            self._say(f"{joint}: {bed}")
+
+
+def _recorded(path: Path) -> bool:
+    """Whether there are records of a bed that was armed. Raises records.Unsound, OSError."""
+    return path.exists() and len(records.read(path).rows) > 0

@@ -20,6 +20,10 @@ from met.run import STOPPED, Prepared
 
 FAILURE, TICK = OUTPUTS.index("failure"), OUTPUTS.index("failure.tick")
 
+HEAD = {"key", "row", "joints", "beds", "tick_hz", "repeats"}
+"""Of a case's records."""
+
+
 @frozen
 class Made:
     """rows: histories [row, column];  outputs: [output];  whole: whether the case reached its end
@@ -48,6 +52,8 @@ def read_rates(found: records.Records, beds: int) -> np.ndarray:
 def made(path: Path, prepared: Prepared, row: int) -> Made:
     """What a case's records say. prepared: with its wires open. Raises records.Unsound, OSError."""
     found = records.read(path)
+    if HEAD - set(found.head):
+        raise records.Unsound("was written by another version of MET")
     driven = Driven(prepared, row)
     beds = len(driven.joints)
     rows, outputs, done = driven.again(read_rates(found, beds))

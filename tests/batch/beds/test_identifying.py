@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -45,23 +46,10 @@ run found like wired {
 TRUTH = {"kt": 0.067, "resistance": 1.8, "tau_max": 0.144, "f_c": 0.024, "f_v": 2.58e-5, "inertia": 7e-5, "f_cut": 50.0}
 
 
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "deck.ic").write_text(DECK)
-    return tmp_path
-
-
 @pytest.fixture
-def identify(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+def identify(met_bed: Callable[..., tuple[int, str, str]]) -> Callable[..., tuple[int, str, str]]:
     """`met bed identify deck.ic wired ...`: exit status, what was said, and what was complained of."""
-
-    def run(*words: str) -> tuple[int, str, str]:
-        status = cli.main(["bed", "identify", "deck.ic", "wired", *words])
-        told = capsys.readouterr()
-        return status, told.out, told.err
-
-    return run
+    return partial(met_bed, "identify", "deck.ic", "wired")
 
 
 def wired() -> Experiment:

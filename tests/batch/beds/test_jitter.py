@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pytest
@@ -18,31 +18,17 @@ from hw.jitter import kept
 from hw.pace import Pace
 from hw.records import ANSWERED, LATE_WOKEN, LAYOUT
 from met import cli
-from tests.batch.beds.test_probe import DECK, HELLO, READ, STOP, Listening
-from tests.hw.conftest import on_pty
+from tests.batch.beds.listening import DECK, HELLO, READ, STOP, Listening
 
 pytestmark = pytest.mark.alone
 
-__all__ = ["on_pty"]
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "deck.ic").write_text(DECK)
-    return tmp_path
+__all__ = ["DECK"]  # deck.ic
 
 
 @pytest.fixture
-def jitter(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+def jitter(met_bed: Callable[..., tuple[int, str, str]]) -> Callable[..., tuple[int, str, str]]:
     """`met bed jitter ...`: exit status, what was said, and what was complained of."""
-
-    def run(*words: str) -> tuple[int, str, str]:
-        status = cli.main(["bed", "jitter", *words])
-        told = capsys.readouterr()
-        return status, told.out, told.err
-
-    return run
+    return partial(met_bed, "jitter")
 
 
 def test_a_bed_behind_a_pseudo_terminal(jitter: Callable[..., tuple[int, str, str]]) -> None:

@@ -4,65 +4,24 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from hw.beds import serial_line
 from met import cli
-from tests.hw.conftest import on_pty
-from tests.hw.device import DEAD, DEADMAN, STOPPED, Device, payload
+from tests.batch.beds.listening import DECK, HELLO, READ, STOP, Listening
+from tests.hw.device import DEAD, DEADMAN, STOPPED, Device
 
 pytestmark = pytest.mark.alone
 
-__all__ = ["on_pty"]
-
-DECK = """\
-#include <two_link.ic>
-run wired like nominal {
-    rates    { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }
-    duration = 1 s;
-    record   = [q];
-    remove settle;
-    remove volts;
-    substitute shoulder { bed = emulated(delay = 1, faults = typical);  law = velocity_tracking; }
-}
-run both like wired { substitute elbow { bed = emulated(delay = 1);  law = velocity_tracking; } }
-run soft like wired { remove shoulder; }
-"""
-
-HELLO, STOP, READ = 1, 6, 8
-
-
-class Listening(Device):
-    """A device that keeps the kinds of the messages that it was sent."""
-
-    def boot(self) -> None:
-        super().boot()
-        self.kinds: list[int] = []
-
-    def take(self, data: bytes) -> bytes:
-        self.kinds += [found[0] for each in data.split(b"\0")[:-1] if (found := payload(each)) is not None]
-        return super().take(data)
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "deck.ic").write_text(DECK)
-    return tmp_path
-
+__all__ = ["DECK"]  # deck.ic
 
 @pytest.fixture
-def probe(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+def probe(met_bed: Callable[..., tuple[int, str, str]]) -> Callable[..., tuple[int, str, str]]:
     """`met bed probe ...`: exit status, what was said, and what was complained of."""
-
-    def run(*words: str) -> tuple[int, str, str]:
-        status = cli.main(["bed", "probe", *words])
-        told = capsys.readouterr()
-        return status, told.out, told.err
-
-    return run
+    return partial(met_bed, "probe")
 
 
 def test_an_emulated_bed(probe: Callable[..., tuple[int, str, str]]) -> None:

@@ -46,23 +46,10 @@ run unstable like wired {
 """
 
 
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "deck.ic").write_text(DECK)
-    return tmp_path
-
-
 @pytest.fixture
-def bed(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+def bed(met_bed: Callable[..., tuple[int, str, str]]) -> Callable[..., tuple[int, str, str]]:
     """`met bed run deck.ic ...`: exit status, what was said, and what was complained of."""
-
-    def run(*words: str) -> tuple[int, str, str]:
-        status = cli.main(["bed", "run", "deck.ic", *words, "--no-picture"])
-        told = capsys.readouterr()
-        return status, told.out, told.err
-
-    return run
+    return lambda *words: met_bed("run", "deck.ic", *words, "--no-picture")
 
 
 @pytest.mark.parametrize(("port", "more"), [("emulated", ()), ("firmware", ("--lock-step",))])

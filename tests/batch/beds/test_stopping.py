@@ -40,7 +40,7 @@ PERIOD = 0.002
 DECK = """\
 #include <two_link.ic>
 run wired like hybrid {
-    duration = DURATION;
+    duration = 300 s;
     remove settle;
     remove volts;
     record = [q, qd, shoulder.bed.load_current];
@@ -77,13 +77,6 @@ class BedHost:
             bed.connect()
             sample = bed.read()
             return sample.state, sample.faults
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "deck.ic").write_text(DECK.replace("DURATION", "300 s"), encoding="utf-8")
-    return tmp_path
 
 
 @contextlib.contextmanager
@@ -236,7 +229,7 @@ def test_an_exception_in_the_middle_stops_the_bed(host: BedHost) -> None:
 
 
 def test_a_run_in_real_time_is_replayed_from_its_transcript(host: BedHost, here: Path) -> None:
-    (here / "deck.ic").write_text(DECK.replace("DURATION", "1 s"), encoding="utf-8")
+    (here / "deck.ic").write_text(DECK.replace("300 s", "1 s"), encoding="utf-8")
     (here / "kept").mkdir()
     words = ["--transcripts", "kept"]
     done = subprocess.run([*command(host.terminal), *words], capture_output=True, text=True)
@@ -249,11 +242,8 @@ def test_a_line_that_is_lost_is_said_and_replayed_as_it_was(host: BedHost, here:
     (here / "kept").mkdir()
     process = running(host.terminal, here, "--transcripts", "kept")
     host.process.kill()
-    _, complaint = process.communicate(timeout=30.0)
-    lost = f"the line to the bed on {host.terminal} was lost: "
-    assert process.returncode == cli.BAD_INPUT and f"error[E401]: {lost}" in complaint
-    done = subprocess.run(command(host.terminal), capture_output=True, text=True)
-    assert done.returncode == cli.NO and lost in done.stdout
+    told, complaint = process.communicate(timeout=30.0)
+    assert process.returncode == cli.NO and f"the line to the bed on {host.terminal} was lost: " in told, complaint
     replayed(here)
 
 
@@ -261,11 +251,8 @@ def replayed(here: Path) -> None:
     """a.h5 again, from its transcript."""
     [transcript] = (here / "kept").iterdir()
     again = ["b.h5" if word == "a.h5" else word for word in command(str(transcript))]
-    status = cli.BAD_INPUT
-    while status == cli.BAD_INPUT and not (here / "b.h5").exists():  # once more, where its line was lost in the middle
-        done = subprocess.run(again, capture_output=True, text=True)
-        status = done.returncode
-        assert status != cli.BAD_INPUT or "error[E401]" in done.stderr, done.stderr
+    done = subprocess.run(again, capture_output=True, text=True)
+    assert done.returncode in (cli.YES, cli.NO), done.stderr
     one, other = batch.open("a.h5"), batch.open("b.h5")
     assert int(one.n_valid[0]) >= 10 and one.n_valid.values == other.n_valid.values
     assert one.cause.values.tolist() == other.cause.values.tolist()

@@ -19,8 +19,8 @@ from hw import records
 from hw.bed import Fault, Sample, State
 from hw.records import SIZE
 from met import cli
+from tests.batch.beds.listening import DECK
 from tests.batch.beds.test_jitter import rows_of
-from tests.batch.beds.test_probe import DECK
 
 FIGURES = {"median", "p99", "p99.9", "largest"}
 

@@ -1,0 +1,105 @@
+"""What comes of a case whose bed was never armed, whose line was lost, or whose records nobody made."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import batch
+from batch.beds.executor import OnBeds
+from hw import records
+from met import cli
+from tests.batch.beds.listening import DECK
+from tests.hw.device import DEAD, STOPPED, Device
+
+__all__ = ["DECK"]  # deck.ic
+
+Met = Callable[..., tuple[int, str, str]]
+LIMITS = (60.0, 3.0, 1000.0, 5.0, 2e5, 1e4, 1e9)
+"""Of a device that bears what the deck asks of it."""
+
+RECORDS = Path("a.h5.campaign/beds/0-0.records")
+
+
+def run(met_bed: Met, port: str, *words: str) -> tuple[int, str, str]:
+    return met_bed("run", "deck.ic", "wired", "--port", port, "-o", "a.h5", "--no-picture", *words)
+
+
+def test_a_case_whose_bed_did_not_arm_is_driven_the_next_time(met_bed: Met, on_pty: Callable[..., str]) -> None:
+    device = Device(limits=LIMITS)
+    device.state, device.faults = STOPPED, DEAD
+    port = on_pty(device)
+    status, _, complaint = run(met_bed, port, "--lock-step")
+    assert status == cli.BAD_INPUT
+    assert "error[E406]: bed `model` does not start its plant anew: it stopped itself: " in complaint
+    assert not Path("a.h5").exists()
+    device.boot()
+    status, said, complaint = run(met_bed, port, "--lock-step")
+    assert (status, complaint) == (cli.YES, "") and "the case reached its end" in said
+
+
+@pytest.mark.parametrize("begun", [
+    b"", records.MAGIC[:5], records.MAGIC, records.MAGIC + (400).to_bytes(8, "little") + b'{"key": "',
+])  # fmt: skip
+def test_records_that_were_cut_short_before_the_first_are_made_anew(
+    met_bed: Met, monkeypatch: pytest.MonkeyPatch, begun: bytes
+) -> None:
+    def killed(self: OnBeds, section: object, row: int, path: Path, told: Path) -> None:
+        path.write_bytes(begun)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(OnBeds, "_drive", killed)
+        assert run(met_bed, "emulated")[0] == 130
+    assert RECORDS.read_bytes() == begun
+    assert run(met_bed, "emulated")[0] == cli.YES
+
+
+def test_a_line_that_is_lost_ends_the_case_and_the_archive_has_what_was_before(met_bed: Met) -> None:
+    device = Device(limits=LIMITS)
+    server = socket.create_server(("127.0.0.1", 0))
+
+    def answer() -> None:
+        line, _ = server.accept()
+        with server, line:
+            while len(device.commanded) < 50:
+                line.sendall(device.take(line.recv(4096)))
+
+    thread = threading.Thread(target=answer)
+    thread.start()
+    port = f"socket://127.0.0.1:{server.getsockname()[1]}"
+    status, said, complaint = run(met_bed, port, "--lock-step")
+    thread.join()
+    assert status == cli.NO, complaint
+    assert f"the line to the bed on {port} was lost: " in said
+    data = batch.open("a.h5")
+    assert int(data.status[0]) == 1 and int(data.n_valid[0]) == 6
+    assert not Path("a.h5.campaign").exists()
+
+
+def test_records_of_another_version_are_told(met_bed: Met, monkeypatch: pytest.MonkeyPatch) -> None:
+    row = records.packed(0, 0, 0, (0, 0, 0, 0), 0.0, 0.0, None)
+    text = b'{"key": "x"}'
+    data = records.MAGIC + len(text).to_bytes(8, "little") + text + row
+    monkeypatch.setattr(OnBeds, "_drive", lambda self, section, row, path, told: path.write_bytes(data))
+    status, _, complaint = run(met_bed, "emulated")
+    assert status == cli.BAD_INPUT
+    assert complaint.endswith("""\
+error[E413]: the file of records of case #0 was written by another version of MET
+ = help: remove a.h5.campaign/beds/0-0.records
+
+1 error
+""")
+
+
+def test_a_sweep_names_a_bed_once(met_bed: Met, on_pty: Callable[..., str]) -> None:
+    sweep = "sweep tuning of wired { vary gearbox.kp = [0.01, 0.02, 0.03] V*s/rad; }\n"
+    Path("deck.ic").write_text(DECK + sweep)
+    device = Device(limits=LIMITS)
+    words = ("run", "deck.ic", "tuning", "--port", on_pty(device), "--lock-step", "-o", "a.h5", "--no-picture")
+    _, said, _ = met_bed(*words)
+    assert said.count("bed `model`") == 1 and "of 3 cases" in said
