@@ -1,5 +1,6 @@
-"""A motor in the loop at 1 kHz: the Panda simulated in real time, its shoulder's motor on a bed behind a
-pseudo-terminal, which is the bed's firmware with a time of its own.
+"""A motor in the loop at 1 kHz: the Panda simulated in real time, its shoulder's motor on a bed, which is the bed's
+firmware with a time of its own, behind a pseudo-terminal, as a serial line is, and then on a socket, as `--port
+firmware` is.
 
 The step is what is computed between a sample and the next command, in this process. The rest is of one minute as `met
 bed run` drives it: how late exchanges began, how long they took, and exchanges that began a period late, by cause. A
@@ -10,13 +11,12 @@ it is hard real time: it says how this machine did under the load that it had.
 from __future__ import annotations
 
 import gc
-import json
+import os
 import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Callable
-from dataclasses import asdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache, partial
 from pathlib import Path
 
@@ -25,11 +25,16 @@ import numpy as np
 import ic
 from benchmarks.benchmark import Benchmark, Target, Untaken
 from hw import records
+from hw.build import build
 from hw.case import Asked, pace_of
 from hw.driven import LANES, Driven
+from hw.ports import FIRMWARE, config_of
+from hw.process import talk
+from hw.realtime import PRIORITY
 from hw.timing import Timing, timing
 from met import plan_file
 from met.plan import Experiment, Plan
+from met.program.plant import bed_values, plant_c
 from met.run import prepare
 
 TITLE = "a Panda at 1 kHz with its shoulder's motor on a bed, us and counts; no hard real time"
@@ -75,22 +80,37 @@ def _step(share: float) -> Callable[[], float]:
     return measure
 
 
+@contextmanager
+def _at(line: str, made: Experiment) -> Iterator[str]:
+    """The port of a bed with a time of its own, at the other end of a line of this kind."""
+    if line == "socket":
+        yield FIRMWARE
+        return
+    period = pace_of(made).period
+    program = build("host", config_of(bed_values(made, "joint2", 0), period, lock_step=False),
+                    plant_c(made, "joint2", period=period))  # fmt: skip
+    with subprocess.Popen([program], stdout=subprocess.PIPE, text=True) as process:
+        with suppress(AttributeError, OSError):
+            os.sched_setscheduler(process.pid, os.SCHED_FIFO, os.sched_param(PRIORITY + 1))
+        assert process.stdout is not None
+        try:
+            yield process.stdout.readline().strip()
+        finally:
+            process.kill()
+
+
 @cache
-def _kept() -> tuple[Timing, int]:
+def _kept(line: str) -> tuple[Timing, int]:
     """What the loop made of a minute, and how often it was stopped."""
     made = experiment(SECONDS)
     plan = plan_file.dumps(Plan("", (made,)))
     wanted, found, hz = round(SECONDS * pace_of(made).hz), [], 0.0
     for start in range(STARTS):
-        with tempfile.TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory() as folder, _at(line, made) as port:
             path = Path(folder) / "one.records"
-            asked = Asked(plan=plan, row=0, ports={"joint2": "firmware"}, records=str(path))
-            command = [sys.executable, "-m", "hw.case"]
-            done = subprocess.run(command, input=json.dumps(asdict(asked)), capture_output=True, text=True)
-            last = json.loads(done.stdout.splitlines()[-1]) if done.stdout else {}
-            if "ended" not in last:
-                why = last.get("wrong", {}).get("diagnostics", [{"message": done.stderr[-200:]}])[0]["message"]
-                raise Untaken(why)
+            said = list[str]()
+            for _ in talk("hw.case", Asked(plan=plan, row=0, ports={"joint2": port}, records=str(path)), said.append):
+                pass
             rows = records.read(path)
         hz = rows.head["tick_hz"]
         found.append(rows.rows[rows.rows["exchange"] > 0][: wanted - sum(map(len, found))])
@@ -99,33 +119,39 @@ def _kept() -> tuple[Timing, int]:
     raise Untaken(f"it was stopped {STARTS} times, each time after {sum(map(len, found)) / STARTS / hz:.3g} s or so")
 
 
-def _loop(figure: Callable[[Timing, int], float]) -> Callable[[], float]:
-    kept = _kept()
-    return lambda: figure(*kept)
+def _loop(line: str) -> tuple[Benchmark, ...]:
+    """Of a minute over a line."""
 
+    def one(name: str, doc: str, unit: str, figure: Callable[[Timing, int], float]) -> Benchmark:
+        def take() -> Callable[[], float]:
+            kept = _kept(line)
+            return lambda: figure(*kept)
 
-def _one(name: str, doc: str, unit: str, figure: Callable[[Timing, int], float]) -> Benchmark:
-    return Benchmark(f"bed.{name}", doc, unit, partial(_loop, figure), turns=1, slow=True)
+        return Benchmark(f"bed.{line}.{name}", doc, unit, take, turns=1, slow=True)
 
+    miss = "exchanges in a minute that began a period late"
+    return (
+        one("computing.p50", "the same in the loop", "us", lambda kept, _: 1e6 * kept.computing.median),
+        one("computing.p99", "its 99th percentile", "us", lambda kept, _: 1e6 * kept.computing.high),
+        one("exchange.p50", f"a command over the {line}, until its answer", "us",
+            lambda kept, _: 1e6 * kept.trip.median),
+        one("exchange.p99", "its 99th percentile", "us", lambda kept, _: 1e6 * kept.trip.high),
+        one("late.p50", "from when an exchange was due to when it began", "us",
+            lambda kept, _: 1e6 * kept.lateness.median),
+        one("late.p99", "its 99th percentile", "us", lambda kept, _: 1e6 * kept.lateness.high),
+        one("late.largest", "the largest", "us", lambda kept, _: 1e6 * kept.lateness.largest),
+        one("missed.woken", f"{miss}: woken too late", "", lambda kept, _: kept.woken),
+        one("missed.computed", f"{miss}: it computed too long", "", lambda kept, _: kept.computed),
+        one("missed.waited", f"{miss}: it waited for the answer before", "", lambda kept, _: kept.waited),
+        one("unanswered", "exchanges in a minute without an answer in time", "", lambda kept, _: kept.unanswered),
+        one("stopped", "times that five periods were missed, and the run stopped", "", lambda _, stops: stops),
+    )  # fmt: skip
 
-_MISS = "exchanges in a minute that began a period late"
 
 BENCHMARKS: tuple[Benchmark, ...] = (
     Benchmark("bed.step.p50", "a step of the arm, from a sample to the next command", "us", partial(_step, 0.5),
               Target(5.0)),
     Benchmark("bed.step.p99", "the 99th percentile of 5000 steps", "us", partial(_step, 0.99), Target(60.0)),
-    _one("computing.p50", "the same in the loop", "us", lambda kept, _: 1e6 * kept.computing.median),
-    _one("computing.p99", "its 99th percentile", "us", lambda kept, _: 1e6 * kept.computing.high),
-    _one("exchange.p50", "a command over the pseudo-terminal, until its answer", "us",
-         lambda kept, _: 1e6 * kept.trip.median),
-    _one("exchange.p99", "its 99th percentile", "us", lambda kept, _: 1e6 * kept.trip.high),
-    _one("late.p50", "from when an exchange was due to when it began", "us",
-         lambda kept, _: 1e6 * kept.lateness.median),
-    _one("late.p99", "its 99th percentile", "us", lambda kept, _: 1e6 * kept.lateness.high),
-    _one("late.largest", "the largest", "us", lambda kept, _: 1e6 * kept.lateness.largest),
-    _one("missed.woken", f"{_MISS}: woken too late", "", lambda kept, _: kept.woken),
-    _one("missed.computed", f"{_MISS}: it computed too long", "", lambda kept, _: kept.computed),
-    _one("missed.waited", f"{_MISS}: it waited for the answer before", "", lambda kept, _: kept.waited),
-    _one("unanswered", "exchanges in a minute without an answer in time", "", lambda kept, _: kept.unanswered),
-    _one("stopped", "times that five periods were missed, and the run stopped", "", lambda _, stops: stops),
+    *_loop("terminal"),
+    *_loop("socket"),
 )  # fmt: skip
