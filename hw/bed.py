@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import enum
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from types import TracebackType
 from typing import Self
 
@@ -120,6 +121,10 @@ class Sample:
     acceleration: float | None = None
 
 
+LIMITS = ("voltage", "current", "rate", "voltage_slew", "current_slew")
+"""Those that a session may make tighter: V, A, rad/s, V/s, A/s."""
+
+
 class Bed(ABC):
     """One bed. Every method raises met.diagnostic.Problem (E400-E419) where the bed cannot be reached or says no, but
     `stop` and `close`, which never raise.
@@ -134,16 +139,8 @@ class Bed(ABC):
         """Greet the bed. It is disarmed afterwards, and its limits are its own."""
 
     @abstractmethod
-    def limit(
-        self,
-        *,
-        voltage: float | None = None,
-        current: float | None = None,
-        rate: float | None = None,
-        voltage_slew: float | None = None,
-        current_slew: float | None = None,
-    ) -> None:
-        """Make limits tighter for this session (V, A, rad/s, V/s, A/s). None: as they are."""
+    def limit(self, asked: Mapping[str, float]) -> None:
+        """Make limits tighter for this session. asked: those of `LIMITS` that are to change, by name."""
 
     @abstractmethod
     def arm(self) -> Sample:

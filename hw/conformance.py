@@ -74,7 +74,7 @@ class Conformance:
     def driven(self, bed: Bed, **limits: float) -> About:
         """Connected and armed, under these limits."""
         about = self.connected(bed)
-        bed.limit(**limits)
+        bed.limit(limits)
         bed.arm()
         return about
 
@@ -123,7 +123,7 @@ class Conformance:
         assert (sample.acceleration is not None) == (Capability.ACCELEROMETER in about.capabilities)
 
     def test_nothing_can_be_asked_before_it_is_greeted(self, bed: Bed) -> None:
-        for ask in (bed.arm, bed.read, bed.clear, lambda: bed.exchange(0.0, 0.0), lambda: bed.limit(voltage=1.0)):
+        for ask in (bed.arm, bed.read, bed.clear, lambda: bed.exchange(0.0, 0.0), lambda: bed.limit({"voltage": 1.0})):
             with refused("E401"):
                 ask()
         bed.stop()
@@ -241,7 +241,7 @@ class Conformance:
         about = self.connected(bed)
         scale = getattr(about.scales, which)
         most = round(self.share * getattr(about.limits, which) / scale)
-        bed.limit(**{which: most * scale})
+        bed.limit({which: most * scale})
         bed.arm()
         place = {"voltage": 0, "current": 1}[which]
         command = [0.0, 0.0]
@@ -273,18 +273,18 @@ class Conformance:
     def test_limits_are_not_taken_while_it_is_armed(self, bed: Bed) -> None:
         about = self.driven(bed)
         with refused("E406"):
-            bed.limit(voltage=self.share * about.limits.voltage)
+            bed.limit({"voltage": self.share * about.limits.voltage})
 
     @pytest.mark.parametrize("wrong", [-1.0, math.nan, math.inf])
     def test_a_limit_is_a_number_from_zero_on(self, bed: Bed, wrong: float) -> None:
         self.connected(bed)
         with refused("E408"):
-            bed.limit(rate=wrong)
+            bed.limit({"rate": wrong})
 
     def test_a_shaft_faster_than_its_limit_stops_it(self, bed: Bed) -> None:
         about = self.connected(bed)
         most = 4.0 * about.limits.arming_rate
-        bed.limit(rate=most)
+        bed.limit({"rate": most})
         bed.arm()
         sample = self.drive(bed, 1.0, voltage=3.0 * self.share * about.limits.voltage)
         assert abs(sample.rate) > most
@@ -297,7 +297,7 @@ class Conformance:
         about = self.connected(bed)
         most = self.share * getattr(about.limits, which)
         # half the change of this test in all the ticks from one command to the next, a late one too
-        bed.limit(**{f"{which}_slew": 0.5 * most / 0.015})
+        bed.limit({f"{which}_slew": 0.5 * most / 0.015})
         bed.arm()
         held = {"voltage": 0.0, "current": 0.0}
         assert self.drive(bed, self.period, **held).state == State.ARMED

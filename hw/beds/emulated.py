@@ -87,18 +87,8 @@ class EmulatedBed(Bed):
         self._about, self._in_force = about, greeting.in_force(about)
         return about
 
-    def limit(
-        self,
-        *,
-        voltage: float | None = None,
-        current: float | None = None,
-        rate: float | None = None,
-        voltage_slew: float | None = None,
-        current_slew: float | None = None,
-    ) -> None:
+    def limit(self, asked: Mapping[str, float]) -> None:
         about = self._there()
-        asked = {"voltage": voltage, "current": current, "rate": rate, "voltage_slew": voltage_slew,
-                 "current_slew": current_slew}  # fmt: skip
         tighter = greeting.tighter(about, asked)
         if self._state != State.DISARMED:
             raise refusals.refused(about, "take tighter limits", self._sample(refused=True))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from hw.bed import About, Capability, Limits, Scales
+from hw.bed import LIMITS, About, Capability, Limits, Scales
 from hw.protocol import messages
 from met.diagnostic import Problem, error
 
@@ -50,22 +50,16 @@ def in_force(about: About) -> messages.InForce:
     return messages.InForce(voltage, current, rate, *slews)
 
 
-def tighter(about: About, asked: Mapping[str, float | None]) -> dict[str, int]:
-    """Limits that are asked for by their names in `InForce` (V, A, rad/s, V/s, A/s), in its counts and order; None for
-    one that is not asked for. Raises Problem E408."""
+def tighter(about: About, asked: Mapping[str, float]) -> dict[str, int]:
+    """Limits that are asked for, by their names in `LIMITS`, in counts, slews in counts a tick. Raises Problem E408,
+    KeyError."""
     s, hz = about.scales, about.tick_hz
-    of = {"voltage": s.voltage, "current": s.current, "rate": s.rate, "voltage_slew": s.voltage * hz,
-          "current_slew": s.current * hz}  # fmt: skip
-    found = {}
-    for name, scale in of.items():
-        value = asked[name]
-        if value is None:
-            continue
+    of = dict(zip(LIMITS, (s.voltage, s.current, s.rate, s.voltage * hz, s.current * hz), strict=True))
+    for name, value in asked.items():
         if not 0.0 <= value < math.inf:
             message = f"a limit of {_words(name)} of {value:g} {_UNITS[name]} for bed `{about.name}`"
             raise Problem(error("E408", message, help="a limit is a number from 0 on"))
-        found[name] = counts(value, scale)
-    return found
+    return {name: counts(value, of[name]) for name, value in asked.items()}
 
 
 def commanded(value: float, scale: float, most: int) -> int | None:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
 from hw import refusals
-from hw.bed import About, Bed, Capability, Fault, Sample, State, real_plant
+from hw.bed import LIMITS, About, Bed, Capability, Fault, Sample, State, real_plant
 from hw.beds import greeting
 from hw.line import Line
 from hw.protocol import messages
@@ -93,20 +93,10 @@ class WireBed(Bed):
         self._step = greeting.ticks(about, self.period) if steps else 0
         return about
 
-    def limit(
-        self,
-        *,
-        voltage: float | None = None,
-        current: float | None = None,
-        rate: float | None = None,
-        voltage_slew: float | None = None,
-        current_slew: float | None = None,
-    ) -> None:
+    def limit(self, asked: Mapping[str, float]) -> None:
         about = self._there()
-        asked = {"voltage": voltage, "current": current, "rate": rate, "voltage_slew": voltage_slew,
-                 "current_slew": current_slew}  # fmt: skip
         for name, most in greeting.tighter(about, asked).items():
-            found = self._asked(messages.Limit(list(asked).index(name), most), InForce)
+            found = self._asked(messages.Limit(LIMITS.index(name), most), InForce)
             if getattr(found, name) > most:
                 message = f"bed `{about.name}` does not take a tighter limit of {name.replace('_', ' ')}"
                 raise Problem(error("E406", message, help="limits are set before it is armed"))

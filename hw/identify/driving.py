@@ -100,7 +100,7 @@ def run(asked: Asked) -> Ended:
         most, top = peaks(about.limits, asked.sheet, asked)
         scales = about.scales
         # a command is a whole count, the nearest
-        bed.limit(voltage=most.voltage + scales.voltage, current=most.current + scales.current)
+        bed.limit({"voltage": most.voltage + scales.voltage, "current": most.current + scales.current})
         # a change of command is of whole counts too
         slews = [SHARE * slew for slew in (about.limits.voltage_slew, about.limits.current_slew)]
         guide = Guide(guided(top), most, of.period, (slews[0], slews[1]))

@@ -83,7 +83,7 @@ def test_why_it_does_not_take_limits_while_it_is_armed() -> None:
     bed.connect()
     bed.arm()
     with pytest.raises(Problem) as caught:
-        bed.limit(rate=10.0)
+        bed.limit({"rate": 10.0})
     assert (
         said(caught.value)
         == "error[E406]: bed `emulated` does not take tighter limits: it is armed\n = help: stop it first"

@@ -367,7 +367,7 @@ def test_what_is_asked_in_another_state() -> None:
     bed.arm()
     for do, words in ((bed.arm, "arm"), (bed.clear, "clear"), (bed.preset, "start its plant anew")):
         assert refusal(do) == f"error[E406]: bed `model` does not {words}: it is armed\n = help: stop it first"
-    assert refusal(lambda: bed.limit(rate=10.0)) == (
+    assert refusal(lambda: bed.limit({"rate": 10.0})) == (
         "error[E406]: bed `model` does not take a tighter limit of rate\n = help: limits are set before it is armed"
     )
 
@@ -397,7 +397,7 @@ def test_commands_that_are_not_sent() -> None:
             == f"error[E408]: {wrong}; the bed was stopped\n = help: {helps}"
         )  # type: ignore[misc]
         assert device.state == model.DISARMED and device.outputs[-2:] == [("current", 0.0), ("voltage", 0.0)]
-    assert refusal(lambda: bed.limit(current_slew=-1.0)) == (
+    assert refusal(lambda: bed.limit({"current_slew": -1.0})) == (
         "error[E408]: a limit of current slew of -1 A/s for bed `model`\n = help: a limit is a number from 0 on"
     )
 

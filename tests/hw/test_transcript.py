@@ -150,7 +150,7 @@ def test_a_killed_writer_loses_nothing_that_was_written(tmp_path: Path) -> None:
 
 def run(bed: SerialBed | ReplayBed | LineBed, count: int = 50, other: int = -1) -> list[Sample | None]:
     bed.connect()
-    bed.limit(voltage=5.0)
+    bed.limit({"voltage": 5.0})
     samples: list[Sample | None] = [bed.preset(rate=1.0, seed=4), bed.arm()]
     for n in range(count):
         voltage = 0.02 * n if n != other else 1.25

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -150,7 +150,7 @@ class Watched(Bed):
     def exchange(self, voltage: float, current: float) -> Sample | None:
         raise AssertionError
 
-    def limit(self, **limits: float | None) -> None:
+    def limit(self, asked: Mapping[str, float]) -> None:
         raise AssertionError
 
     def clear(self) -> Sample:
