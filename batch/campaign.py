@@ -22,6 +22,7 @@ from batch.tasks import Section
 from ic.printing.columns import size as size_text
 from met import run as engine
 from met.diagnostic import Problem, error
+from met.distinct import distinct
 from met.frozen import frozen
 from met.plan import Experiment, Plan
 
@@ -181,10 +182,12 @@ def _parts(
     """The experiments with what is kept of them. Raises Problem E311, E312 for cases that are none."""
     chosen = choosing.selected([experiment for experiment, _ in selected], wanted.cases) if wanted.cases else []
     named = {experiment.name: rows for experiment, rows in chosen}
-    strays = {experiment.cases.table[row] for experiment, rows in selected
-              for row in np.setdiff1d(named.get(experiment.name, rows), rows)}  # fmt: skip
-    run = {experiment.cases.table[row] for experiment, rows in selected
-           for row in np.intersect1d(named.get(experiment.name, rows[:0]), rows)}  # fmt: skip
+    strays, run = set[int](), set[int]()
+    for experiment, rows in selected:
+        own = named.get(experiment.name, rows[:0])
+        among = np.isin(own, rows)
+        strays.update(experiment.cases.table[row] for row in own[~among])
+        run.update(experiment.cases.table[row] for row in own[among])
     if strays - run:
         case = min(strays - run)
         raise Problem(error("E351", f"the history of case #{case} cannot be kept: it is not among those to run"))
@@ -216,7 +219,7 @@ def histories_section(campaign: Campaign, values: Section, results: Callable[[],
         return None
     kept = part.kept
     if campaign.keep.later:
-        kept = np.union1d(kept, chosen(campaign.keep, part.experiment, results()))
+        kept = distinct(np.concatenate([kept, chosen(campaign.keep, part.experiment, results())]))
     if not len(kept):
         return None
     number = len(campaign.parts) + values.number

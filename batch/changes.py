@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from met.distinct import distinct
 from met.keys import LATER_FIELDS, SILENT_FIELDS
 from met.plan import Cases, Experiment, Formula, Plan, Quantity, Schedule
 
@@ -61,7 +62,7 @@ def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
         if path not in old or path not in new:
             yield f"{path} is {'varied' if path in new else 'not varied any more'}"
         elif not np.array_equal(old[path], new[path], equal_nan=True):
-            some = [f"{len(np.unique(values)):,} values from {values.min():g} to {values.max():g}" for values in
+            some = [f"{len(distinct(values)):,} values from {values.min():g} to {values.max():g}" for values in
                     (old[path], new[path])]  # fmt: skip
             yield f"{path}: {some[0]}, now {some[1]}" if some[0] != some[1] else f"values of {path}"
     for name in ("seed", "seeds"):

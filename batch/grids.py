@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from batch.signals import number_text
+from met.distinct import distinct
 from met.frozen import frozen
 
 MOST_LEVELS = 48
@@ -38,7 +39,7 @@ class Levels:
 
 def levels(values: np.ndarray) -> np.ndarray:
     """The different values that are numbers, rising."""
-    return np.unique(values[np.isfinite(values)])
+    return distinct(values[np.isfinite(values)])
 
 
 def levelled(values: np.ndarray, words: Sequence[str] = ()) -> Levels:
@@ -62,7 +63,7 @@ def is_grid(x: np.ndarray, y: np.ndarray) -> bool:
     if len(x_levels) < 2 or len(y_levels) < 2 or len(x_levels) * len(y_levels) > 2 * good.sum():
         return False
     cells = np.searchsorted(x_levels, x[good]) * len(y_levels) + np.searchsorted(y_levels, y[good])
-    return len(np.unique(cells)) > FULL * len(x_levels) * len(y_levels)
+    return len(distinct(cells)) > FULL * len(x_levels) * len(y_levels)
 
 
 def cells_of(across: Levels, up: Levels) -> np.ndarray:

@@ -13,6 +13,7 @@ from batch.archive.read import Group, Stored
 from batch.failures import STATUS
 from batch.grids import levels
 from batch.signals import deck_unit, number_text
+from met.distinct import distinct
 from met.frozen import frozen
 from met.run import DONE
 
@@ -114,7 +115,7 @@ class Pool:
         out = np.full(self.count, ENDED.index("met" if self.requirements else "done"))
         out[(self.outcomes < 0).any(axis=1)] = ENDED.index("unknown")
         out[(self.outcomes == 0).any(axis=1)] = ENDED.index("missed")
-        for status in np.unique(self.status).tolist():
+        for status in distinct(self.status).tolist():
             if status != DONE:
                 word = STATUS.get(status, "failed")
                 out[self.status == status] = next(n for n, each in enumerate(ENDED) if each in (word, "lost"))

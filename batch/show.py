@@ -8,8 +8,6 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from batch import braille, cases
 from batch.archive.read import ArchiveFile, Group
 from batch.failures import failure_lines
@@ -19,6 +17,7 @@ from batch.structures import structures
 from batch.summary import MetricSummary, Summary, summary_of
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem, error
+from met.distinct import distinct
 
 MOST_GROUPS = 4
 """So many structures of a sweep are shown in full unless they are named; of more, their table alone."""
@@ -147,7 +146,7 @@ def heading(group: Group, width: int) -> list[str]:
     for variable in group.role("coordinate"):
         scale = float(variable.attributes.get("deck_scale", 1.0))
         unit = pretty_unit(str(variable.attributes.get("deck_unit", variable.unit)))
-        values = np.unique(group.values(variable.name)) / scale
+        values = distinct(group.values(variable.name)) / scale
         few = ", ".join(number_text(value) for value in values[:6]) if len(values) <= 6 else ""
         many = f"{len(values)} values from {number_text(values[0])} to {number_text(values[-1])}"
         out.append(f"  {variable.name} = {few or many} {unit}".removesuffix(" 1"))

@@ -18,6 +18,7 @@ from batch.archive.hdf5 import SIGNATURE, h5py
 from batch.archive.layout import SCHEMA, VERSION
 from batch.rows import row_of
 from met.diagnostic import Problem, error
+from met.distinct import distinct
 from met.frozen import frozen
 from met.plan import Plan
 
@@ -226,7 +227,7 @@ def found_cases(wanted: str, rows: np.ndarray, ids: np.ndarray, name: str) -> np
     else:
         found = np.flatnonzero([case_id.startswith(wanted) for case_id in ids])
     if len(found) == 0:
-        raise Problem(error("E321", f"no case `{wanted}` in `{name}`", help=_cases_here(np.unique(rows))))
+        raise Problem(error("E321", f"no case `{wanted}` in `{name}`", help=_cases_here(distinct(rows))))
     if row is None and len(found) > 1:
         some = ", ".join(ids[found[:4]]) + (" ..." if len(found) > 4 else "")
         raise Problem(error("E322", f"case `{wanted}` may be any of {len(found)}: {some}", help="give more of its id"))

@@ -31,6 +31,7 @@ from batch.differences.tolerance import Tolerance, Tolerances, check, fits, of_d
 from batch.requirements import required
 from batch.signals import deck_unit
 from met.diagnostic import Problem
+from met.distinct import distinct
 from met.outputs import joint_parts
 from met.plan import Plan
 
@@ -134,7 +135,7 @@ def _how(scores: _Scores, matched: Cases, b: Group, found: Experiment) -> np.nda
 def _other_noise(a: Group, b: Group) -> bool:
     """Whether the two have other seeds, so that single cases differ by chance."""
     mine, theirs = a.values("seed"), b.values("seed")
-    return not np.array_equal(mine, theirs) and not np.array_equal(np.unique(mine), np.unique(theirs))
+    return not np.array_equal(mine, theirs) and not np.array_equal(distinct(mine), distinct(theirs))
 
 
 def _ended(a: Group, b: Group, matched: Cases, out: Experiment) -> None:

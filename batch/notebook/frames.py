@@ -93,7 +93,7 @@ def _stacked(links: Sequence[np.ndarray], unknown: np.ndarray) -> np.ndarray:
 def _all_recorded(data: xarray.Dataset, group: Group) -> None:
     """Raises Problem E328 where a case has no history."""
     recorded = data[RECORDED].values if RECORDED in data.coords else np.empty(0)
-    for case in np.setdiff1d(data[CASE].values, recorded) if CASE in data.coords else ():
+    for case in data[CASE].values[~np.isin(data[CASE].values, recorded)] if CASE in data.coords else ():
         group.recorded_position(f"#{int(case)}")
 
 

@@ -11,6 +11,7 @@ import xarray
 from batch.notebook.quantities import in_deck_unit, same_units
 from batch.notebook.table import CASE, RECORDED, REPEAT, asked, missing, name_of, varied
 from met.diagnostic import Problem, error
+from met.distinct import distinct
 from met.frozen import frozen
 
 EMPTIEST, SMALL = 100, 1_000_000
@@ -129,7 +130,7 @@ def _axes(columns: Mapping[str, xarray.DataArray]) -> tuple[list[Axis], dict[str
         beside: dict[str, np.ndarray] = {}
         within: list[int] = []
         for number, axis in enumerate(axes):
-            mine, yours = np.divmod(np.unique(axis.codes * len(values) + codes), len(values))
+            mine, yours = np.divmod(distinct(axis.codes * len(values) + codes), len(values))
             if len(mine) == len(axis.values):  # it follows from the other
                 axes[number] = Axis(axis.path, axis.values, axis.codes, {**axis.beside, path: values[yours]})
                 break

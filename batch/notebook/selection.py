@@ -12,6 +12,7 @@ from batch.archive.read import found_cases
 from batch.notebook.quantities import in_deck_unit, number, same_units
 from batch.notebook.table import CASE, PREFIX, RECORDED, along, asked, dimension, missing, name_of, varied
 from met.diagnostic import Problem, did_you_mean, error
+from met.distinct import distinct
 
 CLOSE = 1e-9
 """Relative: a number that somebody types is one that the archive has, within this. The engine's rounding is 1e-16."""
@@ -125,7 +126,7 @@ def _largest(values: np.ndarray) -> float:
 
 def _no_such(values: np.ndarray, value: float, given: Any, name: str, attributes: Mapping[str, Any]) -> Problem:
     """E387, with the values next to the one that no case has."""
-    finite = np.unique(values[np.isfinite(values)])
+    finite = distinct(values[np.isfinite(values)])
     nearest = np.sort(finite[np.argsort(np.abs(finite - value), kind="stable")[:NEAREST]])
     unit, shown = (str(attributes.get(key, "")) for key in ("units", "deck_unit"))
     texts = in_deck_unit(nearest, attributes)

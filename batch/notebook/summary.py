@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 import xarray
 
 from batch.failures import STATUS
 from batch.notebook.quantities import in_deck_unit
 from batch.notebook.table import CASE, RECORDED, name_of, varied
+from met.distinct import distinct
 from met.run import DONE
 
 FEW = 5
@@ -45,7 +45,7 @@ def _cases(data: xarray.Dataset) -> str:
 
 def _values(array: xarray.DataArray) -> str:
     """The different values, few of them, or from where to where they are; in the deck's unit."""
-    values = np.unique(array.values)
+    values = distinct(array.values)
     numbers = values.dtype.kind in "iuf"
     if len(values) <= FEW:
         return ", ".join(in_deck_unit(values, array.attrs) if numbers else values.astype(str))

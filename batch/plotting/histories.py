@@ -19,6 +19,7 @@ from batch.plotting.against import Beside, lacking
 from batch.plotting.sheet import COLOURS, FAINT, INK, Sheet, sequence
 from batch.signals import Panel, case_text, deck_unit, history, number_text, panels
 from met.diagnostic import Problem, error
+from met.distinct import distinct
 
 OVERLAID = 8
 LEGEND_EVERY = 4
@@ -257,7 +258,7 @@ def _line(ax: Any, time: np.ndarray, y: np.ndarray, **style: Any) -> None:
 
 def _differing(group: Group) -> list[Stored]:
     """The varied parameters that tell the cases here apart."""
-    return [v for v in group.role("coordinate") if len(np.unique(group.values(v.name))) > 1]
+    return [v for v in group.role("coordinate") if len(distinct(group.values(v.name))) > 1]
 
 
 def _case_label(group: Group, position: int) -> str:

@@ -19,6 +19,7 @@ from batch.plotting.points import RASTERED
 from batch.plotting.sheet import FAINT, INK, Sheet
 from batch.plotting.sides import Side
 from batch.pool import Column
+from met.distinct import distinct
 from met.frozen import frozen
 
 RISING, PARTING = "viridis", "RdBu_r"
@@ -57,7 +58,7 @@ def plan(x: Column, y: Column, third: Column | None, other: tuple[str, str] | No
     across, up = sides.side(x), sides.side(y)
     cells = cells_of(across.levels, up.levels)
     there = cells[cells >= 0]
-    filled = len(np.unique(there)) > FULL * len(across.levels.texts) * len(up.levels.texts)
+    filled = len(distinct(there)) > FULL * len(across.levels.texts) * len(up.levels.texts)
     apart = there if third is None else there * 1000 + levelled(third.values).places[cells >= 0]
     several = int(np.unique(apart, return_counts=True)[1].max(initial=0))
     return Plan(across, up, cells, filled, several, other)
@@ -342,7 +343,7 @@ def _marks(metrics: Sequence[Measured], found: Plan) -> dict[str, Any]:
     if any(each.failed.any() for each in metrics):
         out["failed"] = dot("x", markersize=4.5)
     both = metrics[0].both if metrics else True
-    empty = len(np.unique(found.cells[both & (found.cells >= 0)])) < np.prod(found.shape)
+    empty = len(distinct(found.cells[both & (found.cells >= 0)])) < np.prod(found.shape)
     if found.filled and any(_lacking(values, each) for values, each in zip(shown, metrics, strict=True)):
         out["no value"] = Patch(facecolor=GREY)
     if found.filled and empty:

@@ -11,6 +11,7 @@ from batch.pool import ENDED, Column, Pool
 from batch.report.against import GOOD, Before, change
 from batch.report.content import Overview
 from batch.report.maps import maps
+from met.distinct import distinct
 
 MOST_POINTS = 12_000
 """Cases that a page holds. Of more, those go that lie on a dot with another one."""
@@ -121,7 +122,7 @@ def _drawn(
     across, up = DOTS
     while True:
         found = [_on_dots(x.values, y.values, rank, across, up) for x in against for y in metrics]
-        places = np.unique(np.concatenate([*always, *found]))
+        places = distinct(np.concatenate([*always, *found]))
         if len(places) <= MOST_POINTS or (across, up) == (1, 1):
             return places, (across, up)
         across, up = max(1, across * 4 // 5), max(1, up * 4 // 5)

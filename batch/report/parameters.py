@@ -14,6 +14,7 @@ from batch.signals import pretty_unit
 from ic.printing.columns import number
 from ic.printing.settings import settings
 from met.diagnostic import Place
+from met.distinct import distinct
 from met.plan import Experiment, Formula, Origin, Quantity
 from met.render import shown_place
 
@@ -55,7 +56,7 @@ def parameters(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Param
 def _spans(experiment: Experiment) -> dict[int, tuple[float, float]]:
     """By output of the formulas: the smallest and the largest value, over as many cases as are looked at."""
     count = experiment.cases.count
-    rows = np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(int))
+    rows = distinct(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(int))
     inputs = {coordinate.path: coordinate.values[rows] for coordinate in experiment.cases.coordinates}
     outputs = (np.asarray(values, dtype=float) for values in experiment.formulas.replay(inputs))
     return {place: (float(values.min()), float(values.max())) for place, values in enumerate(outputs)}

@@ -9,6 +9,7 @@ import numpy as np
 from batch.failures import ranges
 from batch.pool import Column, Pool
 from batch.report.content import Bed, Stability
+from met.distinct import distinct
 from met.margin import Margin, margins
 from met.plan import Experiment
 
@@ -55,13 +56,13 @@ def _chosen(pool: Pool, experiment: Experiment, places: np.ndarray) -> np.ndarra
         rows = np.searchsorted(experiment.cases.table, pool.cases[places])
         loops = np.unique(np.stack([c.values[rows] for c in deciding], axis=1), axis=0, return_inverse=True)[1].ravel()
         count = int(loops.max(initial=0)) + 1
-        kept = np.unique(np.linspace(0, count - 1, min(count, MOST_LOOPS)).astype(int))
+        kept = distinct(np.linspace(0, count - 1, min(count, MOST_LOOPS)).astype(int))
         places = places[np.isin(loops, kept)]
     if len(places) <= MOST_CASES:
         return places
     spread = places[np.linspace(0, len(places) - 1, MOST_CASES - 1).astype(int)]
     worst = pool.worst_first[np.isin(pool.worst_first, places)][:1]
-    return np.unique(np.concatenate([spread, worst]))
+    return distinct(np.concatenate([spread, worst]))
 
 
 def _of(case: Sequence[Margin], joint: str) -> Margin | None:

@@ -10,6 +10,7 @@ from batch.output import quoted
 from batch.pool import ENDED, Column, Pool, shown
 from batch.report.against import GOOD, Before
 from batch.report.content import Table, Worst
+from met.distinct import distinct
 
 MOST_CASES = 20
 """Rows of the table of worst cases."""
@@ -70,7 +71,7 @@ def _misses(pool: Pool, column: Column, place: int) -> bool:
 
 def _title(pool: Pool, shown: int) -> str:
     every = shown == pool.count
-    if any(ENDED[each] not in ("met", "done") for each in np.unique(pool.ended)):
+    if any(ENDED[each] not in ("met", "done") for each in distinct(pool.ended)):
         return "Cases, worst first" if every else "Worst cases"
     if not pool.requirements:
         return "Cases" if every else "The first cases"

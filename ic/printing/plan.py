@@ -10,6 +10,7 @@ import numpy as np
 
 from ic.printing.columns import columns, count, number, quantity, size, vector
 from met import models
+from met.distinct import distinct
 from met.plan import Experiment, Formula, Joint, Plan, Structure
 
 CHOSEN = 88  # columns, of parameters that stand in one cell
@@ -279,7 +280,7 @@ def _cases(experiment: Experiment) -> Iterator[str]:
     yield f"Cases: {cases.count}, {written}"
     rows = [(choice.path, choice.value) for choice in cases.choices]
     for coordinate in cases.coordinates:
-        shown = np.unique(coordinate.values) / coordinate.scale
+        shown = distinct(coordinate.values) / coordinate.scale
         if shown.size == 0:
             continue
         if shown.size <= 4:
@@ -288,7 +289,7 @@ def _cases(experiment: Experiment) -> Iterator[str]:
             several = f"{shown.size} values from {number(float(shown[0]))} to {number(float(shown[-1]))}"
         rows.append((coordinate.path, f"{several} {coordinate.unit}" if coordinate.unit != "1" else several))
     if cases.repeats is not None:
-        rows.append(("repeat", f"{len(np.unique(cases.repeats))} times each"))
+        rows.append(("repeat", f"{len(distinct(cases.repeats))} times each"))
     if cases.seeds == "independent":
         rows.append(("seeds", "each case has noise of its own"))
     yield from columns(rows)

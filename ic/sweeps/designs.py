@@ -26,6 +26,7 @@ from ic.meaning.values import PURE, Value, evaluate_number, measure_of, place_of
 from ic.sweeps.choices import check_still
 from met import units
 from met.diagnostic import Place, Problem, did_you_mean, error
+from met.distinct import distinct
 from met.frozen import frozen
 from met.trace import Scalar
 
@@ -81,7 +82,7 @@ class Sample:
         points = _points(self.design, self.count, [part.path for part in self.parts], self.seed, number)
         found = [part.values(column) for part, column in zip(self.parts, points.T, strict=True)]
         for part, values in zip(self.parts, found, strict=True):
-            different = len(np.unique(values))
+            different = len(distinct(values))
             if 2 * different < self.count:
                 raise Problem(error("D225", f"`{part.path}` hardly varies: {self.count} samples have {different} "
                                     f"value{'s' * (different != 1)}", part.place,
