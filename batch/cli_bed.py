@@ -80,6 +80,23 @@ def probe(word: str, source: str | None, names: tuple[str, ...], **options: Any)
     return YES
 
 
+@bed.command(short_help="Have a bed forget faults that it has latched.")
+@PORT
+@BAUD
+@format_option
+@loudness_options
+def clear(word: str, **options: Any) -> int:
+    """A bed that stopped itself does not arm again until it is told to forget why. This prints what it was, waits until
+    the shaft has come to rest, and clears it. Find the cause first.
+
+    Exit status: 0 nothing is latched any more; 2 the bed does not answer, or its shaft turns on.
+    """
+    from batch.beds.clearing import clear_and_tell
+
+    clear_and_tell(word, **options)
+    return YES
+
+
 @bed.command(short_help="Measure how well exchanges with a bed keep their time.")
 @click.argument("source", metavar="[DECK|PLAN.json]", required=False)
 @click.argument("names", nargs=-1, metavar="[NAME]")
@@ -154,6 +171,8 @@ def identify(word: str, source: str, names: tuple[str, ...], **options: Any) -> 
               "that a run has the same bits each time.")  # fmt: skip
 @click.option("--rest", type=SECONDS, metavar="TIME", help="Let the motors cool between cases (`30 s`).")
 @click.option("--transcripts", metavar="DIR", help="Write what goes over the lines into files in this folder.")
+@click.option("--clear", is_flag=True, help="Before each case, clear what its bed has latched: a sweep then goes on "
+              "after a case whose bed stopped itself.")  # fmt: skip
 @click.option("--force", is_flag=True, help="Arm the bed also where a law has no margin of stability.")
 @click.option("-o", "--output", metavar="FILE", help="The archive [as `met run` calls it].")
 @click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'.")

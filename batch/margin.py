@@ -1,4 +1,4 @@
-"""What `met margin` prints: of each joint whose motor is on a bed, how heavy the arm is and how heavy it may be."""
+"""What `met margin` prints: of each joint whose motor is on a bed, how heavy the arm is and may be."""
 
 from __future__ import annotations
 
@@ -17,16 +17,21 @@ def told(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> Iterator[
     yield f"{experiment.name}: {count(len(found[0]), 'joint')} on a bed{cases}"
     yield ""
     several = len(found[0]) > 1
-    rows = [["joint", "law", "servo", "delay", "r", *["together"] * several, "stable to r", "margin"]]
     joints = list(zip(*found, strict=True))
-    for each in joints:
-        worst = min(each, key=_room)
+    tightest = [min(each, key=lambda one: one.room) for each in joints]
+    spans = any(one.lower > 0.0 for one in tightest)
+    rows = [["joint", "law", "servo", "delay", "r", *["together"] * several, stable_head(spans), "margin"]]
+    for one in tightest:
+        together = f"{one.least:.3g} to {one.together:.3g}" if spans else f"{one.together:.3g}"
         rows.append([
-            worst.joint, worst.law, f"{worst.rate_hz:g} Hz", f"{worst.delay:g}", f"{worst.r:.3g}",
-            *[f"{worst.together:.3g}"] * several, _limit(worst), _verdict(worst),
+            one.joint, one.law, f"{one.rate_hz:g} Hz", f"{one.delay:g}", f"{one.r:.3g}", *[together] * several,
+            stable_at(one, spans), verdict(one),
         ])  # fmt: skip
     yield from columns(rows, right=(2, 3, 4, 5, 6) if several else (2, 3, 4, 5))
     yield ""
+    for one in tightest:
+        if not one.stable:
+            yield f"  {one.joint}: {remedy(one)} may help"
     for each in joints:
         bad = [one for one in each if not one.stable]
         if bad and len(found) > 1:
@@ -36,7 +41,8 @@ def told(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> Iterator[
         yield "  each row is the tightest of all cases"
     yield "  r = J_eff/(N^2 J_m) at the start of the run, each joint by itself; delay in ticks of the servo"
     if several:
-        yield "  together: the largest of any motion of all of them, which the limit is held against"
+        largest = "the least and the largest" if spans else "the largest"
+        yield f"  together: {largest} of any motion of all of them, which the limit is held against"
 
 
 def as_data(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> dict[str, Any]:
@@ -45,21 +51,34 @@ def as_data(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> dict[s
     return {"experiment": experiment.name, "searched_to": HEAVIEST, "margins": rows}
 
 
-def _limit(one: Margin) -> str:
-    if one.limit is None:
-        return f"more than {one.searched:.4g}"
-    return f"{one.limit:.3g}" if one.limit > 0.0 else "nothing"
+def stable_head(spans: bool) -> str:
+    """Above what `stable_at` gives. spans: whether one of several has a lower end."""
+    return "stable at r" if spans else "stable to r"
 
 
-def _room(one: Margin) -> float:
-    """How many times heavier the arm might be at least; nothing is tighter than an arm whose r is no number."""
-    room = one.factor if one.factor is not None else one.searched / one.together
-    return room if room == room else 0.0
+def stable_at(one: Margin, spans: bool) -> str:
+    """The r at which the loop is stable: up to which, or from which to which."""
+    if one.limit == 0.0:
+        return "nothing"
+    limit = f"more than {one.searched:.4g}" if one.limit is None else f"{one.limit:.3g}"
+    return f"{one.lower:.3g} to {limit}" if spans else limit
 
 
-def _verdict(one: Margin) -> str:
-    if not one.stable and one.together != one.together:
-        return "NONE: r is no number"
-    if one.factor is None:
-        return "no limit found"
-    return f"{one.factor:.2g} times" if one.stable else "NONE: unstable"
+def verdict(one: Margin, none: str = "NONE") -> str:
+    """The margin in words; that there is none begins with `none`."""
+    if one.together != one.together:
+        return f"{none}: r is no number"
+    if not one.stable:
+        return f"{none}: unstable, too light" if one.too_light else f"{none}: unstable"
+    if one.lighter is None:
+        return "no limit found" if one.heavier is None else f"{one.heavier:.2g} times"
+    heavier = "" if one.heavier is None else f"{one.heavier:.2g} times heavier, "
+    return f"{heavier}{one.lighter:.2g} times lighter"
+
+
+def remedy(one: Margin) -> str:
+    """What may make a joint stable that is not."""
+    if one.too_light:
+        return "a lower gain of the servo's rate loop, a faster servo or a heavier arm"
+    changed = "lower gains" if one.limit == 0.0 else "a lighter arm"
+    return f"{changed}, a faster servo or another law"

@@ -54,20 +54,23 @@ def there(campaign: Campaign, key: str) -> str:
 
 
 def guard(campaign: Campaign) -> None:
-    """Refuse to replace a finished archive of another campaign that took long. Raises Problem E353."""
+    """Refuse to replace a finished archive of another campaign that took long, or was measured on motor beds. Raises
+    Problem E353."""
     try:
         told = json.loads(sidecar_path(campaign.output).read_text(encoding="utf-8"))
         seconds = sum(float(each["seconds"]) for each in told["experiments"])
     except (OSError, ValueError, LookupError, TypeError):
         return
-    if seconds < GUARDED_SECONDS or not campaign.output.exists():
+    measured = bool(told.get("beds"))
+    if (seconds < GUARDED_SECONDS and not measured) or not campaign.output.exists():
         return
     try:
         with ArchiveFile(campaign.output) as file:
             found = changes(file.plan(as_written=True), campaign.plan)
     except Problem:
         found = ["it cannot be read any more"]
-    message = f"{campaign.output} holds another campaign, {duration(seconds)} of computing, and is left as it is"
+    what = "driven on motor beds" if measured else f"{duration(seconds)} of computing"
+    message = f"{campaign.output} holds another campaign, {what}, and is left as it is"
     raise Problem(error("E353", message, help=_what(found or ["what is asked for (`--case`, `--histories`)"])))
 
 

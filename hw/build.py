@@ -113,6 +113,20 @@ LAG = 3.0
 _ROOM = 1 << 60
 """What no product of the guards' whole numbers may reach."""
 
+GUARD_BITS = 24
+"""Of a fraction in the tachometer's guard; fewer where a tick of a light shaft is many fine counts."""
+
+_BEYOND = 2.0**62
+"""What any larger number counts as: nothing is taken that is so large."""
+
+
+class Uncountable(ValueError):
+    """A config that a device cannot count with. remedy: what there is to change in a deck's bed."""
+
+    def __init__(self, message: str, remedy: str) -> None:
+        super().__init__(message)
+        self.remedy = remedy
+
 
 def build(
     kind: Kind,
@@ -127,19 +141,22 @@ def build(
     plant_c   text of the simulated plant; None only for a library, whose port is in `sources`
     flags     more words for the compiler
 
-    Problem E410, E411: there is no compiler, or it does not build this. ValueError: a config that cannot be counted.
+    Problem E410, E411: there is no compiler, or it does not build this. ValueError: a config that cannot be counted
+    (`Uncountable`), or whose ticks are not the plant's periods.
     """
     if plant_c is None and kind != "library":
         raise ValueError(f"firmware of kind {kind!r} needs a plant")
     compiler = _compiler(kind)
     texts = {"config.c": config_c(config, plant=plant_c is not None)}
     if plant_c is not None:
+        _check_period(config, plant_c)
         texts["plant.c"] = plant_c
     files = _sources(kind, plant=plant_c is not None) + [Path(path) for path in sources]
     words = [*WARNINGS, *_FLAGS[kind], *(() if kind == "arm" else _fused()), *flags]
-    texts["config.c"] = texts["config.c"].replace(_NO_HASH, _bytes(firmware_hash(files, texts)))
+    read = sorted([*FIRMWARE.rglob("*.h"), *(FIRMWARE.rglob("*.ld") if kind == "arm" else ())])
+    stamp = firmware_hash([*files, *read], texts)
+    texts["config.c"] = config_c(config, plant=plant_c is not None, firmware=stamp)
     version = subprocess.run([compiler, "--version"], capture_output=True, text=True).stdout
-    read = sorted(FIRMWARE.rglob("*.h"))
     name = cache.key(
         kind, compiler, version, *words, *(each for pair in sorted(texts.items()) for each in pair),
         *(each for path in [*files, *read] for each in (path.name, path.read_text(encoding="utf-8"))),
@@ -148,7 +165,8 @@ def build(
 
 
 def firmware_hash(files: Sequence[Path], texts: Mapping[str, str]) -> bytes:
-    """First eight bytes of the SHA-256 of what is built: files of the firmware, config (its hash zero) and plant."""
+    """First eight bytes of the SHA-256 of what is built: files of the firmware, and texts that were written for it,
+    such as config.c with the hash left zero, by their names."""
     digest = hashlib.sha256()
     for name, text in sorted([*((path.name, path.read_text(encoding="utf-8")) for path in files), *texts.items()]):
         for part in (name, text):
@@ -174,13 +192,12 @@ def counted(config: Config) -> tuple[dict[str, int], Limits, float]:
     """What the device counts with, and the limits and deadman in SI that are just that.
 
     Names are those of `bed_limit` in hw/firmware/core/bed.h, and arming_rate, load_trip, drive_trip, deadman (ticks),
-    heat, continuous. ValueError where something is out of range.
+    heat, continuous. Uncountable where something is out of range.
     """
     s, limits, hz = config.scales, config.limits, config.tick_hz
     given = {**_fields(s, "scale of "), **_fields(limits, "limit of "), "tick rate": hz}
     for what, value in given.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{what} is {value:g}, not a number above 0")
+        _check_above_0(what, value)
     counts = {
         "voltage": _whole(limits.voltage / s.voltage),
         "current": _whole(limits.current / s.current),
@@ -194,14 +211,17 @@ def counted(config: Config) -> tuple[dict[str, int], Limits, float]:
     }
     for what, count in counts.items():
         if not (0 if what == "drive_trip" else 1) <= count < 2**31 - 1:
-            raise ValueError(f"{what} is {count} counts, not 1 to 2147483646")
+            words = f"{what.replace('_', ' ')} is {count:.10g} counts, not 1 to 2147483646"
+            step = f"a {'smaller' if count < 1 else 'larger'} `{_STEPS.get(what, 'converter_current')}`"
+            raise Uncountable(words, step)
     counts["heat"] = _whole(limits.heat / s.current**2 * hz)
     counts["continuous"] = _whole((config.continuous_current / s.current) ** 2)
     if max(counts["heat"], counts["continuous"]) >= _ROOM:
-        raise ValueError("the current's scale is too fine for the I2t of the load")
+        raise Uncountable("the current's scale is too fine for the I2t of the load", "a larger `converter_current`")
     deadman = counts["deadman"] / hz
     if not 0.010 - 1e-9 <= deadman <= 0.020 + 1e-9:
-        raise ValueError(f"a deadman of {deadman:g} s, in whole ticks, is not 0.010 to 0.020 s")
+        raise Uncountable(f"a deadman of {deadman:g} s, in whole ticks, is not 0.010 to 0.020 s", "another rate")
+    deadman = min(max(deadman, 0.010), 0.020)  # but for what rounding has left beyond them
     told = Limits(
         voltage=counts["voltage"] * s.voltage,
         current=counts["current"] * s.current,
@@ -214,49 +234,91 @@ def counted(config: Config) -> tuple[dict[str, int], Limits, float]:
     return counts, told, deadman
 
 
+_STEPS = {
+    "voltage": "converter_voltage", "voltage_slew": "converter_voltage",
+    "rate": "converter_in", "arming_rate": "converter_in",
+}  # fmt: skip
+"""The parameter of a deck's bed that is what is counted by; `converter_current` of all others."""
+
+
 def _fields(of: Scales | Limits, what: str) -> dict[str, float]:
     return {what + name.replace("_", " "): getattr(of, name) for name in type(of).__dataclass_fields__}
 
 
+def _check_above_0(what: str, value: float, *, or_0: bool = False) -> None:
+    if not (math.isfinite(value) and (value > 0.0 or (or_0 and value == 0.0))):
+        raise Uncountable(f"{what} is {value:g}, not a number above 0", "a number above 0")
+
+
 def _whole(value: float) -> int:
     """Down to a whole number, but for what rounding has left below one."""
-    return math.floor(value * (1.0 + 1e-12))
+    return math.floor(min(value, _BEYOND) * (1.0 + 1e-12))
 
 
 def guard(config: Config) -> dict[str, int]:
-    """The fields of `guard_tachometer_config` (hw/firmware/core/guard.h); all zero without a shaft."""
-    names = ("voltage", "back_emf", "most", "current", "viscous", "friction", "tolerance", "change", "lag")
+    """The fields of `guard_tachometer_config` (hw/firmware/core/guard.h); all zero without a shaft. Uncountable where
+    it cannot be watched."""
+    names = ("bits", "voltage", "back_emf", "most", "current", "viscous", "friction", "tolerance", "change", "lag")
     shaft, s = config.shaft, config.scales
     if shaft is None:
         return dict.fromkeys(names, 0)
-    per = 2.0**24 / (shaft.inertia * config.tick_hz * s.rate)  # of a torque, N m
-    armature = shaft.kt / shaft.resistance
+    for what, value in shaft.__dict__.items():
+        _check_above_0(f"the shaft's {what}", value, or_0=what in ("f_c", "f_v"))
     limits, delay = counted(config)[0], math.sqrt(2.0) / (2.0 * math.pi * shaft.f_cut)
+    lag, tolerance = LAG * delay * config.tick_hz, round(TOLERANCE * 256.0)
+    if lag >= 2**31:
+        raise Uncountable("the tachometer's filter is too slow for its guard", "a larger `f_cut`")
+    per = 1.0 / (shaft.inertia * config.tick_hz * s.rate)  # of a torque, N m
+    armature = shaft.kt / shaft.resistance
     found = {
-        "voltage": round(armature * s.voltage * per),
-        "back_emf": round(armature * shaft.kt * s.rate * per),
-        "most": round(shaft.tau_max * per),
-        "current": round(shaft.kt_load * s.current * per),
-        "viscous": round(shaft.f_v * s.rate * per),
-        "friction": round(FRICTION * shaft.f_c * per),
-        "tolerance": round(TOLERANCE * 256.0),
-        "change": max(16, math.ceil(CHANGE * limits["rate"])),
-        "lag": math.ceil(LAG * delay * config.tick_hz),
+        "voltage": armature * s.voltage * per,
+        "back_emf": armature * shaft.kt * s.rate * per,
+        "most": shaft.tau_max * per,
+        "current": shaft.kt_load * s.current * per,
+        "viscous": shaft.f_v * s.rate * per,
+        "friction": FRICTION * shaft.f_c * per,
     }
-    largest = (
-        found["voltage"] * limits["voltage"],
-        found["back_emf"] * limits["rate"],
-        found["most"] * 256,
-        found["current"] * limits["current"] * 256,
-        found["viscous"] * limits["rate"],
+    highest = found["voltage"] * limits["voltage"] + found["back_emf"] * limits["rate"]
+    found["most"] = min(found["most"], highest)  # a torque that no voltage reaches takes no room
+    load, viscous = found["current"] * limits["current"], found["viscous"] * limits["rate"]
+    largest = max(
+        highest,
+        256.0 * found["most"],
+        256.0 * load,
         found["friction"],
+        # what may be sure in a tick, summed while a rate is waited for
+        (found["most"] + load + viscous) * (lag + 2.0),
     )
-    if max(largest) >= _ROOM // 8:
-        raise ValueError("the scales are too fine, or the shaft too light, for the tachometer's guard")
-    return found
+    bits = min(GUARD_BITS, math.floor(math.log2(_ROOM // 8 / min(largest, _BEYOND))))
+    if bits < 0:
+        raise Uncountable(
+            "the scales are too fine, or the shaft too light, for the tachometer's guard",
+            "a larger `inertia` or `converter_in`",
+        )
+    return {
+        "bits": bits,
+        **{name: round(value * 2.0**bits) for name, value in found.items()},
+        "tolerance": tolerance,
+        "change": max(16, math.ceil(CHANGE * limits["rate"])),
+        "lag": math.ceil(lag),
+    }
 
 
-_NO_HASH = ", ".join(["0x00"] * 8)
+_PERIOD = re.compile(r"\bplant_period\s*=\s*([^;]*?)\s*;")
+
+
+def _check_period(config: Config, plant_c: str) -> None:
+    """That a plant's period is a tick. ValueError."""
+    found = _PERIOD.search(plant_c)
+    word = "" if found is None else found[1]
+    macro = re.search(rf"#\s*define\s+{re.escape(word)}\s+(\S+)", plant_c) if word.isidentifier() else None
+    word = word if macro is None else macro[1]
+    try:
+        period = float.fromhex(word) if "x" in word else float(word)
+    except ValueError:
+        raise ValueError("plant.c does not say its `plant_period` as a number") from None
+    if not abs(period * config.tick_hz - 1.0) < 1e-6:
+        raise ValueError(f"a tick of {config.tick_hz:g} Hz is not the plant's period, {period:g} s")
 
 
 def _bytes(data: bytes) -> str:
@@ -267,11 +329,13 @@ def _double(value: float) -> str:
     return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016x}u"
 
 
-def config_c(config: Config, *, plant: bool) -> str:
-    """The text of config.c: one bed's numbers, the firmware's hash left zero. plant: the bed is a simulated one."""
+def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
+    """The text of config.c: one bed's numbers. plant: the bed is a simulated one;  firmware: `firmware_hash` of what is
+    built, this text with zeros in its place included. ValueError: a config that cannot be."""
     counts, limits, deadman = counted(config)
     s, g = config.scales, guard(config)
-    name = config.name.encode("ascii", "replace")[:16].ljust(16, b"\0")
+    if not (1 <= len(config.name) <= 16 and config.name.isascii() and config.name.isprintable()):
+        raise ValueError(f"the name {config.name!r} is not 1 to 16 printable characters of ASCII")
     capabilities = config.capabilities | (Capability.SIMULATED if plant else Capability(0))
     if Capability.LOCK_STEP in capabilities and not plant and Capability.SIMULATED not in capabilities:
         raise ValueError("lock-step is for simulated plants")
@@ -288,8 +352,8 @@ def config_c(config: Config, *, plant: bool) -> str:
         *([] if plant else ["extern const bed_plant board_plant;"]),
         "const bed_config board_config = {",
         f"    .capabilities = 0x{int(capabilities):04x}u,",
-        f"    .firmware = {{{_NO_HASH}}},",
-        f"    .name = {{{_bytes(name)}}},",
+        f"    .firmware = {{{_bytes(firmware)}}},",
+        f"    .name = {{{_bytes(config.name.encode().ljust(16, bytes(1)))}}},",
         "    .announced = {",
         *(f"        {_double(value)}, /* {value!r} */" for value in announced),
         "    },",
@@ -298,7 +362,7 @@ def config_c(config: Config, *, plant: bool) -> str:
         f"    .deadman = {counts['deadman']}u,",
         f"    .heat = {{.most = {counts['heat']}, .continuous = {counts['continuous']}}},",
         "    .tachometer = {",
-        *(f"        .{each} = {value}{'u' if each == 'lag' else ''}," for each, value in g.items()),
+        *(f"        .{each} = {value}{'u' if each in ('bits', 'lag') else ''}," for each, value in g.items()),
         "    },",
         f"    .plant = {'&board_plant' if Capability.SIMULATED in capabilities else '0'},",
         "};",

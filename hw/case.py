@@ -12,8 +12,9 @@ from dataclasses import asdict, field
 from pathlib import Path
 from typing import Any
 
-from hw import loop, process
+from hw import loop, process, refusals
 from hw.bed import About, Bed, Capability
+from hw.beds import latch
 from hw.driven import LANES, Driven, divisor, substituted
 from hw.pace import Pace, pace
 from hw.ports import Port, opened
@@ -32,6 +33,7 @@ class Asked:
     ports: by joint;  lock_step: whether the beds have no time of their own;  baud: of serial lines
     records: the file that they go to;  head: what else stands at its beginning;  rest: s of rest before the case
     transcripts: by joint, files that what goes over the line is written to
+    clear: whether faults that a bed has latched are cleared; else it is not driven
     """
 
     plan: str
@@ -41,6 +43,7 @@ class Asked:
     lock_step: bool = False
     baud: int = 921600
     rest: float = 0.0
+    clear: bool = False
     head: Mapping[str, Any] = field(default_factory=dict)
     transcripts: Mapping[str, str] = field(default_factory=dict)
 
@@ -63,7 +66,7 @@ def run(asked: Asked) -> loop.Ended:
         for joint in joints:
             port = Port(asked.ports[joint], asked.baud, asked.lock_step, asked.transcripts.get(joint))
             beds.append(opened(port, experiment, joint, asked.row, of.period))
-            abouts.append(_greeted(beds[-1], joint, experiment, asked.row))
+            abouts.append(_greeted(beds[-1], joint, experiment, asked))
         lock_step = asked.lock_step
         _check_time(abouts, lock_step)
         prepared = prepare(experiment, wire=True, late=of.late(lock_step), lanes=LANES)
@@ -89,11 +92,15 @@ def run(asked: Asked) -> loop.Ended:
             bed.close()
 
 
-def _greeted(bed: Bed, joint: str, experiment: Experiment, row: int) -> About:
+def _greeted(bed: Bed, joint: str, experiment: Experiment, asked: Asked) -> About:
     """Who the bed is; a simulated one begins anew, with the case's noise."""
-    about = bed.connect()
+    about, row = bed.connect(), asked.row
     process.say(bed=joint, about=process.told(about))
     process.warnings(bed)
+    if not asked.clear:
+        latch.check(bed, about, asked.ports[joint])
+    elif faults := latch.cleared(bed, about):
+        process.say(said=f"{joint}: cleared: {refusals.words(faults)}")
     if Capability.SIMULATED in about.capabilities:
         cases = experiment.cases
         seed = int(case_seeds(experiment, [row])[0]) if SEED in cases.noise else cases.seed

@@ -12,13 +12,14 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 
+from hw import refusals
 from hw.bed import Bed, Capability
 from hw.beds import emulated
 from hw.beds.emulated import EmulatedBed
 from hw.beds.replay import ReplayBed
 from hw.beds.serial_line import BAUD, SerialBed
 from hw.beds.simulated import SimulatedBed
-from hw.build import Config, Shaft
+from hw.build import Config, Shaft, Uncountable
 from hw.protocol.frames import unframed
 from hw.protocol.messages import Step
 from hw.transcript import MAGIC, SENT, File, read
@@ -62,7 +63,10 @@ def opened(port: Port, experiment: Experiment | None, joint: str, row: int, peri
         config = config_of(bed_values(experiment, joint, row), period, lock_step=port.lock_step)
         text = plant_c(experiment, joint, case=row, period=period)
         kind = "qemu" if port.name == QEMU else "firmware"
-        return SimulatedBed(kind, config, text, period=period, transcript=keep)  # type: ignore[arg-type]
+        try:
+            return SimulatedBed(kind, config, text, period=period, transcript=keep)  # type: ignore[arg-type]
+        except Uncountable as reason:
+            raise refusals.uncountable(joint, reason) from None
     if is_transcript(port.name):
         return ReplayBed(port.name)
     return SerialBed(port.name, period=period, baud=port.baud, transcript=keep)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hw.bed import About, Fault, Sample, State
+from hw.build import Uncountable
 from hw.protocol.messages import VERSION
 from met.diagnostic import Problem, error
 
@@ -71,6 +72,13 @@ def refused(about: About, what: str, sample: Sample) -> Problem:
     return Problem(error("E406", f"bed `{about.name}` does not {what}: {why}", help=helps))
 
 
+def latched(about: About, faults: Fault, port: str) -> Problem:
+    """A bed that stopped itself before it was greeted, and was not told to forget it."""
+    message = f"bed `{about.name}` has stopped itself, and is to be cleared first: {words(faults & ~Fault.WATCHDOG)}"
+    own = f"then `met bed clear --port {port}`; `met bed run --clear` does so before each case"
+    return Problem(error("E406", message, help=[*remedies(faults & ~Fault.WATCHDOG), own]))
+
+
 def not_connected(name: str) -> Problem:
     helps = "connect to it first; a line that was lost is not taken up again by itself"
     return Problem(error("E401", f"there is no line to a bed on {name}", help=helps))
@@ -93,3 +101,10 @@ def no_command(about: About, what: str, value: float, unit: str, most: float) ->
     said = "no finite number" if value - value != 0.0 else f"beyond the limit of {most:.6g} {unit}"
     message = f"{what} of {value:.6g} {unit} for bed `{about.name}` is {said}; the bed was stopped"
     return Problem(error("E408", message, help="the simulation diverges, or asks more than the bed may give"))
+
+
+def uncountable(joint: str, reason: Uncountable) -> Problem:
+    """A deck's bed of which firmware cannot count the numbers."""
+    message = f"the bed of joint `{joint}` cannot be one of firmware: {reason}"
+    helps = (f"give the deck's bed {reason.remedy}", "`--port emulated` has it as it is")
+    return Problem(error("E404", message, help=helps))

@@ -1,4 +1,4 @@
-"""Whether a motor on a bed stays stable: how heavy the arm may be for its law, rate and delay, and how heavy it is.
+"""Whether a motor on a bed stays stable: how heavy the arm may be for its law, rate and delay, how light, and its weight.
 
 The measure is r = J_eff/(N^2 J_m), the arm's inertia at the joint against the rotor's. The loop of bed, filter,
 converter-free wire, servo and law is taken round once by the functions that run it, at a steady rate of the shaft where
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,8 @@ GROWS = 1.0 + 1e-6
 LIGHTEST, HEAVIEST, STEPS = 0.05, 2000.0, 40
 """Range of r that is searched, wider for an arm that lies outside it; and how many values, a constant share apart."""
 
+_Stretches = tuple[tuple[float, float | None], ...]
+
 # ends of the names of angles, which only add up and come back to nothing
 _ANGLES = ("angle",)
 
@@ -39,7 +42,9 @@ class Margin:
 
     r         of the arm at the start of the run
     together  the largest r of any motion of all substituted joints, an eigenvalue of Lambda/(N^2 J_m); of one joint: r
-    limit     smallest r at which the loop is unstable; None: none found up to `searched`; 0: at any
+    least     the smallest of them
+    lower     r above which the loop is stable, of the stretch of r around `together`, else of the nearest; 0: any
+    limit     r up to which it is, of the same stretch; None: none found up to `searched`; 0: it is stable at no r
     """
 
     case: int
@@ -50,18 +55,45 @@ class Margin:
     delay: float
     r: float
     together: float
+    least: float
+    lower: float
     limit: float | None
     searched: float
 
     @property
-    def factor(self) -> float | None:
+    def heavier(self) -> float | None:
         """How many times heavier the arm might be; None where no limit was found."""
         return None if self.limit is None else self.limit / self.together
 
     @property
+    def lighter(self) -> float | None:
+        """How many times lighter it might be; None where it may be as light as any."""
+        return self.least / self.lower if self.lower > 0.0 else None
+
+    @property
+    def factor(self) -> float | None:
+        """How many times heavier, or lighter, the arm might be, whichever is less; below 1 where it is unstable."""
+        return min((each for each in (self.heavier, self.lighter) if each is not None), default=None)
+
+    @property
+    def room(self) -> float:
+        """`factor`, as far as was searched; nothing has less than an arm whose r is no number."""
+        found = self.searched / self.together if self.factor is None else self.factor
+        return found if found == found else 0.0
+
+    @property
+    def too_light(self) -> bool:
+        """Whether it is for its lightness that the arm is not stable."""
+        return self.least <= self.lower and not self.too_heavy
+
+    @property
+    def too_heavy(self) -> bool:
+        return self.limit is not None and 0.0 < self.limit <= self.together
+
+    @property
     def stable(self) -> bool:
         """Of an arm whose r is no number nothing is known: False."""
-        return self.together < (self.searched if self.limit is None else self.limit)
+        return self.lower < self.least and self.together < (self.searched if self.limit is None else self.limit)
 
 
 def margins(
@@ -69,14 +101,14 @@ def margins(
 ) -> tuple[tuple[Margin, ...], ...]:
     """Every substituted joint of an experiment: one tuple a case (all by default).
 
-    The loop is taken round for each joint by itself, and held against the heaviest that the arm is in any motion of all
-    of them together: their loops are one through the arm.
+    The loop is taken round for each joint by itself, and held against the lightest and the heaviest that the arm is in
+    any motion of all of them together: their loops are one through the arm.
 
-    progress  called with the number of cases done so far. A limit is looked for once for all cases that share the
+    progress  called with the number of cases done so far. Limits are looked for once for all cases that share the
               parameters of servo, bed and law
     """
     plain = _faultless(experiment)
-    known: dict[tuple[Any, ...], float | None] = {}
+    known: dict[tuple[Any, ...], _Known] = {}
     found = []
     for done, case in enumerate(range(experiment.cases.count) if cases is None else cases, start=1):
         found.append(tuple(_margins(plain, case, known)))
@@ -85,7 +117,16 @@ def margins(
     return tuple(found)
 
 
-def _margins(experiment: Experiment, case: int, known: dict[tuple[Any, ...], float | None]) -> Iterator[Margin]:
+@frozen
+class _Known:
+    """Of a loop: the stretches of r in which it is stable (from 0: any; to None: as far as searched), and whether it
+    grows at the r of arms so far."""
+
+    stretches: _Stretches
+    grows: dict[float, bool]
+
+
+def _margins(experiment: Experiment, case: int, known: dict[tuple[Any, ...], _Known]) -> Iterator[Margin]:
     builder, tape = _begun(experiment, case)
     beds = builder.step.beds
     # All of them first: a loop is taken round over the same cells, with loads of its own.
@@ -94,24 +135,60 @@ def _margins(experiment: Experiment, case: int, known: dict[tuple[Any, ...], flo
     loops = [_Loop(builder, tape, each) for each in beds.mounted]
     ratios = Lambda / np.array([loop.rotor for loop in loops])[:, None]
     # of a matrix that is similar to a symmetric one: real but for rounding
-    together = float(np.linalg.eigvals(ratios).real.max()) if np.isfinite(ratios).all() else np.nan
+    together, least = np.nan, np.nan
+    if np.isfinite(ratios).all():
+        motions = np.linalg.eigvals(ratios).real
+        together, least = float(motions.max()), float(motions.min())
     for each, loop, r in zip(beds.mounted, loops, ratios.diagonal().tolist(), strict=True):
         heads = (f"{each.joint}.servo.", f"{each.joint}.bed.", f"{each.joint}.law.")
         own = [path for path in experiment.parameters if path.startswith(heads) and ".command." not in path]
         # Its own r is always among those searched. Where a loop grows, or not, beyond them is not known.
         lightest, heaviest = LIGHTEST, HEAVIEST
-        if r > 0.0 and together < np.inf:
-            lightest, heaviest = min(lightest, 0.5 * r), max(heaviest, 2.0 * together)
+        if least > 0.0 and together < np.inf:
+            lightest, heaviest = min(lightest, 0.5 * least), max(heaviest, 2.0 * together)
         key = (each.joint, lightest, heaviest, *(builder.machine.value(path, tape.read) for path in own))
         if key not in known:
-            known[key] = loop.limit(lightest, heaviest)
+            known[key] = _Known(loop.stretches(lightest, heaviest), {})
+        lower, limit = _around(known[key], loop, (least, together), (lightest, heaviest))
         delay = float(builder.machine.value(f"{each.joint}.bed.delay", tape.read))
         rate_hz = builder.schedule.base_hz / beds.divisor
-        yield Margin(case, each.joint, each.law.name, each.bed.name, rate_hz, delay, r, together, known[key], heaviest)
+        yield Margin(
+            case, each.joint, each.law.name, each.bed.name, rate_hz, delay, r, together, least, lower, limit, heaviest
+        )
+
+
+def _around(
+    known: _Known, loop: _Loop, own: tuple[float, float], searched: tuple[float, float]
+) -> tuple[float, float | None]:
+    """The stretch around the heavier of the arm's own r, else the nearest to it; (0, 0): there is none.
+
+    At its own r it is as the loop is there, also where the search has gone past a narrow stretch.
+    """
+    stretches = known.stretches
+    numbers = [r for r in own if 0.0 < r < np.inf]
+    for r in numbers:
+        if r not in known.grows:
+            known.grows[r] = loop.grows(r)
+    if any(known.grows[r] == any(_holds(each, r) for each in stretches) for r in numbers):
+        stretches = loop.stretches(*searched, numbers)
+
+    def near(stretch: tuple[float, float | None]) -> float:
+        lower, limit = stretch
+        if own[1] <= lower:
+            return own[1] / lower if lower > 0.0 else 1.0
+        return 1.0 if limit is None else min(1.0, limit / own[1])
+
+    return max(stretches, key=near, default=(0.0, 0.0))
+
+
+def _holds(stretch: tuple[float, float | None], r: float) -> bool:
+    lower, limit = stretch
+    return lower < r and (limit is None or r < limit)
 
 
 def _faultless(experiment: Experiment) -> Experiment:
-    """The experiment with beds that have no faults: noise and converters would be taken for slopes."""
+    """The experiment with beds that have no faults, whose noise and converters would be taken for slopes, and whose
+    current has no limit, at which there is none."""
     from met import models
 
     parameters = dict(experiment.parameters)
@@ -120,6 +197,9 @@ def _faultless(experiment: Experiment) -> Experiment:
         for name in {name for preset in bed.presets.values() for name in preset}:
             path = f"{use.joint}.bed.{name}"
             parameters[path] = replace(parameters[path], value=0.0)
+        if any(parameter.name == "i_max" for parameter in bed.parameters):
+            path = f"{use.joint}.bed.i_max"
+            parameters[path] = replace(parameters[path], value=np.inf)
     return replace(experiment, parameters=parameters)
 
 
@@ -204,20 +284,27 @@ class _Loop:
         matrix = np.array(columns).T
         return float("inf") if not np.isfinite(matrix).all() else float(np.abs(np.linalg.eigvals(matrix)).max())
 
-    def limit(self, lightest: float, heaviest: float) -> float | None:
-        """Smallest r of this range at which the loop grows, to a hundredth; None where there is none, 0 where it grows
-        at the lightest already."""
-        low = 0.0
-        for r in np.geomspace(lightest, heaviest, STEPS):
-            if self.radius(float(r)) > GROWS:
-                high = float(r)
-                break
-            low = float(r)
-        else:
-            return None
-        if low == 0.0:
-            return 0.0
-        while high > 1.005 * low:
-            middle = (low * high) ** 0.5
-            low, high = (low, middle) if self.radius(middle) > GROWS else (middle, high)
-        return (low * high) ** 0.5
+    def grows(self, r: float) -> bool:
+        return self.radius(r) > GROWS
+
+    def stretches(self, lightest: float, heaviest: float, also: Sequence[float] = ()) -> _Stretches:
+        """Where in this range the loop does not grow, rising: from and to which r, to a hundredth.
+
+        From 0 where it does not at the lightest, to None where it does not at the heaviest. also: r to look at besides
+        """
+        looked_at = sorted({*np.geomspace(lightest, heaviest, STEPS).tolist(), *also})
+        growing = [self.grows(r) for r in looked_at]
+        found: list[tuple[float, float | None]] = []
+        lower = 0.0
+        for (low, high), (before, after) in zip(pairwise(looked_at), pairwise(growing), strict=True):
+            if before == after:
+                continue
+            while high > 1.005 * low:
+                middle = (low * high) ** 0.5
+                low, high = (low, middle) if self.grows(middle) == after else (middle, high)
+            end = (low * high) ** 0.5
+            if after:
+                found.append((lower, end))
+            else:
+                lower = end
+        return (*found, (lower, None)) if not growing[-1] else tuple(found)

@@ -30,20 +30,21 @@ from met.frozen import frozen
 from met.plan import Plan
 from met.run import FAILED
 
-FATES = ("E401", "E408")
-"""What may come of a bed that is armed: its line is lost, a command is no number or beyond a limit."""
+NO_FATE = ("E407", "E413")
+"""What says nothing of a bed that is armed: another transcript, a full disk. What else is wrong is what came of it."""
 
 
 @frozen
 class Ports:
     """Where the beds are. by_joint: port by joint;  transcripts: a folder for what goes over the lines, or None
-    rest: s before each case but the first, for the motors to cool"""
+    rest: s before each case but the first, for the motors to cool;  clear: whether faults are cleared before a case"""
 
     by_joint: Mapping[str, str]
     baud: int
     lock_step: bool = False
     rest: float = 0.0
     transcripts: Path | None = None
+    clear: bool = False
 
 
 @frozen
@@ -78,13 +79,14 @@ class OnBeds:
         self.beds: dict[str, list[dict[str, str]]] = {joint: [] for joint in ports.by_joint}
         """By joint, name and firmware of the beds that it was on."""
         self.driving: Driving | None = None
+        self._done = 0
         self.ports = ports.by_joint
         self.lock_step, self.baud = ports.lock_step, ports.baud
         self.tick_hz = float("nan")
 
     @property
     def under_way(self) -> int:
-        return 0
+        return self._done
 
     def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
         self._folder, self._sections, self._tell = folder, sections, tell
@@ -98,7 +100,10 @@ class OnBeds:
             return []
         task = self._waiting.popleft()
         section = self._sections[task.section]
-        found = [self._case(section, int(row)) for row in section.rows[task.first : task.last]]
+        found = []
+        for self._done, row in enumerate(section.rows[task.first : task.last]):
+            found.append(self._case(section, int(row)))
+        self._done = 0
         made = [each for each, _ in found]
         history = np.stack([each.rows for each in made]) if section.recorded else None
         if history is not None and section.single:
@@ -140,6 +145,7 @@ class OnBeds:
             why = str(json.loads(told.read_text(encoding="utf-8"))["why"]) or why
         ticks = section.prepared.experiment.structure.schedule
         at = float(found.outputs[2]) / ticks.base_hz
+        self._say(f"case #{section.prepared.experiment.cases.table[row]}, t = {at:g} s: {why}")
         return found, f"t = {at:g} s: {why}"
 
     def _know(self, experiment: int, row: int, head: Mapping[str, Any], exchanges: Sequence[np.ndarray]) -> None:
@@ -169,10 +175,11 @@ class OnBeds:
         transcripts = {} if ports.transcripts is None else {
             joint: str(ports.transcripts / f"{experiment.name}.{row}.{joint}.transcript") for joint in ports.by_joint
         }  # fmt: skip
+        begun = [name for name in transcripts.values() if not Path(name).exists()]
         asked = Asked(
             plan=plan, row=row, ports=dict(ports.by_joint), records=str(path), lock_step=ports.lock_step,
             baud=ports.baud, rest=ports.rest if self.exchanges else 0.0, head={"key": section.key()},
-            transcripts=transcripts,
+            transcripts=transcripts, clear=ports.clear,
         )  # fmt: skip
         structure, schedule = experiment.structure, experiment.structure.schedule
         exchange_hz = pace_of(experiment).hz * len(structure.substitutions)
@@ -184,8 +191,13 @@ class OnBeds:
                     self._greeted(line["bed"], f"bed `{line['about']['name']}`, firmware {line['about']['firmware']}")
                 ended = line.get("ended", ended)
         except Problem as problem:
+            code = problem.diagnostics[0].code
             ended = {"why": problem.diagnostics[0].message}
-            if problem.diagnostics[0].code not in FATES or not _recorded(path):
+            if code == "E407" or not _recorded(path):  # nothing came of it, and it is driven anew
+                ended = None
+                for name in (path, *map(Path, begun)):
+                    name.unlink(missing_ok=True)
+            if code in NO_FATE or ended is None:
                 raise
         finally:
             self.driving = None

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 import re
-import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +13,8 @@ from batch.beds.asking import meant
 from hw.bed import About, Capability, Limits, Scales
 from hw.identify.driving import Asked
 from hw.process import talk
-from ic.printing.columns import columns
-from met import plan_file
+from ic.printing.columns import columns, quantity
+from met import models, plan_file
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Experiment, Formula, Plan
@@ -80,6 +78,7 @@ def identify_and_tell(
     sheet = sheet_of(which.experiment, which.joint, kt_load)
     deck = Path(output or f"{which.joint}.identified.ic")
     records = deck.with_suffix(".records")
+    _check_output(deck)
     if which.simulated is None and not sheet.said:
         message = f"joint `{which.joint}`: the load motor's constant, by which torques are measured, is nowhere said"
         helps = "`--kt-load '0.072 N*m/A'`, from its data sheet; or `bed = emulated(kt_load = ..., ...)` in the deck"
@@ -89,20 +88,32 @@ def identify_and_tell(
         records=str(records), sheet=dict(sheet.values), baud=baud, lock_step=lock_step, voltage=voltage,
         current=current, rate=rate,
     )  # fmt: skip
-    with contextlib.suppress(FileNotFoundError):
-        records.unlink()
+    records.unlink(missing_ok=True)  # of an attempt that found nothing: there is no deck
     about, ended = _driven(asked, say)
     found = _fitted(records, about, ended, sheet)
     check(found, about)
     estimates = widened(found.parameters, kt_load_error / 100.0)
     origin = origin_of(about, ended, estimates)
-    deck.write_text(included(deck, which.joint, estimates, origin), encoding="utf-8")
+    deck.write_text(included(deck, which.experiment, which.joint, estimates, origin), encoding="utf-8")
     if form == "json":
         print(json.dumps(as_data(found, estimates, sheet, deck, records), indent=2))
         return
     for line in told(found, estimates, sheet):
         say(line)
     say(f"{deck} is a deck to include; what was told and read is in {records}")
+
+
+def _check_output(deck: Path) -> None:
+    """Raises Problem E305 where the deck would not be written, or over another."""
+    wrong, helps = "", "give another name with `-o`"
+    if deck.suffix != ".ic":
+        wrong, helps = f"cannot write {deck}: it is to be a deck, which ends in .ic", f"`-o {deck.with_suffix('.ic')}`"
+    elif deck.exists():
+        wrong, helps = f"{deck} is there already: it is not written over", f"{helps}, or remove it"
+    elif not deck.parent.is_dir():
+        wrong, helps = f"cannot write {deck}: {deck.parent} does not exist", f"make it first: `mkdir -p {deck.parent}`"
+    if wrong:
+        raise Problem(error("E305", wrong, help=helps))
 
 
 def check(found: Found, about: About) -> None:
@@ -194,14 +205,22 @@ def origin_of(about: About, ended: Mapping[str, Any], estimates: Mapping[str, Es
     ]
 
 
-def included(deck: Path, joint: str, estimates: Mapping[str, Estimate], origin: Sequence[str]) -> str:
+def included(
+    deck: Path, experiment: Experiment, joint: str, estimates: Mapping[str, Estimate], origin: Sequence[str]
+) -> str:
     """The deck to include, laid out as `met fmt` does."""
     from ic.formatting.formatter import formatted
 
     head = re.sub(r"\W", "_", joint)
-    bed = ", ".join(f"{name} = {head}_{name}" for name in UNITS)
-    servo = "  ".join(f"{own} = {head}_{name};" for name, own in OF_SERVO.items())
-    uses = [f"substitute {joint} {{ bed = emulated({bed}); }}", f"servo found like believed {{ {servo} }}"]
+    [use] = (each for each in experiment.structure.substitutions if each.joint == joint)
+    [servo] = (each for each in experiment.structure.servos if each.joint == joint)
+    bed = [*(f"{name} = {head}_{name}" for name in UNITS), *_believed(experiment, joint)]
+    motor = (f"{own} = {head}_{name}; " for name, own in OF_SERVO.items())
+    uses = (
+        [f"substitute {joint} {{", f"    bed = {use.bed}(", *_packed([f"{each}," for each in bed[:-1]] + bed[-1:], 8),
+         "    );", f"    law = {use.law};", "}"],
+        [f"servo found like {servo.definition} {{", *_packed(motor, 4), "}"],
+    )  # fmt: skip
     lines = [
         "#pragma once",
         f"// {deck.name}: the motor bed of joint {joint}",
@@ -210,7 +229,7 @@ def included(deck: Path, joint: str, estimates: Mapping[str, Estimate], origin: 
         "//",
         "// The bed in a run, and its motor in a servo that is like another:",
         "//",
-        *(f"//     {line}" for use in uses for line in textwrap.wrap(use, 105, subsequent_indent="    ")),
+        *(f"//     {line}" for use in uses for line in use),
         "",
     ]
     wide = max(map(len, UNITS))
@@ -222,6 +241,28 @@ def included(deck: Path, joint: str, estimates: Mapping[str, Estimate], origin: 
         said = f"{digits(each, each.value)} {unit};"
         lines.append(f"let {head}_{name:<{wide}} = {said:<26} // {remark}")
     return formatted(str(deck), "\n".join(lines) + "\n")
+
+
+def _believed(experiment: Experiment, joint: str) -> list[str]:
+    """What else the deck says of the bed."""
+    said = {path.rpartition(".")[2]: each for path, each in experiment.parameters.items()
+            if path.startswith(f"{joint}.bed.") and each.origin.kind == "deck"}  # fmt: skip
+    [use] = (each for each in experiment.structure.substitutions if each.joint == joint)
+    own = [f"{name} = {quantity(each.value, each.unit)}" for name, each in said.items()
+           if name not in UNITS and not each.origin.note and isinstance(each.value, float)]  # fmt: skip
+    faults = [f"faults = {word}" for word, values in models.find("bed", use.bed).presets.items()
+              if values and all(name in said and said[name].origin.note for name in values)]  # fmt: skip
+    return own + faults
+
+
+def _packed(words: Iterable[str], indent: int) -> list[str]:
+    """Words in lines, none of them broken."""
+    lines = [" " * indent]
+    for word in words:
+        if len(lines[-1]) + len(word) > 105:
+            lines.append(" " * indent)
+        lines[-1] += f"{word} "
+    return [line.rstrip() for line in lines]
 
 
 def as_data(found: Found, estimates: Mapping[str, Estimate], sheet: Sheet, deck: Path, records: Path) -> dict[str, Any]:

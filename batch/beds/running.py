@@ -87,6 +87,7 @@ def run_and_tell(
     baud: int,
     lock_step: bool = False,
     rest: float | None = None,
+    clear: bool = False,
     force: bool = False,
     transcripts: str | None = None,
     output: str | None = None,
@@ -111,7 +112,7 @@ def run_and_tell(
     for line in check_margins(campaign, force=force):
         say(f"  {line}")
     folder = None if transcripts is None else Path(transcripts)
-    executor = OnBeds(Ports(by_joint, baud, stepped, rest or 0.0, folder), lambda line: telling.say(f"  {line}"))
+    executor = OnBeds(Ports(by_joint, baud, stepped, rest or 0.0, folder, clear), lambda line: telling.say(f"  {line}"))
     telling = Telling(executor, quiet=quiet)
     performed = perform(
         campaign, executor=executor, fresh=fresh, progress=telling, ready=lambda: say(writing(campaign)),

@@ -292,8 +292,11 @@ class Signals:
 class Bed:
     """A joint whose motor is on a bed: how heavy the arm is against the rotor, r, and how heavy it might be.
 
-    r       of each case, the heaviest motion of all substituted joints together
-    limit   of each case, the smallest r at which the loop is unstable; not a number where none was found
+    r         of each case, the heaviest motion of all substituted joints together
+    lower     of each case, the r from which the loop is stable; not a number where it is at any that is smaller
+    limit     of each case, the r up to which it is stable; not a number where no limit was found, 0 where it is nowhere
+    unstable  whether each case is
+    spans     whether one has a lower end, so that `stable_at` tells both
     """
 
     joint: str
@@ -301,9 +304,12 @@ class Bed:
     servo: str
     delay: str
     r: np.ndarray
+    lower: np.ndarray
     limit: np.ndarray
+    unstable: np.ndarray
     spread: str
-    stable_to: str
+    spans: bool
+    stable_at: str
     margin: str
     ok: bool
 

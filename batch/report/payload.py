@@ -148,5 +148,9 @@ def _stability(found: Stability) -> dict[str, Any]:
     return {
         "cases": packed(found.cases),
         "columns": [_column(column) for column in found.columns],
-        "beds": [{"joint": visible(e.joint), "r": packed(e.r), "limit": packed(e.limit)} for e in found.beds],
+        "beds": [
+            {"joint": visible(bed.joint), "r": packed(bed.r), "lower": packed(bed.lower), "limit": packed(bed.limit),
+             "unstable": packed(bed.unstable.astype(int))}
+            for bed in found.beds
+        ],
     }

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from batch.failures import ranges
+from batch.margin import stable_at, verdict
 from batch.pool import Column, Pool
 from batch.report.content import Bed, Stability
 from met.distinct import distinct
@@ -71,42 +72,25 @@ def _of(case: Sequence[Margin], joint: str) -> Margin | None:
 
 def _bed(joint: str, each: Sequence[Margin | None]) -> Bed:
     there = [one for one in each if one is not None]
-    tightest = min(there, key=room)
+    tightest = min(there, key=lambda one: one.room)
+    spans = any(one.lower > 0.0 for one in there)
     r = np.array([np.nan if one is None else one.together for one in each])
     limit = np.array([np.nan if one is None or one.limit is None else one.limit for one in each])
+    lower = np.array([np.nan if one is None or one.lower == 0.0 else one.lower for one in each])
+    unstable = np.array([one is not None and not one.stable for one in each])
     known = r[np.isfinite(r)]
     spread = "-" if not len(known) else f"{known.min():.3g}"
     if len(known) and f"{known.max():.3g}" != spread:
         spread += f" to {known.max():.3g}"
     return Bed(
         joint, _words(one.law for one in there), _words(f"{one.rate_hz:g} Hz" for one in there),
-        _words(f"{one.delay:g}" for one in there), r, limit, spread, _limit(tightest), _margin(tightest),
-        all(one.stable for one in there),
+        _words(f"{one.delay:g}" for one in there), r, lower, limit, unstable, spread, spans,
+        stable_at(tightest, spans), verdict(tightest, "none"), not unstable.any(),
     )  # fmt: skip
 
 
 def _words(texts: Iterable[str]) -> str:
     return ", ".join(dict.fromkeys(texts))
-
-
-def room(one: Margin) -> float:
-    """How many times heavier the arm might be at least; nothing is tighter than an arm whose r is no number."""
-    found = one.factor if one.factor is not None else one.searched / one.together
-    return found if found == found else 0.0
-
-
-def _limit(one: Margin) -> str:
-    if one.limit is None:
-        return f"more than {one.searched:.4g}"
-    return f"{one.limit:.3g}" if one.limit > 0.0 else "nothing"
-
-
-def _margin(one: Margin) -> str:
-    if one.together != one.together:
-        return "none: r is no number"
-    if not one.stable:
-        return "none: unstable"
-    return "no limit found" if one.factor is None else f"{one.factor:.2g} times"
 
 
 def _unstable(

@@ -62,9 +62,10 @@ def command(words: str) -> Html:
 
 def beds(found: Stability) -> Html:
     several = len(found.beds) > 1
-    heads = ("joint", "law", "servo", "delay", "r, together" if several else "r", "stable to r", "margin")
+    stable = stable_head(any(bed.spans for bed in found.beds))
+    heads = ("joint", "law", "servo", "delay", "r, together" if several else "r", stable, "margin")
     rows = tuple(
-        (bed.joint, bed.law, bed.servo, bed.delay, bed.spread, bed.stable_to, bed.margin) for bed in found.beds
+        (bed.joint, bed.law, bed.servo, bed.delay, bed.spread, bed.stable_at, bed.margin) for bed in found.beds
     )
     marked = frozenset((n, 6) for n, bed in enumerate(found.beds) if not bed.ok)
     return table(Table(heads, ("",) * len(heads), rows, frozenset({3, 4, 5}), marked), "Beds")

@@ -149,7 +149,7 @@ class WireBed(Bed):
     def rest(self, time: float) -> Sample:
         about = self._there()
         self.stop()
-        if not self._step:
+        if Capability.LOCK_STEP not in about.capabilities:
             assert self._line is not None
             self._line.sleep(time)
             return self.read()

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from hw import loop, process, refusals
 from hw.bed import Capability, Limits
+from hw.beds import latch
 from hw.case import pace_of
 from hw.identify.moves import Guide, Peaks, guided
 from hw.ports import Port, opened
@@ -94,6 +95,7 @@ def run(asked: Asked) -> Ended:
     with opened(port, experiment, asked.joint, asked.row, of.period) as bed:
         about = bed.connect()
         process.warnings(bed)
+        latch.check(bed, about, asked.port)
         if Capability.SIMULATED in about.capabilities:
             bed.preset(seed=experiment.cases.seed)
         lock_step = Capability.LOCK_STEP in about.capabilities

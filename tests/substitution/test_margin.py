@@ -55,7 +55,7 @@ def test_an_arm_heavier_than_all_that_is_searched_is_searched_too() -> None:
 
 
 def test_an_arm_whose_r_is_no_number_is_not_called_stable() -> None:
-    one = Margin(0, "a", "velocity_tracking", "emulated", 1000.0, 0.0, float("nan"), float("nan"), None, HEAVIEST)
+    one = Margin(0, "a", "velocity_tracking", "emulated", 1000.0, 0.0, float("nan"), float("nan"), float("nan"), 0.0, None, HEAVIEST)
     assert not one.stable
 
 

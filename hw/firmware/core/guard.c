@@ -1,7 +1,5 @@
 #include "guard.h"
 
-#define ONE ((int64_t)1 << GUARD_BITS)
-
 int64_t guard_heat(const guard_heat_config *config, int64_t heat, int32_t current)
 {
     const int64_t gained = ((int64_t)current * current) - config->continuous;
@@ -58,11 +56,12 @@ guard_verdict guard_tachometer_tick(guard_tachometer *guard, const guard_tachome
         return GUARD_SOUND;
     }
     guard->sum += sure;
-    const int64_t wanted = config->change * ONE;
+    const int64_t one = (int64_t)1 << config->bits;
+    const int64_t wanted = config->change * one;
     if (guard->sum < wanted) {
         return GUARD_SOUND;
     }
-    const int64_t read = ((int64_t)rate - guard->start) * way * ONE;
+    const int64_t read = ((int64_t)rate - guard->start) * way * one;
     if (read >= guard->sum / 4) {
         guard->sum = 0;
         guard->start = rate;

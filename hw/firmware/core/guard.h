@@ -18,11 +18,10 @@ typedef struct {
 int64_t guard_heat(const guard_heat_config *config, int64_t heat, int32_t current);
 
 /* The shaft as its data sheet has it: by how many counts of rate each thing changes the shaft's rate in a tick, times
-   2^GUARD_BITS, so that a tick is a few products of whole numbers. hw/build.py makes these from SI, and sees to it that
-   no sum of them leaves 62 bits. */
-#define GUARD_BITS 24
-
+   2^bits, so that a tick is a few products of whole numbers. hw/build.py makes these from SI, and sees to it that no sum
+   of them leaves 62 bits. */
 typedef struct {
+    uint32_t bits;     /* of a fraction: 24, or as many as leave room where a tick of a light shaft is many counts */
     int64_t voltage;   /* a count of voltage, through the armature's resistance */
     int64_t back_emf;  /* a count of rate, through back-EMF and resistance: it brakes */
     int64_t most;      /* the drive's largest torque */
@@ -35,7 +34,7 @@ typedef struct {
 } guard_tachometer_config;
 
 typedef struct {
-    int64_t sum;         /* change of rate that is sure since `start`, times 2^GUARD_BITS */
+    int64_t sum;         /* change of rate that is sure since `start`, times 2^bits */
     int32_t start;       /* rate at which the sum began, counts */
     int32_t way;         /* direction of the torque, +1 or -1; 0: none that is sure */
     uint32_t ticks;      /* for which it has been so, up to `lag` */

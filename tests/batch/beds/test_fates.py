@@ -14,7 +14,7 @@ from batch.beds.executor import OnBeds
 from hw import records
 from met import cli
 from tests.batch.beds.listening import DECK
-from tests.hw.device import DEAD, STOPPED, Device
+from tests.hw.device import DEAD, DISARMED, STOPPED, Device
 
 __all__ = ["DECK"]  # deck.ic
 
@@ -35,9 +35,20 @@ def test_a_case_whose_bed_did_not_arm_is_driven_the_next_time(met_bed: Met, on_p
     port = on_pty(device)
     status, _, complaint = run(met_bed, port, "--lock-step")
     assert status == cli.BAD_INPUT
-    assert "error[E406]: bed `model` does not start its plant anew: it stopped itself: " in complaint
+    assert complaint == f"""\
+error[E406]: bed `model` has stopped itself, and is to be cleared first: torque did not change the measured rate
+ = help: look whether the tachometer is connected, and whether the shaft is free
+ = help: then `met bed clear --port {port}`; `met bed run --clear` does so before each case
+
+1 error
+"""
     assert not Path("a.h5").exists()
-    device.boot()
+    assert met_bed("clear", "--port", port) == (cli.YES, f"""\
+bed `model` at {port}: cleared: torque did not change the measured rate
+  = help: look whether the tachometer is connected, and whether the shaft is free
+""", "")  # fmt: skip
+    assert met_bed("clear", "--port", port, "--format", "json")[1] == '{"name": "model", "cleared": []}\n'
+    assert device.state == DISARMED
     status, said, complaint = run(met_bed, port, "--lock-step")
     assert (status, complaint) == (cli.YES, "") and "the case reached its end" in said
 
@@ -96,10 +107,59 @@ error[E413]: the file of records of case #0 was written by another version of ME
 """)
 
 
+SWEEP = DECK + "sweep tuning of wired { vary gearbox.kp = [0.01, 0.02, 0.03] V*s/rad; }\n"
+
+
+def sweep(met_bed: Met, port: str, *words: str) -> tuple[int, str, str]:
+    Path("deck.ic").write_text(SWEEP)
+    return met_bed("run", "deck.ic", "tuning", "--port", port, "--lock-step", "-o", "a.h5", "--no-picture", *words)
+
+
 def test_a_sweep_names_a_bed_once(met_bed: Met, on_pty: Callable[..., str]) -> None:
-    sweep = "sweep tuning of wired { vary gearbox.kp = [0.01, 0.02, 0.03] V*s/rad; }\n"
-    Path("deck.ic").write_text(DECK + sweep)
-    device = Device(limits=LIMITS)
-    words = ("run", "deck.ic", "tuning", "--port", on_pty(device), "--lock-step", "-o", "a.h5", "--no-picture")
-    _, said, _ = met_bed(*words)
+    _, said, _ = sweep(met_bed, on_pty(Device(limits=LIMITS)))
     assert said.count("bed `model`") == 1 and "of 3 cases" in said
+
+
+def test_a_sweep_ends_where_a_bed_stopped_itself_and_goes_on_once_it_is_cleared(
+    met_bed: Met, on_pty: Callable[..., str]
+) -> None:
+    port = on_pty(Device(limits=(60.0, 3.0, 20.0, 5.0, 2e5, 1e4, 1e9)))
+    for case in range(2):
+        status, said, complaint = sweep(met_bed, port)
+        assert status == cli.BAD_INPUT and "is to be cleared first: the shaft was faster than its limit" in complaint
+        assert said.count("the bed stopped itself: rate") == case + 1 and f"case #{case}, t = 0." in said
+        assert met_bed("clear", "--port", port)[0] == cli.YES
+    status, said, _ = sweep(met_bed, port)
+    assert status == cli.NO and "0 of 3 cases reached their end" in said
+    assert [str(cause) for cause in batch.open("a.h5").cause.values if "the bed stopped itself: rate" in cause][2:]
+
+
+def test_a_sweep_that_clears_goes_on_by_itself(met_bed: Met, on_pty: Callable[..., str]) -> None:
+    device = Device(limits=(60.0, 3.0, 20.0, 5.0, 2e5, 1e4, 1e9))
+    status, said, _ = sweep(met_bed, on_pty(device), "--clear")
+    assert status == cli.NO and "0 of 3 cases reached their end" in said
+    assert said.count("shoulder: cleared: the shaft was faster than its limit") == 2
+    assert (device.voltage, device.current) == (0.0, 0.0)
+
+
+def test_what_was_measured_is_not_written_over(met_bed: Met) -> None:
+    Path("deck.ic").write_text(SWEEP)
+    words = ("run", "deck.ic", "tuning", "--port", "emulated", "-o", "a.h5", "--no-picture")
+    assert met_bed(*words)[0] == cli.YES
+    status, _, complaint = met_bed(*words, "--case", "#0")
+    assert status == cli.BAD_INPUT
+    assert "error[E353]: a.h5 holds another campaign, driven on motor beds, and is left as it is" in complaint
+    assert len(batch.open("a.h5").case_id) == 3
+
+
+def test_a_transcript_of_another_run_is_refused_and_then_the_right_one_is_replayed(met_bed: Met) -> None:
+    Path("deck.ic").write_text(SWEEP)
+    Path("kept").mkdir()
+    words = ("--lock-step", "--transcripts", "kept", "--no-picture")
+    assert met_bed("run", "deck.ic", "tuning", "--port", "firmware", "-o", "a.h5", *words)[0] == cli.YES
+    for row, status in ((1, cli.BAD_INPUT), (0, cli.YES)):
+        port = f"kept/tuning.{row}.shoulder.transcript"
+        found, _, complaint = met_bed("run", "deck.ic", "tuning", "--case", "#0", "--port", port, "-o", "b.h5",
+                                      "--no-picture")  # fmt: skip
+        assert found == status and ("error[E407]" in complaint) == (row == 1)
+    assert batch.open("b.h5").q.values.tobytes() == batch.open("a.h5").q.values[:1].tobytes()

@@ -293,13 +293,13 @@ class Turning:
 
     def __init__(self, told: Callable[[float], float], config: Config = WATCHED, shaft: Shaft = SHAFT) -> None:
         self.device = Device(config)
-        self.told, self.shaft = told, shaft
+        self.told, self.shaft, self.scales = told, shaft, config.scales
         self.w = self.y = self.slope = 0.0
         self.device.ready()
 
     def tick(self, voltage: float, current: float) -> bool:
         """One tick under V and A; whether it is armed still."""
-        sample = self.device.drive(round(voltage / 0.01), round(current / 0.002))
+        sample = self.device.drive(round(voltage / self.scales.voltage), round(current / self.scales.current))
         if sample.state != wire.ARMED:
             return False
         h, s, wc = 1e-5, self.shaft, 6.283185307179586 * self.shaft.f_cut
@@ -314,7 +314,7 @@ class Turning:
             self.w = 0.0 if self.w * after < 0.0 else after
             self.slope += h * (wc * wc * (self.w - self.y) - 1.4142135623730951 * wc * self.slope)
             self.y += h * self.slope
-        self.device.sensors.rate = round(self.told(self.y) / 0.1)
+        self.device.sensors.rate = round(self.told(self.y) / self.scales.rate)
         self.device.tick()
         return True
 
@@ -404,6 +404,27 @@ def test_a_filter_slower_than_its_data_sheet_is_no_dead_tachometer() -> None:
     for voltage in (0.3, 6.0, -6.0, 0.0, 2.0, -8.0):
         for _ in range(100):
             assert bed.tick(voltage, 0.0)
+
+
+LIGHT = replace(SHAFT, inertia=1.2e-6, f_c=0.002)
+FINE = replace(WATCHED, shaft=LIGHT, scales=replace(WATCHED.scales, voltage=2.0**-20, current=2.0**-20, rate=2.0**-20))
+
+
+@pytest.mark.parametrize(
+    ("told", "fault"), [(lambda y: y, 0), (lambda y: 0.0, wire.DEAD), (lambda y: -y, wire.REVERSED)]
+)  # fmt: skip
+def test_a_light_shaft_in_fine_counts_is_watched_like_one_in_coarse_ones(
+    told: Callable[[float], float], fault: int
+) -> None:
+    """A count of rate is 1e-6 rad/s, of which a tick may be 10^8: with fewer bits of a fraction."""
+    assert guard(FINE)["bits"] == 18
+    ends = []
+    for config in (FINE, replace(FINE, scales=WATCHED.scales)):
+        bed = Turning(told, config, LIGHT)
+        stopped = [bed.until_stopped(voltage, 0.0, 100) for voltage in (0.5, 2.0, -1.0, 0.0, 4.0)]
+        assert bed.device.read().faults == fault
+        ends.append(stopped[0])
+    assert ends[0] == ends[1] and bool(ends[0]) == bool(fault)
 
 
 def test_without_a_shaft_s_data_nobody_watches() -> None:

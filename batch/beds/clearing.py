@@ -1,0 +1,39 @@
+"""`met bed clear`: have a bed forget the faults that it has latched."""
+
+from __future__ import annotations
+
+import json
+import math
+
+from batch.beds.asking import meant
+from hw import refusals
+from hw.bed import About, Fault
+from hw.beds import latch
+from hw.ports import SIMULATED, Port, opened
+from met.diagnostic import Problem, error
+
+
+def clear_and_tell(word: str, *, baud: int, form: str, quiet: bool = False, verbose: bool = False) -> None:
+    """The command. Raises Problem."""
+    about, faults = clear(word, baud)
+    if form == "json":
+        names = [str(fault.name).lower() for fault in Fault if fault in faults]
+        print(json.dumps({"name": about.name, "cleared": names}))
+    elif not quiet:
+        print(f"bed `{about.name}` at {word}: {told(faults)}")
+        for each in refusals.remedies(faults):
+            print(f"  = help: {each}")
+
+
+def clear(word: str, baud: int) -> tuple[About, Fault]:
+    """Who the bed at a port is, and what it had latched. It is not armed. Raises Problem."""
+    if word in SIMULATED:
+        helps = "each run begins with one in which nothing is latched"
+        raise Problem(error("E425", f"port `{word}` simulates a bed, anew for each command", help=helps))
+    with opened(Port(meant(word, None, ()).port, baud), None, "", 0, math.inf) as bed:
+        about = bed.connect()
+        return about, latch.cleared(bed, about)
+
+
+def told(faults: Fault) -> str:
+    return f"cleared: {refusals.words(faults)}" if faults else "nothing was latched"
