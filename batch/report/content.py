@@ -296,7 +296,6 @@ class Bed:
     lower     of each case, the r from which the loop is stable; not a number where it is at any that is smaller
     limit     of each case, the r up to which it is stable; not a number where no limit was found, 0 where it is nowhere
     unstable  whether each case is
-    spans     whether one has a lower end, so that `stable_at` tells both
     """
 
     joint: str
@@ -308,7 +307,6 @@ class Bed:
     limit: np.ndarray
     unstable: np.ndarray
     spread: str
-    spans: bool
     stable_at: str
     margin: str
     ok: bool
@@ -316,12 +314,17 @@ class Bed:
 
 @frozen
 class Stability:
-    """Of some cases, whether their beds are stable. columns: what r may be drawn against."""
+    """Of some cases, whether their beds are stable.
+
+    columns  what r may be drawn against
+    spans    whether one is unstable where the arm is too light, so that the beds' `stable_at` have two ends
+    """
 
     cases: np.ndarray
     columns: tuple[Column, ...]
     beds: tuple[Bed, ...]
     unstable: tuple[str, ...]
+    spans: bool = False
     said: str = ""
 
 

@@ -163,7 +163,7 @@ def _notes(notes: Sequence[str]) -> Html | None:
 
 ABOUT_STABILITY = (
     "r is how heavy the arm is at the joint against the rotor of its motor, J_eff/(N² J_m), at the start of the run. "
-    "The loop of bed, servo and law is stable where the table says. Each row of it is its tightest case."
+    "The loop of bed, servo and law is stable at the r of the table. Each row of it is its tightest case."
 )
 
 

@@ -42,9 +42,10 @@ def stability(
     joints = list(dict.fromkeys(one.joint for place in places.tolist() for one in found[place]))
     columns = [Column(c.key, c.label, c.unit, c.role, c.values[places], c.words) for c in pool.varied()]
     columns.append(Column("case", "case", "", "case", pool.cases[places].astype(float)))
-    beds = tuple(_bed(joint, [_of(found[place], joint) for place in places.tolist()]) for joint in joints)
+    spans = any(one.lower > 0.0 for case in found.values() for one in case)
+    beds = tuple(_bed(joint, [_of(found[place], joint) for place in places.tolist()], spans) for joint in joints)
     said = f"Computed for {len(places):,} of {len(places) + left:,} cases, spread over all." if left else ""
-    return Stability(pool.cases[places], tuple(columns), beds, _unstable(pool, places, found, joints), said)
+    return Stability(pool.cases[places], tuple(columns), beds, _unstable(pool, places, found, joints), spans, said)
 
 
 def _chosen(pool: Pool, experiment: Experiment, places: np.ndarray) -> np.ndarray:
@@ -70,10 +71,9 @@ def _of(case: Sequence[Margin], joint: str) -> Margin | None:
     return next((one for one in case if one.joint == joint), None)
 
 
-def _bed(joint: str, each: Sequence[Margin | None]) -> Bed:
+def _bed(joint: str, each: Sequence[Margin | None], spans: bool) -> Bed:
     there = [one for one in each if one is not None]
     tightest = min(there, key=lambda one: one.room)
-    spans = any(one.lower > 0.0 for one in there)
     r = np.array([np.nan if one is None else one.together for one in each])
     limit = np.array([np.nan if one is None or one.limit is None else one.limit for one in each])
     lower = np.array([np.nan if one is None or one.lower == 0.0 else one.lower for one in each])
@@ -84,7 +84,7 @@ def _bed(joint: str, each: Sequence[Margin | None]) -> Bed:
         spread += f" to {known.max():.3g}"
     return Bed(
         joint, _words(one.law for one in there), _words(f"{one.rate_hz:g} Hz" for one in there),
-        _words(f"{one.delay:g}" for one in there), r, lower, limit, unstable, spread, spans,
+        _words(f"{one.delay:g}" for one in there), r, lower, limit, unstable, spread,
         stable_at(tightest, spans), verdict(tightest, "none"), not unstable.any(),
     )  # fmt: skip
 

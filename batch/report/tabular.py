@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from batch.margin import stable_head
 from batch.report.blocks import Anchors, case_link, scrolling, spot_link
 from batch.report.content import ParameterRow, SourceText, Stability, Table, Worst
 from batch.report.markup import Child, Html, el, join, lines
@@ -62,7 +63,7 @@ def command(words: str) -> Html:
 
 def beds(found: Stability) -> Html:
     several = len(found.beds) > 1
-    stable = stable_head(any(bed.spans for bed in found.beds))
+    stable = stable_head(found.spans)
     heads = ("joint", "law", "servo", "delay", "r, together" if several else "r", stable, "margin")
     rows = tuple(
         (bed.joint, bed.law, bed.servo, bed.delay, bed.spread, bed.stable_at, bed.margin) for bed in found.beds

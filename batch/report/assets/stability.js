@@ -1,4 +1,4 @@
-// r of the cases against a parameter, and how large it may be.
+// r of the cases against a parameter, and how large, and how small, it may be.
 "use strict";
 
 MET.stability = (() => {
@@ -8,7 +8,7 @@ MET.stability = (() => {
     const data = model.data.stability;
     const cases = unpack(data.cases);
     const columns = data.columns.map((column) => ({ ...column, values: unpack(column.values) }));
-    const beds = data.beds.map((bed) => ({ joint: bed.joint, r: unpack(bed.r), limit: unpack(bed.limit) }));
+    const beds = data.beds.map((bed) => ({ joint: bed.joint, r: unpack(bed.r), ends: [unpack(bed.lower), unpack(bed.limit)], unstable: unpack(bed.unstable) }));
     let [x, joint] = [start(), 0];
     if (cases.length < 2) return;
     const frame = node("div", { class: "frame" });
@@ -22,28 +22,30 @@ MET.stability = (() => {
       if (plot) plot.destroy();
       const bed = beds[joint];
       const cx = columns.find((column) => column.key === x);
-      const limits = Array.from(bed.limit).filter((v) => v > 0);
-      const one = limits.length === cases.length && new Set(limits).size === 1 ? limits[0] : 0;  // the same for all: a line
+      const known = bed.ends.map((end) => Array.from(end).filter((v) => v > 0));
+      const limits = known.flat();
+      const same = known.map((end) => (end.length === cases.length && new Set(end).size === 1 ? end[0] : 0));  // for all: a line
+      const single = bed.ends.map((end, n) => n).filter((n) => !same[n] && known[n].length);
       plot = MET.points.make(frame, {
         x: cx, y: { label: "r", unit: "", words: [], values: bed.r,
-          limits: one ? [{ text: `unstable above ${number(one)}`, value: one, sense: "<" }] : [] }, height: 300, logY: far([...bed.r, ...limits]),
+          limits: [["below", ">"], ["above", "<"]].map(([side, sense], n) => ({ text: `unstable ${side} ${number(same[n])}`, value: same[n], sense })).filter((limit) => limit.value > 0) }, height: 300, logY: far([...bed.r, ...limits]),
         name: `r of ${bed.joint} against ${cx.label}`, reach: limits,
-        style: (place, colours) => ({ fill: bad(bed, place) ? colours.attend : colours.accent, ring: bad(bed, place), size: 4.2 }),
+        style: (place, colours) => ({ fill: bed.unstable[place] ? colours.attend : colours.accent, ring: bed.unstable[place] > 0, size: 4.2 }),
         marks(u, ctx, colours, at, px) {
           ctx.strokeStyle = colours.attend;
           ctx.lineWidth = 2 * px;
-          bed.limit.forEach((limit, place) => {
-            if (one || !(limit > 0) || !Number.isFinite(cx.values[place])) return;
+          single.forEach((n) => bed.ends[n].forEach((limit, place) => {
+            if (!(limit > 0) || !Number.isFinite(cx.values[place])) return;
             const [left, top] = at(cx.values[place], limit);
             ctx.beginPath();
             ctx.moveTo(left - 9 * px, top);
             ctx.lineTo(left + 9 * px, top);
             ctx.stroke();
-          });
+          }));
         },
         told: (place) => [node("p", null, node("b", null, `#${cases[place]}`)), MET.pairs([
           ...columns.filter((c) => c.role !== "case").map((c) => [c.label, MET.quantity(c.values[place], c)]), ["r", number(bed.r[place])],
-          ["stable to", bed.limit[place] > 0 ? number(bed.limit[place]) : "no limit found"]])],
+          stable(...bed.ends.map((end) => end[place]))])],
         choose: (place) => model.choose(cases[place]),
         chosen: () => cases.indexOf(model.chosen),
       });
@@ -51,7 +53,7 @@ MET.stability = (() => {
       const dot = node("span", { class: "dot", style: { background: colours.accent } });
       const dash = node("svg", { viewBox: "0 0 18 8", width: 18, height: 8, "aria-hidden": "true" }, node("line", { x1: 0, x2: 18, y1: 4, y2: 4, stroke: colours.attend, "stroke-width": 2 }));
       scale.replaceChildren(node("span", { class: "item tight" }, dot, "r of a case"),
-        ...(one ? [] : [limits.length ? node("span", { class: "item" }, dash, "where it becomes unstable") : node("span", null, "no limit was found")]));
+        ...(limits.length && !single.length ? [] : [limits.length ? node("span", { class: "item" }, dash, "where it becomes unstable") : node("span", null, "no limit was found")]));
     }
 
     // Whether values are so far apart that a logarithmic axis tells them apart better.
@@ -60,11 +62,17 @@ MET.stability = (() => {
     // Where one parameter decides r and its limit that one, else the case.
     function start() {
       const told = (column) => new Set(cases.map((_, n) => column.values[n])).size;
-      const both = (column) => new Set(cases.map((_, n) => n).reduce((all, n) => [...all, [column.values[n], ...beds.flatMap((b) => [b.r[n], b.limit[n]])].join()], [])).size;
+      const both = (column) => new Set(cases.map((_, n) => n).reduce((all, n) => [...all, [column.values[n], ...beds.flatMap((b) => [b.r[n], ...b.ends.map((end) => end[n])])].join()], [])).size;
       return columns.find((column) => both(column) === told(column)).key;
     }
 
-    const bad = (bed, place) => bed.limit[place] <= bed.r[place];
+    // Where it is: not a number is an end that was not found; up to 0 is nowhere.
+    function stable(lower, limit) {
+      if (limit === 0) return ["stable", "nowhere"];
+      if (lower > 0) return limit > 0 ? ["stable at", `${number(lower)} to ${number(limit)}`] : ["stable from", number(lower)];
+      return ["stable to", limit > 0 ? number(limit) : "no limit found"];
+    }
+
     draw();
     MET.drawn.push(draw);
     model.watch(() => plot.redraw());
