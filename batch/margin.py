@@ -76,6 +76,15 @@ def verdict(one: Margin, none: str = "NONE") -> str:
     return f"{heavier}{one.lighter:.2g} times lighter"
 
 
+def in_words(one: Margin) -> str:
+    """A joint's r, and at which r it is stable, in a line."""
+    limit = f"more than {one.searched:.3g}" if one.limit is None else f"{one.limit:.3g}"
+    ends = f"from {one.lower:.3g} to {limit}" if one.lower > 0.0 else f"to {limit}"
+    r = one.least if one.too_light else one.together
+    stable = "at no r" if one.limit == 0.0 else ends
+    return f"{one.joint}: r = {r:.3g}, stable {stable} with {one.law} at {one.rate_hz:g} Hz"
+
+
 def remedy(one: Margin) -> str:
     """What may make a joint stable that is not."""
     if one.too_light:

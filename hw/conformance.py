@@ -6,6 +6,10 @@
             with MyBed("/dev/ttyUSB0") as bed:
                 yield bed
 
+They ask as a host of this package does. What none says - a command beyond a limit, an old number, another session's, a
+frame that does not decode, a load driven until it is hot - no test here has said: that a device bears it is for its own
+tests, as those of tests/hw/firmware are.
+
 `Conformance` holds for all beds; `LockStep` and `FreeRunning` add what holds for those without and with a time of their
 own, `Simulated` what holds for those without a motor. The shaft turns, under a tenth of the limits, in two tests under
 three tenths: nothing but the load motor may be on it.

@@ -20,3 +20,29 @@ class Line(Protocol):
         """Let its clock go on by so many."""
 
     def close(self) -> None: ...
+
+
+class Heard:
+    """A line, and all that went over it. sent, came: bytes"""
+
+    def __init__(self, line: Line) -> None:
+        self._line = line
+        self.sent, self.came = bytearray(), bytearray()
+
+    def now(self) -> float:
+        return self._line.now()
+
+    def send(self, frame: bytes) -> None:
+        self.sent += frame
+        self._line.send(frame)
+
+    def receive(self, until: float) -> bytes:
+        data = self._line.receive(until)
+        self.came += data
+        return data
+
+    def sleep(self, seconds: float) -> None:
+        self._line.sleep(seconds)
+
+    def close(self) -> None:
+        self._line.close()

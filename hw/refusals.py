@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hw.bed import About, Fault, Sample, State
 from hw.build import Uncountable
+from hw.protocol.frames import Decoder
 from hw.protocol.messages import VERSION
 from met.diagnostic import Problem, error
 
@@ -67,6 +68,8 @@ def refused(about: About, what: str, sample: Sample) -> Problem:
         helps = ["wait until it has come to rest; a shaft that does not is driven by something"]
     elif sample.state == State.ARMED:
         why, helps = "it is armed", ["stop it first"]
+    elif Fault.HEAT in latched:
+        why, helps = "the load motor has not cooled down to half of its I2t", ["wait, or switch its amplifier off"]
     else:
         why, helps = "it does not say why", ["switch it off and on, and begin anew"]
     return Problem(error("E406", f"bed `{about.name}` does not {what}: {why}", help=helps))
@@ -88,6 +91,26 @@ def other_version(version: int) -> Problem:
     message = f"the bed speaks version {version} of the protocol, and this MET {VERSION}"
     helps = "put the firmware of this version of MET on it, or take the MET that its firmware came with"
     return Problem(error("E403", message, help=helps))
+
+
+def no_greeting(name: str, sent: bytes, came: bytes) -> Problem:
+    """No answer to HELLO, asked for again and again; what was sent, and what came instead of one."""
+    message = f"nobody answers HELLO on {name}"
+    asked, decoder = set(sent.split(b"\0")) - {b""}, Decoder()
+    ours = sum(frame in asked for frame in came.split(b"\0"))
+    frames = len(decoder.feed(came)) - ours
+    if not came:
+        helps = ["is the bed switched on, and this the line that it is on?", "does it expect this baud rate?"]
+    elif ours:
+        message += f": what comes back is what was sent, {ours} of {len(asked)} frames"
+        helps = ["take away a loop-back plug, or a bridge between its two wires", "switch a modem's echo off"]
+    elif frames:
+        message += f": {frames} frame{'s' * (frames > 1)} came, and no answer among them"
+        helps = ["is another computer on the same line?", "is it the firmware of a bed, of this version?"]
+    else:
+        message += f": {len(came):,} bytes came, and no frame that decodes"
+        helps = ["give the baud rate that the bed has, `--baud`", "is another device on this line?"]
+    return Problem(error("E402", message, help=helps))
 
 
 def silent(name: str, asked: str) -> Problem:

@@ -1,4 +1,4 @@
-"""Whether a motor on a bed stays stable: how heavy the arm may be for its law, rate and delay, how light, and its weight.
+"""Whether a motor on a bed stays stable: how heavy, and how light, the arm may be for its law, rate and delay.
 
 The measure is r = J_eff/(N^2 J_m), the arm's inertia at the joint against the rotor's. The loop of bed, filter,
 converter-free wire, servo and law is taken round once by the functions that run it, at a steady rate of the shaft where

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 
 from batch.choosing import experiments_named
@@ -50,14 +51,24 @@ def meant(
 
 
 def _meant(word: str, plan: Plan | None, names: tuple[str, ...]) -> Meant:
+    joint, port = _split(word)
     if plan is None:
-        return Meant(word)
+        return Meant(port)
     experiment = on_beds(plan, names or None)[0]
     joints = [each.joint for each in experiment.structure.substitutions]
-    joint, equals, port = word.partition("=")
-    if equals and joint in joints:
+    if joint in joints:
         return Meant(port, experiment, joint)
+    if joint:
+        on = ", ".join(f"`{each}`" for each in joints)
+        said = f"port `{word}`: run `{experiment.name}` has no joint `{joint}` on a bed"
+        raise Problem(error("E418", said, help=f"on a bed there: {on}"))
     if len(joints) > 1:
         each = " or ".join(f"`--port {joint}={word}`" for joint in joints)
         raise Problem(error("E418", f"port `{word}`: of which joint?", help=f"say {each}"))
-    return Meant(word, experiment, joints[0])
+    return Meant(port, experiment, joints[0])
+
+
+def _split(word: str) -> tuple[str, str]:
+    """Joint and port of `JOINT=PORT`, or none and `PORT`, which may have a `=` in its path or address."""
+    joint, equals, port = word.partition("=")
+    return (joint, port) if equals and joint.isidentifier() and not os.path.exists(word) else ("", word)

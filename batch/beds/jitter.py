@@ -84,7 +84,7 @@ def lines(data: Mapping[str, Any]) -> list[str]:
     times = "never" if not data["stops"] else "once" if data["stops"] == 1 else f"{data['stops']:,} times"
     out.append(f"a run would have been stopped {times}, by five periods of lateness or silence")
     if data["clock"] is not None:
-        out.append(f"the bed's clock against the computer's: {1e6 * data['clock']:+.3g} ppm")
+        out.append(f"the bed's clock against the computer's: {off(data['clock'])}")
     return out
 
 
@@ -105,13 +105,23 @@ def histogram(stretches: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def duration(seconds: float | None) -> str:
-    """`2.5 us`, `1.2 ms`, `3 s`; three digits."""
-    if seconds is None:
+    """`2.5 us`, `1.2 ms`, `3 s`; three digits; `-` where it is not known."""
+    if seconds is None or math.isnan(seconds):
         return "-"
     for scale, unit in ((1e-6, "us"), (1e-3, "ms")):
         if float(f"{seconds:.3g}") < 1000.0 * scale * (1.0 - 1e-12):
             return f"{seconds / scale:.3g} {unit}"
     return f"{seconds:.3g} s"
+
+
+def off(share: float) -> str:
+    """By how much a clock is off: `+12.3 ppm`, from 1 % on in percent."""
+    if math.isnan(share):
+        return "not known"
+    if abs(share) >= 0.01:
+        return f"{1e2 * share:+.3g} %"
+    ppm = round(1e6 * share, 2) + 0.0  # no -0
+    return f"{ppm:+,.0f} ppm" if abs(ppm) >= 100.0 else f"{ppm:+.3g} ppm"
 
 
 def _spread(found: Mapping[str, Any]) -> dict[str, Any]:

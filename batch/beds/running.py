@@ -10,7 +10,7 @@ from batch.beds.asking import on_beds
 from batch.beds.executor import OnBeds, Ports
 from batch.beds.telling import Telling, beside, kept_time
 from batch.campaign import Campaign, Wires, prepare
-from batch.margin import remedy
+from batch.margin import in_words, remedy
 from batch.performing import perform
 from batch.running import first_picture, read_plan
 from batch.summary import summarise
@@ -18,7 +18,7 @@ from batch.verdict import announcement, told, worst_cases, writing
 from hw.case import pace_of
 from hw.ports import in_lock_step
 from met.diagnostic import Problem, error
-from met.margin import Margin, margins
+from met.margin import margins
 from met.plan import Experiment, Plan
 
 
@@ -64,25 +64,17 @@ def campaign_of(
 
 def check_margins(campaign: Campaign, *, force: bool) -> list[str]:
     """What is said of stability before a bed is armed. Raises Problem E419 where a law has no margin."""
-
-
-    def text(one: Margin) -> str:
-        limit = f"more than {one.searched:.3g}" if one.limit is None else f"{one.limit:.3g}"
-        ends = "at no r" if one.limit == 0.0 else f"from {one.lower:.3g} to {limit}" if one.lower else f"to {limit}"
-        r = f"{one.least if one.too_light else one.together:.3g}"
-        return f"{one.joint}: r = {r}, stable {ends} with {one.law} at {one.rate_hz:g} Hz"
-
     said = []
     for part in campaign.parts:
         for each in zip(*margins(part.experiment, part.rows.tolist()), strict=True):
             bad = next((one for one in each if not one.stable), None)
             if bad is not None and not force:
                 helps = f"`met margin` says what would be; {remedy(bad)}", "`--force` arms it all the same"
-                raise Problem(error("E419", f"case #{bad.case}, {text(bad)}: it would not be stable", help=helps))
+                raise Problem(error("E419", f"case #{bad.case}, {in_words(bad)}: it would not be stable", help=helps))
             worst = min(each, key=lambda one: one.room)
-            several = len({text(one) for one in each}) > 1
-            among = f" (case #{worst.case}, the least margin of {len(each)})" if several else ""
-            said.append(text(worst) + among)
+            several = len({in_words(one) for one in each}) > 1
+            among = f" (case #{worst.case}, the least margin of {len(each)} cases)" if several else ""
+            said.append(in_words(worst) + among)
     return list(dict.fromkeys(said))
 
 

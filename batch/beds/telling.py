@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from batch.beds.executor import OnBeds
+from batch.beds.jitter import duration, off
 from batch.progress import Bar
 from hw.timing import Spread, Timing, timing
 
@@ -60,18 +61,33 @@ def timings(executor: OnBeds) -> dict[str, Timing]:
     return found
 
 
+WORST = 0.01
+"""Share of the exchanges without an answer, or by which a bed's clock is off, from which there is a warning."""
+
+
 def kept_time(executor: OnBeds) -> list[str]:
-    """How well the loop kept its time, in words."""
+    """How well the loop kept its time, in words; a warning where the bed did not."""
     lines = []
     for joint, found in timings(executor).items():
         late = found.woken + found.computed + found.waited
         parts = [("late by", found.lateness), ("answered in", found.trip), ("computed in", found.computing)]
-        spreads = "; ".join(f"{what} {_us(each.median)}, p99 {_us(each.high)}" for what, each in parts)
+        spreads = "; ".join(f"{what} {duration(each.median)}, p99 {duration(each.high)}" for what, each in parts)
         lines.append(f"{joint}: {found.exchanges:,} exchanges; {spreads}")
         lines.append(
             f"  a period late: {late:,} (woken too late {found.woken:,}, computing {found.computed:,}, waiting "
-            f"{found.waited:,}); unanswered: {found.unanswered:,}; the bed's clock: {1e6 * found.drift:+.3g} ppm"
+            f"{found.waited:,}); unanswered: {found.unanswered:,}; the bed's clock: {off(found.drift)}"
         )
+        if abs(found.drift) > WORST:
+            hz = executor.tick_hz
+            lines.append(
+                f"  warning: the bed says that it ticks at {hz:g} Hz, and ticks at {(1.0 + found.drift) * hz:.4g} Hz: "
+                "its deadman and slew limits are not what it says; mend its timer, or its configuration"
+            )
+        if found.unanswered > WORST * found.exchanges:
+            lines.append(
+                f"  warning: {100.0 * found.unanswered / found.exchanges:.3g} % of the exchanges had no answer, and "
+                "commands were held longer than was computed: `met bed jitter` and `met bed probe` say more of the line"
+            )
     return lines
 
 
@@ -98,7 +114,3 @@ def _figures(found: Timing) -> dict[str, Any]:
 def _spread(found: Spread) -> dict[str, float | None]:
     values = {"median": found.median, "p99": found.high, "p99.9": found.highest, "largest": found.largest}
     return {name: round(value, 9) if math.isfinite(value) else None for name, value in values.items()}
-
-
-def _us(seconds: float) -> str:
-    return f"{1e6 * seconds:.3g} us"

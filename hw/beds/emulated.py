@@ -134,7 +134,8 @@ class EmulatedBed(Bed):
 
     def clear(self) -> Sample:
         about = self._there()
-        if self._state == State.ARMED or (self._state == State.STOPPED and not self._slow()):
+        hot = Fault.HEAT in self._faults and self._heat > self._limits.heat / 2.0
+        if self._state == State.ARMED or (self._state == State.STOPPED and (hot or not self._slow())):
             raise refusals.refused(about, "clear", self._sample(refused=True))
         self._state, self._faults = State.DISARMED, Fault(0)
         return self._sample()

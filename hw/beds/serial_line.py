@@ -12,8 +12,9 @@ import os
 import secrets
 import select
 import socket
+import termios
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -36,6 +37,7 @@ _WRITE_TIMEOUT = 1.0
 """s that 16 bytes may wait to be sent; then the line hangs. pyserial counts what a busy machine does as well."""
 
 _UNIX = "unix://"
+_NETWORK = ("socket", "rfc2217")
 
 _SLICE = 0.001
 """s between two looks at a line that cannot be waited for."""
@@ -98,7 +100,7 @@ class SerialLine:
         local = "://" not in url
         try:
             self._port: Any = _opened(url, baud)
-        except (OSError, ValueError) as reason:
+        except (OSError, ValueError, KeyError) as reason:  # KeyError: pyserial's, of an option that it does not know
             raise _not_opened(url, reason) from None
         try:
             self._file: int | None = self._port.fileno()
@@ -156,10 +158,26 @@ class SerialLine:
 def _opened(url: str, baud: int) -> Any:
     if url.startswith(_UNIX):
         return _UnixSocket(url.removeprefix(_UNIX))
+    _check_address(url)
     import serial  # only who drives a bed pays for it
 
     own = {} if "://" in url else {"exclusive": True}
     return serial.serial_for_url(url, baudrate=baud, timeout=0, write_timeout=_WRITE_TIMEOUT, **own)
+
+
+def _check_address(url: str) -> None:
+    """That what is to be reached over a network has a host and a port. Raises Problem E400."""
+    scheme = url.partition("://")[0]
+    if scheme not in _NETWORK:
+        return
+    try:
+        parts = urlsplit(url)
+        wrong = "it names no host" if not parts.hostname else "it names no port" if not parts.port else ""
+    except ValueError:  # as of a port that is no number
+        wrong = "it is no address of a host and a port"
+    if wrong:
+        helps = f"write `{scheme}://HOST:PORT`, where PORT is 1 to 65535"
+        raise Problem(error("E400", f"{url} cannot be opened: {wrong}", help=helps))
 
 
 class _UnixSocket:
@@ -197,20 +215,37 @@ class _UnixSocket:
 
 
 def _not_opened(url: str, reason: Exception) -> Problem:
-    number = _number(reason)
-    if isinstance(reason, ValueError):
-        helps = ["such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217://HOST:PORT"]
+    number, why = _number(reason), _why(reason)
+    if number == errno.ENOTTY:
+        why, helps = "it is no serial line", [_ports()]
+        if os.path.isfile(url):
+            why = "it is a file, and no transcript, which could be replayed"
     elif number == errno.EACCES:
         helps = ["`sudo usermod -a -G dialout $USER` lets you use serial lines, once you have logged in again"]
+    elif number in (errno.EAGAIN, errno.EBUSY) and _is_ours(url):
+        why, helps = "this run has it open already", ["each bed is on a line of its own: give each joint another port"]
     elif number in (errno.EAGAIN, errno.EBUSY):
         helps = [f"another program uses it; `fuser -v {url}` says which"]
+    elif isinstance(reason, ValueError | KeyError):
+        helps = ["such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217://HOST:PORT"]
     elif "://" in url and not url.startswith(_UNIX):
         helps = ["is there someone who listens at that address?"]
     elif url.startswith(_UNIX):
         helps = ["is there someone who made that socket, and listens?"]
     else:
         helps = [_ports()]
-    return Problem(error("E400", f"{url} cannot be opened: {_why(reason)}", help=helps))
+    return Problem(error("E400", f"{url} cannot be opened: {why}", help=helps))
+
+
+def _is_ours(path: str) -> bool:
+    """Whether this process has the same device open, other than as its terminal."""
+    with contextlib.suppress(OSError):
+        wanted = os.stat(path).st_rdev
+        for name in os.listdir("/proc/self/fd"):
+            with contextlib.suppress(OSError):
+                if int(name) > 2 and wanted and os.fstat(int(name)).st_rdev == wanted:
+                    return True
+    return False
 
 
 def _ports() -> str:
@@ -235,15 +270,29 @@ def latency(url: str) -> tuple[Diagnostic, ...]:
 
 
 def _why(reason: Exception) -> str:
-    """In the system's words where it has some."""
+    """In the system's words where it has some, else those of what went wrong first."""
     number = _number(reason)
-    return os.strerror(number).lower() if number else " ".join(str(reason).split())
+    if number and number > 0:
+        return os.strerror(number).lower()
+    for each in _chain(reason):
+        if isinstance(each, socket.gaierror) and each.strerror:
+            return each.strerror.lower()
+        if isinstance(each, ValueError):
+            reason = each
+    return " ".join(str(reason).split())
 
 
 def _number(reason: BaseException | None) -> int | None:
     """The system's, of an error that pyserial raised, or of what it raised it from."""
-    while reason is not None:
-        if isinstance(reason, OSError) and reason.errno:
-            return reason.errno
-        reason = reason.__context__
+    for each in _chain(reason):
+        number = each.args[0] if isinstance(each, termios.error) else getattr(each, "errno", None)
+        if number:
+            return int(number)
     return None
+
+
+def _chain(reason: BaseException | None) -> Iterator[BaseException]:
+    """An error, and those from which it came."""
+    while reason is not None:
+        yield reason
+        reason = reason.__context__

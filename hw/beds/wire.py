@@ -13,7 +13,7 @@ from typing import TypeVar
 from hw import refusals
 from hw.bed import LIMITS, About, Bed, Capability, Fault, Sample, State, real_plant
 from hw.beds import greeting
-from hw.line import Line
+from hw.line import Heard, Line
 from hw.protocol import messages
 from hw.protocol.frames import Decoder
 from hw.protocol.messages import Asked, Greeting, InForce, OtherVersion, Reading
@@ -77,10 +77,15 @@ class WireBed(Bed):
         return self._about
 
     def _greet(self) -> About:
-        found = self._asked_again(messages.Hello(), Greeting, _BOOT)
+        line = self._line
+        assert line is not None
+        self._line = heard = Heard(line)
+        try:
+            found = self._asked_again(messages.Hello(), Greeting, _BOOT)
+        finally:
+            self._line = line
         if found is None:
-            helps = ("is the bed switched on, and this the line that it is on?", "does it expect this baud rate?")
-            raise Problem(error("E402", f"nobody answers HELLO on {self._name}", help=helps))
+            raise refusals.no_greeting(self._name, bytes(heard.sent), bytes(heard.came))
         about = greeting.about(found)
         scales: Mapping[Capability, tuple[str, float]] = {
             Capability.ENCODER: ("angle", about.scales.angle),

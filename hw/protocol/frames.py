@@ -20,7 +20,7 @@ def framed(payload: bytes) -> bytes:
 
 def unframed(frame: bytes) -> bytes | None:
     """The payload of a frame without its zero; None if it is not one."""
-    if len(frame) >= LONGEST:
+    if len(frame) >= LONGEST or b"\0" in frame:
         return None
     runs, at = [], 0
     while at < len(frame):
@@ -28,7 +28,7 @@ def unframed(frame: bytes) -> bytes | None:
         runs.append(frame[at + 1 : end])
         at = end
     whole = b"\0".join(runs)
-    if at != len(frame) or not 5 <= len(whole) <= LONGEST_PAYLOAD + 2 or b"\0" in frame:
+    if at != len(frame) or not 5 <= len(whole) <= LONGEST_PAYLOAD + 2:
         return None
     payload = whole[:-2]
     return payload if crc_hqx(payload, 0xFFFF) == int.from_bytes(whole[-2:], "little") else None

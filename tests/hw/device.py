@@ -261,10 +261,12 @@ class Device:
     def done(self, kind: int, body: bytes) -> bool:
         if kind == 3:
             (session,) = struct.unpack("<I", body)
-            if self.state != DISARMED or not self.greeted or session != self.session or not self.slow():
+            cool = self.heat <= self.limits[6]
+            if not (self.state == DISARMED and self.greeted and session == self.session and self.slow() and cool):
                 return False
             self.safe()
             self.state, self.since, self.suspect, self.seen = ARMED, 0, [0, 0], self.rate * self.scales[2]
+            self.first = 1, 0, 0
             self.frames.clear()
         elif kind in (4, 5):
             voltage, current, ticks = struct.unpack("<iiB", body)
@@ -279,7 +281,8 @@ class Device:
             self.safe()
             self.state = DISARMED if self.state == ARMED else self.state
         elif kind == 7:
-            if self.state == ARMED or (self.state == STOPPED and not self.slow()):
+            hot = self.faults & HEAT and self.heat > self.limits[6] / 2
+            if self.state == ARMED or (self.state == STOPPED and (hot or not self.slow())):
                 return False
             self.state, self.faults = DISARMED, 0
         elif kind == 9:
@@ -291,10 +294,14 @@ class Device:
         return True
 
     def command(self, voltage: int, current: int) -> None:
-        since = max(1, self.since)
+        if self.since:
+            self.first = self.since, self.volts, self.amperes
+        # from the command before this one, and from the one before the first of this tick
+        before = (max(1, self.since), self.volts, self.amperes), (self.first[0] + 1, *self.first[1:])
         if abs(voltage) > self.force[0] or abs(current) > self.force[1]:
             self.stop(RANGE)
-        elif abs(voltage - self.volts) > since * self.force[3] or abs(current - self.amperes) > since * self.force[4]:
+        elif any(abs(voltage - volts) > ticks * self.force[3] or abs(current - amperes) > ticks * self.force[4]
+                 for ticks, volts, amperes in before):  # fmt: skip
             self.stop(SLEW)
         else:
             self.hold(voltage, current)

@@ -6,10 +6,13 @@ import math
 import os
 import socket
 import struct
+import subprocess
+import sys
 import threading
 import tty
 from collections.abc import Callable
 from pathlib import Path
+from subprocess import PIPE
 from typing import Any
 
 import pytest
@@ -47,14 +50,37 @@ def test_a_line_that_is_not_there() -> None:
     )
 
 
-def test_a_line_that_another_program_has(on_pty: Callable[..., str]) -> None:
-    name = on_pty(Device())
-    with SerialBed(name, period=1e-3) as bed:
-        bed.connect()
+def test_a_line_that_another_program_has() -> None:
+    text = "import fcntl, os; own = os.openpty()[1]; fcntl.flock(own, fcntl.LOCK_EX); print(os.ttyname(own)); input()"
+    with subprocess.Popen([sys.executable, "-uc", text], stdin=PIPE, stdout=PIPE, text=True) as other:
+        assert other.stdin is not None and other.stdout is not None
+        name = other.stdout.readline().strip()
         assert refusal(SerialBed(name, period=1e-3).connect) == (
             f"error[E400]: {name} cannot be opened: resource temporarily unavailable\n"
             f" = help: another program uses it; `fuser -v {name}` says which"
         )
+        other.stdin.write("\n")
+
+
+def test_a_line_that_another_joint_s_bed_is_on(on_pty: Callable[..., str]) -> None:
+    name = on_pty(Device())
+    with SerialBed(name, period=1e-3) as bed:
+        bed.connect()
+        assert refusal(SerialBed(name, period=1e-3).connect) == (
+            f"error[E400]: {name} cannot be opened: this run has it open already\n"
+            " = help: each bed is on a line of its own: give each joint another port"
+        )
+
+
+@pytest.mark.parametrize("text", [None, "", "anything"])
+def test_what_is_no_serial_line(tmp_path: Path, text: str | None) -> None:
+    path = Path(os.devnull) if text is None else tmp_path / "file"
+    if text is not None:
+        path.write_text(text)
+    why = "it is no serial line" if text is None else "it is a file, and no transcript, which could be replayed"
+    told = refusal(SerialBed(str(path), period=1e-3).connect).splitlines()
+    assert told[0] == f"error[E400]: {path} cannot be opened: {why}"
+    assert len(told) == 2 and told[1].startswith((" = help: serial lines here: ", " = help: there is no serial line"))
 
 
 def test_a_line_that_may_not_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,11 +104,27 @@ def test_an_address_at_which_nobody_listens() -> None:
         )
 
 
-def test_an_address_that_is_none() -> None:
-    told = refusal(SerialBed("wire://x", period=1e-3).connect)
-    assert told == (
-        "error[E400]: wire://x cannot be opened: invalid URL, protocol 'wire' not known\n"
-        " = help: such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217://HOST:PORT"
+@pytest.mark.parametrize(
+    ("url", "why", "remedy"),
+    [
+        ("wire://x", "invalid URL, protocol 'wire' not known",
+         "such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217://HOST:PORT"),
+        ("loop://?x=y", "unknown option: 'x'", "such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217://HOST:PORT"),
+        ("socket://localhost", "it names no port", "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
+        ("socket://localhost:0", "it names no port", "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
+        ("socket://:7000", "it names no host", "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
+        ("rfc2217://bench", "it names no port", "write `rfc2217://HOST:PORT`, where PORT is 1 to 65535"),
+        ("socket://bench:serial", "it is no address of a host and a port",
+         "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
+        ("socket://bench:70000", "it is no address of a host and a port",
+         "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
+        ("socket://[::1", "it is no address of a host and a port",
+         "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
+    ],
+)  # fmt: skip
+def test_an_address_that_is_none(url: str, why: str, remedy: str) -> None:
+    assert refusal(SerialBed(url, period=1e-3).connect) == (
+        f"error[E400]: {url} cannot be opened: {why}\n = help: {remedy}"
     )
 
 
@@ -139,6 +181,40 @@ def test_nobody_there() -> None:
         " = help: does it expect this baud rate?"
     )
     assert bed.stop()
+
+
+@pytest.mark.parametrize(
+    ("answer", "said", "helps"),
+    [
+        (lambda frame: b"\x8f\x01\0" * 3, "162 bytes came, and no frame that decodes",
+         ("give the baud rate that the bed has, `--baud`", "is another device on this line?")),
+        (lambda frame: b"\xff" * 2000, "36,000 bytes came, and no frame that decodes",
+         ("give the baud rate that the bed has, `--baud`", "is another device on this line?")),
+        (lambda frame: frame, "what comes back is what was sent, 18 of 18 frames",
+         ("take away a loop-back plug, or a bridge between its two wires", "switch a modem's echo off")),
+        (lambda frame: model.frame(b"\x84\0\0" + bytes(10)), "18 frames came, and no answer among them",
+         ("is another computer on the same line?", "is it the firmware of a bed, of this version?")),
+    ],
+)  # fmt: skip
+def test_somebody_there_who_does_not_answer(
+    answer: Callable[[bytes], bytes], said: str, helps: tuple[str, str]
+) -> None:
+    class Other(VirtualLine):
+        def send(self, frame: bytes) -> None:
+            self._push(self.time, "down", answer(frame))
+
+    assert refusal(LineBed(lambda: Other(Device(), None)).connect) == (
+        f"error[E402]: nobody answers HELLO on a line: {said}\n = help: {helps[0]}\n = help: {helps[1]}"
+    )
+
+
+def test_a_line_that_echoes_and_answers_is_a_bed_s() -> None:
+    class Echoing(VirtualLine):
+        def send(self, frame: bytes) -> None:
+            self._push(self.time, "down", frame)
+            super().send(frame)
+
+    assert LineBed(lambda: Echoing(Device(), None)).connect().name == "model"
 
 
 def test_a_device_that_boots_when_its_line_is_opened() -> None:

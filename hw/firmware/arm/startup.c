@@ -11,10 +11,14 @@ void *memcpy(void *to, const void *from, size_t count);
 void *memmove(void *to, const void *from, size_t count);
 void *memset(void *to, int value, size_t count);
 
-/* A fault of the processor, or an interrupt that nobody asked for: nothing more goes out to an amplifier but zeros. */
-static void halt(void)
+/* A fault of the processor, or an interrupt that nobody asked for: nothing more goes out to an amplifier but zeros. It
+   takes the stack from its beginning, since a stack that was too deep is what it may have come from. */
+__attribute__((naked)) static void halt(void)
 {
-    lm3s6965_halt();
+    __asm volatile("ldr r0, =stack_top\n\t"
+                   "msr msp, r0\n\t"
+                   "b lm3s6965_halt\n\t"
+                   ".ltorg");
 }
 
 void reset(void)

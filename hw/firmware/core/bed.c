@@ -160,6 +160,12 @@ static bool slow(const bed *self)
     return !beyond(self->sensors.rate, self->config->arming_rate);
 }
 
+/* Half of what it may be: so that a load which is cleared and driven again and again is not driven more than it bears. */
+static bool cooled(const bed *self)
+{
+    return self->heat <= self->config->heat.most / 2;
+}
+
 static bool too_steep(int32_t from, int32_t to, int32_t slew, uint32_t ticks)
 {
     const int64_t change = (int64_t)to - from;
@@ -178,6 +184,13 @@ static uint32_t wrong_with(const bed *self, int32_t voltage, int32_t current)
     if (too_steep(self->voltage, voltage, self->limits[BED_VOLTAGE_SLEW], ticks) ||
         too_steep(self->current, current, self->limits[BED_CURRENT_SLEW], ticks)) {
         faults |= BED_FAULT_SLEW;
+    }
+    if (self->since == 0u) { /* not the first since the last tick: together they are one change */
+        const uint32_t together = self->from_ticks + 1u;
+        if (too_steep(self->from_voltage, voltage, self->limits[BED_VOLTAGE_SLEW], together) ||
+            too_steep(self->from_current, current, self->limits[BED_CURRENT_SLEW], together)) {
+            faults |= BED_FAULT_SLEW;
+        }
     }
     return faults;
 }
@@ -207,10 +220,14 @@ static void tighten(bed *self, uint8_t which, int32_t value)
 
 static bool arm(bed *self, uint32_t session)
 {
-    const bool possible = (self->state == BED_DISARMED) && self->greeted && (session == self->session) && slow(self);
+    const bool possible = (self->state == BED_DISARMED) && self->greeted && (session == self->session) && slow(self) &&
+                          (self->heat <= self->config->heat.most);
     if (possible) {
         make_safe(self);
         self->since = 0u;
+        self->from_voltage = 0;
+        self->from_current = 0;
+        self->from_ticks = 1u;
         self->dropped = 0u;
         self->drops = 0u;
         guard_tachometer_start(&self->tachometer);
@@ -227,7 +244,13 @@ static bool command(bed *self, int32_t voltage, int32_t current)
         if (faults != 0u) {
             stop_for(self, faults);
         } else {
+            if (self->since > 0u) {
+                self->from_voltage = self->voltage;
+                self->from_current = self->current;
+                self->from_ticks = self->since;
+            }
             self->since = 0u;
+            self->largest = beyond(current, self->largest) ? ((current < 0) ? -current : current) : self->largest;
             self->current = current;
             self->voltage = voltage;
             port_set_current(current);
@@ -258,7 +281,8 @@ static void disarm(bed *self)
 
 static bool clear(bed *self)
 {
-    const bool possible = (self->state == BED_DISARMED) || ((self->state == BED_STOPPED) && slow(self));
+    const bool hot = ((self->faults & BED_FAULT_HEAT) != 0u) && !cooled(self);
+    const bool possible = (self->state == BED_DISARMED) || ((self->state == BED_STOPPED) && slow(self) && !hot);
     if (possible) {
         make_safe(self);
         self->faults = 0u;
@@ -411,6 +435,10 @@ void bed_boot(bed *self, const bed_config *config, bed_cause cause)
     self->tick = 0u;
     take_limits_back(self);
     self->since = 0u;
+    self->from_voltage = 0;
+    self->from_current = 0;
+    self->from_ticks = 1u;
+    self->largest = 0;
     self->heat = 0;
     guard_tachometer_start(&self->tachometer);
     self->dropped = 0u;
@@ -458,7 +486,9 @@ void bed_tick(bed *self)
     const bed_config *config = self->config;
     self->tick++;
     port_read(&self->sensors);
-    self->heat = guard_heat(&config->heat, self->heat, self->sensors.load_current);
+    /* A current that came and went between two readings is heat, too. */
+    const bool seen = beyond(self->sensors.load_current, self->largest);
+    self->heat = guard_heat(&config->heat, self->heat, seen ? self->sensors.load_current : self->largest);
     if (self->state == BED_ARMED) {
         uint32_t faults = 0u;
         self->since++;
@@ -491,5 +521,6 @@ void bed_tick(bed *self)
     } else {
         make_safe(self); /* again, whatever has become of the amplifiers' inputs */
     }
+    self->largest = (self->current < 0) ? -self->current : self->current;
     port_kick();
 }

@@ -92,6 +92,10 @@ typedef struct {
     int32_t voltage;            /* command in force, counts; 0 unless armed */
     int32_t current;
     uint32_t since; /* ticks since the last command or arming */
+    int32_t from_voltage; /* command in force before the first one since the last tick */
+    int32_t from_current;
+    uint32_t from_ticks; /* ticks for which it had been, at least 1 */
+    int32_t largest;     /* size of the largest current that was in force since the last tick */
     port_sensors sensors;
     int64_t heat;
     guard_tachometer tachometer;

@@ -17,6 +17,7 @@ int64_t guard_heat(const guard_heat_config *config, int64_t heat, int32_t curren
 void guard_tachometer_start(guard_tachometer *guard)
 {
     guard->sum = 0;
+    guard->way_sum = 0;
     guard->start = 0;
     guard->way = 0;
     guard->ticks = 0u;
@@ -42,26 +43,29 @@ guard_verdict guard_tachometer_tick(guard_tachometer *guard, const guard_tachome
     const int64_t load = config->current * current;
     const int64_t net = drive + load - (config->viscous * rate);
     const int64_t unsure = config->friction + ((config->tolerance * (size(drive) + size(load))) / 256);
-    const int64_t sure = size(net) - unsure;
-    const int32_t way = (sure <= 0) ? 0 : ((net > 0) ? 1 : -1);
+    const int64_t one = (int64_t)1 << config->bits;
+    const int64_t wanted = config->change * one;
+    const int64_t sure = (net * guard->way) - unsure; /* below 0: so much of the change may have gone again */
+    const int64_t after = guard->way_sum + sure;
 
-    if ((config->change <= 0) || (way == 0) || (way != guard->way)) {
+    if ((config->change <= 0) || (guard->way == 0) || (after <= 0)) {
         guard_tachometer_start(guard);
-        guard->way = way;
+        guard->way = (size(net) <= unsure) ? 0 : ((net > 0) ? 1 : -1);
+        guard->way_sum = size(net) - unsure;
         return GUARD_SOUND;
     }
+    guard->way_sum = (after < wanted) ? after : wanted;
     if (guard->ticks < config->lag) {
         guard->ticks++;
         guard->start = rate;
         return GUARD_SOUND;
     }
     guard->sum += sure;
-    const int64_t one = (int64_t)1 << config->bits;
-    const int64_t wanted = config->change * one;
     if (guard->sum < wanted) {
+        guard->suspicious = 0u;
         return GUARD_SOUND;
     }
-    const int64_t read = ((int64_t)rate - guard->start) * way * one;
+    const int64_t read = ((int64_t)rate - guard->start) * guard->way * one;
     if (read >= guard->sum / 4) {
         guard->sum = 0;
         guard->start = rate;

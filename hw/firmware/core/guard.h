@@ -35,9 +35,10 @@ typedef struct {
 
 typedef struct {
     int64_t sum;         /* change of rate that is sure since `start`, times 2^bits */
+    int64_t way_sum;     /* the same since `way`, no more than is wanted: while above 0 the shaft was pushed that way */
     int32_t start;       /* rate at which the sum began, counts */
     int32_t way;         /* direction of the torque, +1 or -1; 0: none that is sure */
-    uint32_t ticks;      /* for which it has been so, up to `lag` */
+    uint32_t ticks;      /* for which it has been so, up to `lag`; a tick without torque is no end of it */
     uint32_t suspicious; /* ticks for which the rate has not followed */
 } guard_tachometer;
 
@@ -55,7 +56,8 @@ void guard_tachometer_start(guard_tachometer *guard);
    Friction and an error of the constants may take all of a torque; what is beyond both must change the rate. So a shaft
    at rest, one that the load motor holds, and one whose arm takes most of the torque say nothing. A torque that is sure
    is left alone for `lag` ticks, until the filter shows only what it does. From there on the change of rate that is
-   sure is summed. Once that is `change`, a quarter of it must have been read: the other three quarters are for a shaft
+   sure is summed; a tick whose torque is not takes as much from the sum as it may have undone, so that a torque with
+   gaps is watched like one without. Once that is `change`, a quarter of it must have been read: the other three quarters are for a shaft
    of up to three times the inertia, and for noise. Not having been read for `lag` ticks more, it is a verdict: the
    filter is late where a torque grows. */
 guard_verdict guard_tachometer_tick(guard_tachometer *guard, const guard_tachometer_config *config, int32_t voltage,

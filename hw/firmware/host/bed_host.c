@@ -36,7 +36,9 @@ static FILE *log_file;
 
 static void on_signal(int number)
 {
-    wanted = number;
+    if (wanted != SIGTERM) { /* of several that came together, the end */
+        wanted = number;
+    }
 }
 
 static int64_t now_ns(void)

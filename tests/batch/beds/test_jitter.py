@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from batch.beds.jitter import duration, histogram, lines
+from batch.beds.jitter import duration, histogram, lines, off
 from hw import loop
 from hw.bed import About, Bed, Fault, Sample, State
 from hw.jitter import kept
@@ -247,8 +247,14 @@ def test_bars_show_what_is_there_at_all() -> None:
 
 
 def test_times_in_three_digits() -> None:
-    assert [duration(each) for each in (2.5e-6, 999.6e-6, 1e-3, 0.02, 3.0, None)] == [
-        "2.5 us", "1 ms", "1 ms", "20 ms", "3 s", "-"
+    assert [duration(each) for each in (2.5e-6, 999.6e-6, 1e-3, 1.8e-3, 0.02, 3.0, None, math.nan)] == [
+        "2.5 us", "1 ms", "1 ms", "1.8 ms", "20 ms", "3 s", "-", "-"
+    ]  # fmt: skip
+
+
+def test_how_far_a_clock_is_off() -> None:
+    assert [off(each) for each in (5e-5, -1e-15, -9.9e-3, -0.5, 1.0, math.nan)] == [
+        "+50 ppm", "+0 ppm", "-9,900 ppm", "-50 %", "+100 %", "not known"
     ]  # fmt: skip
 
 

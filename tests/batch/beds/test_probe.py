@@ -116,6 +116,23 @@ error[E425]: port `emulated` simulates a deck's bed, and there is no deck
 error[E418]: port `qemu`: of which joint?
  = help: say `--port shoulder=qemu` or `--port elbow=qemu`
 """),
+    ("deck.ic wired --port elbow=firmware", """\
+error[E418]: port `elbow=firmware`: run `wired` has no joint `elbow` on a bed
+ = help: on a bed there: `shoulder`
+"""),
+    ("deck.ic both --port wrist=firmware", """\
+error[E418]: port `wrist=firmware`: run `both` has no joint `wrist` on a bed
+ = help: on a bed there: `shoulder`, `elbow`
+"""),
+    ("--port elbow=firmware", """\
+error[E425]: port `firmware` simulates a deck's bed, and there is no deck
+ = help: give a deck, and the name of a run in it that substitutes a joint
+"""),
+    ("--port elbow=/dev/nobody", """\
+error[E400]: /dev/nobody cannot be opened: no such file or directory
+"""),
+    ("--port socket://localhost:1/?logging=no=thing", """\
+error[E400]: socket://localhost:1/?logging=no=thing cannot be opened: """),
     ("deck.ic soft --port emulated", """\
 error[E333]: no joint is on a bed here
  = help: a run says so: `substitute JOINT { }`
@@ -145,3 +162,11 @@ def test_one_bed_at_a_time(probe: Callable[..., tuple[int, str, str]]) -> None:
 
 def test_a_joint_of_several_is_named_with_its_port(probe: Callable[..., tuple[int, str, str]]) -> None:
     assert probe("deck.ic", "both", "--port", "elbow=emulated")[0] == cli.YES
+    assert probe("deck.ic", "wired", "--port", "shoulder=emulated")[1].startswith("bed `emulated` at emulated\n")
+
+
+def test_a_line_s_joint_may_be_named_without_a_deck(
+    probe: Callable[..., tuple[int, str, str]], on_pty: Callable[..., str]
+) -> None:
+    port = on_pty(Device(lock_step=False))
+    assert probe("--port", f"elbow={port}")[1].startswith(f"bed `model` at {port}\n")

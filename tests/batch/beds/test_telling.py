@@ -6,12 +6,13 @@ import io
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import batch
 import ic
 from batch.beds.executor import Driving, OnBeds, Ports
-from batch.beds.telling import Telling, timings
+from batch.beds.telling import Telling, kept_time, timings
 from batch.beds.telling import beside as written_beside
 from batch.folder import Folder
 from batch.progress import Bar
@@ -117,3 +118,45 @@ def test_the_clock_of_a_bed_goes_on_from_case_to_case() -> None:
     found = timings(executor)["shoulder"]
     assert found.exchanges == 398
     assert found.drift == pytest.approx(-0.5e-4, rel=1e-3)
+
+
+def told(rows: np.ndarray, hz: float) -> list[str]:
+    executor = OnBeds(Ports({"shoulder": "/dev/ttyUSB0"}, 921600))
+    executor.tick_hz = hz
+    executor.exchanges = {(0, 0): {"shoulder": rows}}
+    return kept_time(executor)
+
+
+HEAD = "shoulder: 200 exchanges; late by 3 us, p99 3 us; answered in 100 us, p99 100 us; computed in "
+LATE = "  a period late: 0 (woken too late 0, computing 0, waiting 0); unanswered: "
+
+
+def test_a_bed_that_keeps_its_time() -> None:
+    rows = rows_of(201)
+    rows["computed"] = rows["ended"] - 1_000_000 + 1_800_000
+    assert told(rows, 1000.0) == [f"{HEAD}1.8 ms, p99 1.8 ms", f"{LATE}0; the bed's clock: +0 ppm"]
+
+
+def test_a_bed_whose_ticks_are_not_what_it_announces_is_warned_of() -> None:
+    assert told(rows_of(201), 2000.0)[1:] == [
+        f"{LATE}0; the bed's clock: -50 %",
+        "  warning: the bed says that it ticks at 2000 Hz, and ticks at 1000 Hz: its deadman and slew limits are not "
+        "what it says; mend its timer, or its configuration",
+    ]
+    assert len(told(rows_of(201), 1009.0)) == 2
+    assert told(rows_of(201), 985.0)[1].endswith("; the bed's clock: +1.52 %")
+    assert "  warning: the bed says that it ticks at 985 Hz, and ticks at 1000 Hz: " in told(rows_of(201), 985.0)[2]
+
+
+def test_exchanges_without_an_answer_are_warned_of() -> None:
+    assert len(told(rows_of(201, silent=(5, 9)), 1000.0)) == 2
+    found = told(rows_of(201, silent=(5, 9, 20)), 1000.0)
+    assert found[1].startswith(f"{LATE}3; the bed's clock: ")
+    assert found[2:] == [
+        "  warning: 1.5 % of the exchanges had no answer, and commands were held longer than was computed: "
+        "`met bed jitter` and `met bed probe` say more of the line"
+    ]
+
+
+def test_a_clock_of_which_too_little_was_seen_is_not_known() -> None:
+    assert told(rows_of(5), 1000.0)[1] == f"{LATE}0; the bed's clock: not known"

@@ -31,7 +31,9 @@ class Model:
     tick_count: int = 0
     since: int = 0
     held: tuple[int, int] = (0, 0)
+    base: tuple[int, int, int] = (1, 0, 0)
     heat: int = 0
+    largest: int = 0
     rate: int = 0
     seen: int = 0
     frames: list[bool] = field(default_factory=list)
@@ -80,9 +82,10 @@ class Model:
     def refuses(self, kind: int, body: bytes) -> bool:
         state, slow = self.state, abs(self.seen) <= self.arming
         if kind == wire.ARM:
-            if state == wire.DISARMED and self.greeted and slow and struct.unpack("<I", body) == (self.session,):
+            ready = self.greeted and slow and self.heat <= self.most
+            if state == wire.DISARMED and ready and struct.unpack("<I", body) == (self.session,):
                 self.safe(wire.ARMED)
-                self.since, self.frames = 0, []
+                self.since, self.base, self.frames = 0, (1, 0, 0), []
                 return False
             return True
         if kind in (wire.DRIVE, wire.STEP):
@@ -94,7 +97,8 @@ class Model:
         if kind == wire.STOP:
             self.safe(wire.DISARMED if state == wire.ARMED else state)
         if kind == wire.CLEAR:
-            if state == wire.ARMED or (state == wire.STOPPED and not slow):
+            hot = bool(self.faults & wire.HEAT) and 2 * self.heat > self.most
+            if state == wire.ARMED or (state == wire.STOPPED and (hot or not slow)):
                 return True
             self.faults = 0
             self.safe(wire.DISARMED)
@@ -111,20 +115,29 @@ class Model:
         if self.state != wire.ARMED:
             return
         ticks, faults = max(self.since, 1), 0
+        if self.since:
+            self.base = (self.since, *self.held)
         if abs(voltage) > self.limits[0] or abs(current) > self.limits[1]:
             faults |= wire.RANGE
         if abs(voltage - self.held[0]) > ticks * self.limits[3] or abs(current - self.held[1]) > ticks * self.limits[4]:
+            faults |= wire.SLEW
+        together = self.base[0] + 1
+        if (
+            abs(voltage - self.base[1]) > together * self.limits[3]
+            or abs(current - self.base[2]) > together * self.limits[4]
+        ):
             faults |= wire.SLEW
         if faults:
             self.stop(faults)
             return
         self.held, self.since = (voltage, current), 0
+        self.largest = max(self.largest, abs(current))
         self.events += [("i", current), ("v", voltage)]
 
     def tick(self) -> None:
         self.tick_count += 1
         self.seen = self.rate
-        self.heat = min(max(self.heat + self.held[1] ** 2 - self.continuous, 0), self.most + 1)
+        self.heat = min(max(self.heat + self.largest**2 - self.continuous, 0), self.most + 1)
         if self.state == wire.ARMED:
             self.since += 1
             faults = wire.DEADMAN * (self.since >= self.deadman) | wire.RATE * (abs(self.rate) > self.limits[2])
@@ -133,6 +146,7 @@ class Model:
                 self.stop(faults)
         else:
             self.safe(self.state)
+        self.largest = abs(self.held[1])
         self.events.append(("k", 0))
 
     def stop(self, faults: int) -> None:

@@ -14,10 +14,12 @@ import pytest
 from hw import build as building
 from hw.bed import Capability
 from hw.build import Config, build, config_c, counted, guard, qemu
+from hw.ports import Port, opened
 from met.diagnostic import Problem
 from met.render import render
 from tests.hw.firmware.device import PLAIN, SHAFT
 from tests.hw.firmware.line import FREE, PLANT, STEPPED, behind_a_terminal
+from tests.substitution.hybrid import compiled, deck
 
 
 @pytest.fixture
@@ -55,17 +57,82 @@ def test_a_limit_that_is_a_whole_count_loses_none() -> None:
         ({"tick_hz": math.nan}, "tick rate is nan, not a number above 0"),
         ({"scales": replace(PLAIN.scales, rate=-1.0)}, "scale of rate is -1, not a number above 0"),
         ({"limits": replace(PLAIN.limits, heat=math.inf)}, "limit of heat is inf, not a number above 0"),
-        ({"limits": replace(PLAIN.limits, voltage_slew=9.0)}, "voltage_slew is 0 counts, not 1 to 2147483646"),
-        ({"scales": replace(PLAIN.scales, voltage=1e-9)}, "voltage is 20000000000 counts, not 1 to 2147483646"),
+        ({"limits": replace(PLAIN.limits, voltage_slew=9.0)}, "voltage slew is 0 counts, not 1 to 2147483646"),
+        ({"scales": replace(PLAIN.scales, voltage=1e-9)}, "voltage is 2e+10 counts, not 1 to 2147483646"),
         ({"limits": replace(PLAIN.limits, heat=1e12)}, "the current's scale is too fine for the I2t of the load"),
-        ({"shaft": replace(SHAFT, inertia=1e-14)},
+        ({"trip": math.inf}, "load trip is 4.611686018e+18 counts, not 1 to 2147483646"),
+        ({"scales": replace(PLAIN.scales, voltage=5e-324)},
+         "voltage is 4.611686018e+18 counts, not 1 to 2147483646"),
+        ({"shaft": replace(SHAFT, inertia=1e-18)},
          "the scales are too fine, or the shaft too light, for the tachometer's guard"),
+        ({"shaft": replace(SHAFT, f_cut=1e-8)}, "the tachometer's filter is too slow for its guard"),
+        ({"shaft": replace(SHAFT, f_cut=0.0)}, "the shaft's f_cut is 0, not a number above 0"),
+        ({"shaft": replace(SHAFT, f_c=-0.01)}, "the shaft's f_c is -0.01, not a number above 0"),
+        ({"shaft": replace(SHAFT, kt=math.nan)}, "the shaft's kt is nan, not a number above 0"),
+        ({"name": ""}, "the name '' is not 1 to 16 printable characters of ASCII"),
+        ({"name": "a bed for us all!"}, "the name 'a bed for us all!' is not 1 to 16 printable characters of ASCII"),
+        ({"name": "b\0"}, "the name 'b\\x00' is not 1 to 16 printable characters of ASCII"),
+        ({"name": "caf\xe9"}, "the name 'caf\xe9' is not 1 to 16 printable characters of ASCII"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_counted_is_said(change: dict[str, object], said: str) -> None:
     with pytest.raises(ValueError) as found:
         config_c(replace(PLAIN, **change), plant=False)  # type: ignore[arg-type]
     assert str(found.value) == said
+
+
+@pytest.mark.parametrize(
+    ("bed", "reason", "remedy"),
+    [
+        ("converter_in = 6 rad/s", "arming rate is 0 counts, not 1 to 2147483646", "a smaller `converter_in`"),
+        ("converter_current = 10 A", "current is 0 counts, not 1 to 2147483646", "a smaller `converter_current`"),
+        ("i_max = 1e6 A", "current is 1.048576e+12 counts, not 1 to 2147483646", "a larger `converter_current`"),
+        ("i_max = 100 A", "the current's scale is too fine for the I2t of the load", "a larger `converter_current`"),
+        ("inertia = 1e-18 kg*m^2", "the scales are too fine, or the shaft too light, for the tachometer's guard",
+         "a larger `inertia` or `converter_in`"),
+        ("f_cut = 1e-8 Hz", "the tachometer's filter is too slow for its guard", "a larger `f_cut`"),
+    ],
+)  # fmt: skip
+def test_a_deck_s_bed_that_firmware_cannot_count_is_said(bed: str, reason: str, remedy: str) -> None:
+    experiment = compiled(deck(bed=f"emulated({bed})"), "on_bench")
+    with pytest.raises(Problem) as found:
+        opened(Port("firmware"), experiment, "shoulder", 0, 1e-3)
+    assert render(found.value.diagnostics, {}) == (
+        f"error[E404]: the bed of joint `shoulder` cannot be one of firmware: {reason}\n"
+        f" = help: give the deck's bed {remedy}\n"
+        " = help: `--port emulated` has it as it is\n\n"
+        "1 error\n"
+    )
+
+
+@pytest.mark.parametrize("bed", ["", "inertia = 1e-9 kg*m^2", "tau_max = 1e9 N*m", "f_c = 0 N*m, f_v = 0 N*m*s/rad"])
+def test_a_deck_s_bed_is_counted_however_light_and_free(bed: str) -> None:
+    experiment = compiled(deck(bed=f"emulated({bed})"), "on_bench")
+    opened(Port("firmware"), experiment, "shoulder", 0, 1e-3)
+
+
+def test_the_guard_has_as_many_bits_as_there_is_room_for() -> None:
+    assert guard(replace(PLAIN, shaft=SHAFT))["bits"] == 24
+    light = [guard(replace(PLAIN, shaft=replace(SHAFT, inertia=10.0**-n))) for n in range(8, 16)]
+    assert [each["bits"] for each in light] == sorted((each["bits"] for each in light), reverse=True)
+    for each in light:
+        counts = counted(PLAIN)[0]
+        sure = each["most"] + each["current"] * counts["current"] + each["viscous"] * counts["rate"]
+        largest = max(256 * each["most"], 256 * each["current"] * counts["current"], sure * (each["lag"] + 1))
+        assert largest < 2**60 and (each["bits"] == 24 or largest >= 2**56)
+
+
+def test_a_tick_is_the_plant_s_period() -> None:
+    for kind in ("host", "library", "arm"):
+        with pytest.raises(ValueError, match=r"^a tick of 500 Hz is not the plant's period, 0\.001 s$"):
+            build(kind, replace(FREE, tick_hz=500.0), PLANT)
+    with pytest.raises(ValueError, match=r"^a tick of 1000 Hz is not the plant's period, 0\.002 s$"):
+        build("host", FREE, PLANT.replace("#define PERIOD 0.001", "#define PERIOD 0.002"))
+    with pytest.raises(ValueError, match=r"^plant\.c does not say its `plant_period` as a number$"):
+        build("host", FREE, PLANT.replace("plant_period = PERIOD", "plant_period = 1.0 / RATE"))
+    odd = 1.0 / 7.0e2
+    for text in (repr(odd), odd.hex()):
+        build("library", replace(FREE, tick_hz=700.0), PLANT.replace("plant_period = PERIOD", f"plant_period = {text}"))
 
 
 def test_lock_step_is_for_simulated_plants() -> None:
@@ -119,6 +186,22 @@ def test_the_firmware_of_hello_is_that_of_sources_config_and_plant(fresh: Path) 
 
     assert told(STEPPED, PLANT) == told(STEPPED, PLANT)
     assert len({told(STEPPED, PLANT), told(STEPPED, PLANT + "\n"), told(replace(STEPPED, trip=1.2), PLANT)}) == 3
+
+
+@pytest.mark.parametrize("length", range(1, 17))
+def test_a_bed_is_called_what_its_config_says(length: int) -> None:
+    name = "bench 1 of twelve"[:length]
+    text = config_c(replace(FREE, name=name), plant=True, firmware=bytes(range(0xF1, 0xF9)))
+    [firmware], [told] = (re.findall(rf"\.{field} = {{(.*?)}},", text) for field in ("firmware", "name"))
+    assert bytes(int(each, 16) for each in firmware.split(", ")) == bytes(range(0xF1, 0xF9))
+    assert bytes(int(each, 16) for each in told.split(", ")) == name.encode().ljust(16, b"\0")
+
+
+@pytest.mark.parametrize("name", ["b", "bench 1", "bench 12"])
+def test_a_bed_of_a_short_name_tells_name_and_firmware(name: str) -> None:
+    with behind_a_terminal(replace(FREE, name=name)) as (line, _):
+        found = line.greet()
+    assert (found.name, bytes(8) == found.firmware) == (name.encode().ljust(16, b"\0"), False)
 
 
 def test_the_longest_unused_are_removed(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
