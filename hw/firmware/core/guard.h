@@ -57,9 +57,9 @@ void guard_tachometer_start(guard_tachometer *guard);
    at rest, one that the load motor holds, and one whose arm takes most of the torque say nothing. A torque that is sure
    is left alone for `lag` ticks, until the filter shows only what it does. From there on the change of rate that is
    sure is summed; a tick whose torque is not takes as much from the sum as it may have undone, so that a torque with
-   gaps is watched like one without. Once that is `change`, a quarter of it must have been read: the other three quarters are for a shaft
-   of up to three times the inertia, and for noise. Not having been read for `lag` ticks more, it is a verdict: the
-   filter is late where a torque grows. */
+   gaps is watched like one without. Once that is `change`, a quarter of it must have been read: the other three
+   quarters are for a shaft of up to three times the inertia, and for noise. Not having been read for `lag` ticks more,
+   it is a verdict: the filter is late where a torque grows. */
 guard_verdict guard_tachometer_tick(guard_tachometer *guard, const guard_tachometer_config *config, int32_t voltage,
                                     int32_t current, int32_t rate);
 
