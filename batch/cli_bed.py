@@ -48,7 +48,8 @@ class Amount(click.ParamType):
 
 
 PORT = click.option("--port", "word", metavar="[JOINT=]PORT", required=True, help="Where the bed is.")
-BAUD = click.option("--baud", type=click.IntRange(min=1), default=921600, show_default=True, help="Of a serial line.")
+BAUD = click.option("--baud", type=click.IntRange(1, 2**31 - 1), default=921600, show_default=True, metavar="BAUD",
+                    help="Of a serial line.")  # fmt: skip
 
 
 @click.group(short_help="Drive a motor bed: probe it, measure its line, run a deck's joint on it.")

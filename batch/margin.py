@@ -41,8 +41,8 @@ def told(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> Iterator[
         yield "  each row is the tightest of all cases"
     yield "  r = J_eff/(N^2 J_m) at the start of the run, each joint by itself; delay in ticks of the servo"
     if several:
-        largest = "the least and the largest" if spans else "the largest"
-        yield f"  together: {largest} of any motion of all of them, which the limit is held against"
+        which, end = ("the least and the largest", "ends are") if spans else ("the largest", "limit is")
+        yield f"  together: {which} of any motion of all of them, which the {end} held against"
 
 
 def as_data(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> dict[str, Any]:

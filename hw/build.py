@@ -74,7 +74,7 @@ class Shaft:
 class Config:
     """One bed, in SI. What it counts with is whole counts of its scales, rounded to the safe side.
 
-    name                ASCII, at most 16 characters
+    name                1 to 16 printable characters of ASCII
     tick_hz, deadman    the device's own ticks, Hz; s, 0.010 to 0.020
     continuous_current  that the load bears for ever, A: above it `limits.heat` (A^2 s) is used up
     trip                measured load current beyond which it is a fault, as a share of `limits.current`
@@ -247,7 +247,7 @@ def _fields(of: Scales | Limits, what: str) -> dict[str, float]:
 
 def _check_above_0(what: str, value: float, *, or_0: bool = False) -> None:
     if not (math.isfinite(value) and (value > 0.0 or (or_0 and value == 0.0))):
-        raise Uncountable(f"{what} is {value:g}, not a number above 0", "a number above 0")
+        raise Uncountable(f"{what} is {value:g}, not a number above 0", "numbers of a size that a bed may have")
 
 
 def _whole(value: float) -> int:
@@ -268,7 +268,8 @@ def guard(config: Config) -> dict[str, int]:
     lag, tolerance = LAG * delay * config.tick_hz, round(TOLERANCE * 256.0)
     if lag >= 2**31:
         raise Uncountable("the tachometer's filter is too slow for its guard", "a larger `f_cut`")
-    per = 1.0 / (shaft.inertia * config.tick_hz * s.rate)  # of a torque, N m
+    unit = shaft.inertia * config.tick_hz * s.rate  # N m, of a torque that changes the rate by a count in a tick
+    per = 1.0 / max(unit, 1e-300)
     armature = shaft.kt / shaft.resistance
     found = {
         "voltage": armature * s.voltage * per,
@@ -281,7 +282,7 @@ def guard(config: Config) -> dict[str, int]:
     highest = found["voltage"] * limits["voltage"] + found["back_emf"] * limits["rate"]
     found["most"] = min(found["most"], highest)  # a torque that no voltage reaches takes no room
     load, viscous = found["current"] * limits["current"], found["viscous"] * limits["rate"]
-    largest = max(
+    products = (
         highest,
         256.0 * found["most"],
         256.0 * load,
@@ -289,12 +290,12 @@ def guard(config: Config) -> dict[str, int]:
         # what may be sure in a tick, summed while a rate is waited for
         (found["most"] + load + viscous) * (lag + 2.0),
     )
-    bits = min(GUARD_BITS, math.floor(math.log2(_ROOM // 8 / min(largest, _BEYOND))))
-    if bits < 0:
+    if not all(each <= _ROOM // 8 for each in products):
         raise Uncountable(
             "the scales are too fine, or the shaft too light, for the tachometer's guard",
             "a larger `inertia` or `converter_in`",
         )
+    bits = min(GUARD_BITS, math.floor(math.log2(_ROOM // 8 / max(products))))
     return {
         "bits": bits,
         **{name: round(value * 2.0**bits) for name, value in found.items()},

@@ -7,7 +7,8 @@ It stops its beds when it is interrupted, terminated, or its parent is no more.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, field
 from pathlib import Path
 from typing import Any
@@ -69,27 +70,40 @@ def run(asked: Asked) -> loop.Ended:
             abouts.append(_greeted(beds[-1], joint, experiment, asked))
         lock_step = asked.lock_step
         _check_time(abouts, lock_step)
+        _check_ticks(abouts, of, lock_step)
         prepared = prepare(experiment, wire=True, late=of.late(lock_step), lanes=LANES)
         driven = Driven(prepared, asked.row, of.repeats)
         _check_delay(driven, of, lock_step)
         if not lock_step:
             process.precedence()
         driven(0, [0.0] * len(beds), [[0.0, 0.0] for _ in beds])  # code and memory are there when time begins to count
+        if not lock_step:  # a motor that is simulated in lock-step does not get hot
+            _rest(beds, asked.rest, asked_to_stop)
         for bed in beds:
-            if asked.rest > 0.0:
-                bed.rest(asked.rest)
             bed.patience = of.patience(lock_step)
+        if asked_to_stop():  # nothing was begun
+            return loop.Ended(0, "the host was asked to stop")
         head = {**asked.head, "row": asked.row, "servo_hz": of.servo_hz, "repeats": of.repeats,
                 "lock_step": lock_step, "joints": list(joints), "tick_hz": abouts[0].tick_hz,
                 "beds": [{"name": each.name, "firmware": each.firmware} for each in abouts]}  # fmt: skip
         with recording(Path(asked.records), head, (driven.exchanges + 1) * len(beds)) as put:
             process.say(began=True)
-            return loop.drive(
+            ended = loop.drive(
                 beds, driven, of, driven.exchanges, put, lock_step=lock_step, asked_to_stop=asked_to_stop
             )  # fmt: skip
+        refusals.check_stopped(beds, abouts, ended.why)
+        return ended
     finally:
         for bed in beds:
             bed.close()
+
+
+def _rest(beds: Sequence[Bed], time: float, asked_to_stop: Callable[[], bool]) -> None:
+    """All of them, at once, for so long, s, or until the host is asked to stop."""
+    for _ in range(math.ceil(time / process.PAUSE - 1e-6)):
+        if asked_to_stop():
+            return
+        beds[0].rest(process.PAUSE)
 
 
 def _greeted(bed: Bed, joint: str, experiment: Experiment, asked: Asked) -> About:
@@ -115,6 +129,15 @@ def _check_time(abouts: Sequence[About], lock_step: bool) -> None:
             message = f"bed `{about.name}` has {'a' if lock_step else 'no'} time of its own"
             helps = "leave out `--lock-step`" if lock_step else "`--lock-step` drives it"
             raise Problem(error("E414", message, help=helps))
+
+
+def _check_ticks(abouts: Sequence[About], of: Pace, lock_step: bool) -> None:
+    """That the beds read their sensors as often as they are spoken to; clocks are off by less than 1 %."""
+    for about in abouts:
+        if not lock_step and about.tick_hz < 0.99 * of.hz:
+            message = f"bed `{about.name}` ticks at {about.tick_hz:g} Hz, and would be spoken to at {of.hz:g} Hz"
+            helps = "what it answers would be older than the law believes: a lower rate of the servo, or a faster bed"
+            raise Problem(error("E405", message, help=helps))
 
 
 def _check_delay(driven: Driven, of: Pace, lock_step: bool) -> None:

@@ -67,10 +67,13 @@ def drive(
                    it leaves out the periods that are gone, and goes on
     asked_to_stop  looked at before each exchange
     """
+    silent = -1
     try:
-        return _driven(beds, compute, pace, exchanges, put, lock_step, asked_to_stop, armed)
+        ended = _driven(beds, compute, pace, exchanges, put, lock_step, asked_to_stop, armed)
+        silent = ended.bed
+        return ended
     finally:
-        for bed in beds:
+        for _, bed in sorted(enumerate(beds), key=lambda each: each[0] == silent):  # the others need not wait for it
             bed.stop()
 
 
@@ -80,6 +83,8 @@ def _driven(
 ) -> Ended:  # fmt: skip
     clock, packed = time.perf_counter_ns, records.packed
     period = round(pace.period * 1e9)
+    if armed and asked_to_stop():
+        return Ended(0, "the host was asked to stop")
     told = [[0.0, 0.0] for _ in beds]
     rates = [0.0] * len(beds)
     missed = [0] * len(beds)

@@ -58,6 +58,9 @@ def opened(port: Port, experiment: Experiment | None, joint: str, row: int, peri
         values = bed_values(experiment, joint, row)
         plant = Plant(experiment, joint, case=row, period=period)
         return EmulatedBed(plant, emulated.scales(values), emulated.limits(values, period))
+    if port.transcript is not None and is_transcript(port.name):
+        helps = f"leave out `--transcripts`: {port.name} is what it would be"
+        raise Problem(error("E409", "a transcript has no line whose transcript could be kept", help=helps))
     keep = None if port.transcript is None else File(port.transcript)
     if port.name == FIRMWARE or port.name == QEMU:
         config = config_of(bed_values(experiment, joint, row), period, lock_step=port.lock_step)
@@ -78,6 +81,11 @@ def in_lock_step(name: str, asked: bool) -> bool:
         sent = (unframed(each.data[:-1]) for each in read(name).records if each.kind == SENT)
         return any(payload is not None and payload[0] == Step.kind for payload in sent)
     return asked or name == EMULATED
+
+
+def kind(name: str) -> str:
+    """What a port is, where another of the same kind may be its stand-in: a line may get another name."""
+    return name if name in SIMULATED or is_transcript(name) else "a line"
 
 
 def is_transcript(name: str) -> bool:

@@ -32,6 +32,10 @@ PAUSE = 0.1
 
 _PR_SET_PDEATHSIG = 1
 
+_STARTED_BY = "MET_STARTED_BY"
+"""The variable of the environment that has the number of who started the process: an orphan's parent need not be 1, nor
+is a parent of that number gone in a container."""
+
 Question = TypeVar("Question")
 
 
@@ -45,8 +49,8 @@ def listening() -> Callable[[], bool]:
         signal.signal(number, lambda which, _: heard.append(which))
     with contextlib.suppress(AttributeError, OSError):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-        if os.getppid() == 1:  # who started it was gone before
-            os.kill(os.getpid(), signal.SIGTERM)
+    if os.environ.get(_STARTED_BY, str(os.getppid())) != str(os.getppid()):  # who started it was gone before
+        os.kill(os.getpid(), signal.SIGTERM)
     return lambda: bool(heard)
 
 
@@ -100,9 +104,13 @@ def talk(
     hear     takes what is for people
     until    a word that must come; where the process ends without it, that is Problem E417
     idle     called now and then while it says nothing
-    goes_on  whether an interrupt, which ends the process, ends no more than that; else it is raised in the end
+    goes_on  whether an interrupt, which ends the process, ends no more than that where it has come to `until`; else it
+             is raised in the end
     """
-    process = subprocess.Popen([sys.executable, "-m", module], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    process = subprocess.Popen(
+        [sys.executable, "-m", module], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        env={**os.environ, _STARTED_BY: str(os.getpid())},
+    )  # fmt: skip
     assert process.stdin is not None and process.stdout is not None
     interrupted: KeyboardInterrupt | None = None
     came = False
@@ -126,6 +134,8 @@ def talk(
                 break
             *whole, rest = (rest + data).split(b"\n")
             for line in map(json.loads, whole):
+                if "wrong" in line and interrupted is not None:
+                    raise interrupted
                 if "wrong" in line:
                     found = line["wrong"]["diagnostics"]
                     raise Problem([error(each["code"], each["message"], help=each["help"]) for each in found])
@@ -139,7 +149,7 @@ def talk(
     finally:
         process.stdout.close()
         process.wait()
-    if interrupted is not None and not goes_on:
+    if interrupted is not None and not (goes_on and came):
         raise interrupted
     if until and not came:
         raise ended(process.returncode)

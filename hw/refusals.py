@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from hw.bed import About, Fault, Sample, State
+from collections.abc import Sequence
+
+from hw.bed import About, Bed, Fault, Sample, State
 from hw.build import Uncountable
 from hw.protocol.frames import Decoder
 from hw.protocol.messages import VERSION
@@ -80,6 +82,16 @@ def latched(about: About, faults: Fault, port: str) -> Problem:
     message = f"bed `{about.name}` has stopped itself, and is to be cleared first: {words(faults & ~Fault.WATCHDOG)}"
     own = f"then `met bed clear --port {port}`; `met bed run --clear` does so before each case"
     return Problem(error("E406", message, help=[*remedies(faults & ~Fault.WATCHDOG), own]))
+
+
+def check_stopped(beds: Sequence[Bed], abouts: Sequence[About], why: str) -> None:
+    """Raises Problem where a bed that was driven has not confirmed that it is not armed. why: it was to stop early."""
+    unsure = [about.name for bed, about in zip(beds, abouts, strict=True) if not bed.stop()]
+    if unsure:
+        early = f"{why}; " if why else ""
+        message = f"{early}bed `{unsure[0]}` does not confirm that it stopped"
+        helps = ("cut its amplifiers' power: press the emergency stop", "its deadman has stopped it, if that works")
+        raise Problem(error("E406", message, help=helps))
 
 
 def not_connected(name: str) -> Problem:

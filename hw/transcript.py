@@ -10,6 +10,7 @@ missing. A record is written with one call: a crash loses at most the last one.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import struct
@@ -70,7 +71,8 @@ class File:
     def __init__(self, path: str | Path) -> None:
         """Its folder is made where it is not there."""
         try:
-            Path(path).parent.mkdir(parents=True, exist_ok=True)
+            with contextlib.suppress(FileExistsError):  # no folder: then no file can be made in it
+                Path(path).parent.mkdir(parents=True, exist_ok=True)
             self._file = open(path, "xb", buffering=0)  # noqa: SIM115
         except FileExistsError:
             helps = "give another name: what was said to a bed is not overwritten"
@@ -155,7 +157,11 @@ def read(path: str | Path) -> Transcript:
             break
         records.append(Record(kind, time, data[at + _HEAD.size : end]))
         at = end + 4
-    if not data.startswith(MAGIC) or not records or records[0].kind != HEADER:
+    try:
+        if not data.startswith(MAGIC) or not records or records[0].kind != HEADER:
+            raise ValueError
+        header = json.loads(records[0].data)
+    except ValueError:
         helps = "give the file that a run with a bed wrote"
-        raise Problem(error("E409", f"{path} is no transcript of a bed", help=helps))
-    return Transcript(json.loads(records[0].data), tuple(records[1:]), len(data) - at)
+        raise Problem(error("E409", f"{path} is no transcript of a bed", help=helps)) from None
+    return Transcript(header, tuple(records[1:]), len(data) - at)

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from hw import records, ring
-from hw.ring import Ring
+from hw.ring import Full, Ring
 from met.diagnostic import Problem, error
 
 RING_BYTES = 64 << 20
@@ -43,12 +43,19 @@ def write(through: Ring, pipe: int, path: Path, head: bytes) -> None:
         os.fsync(file.fileno())
 
 
+_LOOK = 64
+"""Records between two looks whether the process is still there."""
+
+
+class Gone(Exception):
+    """The writer has ended before the loop: what is put is written by nobody."""
+
+
 class Writer:
-    """The writer of one run, from the loop's side. put: takes a record."""
+    """The writer of one run, from the loop's side."""
 
     def __init__(self, through: Ring, path: Path, head: bytes) -> None:
-        self._ring = through
-        self.put = through.put
+        self._ring, self._path, self._count = through, path, 0
         read, self._alive = os.pipe()
         os.set_inheritable(self._alive, False)
         command = [sys.executable, "-m", "hw.writer", str(through.file), str(through.room), str(read), str(path)]
@@ -58,8 +65,17 @@ class Writer:
         )  # fmt: skip
         os.close(read)
         assert self._process.stdin is not None
-        self._process.stdin.write(head)
-        self._process.stdin.close()
+        with contextlib.suppress(BrokenPipeError):  # it has ended, and is heard of at the first look
+            self._process.stdin.write(head)
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.close()
+
+    def put(self, record: bytes) -> None:
+        """A record. Raises Gone, Full."""
+        self._count += 1
+        if self._count % _LOOK == 0 and self._process.poll() is not None:
+            raise Gone
+        self._ring.put(record)
 
     def close(self) -> str:
         """Have all of it on the disk; why it is not, in words, "" where it is."""
@@ -67,19 +83,25 @@ class Writer:
         assert self._process.stderr is not None
         with self._process.stderr as stderr:
             told = stderr.read().decode("utf-8", "replace").strip()
-        self._process.wait()
+        status = self._process.wait()
         self._ring.close()
-        return told
+        return told or (f"cannot write {self._path}: its process ended with {status}" if status else "")
 
 
 @contextlib.contextmanager
 def recording(path: Path, head: Mapping[str, Any], most: int) -> Iterator[Callable[[bytes], None]]:
-    """What takes records, so many at most; all are in the file at the end. Raises Problem E413."""
+    """What takes records, so many at most; all are in the file at the end. Raises Problem E413, in the middle of a run,
+    too, so that no bed is driven of which nothing is kept."""
     writer = Writer(ring.make(min(most, RING_BYTES // records.SIZE)), path, json.dumps(head).encode())
+    stalled = ""
     try:
         yield writer.put
+    except Gone:
+        stalled = f"cannot write {path}: its process has ended"
+    except Full:
+        stalled = f"cannot write {path}: the disk has taken nothing for minutes"
     finally:
-        if wrong := writer.close():
+        if wrong := writer.close() or stalled:
             raise Problem(error("E413", wrong, help="free the disk, or give another place with `-o`"))
 
 

@@ -23,6 +23,7 @@ from batch.folder import Folder
 from batch.tasks import Done, Section, Task
 from hw import records
 from hw.case import Asked, pace_of
+from hw.ports import kind
 from hw.process import talk
 from met import plan_file
 from met.diagnostic import Problem, error
@@ -83,6 +84,8 @@ class OnBeds:
         self.ports = ports.by_joint
         self.lock_step, self.baud = ports.lock_step, ports.baud
         self.tick_hz = float("nan")
+        self.ticks_hz: dict[tuple[int, int], float] = {}
+        """Of the ticks of a case's beds; `tick_hz` of the last one's."""
 
     @property
     def under_way(self) -> int:
@@ -91,6 +94,9 @@ class OnBeds:
     def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
         self._folder, self._sections, self._tell = folder, sections, tell
         folder.beds.mkdir(exist_ok=True)
+        for path in folder.beds.glob("*.records"):
+            with contextlib.suppress(records.Unsound, OSError):
+                self.check(records.read(path).head.get("ports", {}), f"{folder.path} holds cases of this campaign")
 
     def submit(self, task: Task) -> None:
         self._waiting.append(task)
@@ -122,6 +128,14 @@ class OnBeds:
     def close(self) -> None:
         self._waiting.clear()
 
+    def check(self, before: Mapping[str, str], what: str) -> None:
+        """Raises Problem E353 where cases were driven at other ports, by joint; what: and where those cases are."""
+        for joint, port in before.items():
+            if kind(port) != kind(self.ports.get(joint, "")):
+                message = f"{what}, driven at `{port}`, and is left as it is"
+                helps = "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it"
+                raise Problem(error("E353", message, help=helps))
+
     def _case(self, section: Section, row: int) -> tuple[Made, str]:
         """What came of a case, and why it ended early, "" where it did not."""
         path = self._folder.beds / f"{section.experiment}-{row}.records"
@@ -138,11 +152,11 @@ class OnBeds:
             message = f"the records of case #{row}, {reason.filename or path}: {reason.strerror or reason}"
             raise Problem(error("E413", message, help="is the disk full? who may write there?")) from None
         self._know(section.experiment, row, found.head, found.exchanges)
-        if found.whole:
-            return found, ""
-        why = "the host was gone"
+        why = "" if found.whole else "the host was gone"
         with contextlib.suppress(OSError, ValueError, KeyError):
             why = str(json.loads(told.read_text(encoding="utf-8"))["why"]) or why
+        if not why:
+            return found, ""
         ticks = section.prepared.experiment.structure.schedule
         at = float(found.outputs[2]) / ticks.base_hz
         self._say(f"case #{section.prepared.experiment.cases.table[row]}, t = {at:g} s: {why}")
@@ -151,7 +165,7 @@ class OnBeds:
     def _know(self, experiment: int, row: int, head: Mapping[str, Any], exchanges: Sequence[np.ndarray]) -> None:
         """Keep what a case's records say of its beds."""
         self.exchanges[experiment, row] = dict(zip(head["joints"], exchanges, strict=True))
-        self.tick_hz = float(head["tick_hz"])
+        self.tick_hz = self.ticks_hz[experiment, row] = float(head["tick_hz"])
         for joint, about in zip(head["joints"], head["beds"], strict=True):
             if about not in self.beds[joint]:
                 self.beds[joint].append(about)
@@ -178,8 +192,8 @@ class OnBeds:
         begun = [name for name in transcripts.values() if not Path(name).exists()]
         asked = Asked(
             plan=plan, row=row, ports=dict(ports.by_joint), records=str(path), lock_step=ports.lock_step,
-            baud=ports.baud, rest=ports.rest if self.exchanges else 0.0, head={"key": section.key()},
-            transcripts=transcripts, clear=ports.clear,
+            baud=ports.baud, rest=ports.rest if self.exchanges else 0.0, transcripts=transcripts, clear=ports.clear,
+            head={"key": section.key(), "ports": dict(ports.by_joint)},
         )  # fmt: skip
         structure, schedule = experiment.structure, experiment.structure.schedule
         exchange_hz = pace_of(experiment).hz * len(structure.substitutions)
@@ -202,7 +216,8 @@ class OnBeds:
         finally:
             self.driving = None
             if ended is not None:
-                told.write_text(json.dumps(ended), encoding="utf-8")
+                with contextlib.suppress(OSError):  # what the case's process says of a full disk is what counts
+                    told.write_text(json.dumps(ended), encoding="utf-8")
 
     def _greeted(self, joint: str, bed: str) -> None:
         """Say which bed it is, where it is not the one of the case before."""

@@ -79,6 +79,7 @@ def identify_and_tell(
     deck = Path(output or f"{which.joint}.identified.ic")
     records = deck.with_suffix(".records")
     _check_output(deck)
+    _check_sheet(sheet, which.joint)
     if which.simulated is None and not sheet.said:
         message = f"joint `{which.joint}`: the load motor's constant, by which torques are measured, is nowhere said"
         helps = "`--kt-load '0.072 N*m/A'`, from its data sheet; or `bed = emulated(kt_load = ..., ...)` in the deck"
@@ -101,6 +102,15 @@ def identify_and_tell(
     for line in told(found, estimates, sheet):
         say(line)
     say(f"{deck} is a deck to include; what was told and read is in {records}")
+
+
+def _check_sheet(sheet: Sheet, joint: str) -> None:
+    """Raises Problem E424 where the search cannot begin at what is believed."""
+    for name, unit in UNITS.items():
+        if not 0.0 < sheet.values[name] < math.inf:
+            message = f"joint `{joint}`: the search cannot begin at {name} = {sheet.values[name]:g} {unit}"
+            helps = "write in the deck what it is about; it may be off by 30 %"
+            raise Problem(error("E424", message, help=helps))
 
 
 def _check_output(deck: Path) -> None:

@@ -111,7 +111,7 @@ def data(found: Found) -> dict[str, Any]:
         "port": found.port,
         **{name: value for name, value in asdict(about).items() if name not in ("capabilities", "scales")},
         "capabilities": [str(each.name).lower() for each in Capability if each in about.capabilities],
-        "scales": asdict(about.scales),
+        "scales": {name: value if math.isfinite(value) else None for name, value in asdict(about.scales).items()},
         "state": sample.state.name.lower(),
         "sensors": {name: value for name, value, _ in _read(sample)},
         "faults": [{"name": str(fault.name).lower(), "message": refusals.words(fault), "help": refusals.remedies(fault)}

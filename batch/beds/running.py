@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import os
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -11,12 +14,13 @@ from batch.beds.executor import OnBeds, Ports
 from batch.beds.telling import Telling, beside, kept_time
 from batch.campaign import Campaign, Wires, prepare
 from batch.margin import in_words, remedy
+from batch.output import sidecar_path
 from batch.performing import perform
 from batch.running import first_picture, read_plan
 from batch.summary import summarise
 from batch.verdict import announcement, told, worst_cases, writing
 from hw.case import pace_of
-from hw.ports import in_lock_step
+from hw.ports import SIMULATED, in_lock_step
 from met.diagnostic import Problem, error
 from met.margin import margins
 from met.plan import Experiment, Plan
@@ -28,6 +32,9 @@ def ports_of(given: Sequence[str], experiments: Sequence[Experiment]) -> dict[st
     found: dict[str, str] = {}
     for word in given:
         joint, equals, port = word.partition("=")
+        if equals and joint not in joints and re.fullmatch(r"\w+", joint):
+            helps = f"those that are: {', '.join(joints)}"
+            raise Problem(error("E418", f"port `{word}`: joint `{joint}` is on no bed here", help=helps))
         if not equals or joint not in joints:
             joint, port = (joints[0] if len(joints) == 1 else ""), word
         if not joint:
@@ -36,6 +43,11 @@ def ports_of(given: Sequence[str], experiments: Sequence[Experiment]) -> dict[st
         if joint in found:
             raise Problem(error("E418", f"joint `{joint}` has two ports", help="leave one of the two out"))
         found[joint] = port
+    lines = [os.path.realpath(port) for port in found.values() if port not in SIMULATED]
+    if len(set(lines)) < len(lines):
+        one, other = [joint for joint, port in found.items() if lines.count(os.path.realpath(port)) > 1][:2]
+        message = f"joints `{one}` and `{other}` have one port: {found[one]}"
+        raise Problem(error("E418", message, help="each has a bed of its own, and its own line"))
     missing = [joint for joint in joints if joint not in found]
     if missing:
         kinds = "`--port JOINT=PORT`: a serial line, `emulated`, `firmware`, `qemu`, or a transcript"
@@ -118,6 +130,9 @@ def run_and_tell(
         say=telling.say, more=lambda: beside(executor),
     )  # fmt: skip
     if performed.whole:
+        sidecar = json.loads(sidecar_path(campaign.output).read_text(encoding="utf-8"))
+        before = {each["joint"]: each["port"] for each in sidecar.get("beds", ())}
+        executor.check(before, f"{campaign.output} holds this campaign")
         say(f"nothing is missing: {campaign.output} has all of it (`--fresh` drives it again)")
     with ArchiveFile(campaign.output) as file:
         summaries, worst = summarise(file), worst_cases(file)

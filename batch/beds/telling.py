@@ -12,6 +12,7 @@ import numpy as np
 from batch.beds.executor import OnBeds
 from batch.beds.jitter import duration, off
 from batch.progress import Bar
+from hw.records import ANSWERED
 from hw.timing import Spread, Timing, timing
 
 
@@ -51,13 +52,14 @@ def timings(executor: OnBeds) -> dict[str, Timing]:
     """By joint, over all cases that were driven or taken up; nothing of beds in lock-step, which have no time."""
     found = {}
     for joint in executor.ports:
-        cases = [rows[joint] for rows in executor.exchanges.values() if joint in rows]
+        cases = {case: rows[joint] for case, rows in executor.exchanges.items() if joint in rows}
         if cases and not executor.lock_step:
             # a bed's ticks, and the host's clock, begin anew with a case
-            drifts = [timing(rows, executor.tick_hz).drift for rows in cases]
+            hz = {case: executor.ticks_hz.get(case, executor.tick_hz) for case in cases}
+            drifts = [timing(rows, hz[case]).drift for case, rows in cases.items()]
             known = [drift for drift in drifts if math.isfinite(drift)]
             drift = float(np.median(known)) if known else math.nan
-            found[joint] = replace(timing(np.concatenate(cases), executor.tick_hz), drift=drift)
+            found[joint] = replace(timing(np.concatenate([*cases.values()]), math.nan), drift=drift)
     return found
 
 
@@ -88,6 +90,10 @@ def kept_time(executor: OnBeds) -> list[str]:
                 f"  warning: {100.0 * found.unanswered / found.exchanges:.3g} % of the exchanges had no answer, and "
                 "commands were held longer than was computed: `met bed jitter` and `met bed probe` say more of the line"
             )
+    for joint in executor.ports if executor.lock_step else ():
+        silent = sum(int(((rows[joint]["flags"] & ANSWERED) == 0).sum()) for rows in executor.exchanges.values())
+        if silent:
+            lines.append(f"{joint}: unanswered: {silent:,}; such a run has not the bits of another")
     return lines
 
 

@@ -24,7 +24,7 @@ class ReplayBed(WireBed):
         header = self.transcript.header
         try:
             period, first = float(header["period"]), int(header["first"])
-        except (KeyError, TypeError, ValueError):
+        except (KeyError, TypeError, ValueError, OverflowError):
             helps = "give the transcript of a bed on a serial line"
             raise Problem(error("E409", f"{path} does not say how its bed was driven", help=helps)) from None
         super().__init__(str(path), period, first)

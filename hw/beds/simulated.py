@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import secrets
 import select
+import signal
 import socket
 import subprocess
 import tempfile
@@ -26,6 +28,8 @@ from met.diagnostic import Problem, error
 
 WITHIN = 20.0
 """s in which its process must be there."""
+
+_PR_SET_PDEATHSIG = 1
 
 
 class SimulatedBed(WireBed):
@@ -71,7 +75,7 @@ class SimulatedBed(WireBed):
             path = Path(folder) / "line"
             self._process = subprocess.Popen(
                 qemu(self._built, path), stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                start_new_session=True,
+                start_new_session=True, preexec_fn=_end_with_parent,
             )  # fmt: skip
             if not self._lock_step:
                 _put_first(self._process.pid)
@@ -121,6 +125,12 @@ class SocketLine:
     def close(self) -> None:
         with contextlib.suppress(OSError):
             self._connection.close()
+
+
+def _end_with_parent() -> None:
+    """In a process that does not end by itself when its line does."""
+    with contextlib.suppress(AttributeError, OSError):
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _put_first(process: int) -> None:

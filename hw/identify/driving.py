@@ -117,6 +117,7 @@ def run(asked: Asked) -> Ended:
                 [bed], guide, of, guide.exchanges, put, lock_step=lock_step,
                 asked_to_stop=lambda: asked_to_stop() or guide.done or guide.stuck,
             )  # fmt: skip
+        refusals.check_stopped([bed], [about], "" if guide.done else ended.why)
         seconds = ended.exchanges * of.period
         if guide.stuck:
             when = f"after move {len(guide.began)}" if guide.began else "before the first move"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import ic
 from met import run as engine
+from met.cli import main
 from met.plan import Experiment
 from tests.paper.stability_map import limits
 
@@ -49,6 +51,24 @@ def test_the_limits_of_the_page_are_those_that_are_predicted(rate: str) -> None:
     (row,) = re.findall(rf"^\| {rate} \| (\S+) \| (\S+) \| (\S+) \|$", PAGE, re.MULTILINE)
     found = limits("measured_acceleration", float(rate.split()[0]) * (1000.0 if "kHz" in rate else 1.0))
     assert row == tuple(f"{limit:#.3g}" for limit in found if limit is not None)
+
+
+def test_an_arm_that_is_too_light_rings_where_the_page_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("one.ic").write_text(DECK, encoding="utf-8")
+    [(command, said)] = re.findall(r"```\n\$ met (margin [^\n]*)\n(.*?)```", PAGE, re.DOTALL)
+    assert main(shlex.split(command)) == 1
+    assert capsys.readouterr().out == said
+    more = """
+        run stiff like bench { rates { record = 1 kHz; }  record = [swing.servo.voltage]; }
+        sweep arms of stiff { vary gearbox.kp = [1] V*s/rad;  vary r = [0.1, 0.3, 0.5, 0.6, 5]; }
+    """
+    voltage = engine.run(experiment(tmp_path, more, "arms")).signals["swing.servo.voltage"].reshape(5, -1)
+    *ringing, smooth, heavy = voltage[:, -1000:].std(axis=1)
+    assert f"{' / '.join(f'{each:.1f}' for each in ringing)} V rms at r = 0.1 / 0.3 / 0.5" in PAGE
+    assert f"{smooth:.3f} {heavy:.3f}" == "0.004 0.004"
 
 
 @pytest.mark.parametrize("law", ["velocity_tracking", "torque_balance_observer", "torque_balance", "bare"])

@@ -142,6 +142,57 @@ def test_joints_by_measured_acceleration_together_grow_by_the_largest_r_of_all_t
     assert all(one.limit is not None and case[1].r < 0.3 * one.limit for case in told for one in case)
 
 
+def test_a_servo_with_much_gain_grows_below_one_r_and_above_another_as_the_margin_says() -> None:
+    heaviness = (0.05, 0.1, 0.17, 0.2, 0.5, 1.5, 3.0, 3.8, 4.3, 6.0)
+    masses = ", ".join(f"{r * ROTOR * 3.0 / REACH**2:.12g}" for r in heaviness)
+    text = deck(law="measured_acceleration", duration=4.0, arm=ONE, sweep=f"vary load = [{masses}] kg;",
+                servo={"shoulder": "told { kp = 1 V*s/rad; }"})  # fmt: skip
+    found = grows(ran(text, "own").signals["qd"][:, :, 0], shaft(ran(text, "bench"), "shoulder"), 500)
+    told = [one for (one,) in margins(compiled(text, "bench"))]
+    assert found.tolist() == [not one.stable for one in told] == [True] * 3 + [False] * 5 + [True] * 2
+    assert all(one.lower == pytest.approx(0.1815, rel=0.01) for one in told)
+    assert all(one.limit == pytest.approx(4.01, rel=0.01) for one in told)
+
+
+def test_joints_together_grow_where_the_least_r_of_all_their_motions_is_too_small() -> None:
+    """Each joint by itself would not: the lighter of the two is at twice the r that its servo needs.
+
+    A ramp, since after a step that takes the drives to their limits they ring on at these gains.
+    """
+    text = """
+        let ratio = 40;
+        servo stiff {
+            model = rigid_gearbox;  ratio = ratio;  kp = 0.16 V*s/rad;  ki = 1.2 V/rad;  v_max = 24 V;
+            resistance = 0.6 ohm;  kt = 0.036 N*m/A;  tau_max = 0.4 N*m;  j_m = 1.2e-5 kg*m^2;  f_c = 0 N*m;
+            f_v = 3e-6 N*m*s/rad;  command = rate(ramp(to = 60 rad/s / ratio, over = 3 s));
+        }
+        arm desk {
+            link upper { mass = 2.5 kg;  shape = rod(length = 0.6 m, along = x); }
+            link fore  { mass = 1.2 kg;  shape = rod(length = 0.45 m, along = x); }
+            joint hip  revolute { parent = base;   child = upper;  axis = z; }
+            joint knee revolute { parent = upper;  child = fore;   axis = z;  at = [0.6, 0, 0] m; }
+        }
+        run bench {
+            arm      = desk;
+            servos   { hip = stiff;  knee = stiff; }
+            rates    { dynamics = 500 Hz;  servos = 500 Hz;  record = 500 Hz; }
+            duration = 6 s;
+            record   = [hip.servo.voltage, knee.servo.voltage];
+            substitute hip  { bed = emulated(delay = 1);  law = torque_balance_observer; }
+            substitute knee { bed = emulated(delay = 1);  law = torque_balance_observer; }
+        }
+        sweep ratios of bench { vary ratio = [60, 40, 30, 25]; }
+    """
+    signals = ran(text, "ratios").signals
+    told = margins(compiled(text, "ratios"))
+    for number, joint in enumerate(("hip", "knee")):
+        voltage = signals[f"{joint}.servo.voltage"].reshape(4, -1)[:, -500:]
+        rings = np.mean(np.abs(np.diff(voltage, 2, axis=1)), axis=1) > 1e-2  # V
+        stable = [case[number].stable for case in told]
+        assert rings.tolist() == [not each for each in stable] == [True, True, False, False]
+    assert all(one.r > 1.5 * one.lower and one.too_light for one in told[1])
+
+
 def test_the_margin_tells_the_r_of_the_arm_at_the_start() -> None:
     text = deck(sweep=loads([0.5, 5.0]), duration=0.5)
     told = [each[0].r for each in margins(compiled(text, "bench"))]

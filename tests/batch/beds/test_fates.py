@@ -163,3 +163,26 @@ def test_a_transcript_of_another_run_is_refused_and_then_the_right_one_is_replay
                                       "--no-picture")  # fmt: skip
         assert found == status and ("error[E407]" in complaint) == (row == 1)
     assert batch.open("b.h5").q.values.tobytes() == batch.open("a.h5").q.values[:1].tobytes()
+
+
+def test_cases_that_were_driven_elsewhere_are_not_taken_for_driven_here(
+    met_bed: Met, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert run(met_bed, "emulated")[0] == cli.YES
+    assert run(met_bed, "firmware", "--lock-step")[0::2] == (cli.BAD_INPUT, """\
+error[E353]: a.h5 holds this campaign, driven at `emulated`, and is left as it is
+ = help: `--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it
+
+1 error
+""")  # fmt: skip
+    assert "nothing is missing" in run(met_bed, "emulated")[1]
+
+    def ended(self: OnBeds, task: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr("batch.beds.executor.shard.write", ended)
+        Path("a.h5").unlink()
+        assert run(met_bed, "emulated")[0] == 130
+    assert "a.h5.campaign holds cases of this campaign, driven at `emulated`" in run(met_bed, "qemu", "--lock-step")[2]
+    assert run(met_bed, "emulated")[0] == cli.YES

@@ -124,7 +124,6 @@ def named(pid: int, word: bytes) -> list[int]:
 # However it ends
 
 
-@pytest.mark.xfail(strict=True, reason="of no bed it is asked whether STOP was confirmed: the run succeeds")
 def test_a_bed_that_does_not_stop_is_told() -> None:
     def deaf(device: Device, frame: bytes) -> bytes:
         return b"" if kind(frame) == messages.Stop.kind else device.take(frame)
@@ -137,7 +136,6 @@ def test_a_bed_that_does_not_stop_is_told() -> None:
     assert "bed `model` does not confirm that it stopped" in done.stdout
 
 
-@pytest.mark.xfail(strict=True, reason="signals are looked at in the loop alone: it rests to the end, and then arms")
 def test_an_interrupt_while_it_rests_ends_it_at_once_and_arms_nothing(here: Path) -> None:
     process = subprocess.Popen([*MET, "run", "deck.ic", "rested", "--port", "firmware", "--rest", "8 s",
                                 "--transcripts", "k", "-o", "a.h5", "--no-picture"], start_new_session=True,
@@ -159,7 +157,6 @@ def test_an_interrupt_while_it_rests_ends_it_at_once_and_arms_nothing(here: Path
     assert took < 3.0
 
 
-@pytest.mark.xfail(strict=True, reason="an orphan is known by parent 1, which a session's manager is not")
 def test_an_orphan_stops_whoever_takes_its_parent_s_place(here: Path) -> None:
     """The parent is killed before the process hears signals; a subreaper, such as `systemd --user`, takes it."""
     (here / "slow.py").write_text("""\
@@ -194,7 +191,6 @@ list(talk("slow", Asked(), print))
     assert Path("heard").read_text() == "True"
 
 
-@pytest.mark.xfail(strict=True, reason="parent 1 counts as no parent, and in a container `met` is process 1")
 def test_a_run_in_a_container_is_not_asked_to_stop() -> None:
     inside = ["unshare", "-pf", "--mount-proc"]
     try:
@@ -208,7 +204,6 @@ def test_a_run_in_a_container_is_not_asked_to_stop() -> None:
     assert done.returncode == cli.YES, done.stdout
 
 
-@pytest.mark.xfail(strict=True, reason="nobody looks whether the writer lives: the bed is driven on, for nothing")
 def test_a_writer_that_is_gone_ends_the_run(here: Path) -> None:
     record = records.packed(0, 0, 0, (0, 0, 0, 0), 0.0, 0.0, Sample(State.ARMED, True, Fault(0), False, 0, 0.0))
     count = 0
@@ -224,7 +219,6 @@ def test_a_writer_that_is_gone_ends_the_run(here: Path) -> None:
     assert told.value.diagnostics[0].message == f"cannot write {here}/r.records: its process ended with -9"
 
 
-@pytest.mark.xfail(strict=True, reason="QEMU goes on when its line ends, and nothing ends it")
 def test_an_emulator_ends_with_who_drives_it(here: Path) -> None:
     process = subprocess.Popen([*MET, "run", "deck.ic", "long", "--port", "qemu", "--lock-step", "-o", "a.h5",
                                 "--no-picture"], start_new_session=True, stdout=subprocess.DEVNULL,
@@ -246,7 +240,6 @@ def test_an_emulator_ends_with_who_drives_it(here: Path) -> None:
             raise AssertionError("it goes on")
 
 
-@pytest.mark.xfail(strict=True, reason="the process's complaint of being asked to stop goes before the interrupt")
 def test_an_interrupt_of_identify_is_one() -> None:
     process = subprocess.Popen([*MET, "identify", "deck.ic", "wired", "--port", "firmware"], start_new_session=True,
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
@@ -261,7 +254,6 @@ def test_an_interrupt_of_identify_is_one() -> None:
 # What a bed answers
 
 
-@pytest.mark.xfail(strict=True, reason="why a case ended is not asked where all of its exchanges are there")
 def test_a_bed_that_stops_itself_at_the_last_exchange_is_a_failed_case() -> None:
     steps = 0
 
@@ -278,7 +270,6 @@ def test_a_bed_that_stops_itself_at_the_last_exchange_is_a_failed_case() -> None
     assert "the bed stopped itself: rate" in done.stdout
 
 
-@pytest.mark.xfail(strict=True, reason="scales of sensors that are not there are printed as they came")
 def test_scales_of_what_is_not_there_are_valid_json() -> None:
     device = Device()
     device.scales = (*device.scales[:4], float("nan"), float("inf"))
@@ -291,7 +282,6 @@ def test_scales_of_what_is_not_there_are_valid_json() -> None:
     assert json.loads(said, parse_constant=no_number)["scales"]["drive_current"] is None
 
 
-@pytest.mark.xfail(strict=True, reason="nobody holds the ticks against the rate: samples are old, silently")
 def test_a_bed_that_ticks_more_slowly_than_it_is_asked_is_told() -> None:
     device = Device(lock_step=False, tick_hz=100.0)
     with served(device) as port:
@@ -318,18 +308,15 @@ def known(*cases: np.ndarray, hz: tuple[float, ...], lock_step: bool) -> OnBeds:
     return executor
 
 
-@pytest.mark.xfail(strict=True, reason="all clocks are held against the ticks of the case that came last")
 def test_beds_of_runs_at_other_rates_have_each_its_own_ticks() -> None:
     found = known(rows_of(200, 1000.0), rows_of(200, 500.0), hz=(1000.0, 500.0), lock_step=False)
     assert abs(timings(found)["shoulder"].drift) < 1e-6
 
 
-@pytest.mark.xfail(strict=True, reason="nothing is told of time in lock-step, and so of no answer that did not come")
 def test_exchanges_without_an_answer_are_told_in_lock_step() -> None:
     assert "unanswered: 3" in "\n".join(kept_time(known(rows_of(200, 1000.0, silent=3), hz=(1000.0,), lock_step=True)))
 
 
-@pytest.mark.xfail(strict=True, reason="a simulated motor rests as well, and its noise goes on meanwhile")
 def test_rest_does_not_change_the_bits_of_a_simulated_bed() -> None:
     assert run("tuning", "emulated", output="a.h5").returncode == cli.YES
     assert run("tuning", "emulated", "--rest", "1 s", output="b.h5").returncode == cli.YES
@@ -339,7 +326,6 @@ def test_rest_does_not_change_the_bits_of_a_simulated_bed() -> None:
 # Transcripts
 
 
-@pytest.mark.xfail(strict=True, reason="`--transcripts` is ignored where a transcript is the port")
 def test_a_transcript_of_a_transcript_is_refused() -> None:
     assert run("wired", "firmware", "--lock-step", "--transcripts", "k").returncode == cli.YES
     done = run("wired", "k/wired.0.shoulder.transcript", "--transcripts", "again", output="b.h5")
@@ -347,7 +333,6 @@ def test_a_transcript_of_a_transcript_is_refused() -> None:
     assert not list(Path().glob("again/*"))
 
 
-@pytest.mark.xfail(strict=True, reason="what the header holds is believed")
 @pytest.mark.parametrize("header", [b"{", json.dumps({"period": 1e-3, "first": float("inf")}).encode()])
 def test_a_header_that_is_none_is_told(header: bytes) -> None:
     body = struct.pack("<BdH", transcript.HEADER, 0.0, len(header)) + header
@@ -359,7 +344,6 @@ def test_a_header_that_is_none_is_told(header: bytes) -> None:
 # What is asked
 
 
-@pytest.mark.xfail(strict=True, reason="whether two joints have one line is found when they do not arm")
 def test_two_joints_on_one_line_are_told() -> None:
     words = ("--port", f"elbow=unix://{Path('line').absolute()}", "--lock-step")
     with served(Device()) as port:
@@ -367,7 +351,6 @@ def test_two_joints_on_one_line_are_told() -> None:
     assert done.stderr.startswith("error[E418]: joints `shoulder` and `elbow` have one port: unix://")
 
 
-@pytest.mark.xfail(strict=True, reason="a joint that is misspelt is a part of the port's name")
 def test_a_joint_that_is_on_no_bed_is_told() -> None:
     done = run("wired", "shuolder=emulated")
     assert done.stderr == """\
@@ -378,7 +361,6 @@ error[E418]: port `shuolder=emulated`: joint `shuolder` is on no bed here
 """
 
 
-@pytest.mark.xfail(strict=True, reason="pyserial's OverflowError is nobody's")
 def test_a_baud_rate_that_cannot_be_is_told() -> None:
     ours, theirs = os.openpty()
     try:
@@ -388,7 +370,6 @@ def test_a_baud_rate_that_cannot_be_is_told() -> None:
         os.close(theirs)
 
 
-@pytest.mark.xfail(strict=True, reason="the logarithm of 0, once the moves are over")
 def test_a_data_sheet_without_friction_is_told_before_a_shaft_turns(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["bed", "identify", "deck.ic", "sheet", "--port", "emulated"]) == cli.BAD_INPUT
     assert "error[E424]: joint `shoulder`: the search cannot begin at f_v = 0 N*m*s/rad" in capsys.readouterr().err

@@ -16,6 +16,8 @@ import pytest
 import batch
 import ic
 from batch.beds.executor import OnBeds
+from batch.beds.running import check_margins
+from batch.campaign import prepare
 from hw import records
 from met import cli
 
@@ -43,6 +45,9 @@ run unstable like wired {
     rates { servos = 100 Hz;  dynamics = 100 Hz; }
     shoulder { bed = emulated(delay = 1);  law = measured_acceleration; }
 }
+run stiff like wired { shoulder { bed = emulated;  law = measured_acceleration; } }
+sweep light of stiff { vary gearbox.kp = [0.02, 1] V*s/rad;  vary gearbox.ratio = [1570, 5000]; }
+sweep heavy of stiff { vary links.upper.mass = [40, 60, 50] kg; }
 """
 
 
@@ -126,6 +131,12 @@ error[E419]: case #0, shoulder: r = 1.37, stable to 1.2 with measured_accelerati
  = help: `met margin` says what would be; a lighter arm, a faster servo or another law
  = help: `--force` arms it all the same
 """),
+    (("light", "--port", "emulated"), """\
+error[E419]: case #3, shoulder: r = 0.149, stable from 0.181 to 4.01 with measured_acceleration at 1000 Hz: \
+it would not be stable
+ = help: `met margin` says what would be; a lower gain of the servo's rate loop, a faster servo or a heavier arm
+ = help: `--force` arms it all the same
+"""),
     (("wired", "--port", "/dev/nobody"), """\
 error[E400]: /dev/nobody cannot be opened: no such file or directory
 """),
@@ -137,6 +148,20 @@ def test_what_is_wrong(
     assert status == cli.BAD_INPUT
     assert message in complaint
     assert not (here / "x.h5").exists()
+
+
+def test_of_a_sweep_the_least_margin_is_said_once_a_joint_and_of_which_case(here: Path) -> None:
+    names = ("heavy", "slow", "stiff")
+    plan = ic.compile(here / "deck.ic", select=names)
+    said = [check_margins(prepare(plan, experiments=[name]), force=False) for name in names]
+    assert said == [
+        ["shoulder: r = 1.54, stable to 5.35 with measured_acceleration at 1000 Hz"
+         " (case #1, the least margin of 3 cases)"],
+        ["shoulder: r = 1.37, stable to more than 2e+03 with velocity_tracking at 100 Hz"],
+        ["shoulder: r = 1.37, stable to 5.35 with measured_acceleration at 1000 Hz"],
+    ]  # fmt: skip
+    some = check_margins(prepare(plan, experiments=["heavy"], cases=["#0", "#2"]), force=False)
+    assert some[0].endswith(" (case #2, the least margin of 2 cases)")
 
 
 def test_killed_midway_everything_up_to_then_is_in_the_archive(here: Path) -> None:

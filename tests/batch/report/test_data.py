@@ -292,8 +292,23 @@ class TestStability:
         assert bed.r.tolist() == [one.together for (one,) in said]
         assert bed.limit.tolist() == [one.limit for (one,) in said]
         assert not bed.ok and bed.margin == "none: unstable" and bed.delay == "0, 2"
+        assert np.isnan(bed.lower).all() and not found.spans and bed.stable_at == "2.05"
         bad = [one.case for (one,) in said if not one.stable]
+        assert bed.unstable.tolist() == [place in bad for place in range(6)]
         assert found.unstable == (f"shoulder: not stable in {len(bad)} of 6 cases: #3, #5",) and bad == [3, 5]
+
+    def test_tells_from_where_where_an_arm_may_be_too_light(self, tmp_path: Path) -> None:
+        deck = archives.DECK + """
+            run stiff like there { shoulder { bed = emulated;  law = measured_acceleration; } duration = 0.1 s; }
+            sweep light of stiff { vary gearbox.kp = [0.02, 1] V*s/rad;  vary gearbox.ratio = [1570, 5000]; }
+        """
+        batch.run(archives.compiled(tmp_path, "light", deck=deck), output=tmp_path / "a.h5")
+        found = gathered(tmp_path / "a.h5").sections[0].stability
+        assert found is not None and found.spans
+        [bed] = found.beds
+        assert bed.unstable.tolist() == [False, False, False, True] and not bed.ok
+        assert np.isnan(bed.lower[:2]).all() and bed.lower[2:] == pytest.approx([0.181, 0.181], rel=0.01)
+        assert bed.stable_at == "0.181 to 4.01" and bed.margin == "none: unstable, too light"
 
     def test_of_many_cases_is_of_some_and_that_is_said(self, bench: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(stability, "MOST_CASES", 3)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 import re
 import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,7 +19,7 @@ from hw.build import Config, build, config_c, counted, guard, qemu
 from hw.ports import Port, opened
 from met.diagnostic import Problem
 from met.render import render
-from tests.hw.firmware.device import PLAIN, SHAFT
+from tests.hw.firmware.device import PLAIN, SHAFT, Sensors
 from tests.hw.firmware.line import FREE, PLANT, STEPPED, behind_a_terminal
 from tests.substitution.hybrid import compiled, deck
 
@@ -90,7 +92,10 @@ def test_what_cannot_be_counted_is_said(change: dict[str, object], said: str) ->
         ("i_max = 100 A", "the current's scale is too fine for the I2t of the load", "a larger `converter_current`"),
         ("inertia = 1e-18 kg*m^2", "the scales are too fine, or the shaft too light, for the tachometer's guard",
          "a larger `inertia` or `converter_in`"),
+        ("inertia = 1e-320 kg*m^2", "the scales are too fine, or the shaft too light, for the tachometer's guard",
+         "a larger `inertia` or `converter_in`"),
         ("f_cut = 1e-8 Hz", "the tachometer's filter is too slow for its guard", "a larger `f_cut`"),
+        ("i_max = 1e200 A", "limit of heat is inf, not a number above 0", "numbers of a size that a bed may have"),
     ],
 )  # fmt: skip
 def test_a_deck_s_bed_that_firmware_cannot_count_is_said(bed: str, reason: str, remedy: str) -> None:
@@ -314,10 +319,57 @@ def test_the_core_takes_nothing_from_a_library_and_no_floating_point() -> None:
         assert not set(re.findall(r"\w+", text)) & {"double", "float", "malloc", "goto"}, path.name
 
 
-def test_the_example_of_the_readme_is_a_bed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    text = (building.FIRMWARE / "README.md").read_text(encoding="utf-8")
-    exec(re.findall(r"```python\n(.*?)```", text, re.DOTALL)[0], {})
-    words = ["gcc", *building.WARNINGS, f"-I{building.FIRMWARE / 'core'}", "-c", "config.c"]
+def fences(page: Path, language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+
+
+README = building.FIRMWARE / "README.md"
+
+
+def compiled_alone(name: str) -> None:
+    words = ["gcc", *building.WARNINGS, f"-I{building.FIRMWARE / 'core'}", "-c", name]
     done = subprocess.run(words, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_the_example_of_the_readme_is_a_bed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(building.FIRMWARE / "core", "core")
+    [port] = fences(README, "c")
+    Path("port.c").write_text(port)
+    first, second = fences(README, "python")
+    names: dict[str, Any] = {}
+    exec(first, names)
+    text = Path("config.c").read_text()
+    assert f".firmware = {{{', '.join(f'0x{byte:02x}' for byte in names['stamp'])}}}" in text
+    assert any(names["stamp"])
+    compiled_alone("config.c")
+    compiled_alone("port.c")
+    Path("bench.ic").write_text(fences(building.FIRMWARE.parents[1] / "docs" / "bed.md", "c")[0])
+    exec(second.replace('"arm"', '"library"'), names)
+    with behind_a_terminal(names["bed"], plant=names["plant"]) as (line, _):
+        assert line.greet().name == b"bench 1".ljust(16, b"\0")
+
+
+def test_the_port_of_the_readme_reads_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    more = "static int v[3], e; uint16_t adc_read(unsigned k) { return (uint16_t)v[k]; }"
+    more += "uint32_t encoder_read(void) { return (uint32_t)e; }"
+    more += "void put(int a, int b, int c, int d) { v[0] = a; v[1] = b; v[2] = c; e = d; }\n"
+    [port] = fences(README, "c")
+    Path("port.c").write_text(port + more)
+    words = ["gcc", f"-I{building.FIRMWARE / 'core'}", "-shared", "-fPIC", "-o", "port.so", "port.c"]
+    subprocess.run(words, check=True)
+    lib, sensors = ctypes.CDLL(str(tmp_path / "port.so")), Sensors()
+
+    def read(*values: int) -> tuple[int, ...]:
+        lib.put(*values)
+        lib.port_read(ctypes.byref(sensors))
+        return tuple(getattr(sensors, name) for name, _ in Sensors._fields_)
+
+    assert read(2051, 2046, 2048, 0) == (0, 0, 0, 0, 0)
+    assert read(2041, 2056, 2053, -7) == (10, -7, 10, 8, 0)
+    assert read(2061, 2036, 2043, 7) == (-10, 7, -10, -8, 0)
+    assert [read(each, 2046, 2048, 0)[0] == 2**31 - 1 for each in (0, 15, 16, 4079, 4080)] == [
+        True, True, False, False, True
+    ]  # fmt: skip

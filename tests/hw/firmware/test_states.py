@@ -167,6 +167,20 @@ def test_clear_is_refused_while_armed(driving: Device) -> None:
 
 
 @pytest.mark.parametrize("leave", [lambda d: d.ask(wire.STOP), lambda d: d.greet()], ids=["stop", "hello"])
+def test_a_drive_acts_before_the_next_tick_and_is_answered_with_the_last() -> None:
+    device = Device()
+    device.ready()
+    device.tick(3)
+    device.events()
+    device.sensors.rate = 77
+    sample = device.drive(100, 50)
+    assert device.outputs() == [("i", 50), ("v", 100)]
+    assert (sample.tick, sample.rate, sample.state) == (3, 0, wire.ARMED)
+    device.tick()
+    assert (device.read().tick, device.read().rate) == (4, 77)
+    assert device.drive(2001, 50).state == wire.STOPPED  # as it is after the frame
+
+
 def test_stop_and_hello_disarm_at_once(driving: Device, leave: Callable[[Device], object]) -> None:
     leave(driving)
     assert driving.outputs() == SAFE
