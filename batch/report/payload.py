@@ -149,8 +149,13 @@ def _stability(found: Stability) -> dict[str, Any]:
         "cases": packed(found.cases),
         "columns": [_column(column) for column in found.columns],
         "beds": [
-            {"joint": visible(bed.joint), "r": packed(bed.r), "lower": packed(bed.lower), "limit": packed(bed.limit),
-             "unstable": packed(bed.unstable.astype(int))}
+            {
+                "joint": visible(bed.joint),
+                "r": packed(bed.r),
+                "lower": packed(bed.lower),
+                "limit": packed(bed.limit),
+                "unstable": packed(bed.unstable.astype(int)),
+            }
             for bed in found.beds
         ],
     }

@@ -57,7 +57,8 @@ def limits(values: Mapping[str, float], period: float, *, voltage: float = 60.0,
     """Of a bed with these parameters: the current is that of its load's amplifier; what is not asked for (V, rad/s) is
     wide, and within a tick of period s the whole of it may be commanded. It bears its largest current for ever."""
     current = values["i_max"]
-    return Limits(voltage, current, rate, ARMING_RATE, 2.0 * voltage / period, 2.0 * current / period, current * current)
+    heat = current * current  # not a power, which overflows with an error
+    return Limits(voltage, current, rate, ARMING_RATE, 2.0 * voltage / period, 2.0 * current / period, heat)
 
 
 class EmulatedBed(Bed):

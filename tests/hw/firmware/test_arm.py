@@ -62,10 +62,15 @@ def test_hello_is_the_same_but_for_session_and_firmware(tmp_path: Path) -> None:
 
 def test_free_running_it_ticks_by_its_own_clock_and_the_deadman_stops_it(tmp_path: Path) -> None:
     with under_qemu(FREE, tmp_path) as line:
-        first, begun = line.ask(wire.READ).tick, time.monotonic()
-        time.sleep(1.0)
-        ticks, passed = line.ask(wire.READ).tick - first, time.monotonic() - begun
-        assert 0.8 * passed < 1e-3 * ticks < 1.2 * passed + 0.01
+        shares = []
+        for _ in range(10):  # an emulator that has to wait loses ticks
+            first, begun = line.ask(wire.READ).tick, time.monotonic()
+            time.sleep(0.5)
+            ticks, passed = line.ask(wire.READ).tick - first, time.monotonic() - begun
+            shares.append(1e-3 * ticks / passed)
+            if shares[-1] > 0.9:
+                break
+        assert 0.9 < shares[-1] and max(shares) < 1.1, shares
         assert line.arm().state == wire.ARMED
         armed = line.drive(100, 50)
         time.sleep(0.3)

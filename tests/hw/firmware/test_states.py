@@ -163,10 +163,6 @@ def test_clear_is_refused_while_armed(driving: Device) -> None:
     assert driving.outputs() == []
 
 
-# Ways out of armed
-
-
-@pytest.mark.parametrize("leave", [lambda d: d.ask(wire.STOP), lambda d: d.greet()], ids=["stop", "hello"])
 def test_a_drive_acts_before_the_next_tick_and_is_answered_with_the_last() -> None:
     device = Device()
     device.ready()
@@ -181,6 +177,10 @@ def test_a_drive_acts_before_the_next_tick_and_is_answered_with_the_last() -> No
     assert device.drive(2001, 50).state == wire.STOPPED  # as it is after the frame
 
 
+# Ways out of armed
+
+
+@pytest.mark.parametrize("leave", [lambda d: d.ask(wire.STOP), lambda d: d.greet()], ids=["stop", "hello"])
 def test_stop_and_hello_disarm_at_once(driving: Device, leave: Callable[[Device], object]) -> None:
     leave(driving)
     assert driving.outputs() == SAFE
