@@ -14,7 +14,8 @@ from met.diagnostic import Problem, error
 
 
 class ReplayBed(WireBed):
-    """path: of the transcript. Raises Problem E409; its methods E407 where what is asked is not what was asked.
+    """path: of the transcript. Raises Problem E409; its methods E407 where what is asked is not what was asked,
+    E401 where it ends.
 
     transcript  the whole of it; header: as `SerialBed` wrote it
     """
@@ -91,16 +92,15 @@ class _LineThen:
                 self._scales = found[1].scales
 
     def _other(self, asked: str) -> Problem:
-        if self._at == len(self._records):
-            then = "the transcript ends"
-        else:
-            record = self._records[self._at]
-            then = "then it was " + (
-                self._words(record.data) if record.kind == SENT else _KINDS.get(record.kind, "something else")
-            )
+        """Of what is asked, and was not: E407; E401 where there is no more, as of a line that was lost."""
         after = f"after tick {self._tick} of the bed" if self._tick >= 0 else "at the beginning"
+        if self._at == len(self._records):
+            helps = "it was broken off there, or another deck or case made it"
+            return Problem(error("E401", f"{self._name} ends {after}, where {asked}", help=helps))
+        record = self._records[self._at]
+        then = self._words(record.data) if record.kind == SENT else _KINDS.get(record.kind, "something else")
         helps = "a transcript is replayed by what made it: the same deck, case and version of MET"
-        return Problem(error("E407", f"{self._name}: {after} {asked}; {then}", help=helps))
+        return Problem(error("E407", f"{self._name}: {after} {asked}; then it was {then}", help=helps))
 
     def _words(self, frame: bytes) -> str:
         payload = unframed(frame[:-1])

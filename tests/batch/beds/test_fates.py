@@ -165,6 +165,18 @@ def test_a_transcript_of_another_run_is_refused_and_then_the_right_one_is_replay
     assert batch.open("b.h5").q.values.tobytes() == batch.open("a.h5").q.values[:1].tobytes()
 
 
+def test_a_transcript_that_was_broken_off_is_replayed_to_where_it_ends(met_bed: Met) -> None:
+    Path("kept").mkdir()
+    assert run(met_bed, "firmware", "--lock-step", "--transcripts", "kept")[0] == cli.YES
+    [transcript] = Path("kept").iterdir()
+    transcript.write_bytes(transcript.read_bytes()[:60_000])
+    status, said, _ = met_bed("run", "deck.ic", "wired", "--port", str(transcript), "-o", "b.h5", "--no-picture")
+    assert status == cli.NO and f"{transcript} ends after tick " in said
+    whole, part = batch.open("a.h5"), batch.open("b.h5")
+    rows = int(part.n_valid[0])
+    assert 10 < rows < 100 and part.q.values[0, :rows].tobytes() == whole.q.values[0, :rows].tobytes()
+
+
 def test_cases_that_were_driven_elsewhere_are_not_taken_for_driven_here(
     met_bed: Met, monkeypatch: pytest.MonkeyPatch
 ) -> None:
