@@ -215,3 +215,29 @@ def test_a_run_that_crashed_replays_to_its_end(recorded: tuple[Path, list[Sample
         f"error[E401]: {path} ends after tick 17 of the bed, where an answer is waited for\n"
         " = help: it was broken off there, or another deck or case made it"
     )
+
+
+def test_a_disk_that_is_full_is_told_once_and_the_bed_is_stopped() -> None:
+    class Full:
+        room = 30
+
+        def __call__(self, data: bytes) -> None:
+            Full.room -= 1
+            if Full.room < 0:
+                raise OSError(28, os.strerror(28))
+
+    device = Device()
+    bed = LineBed(lambda: VirtualLine(device, None))
+    bed._writer = Writer(Full(), {})
+    bed.connect()
+    bed.arm()
+    with pytest.raises(Problem) as caught:
+        for _ in range(100):
+            bed.exchange(1.0, 0.0)
+    assert said(caught.value) == (
+        "error[E409]: the transcript of the bed cannot be written: No space left on device\n"
+        " = help: make room for it, or give another place"
+    )
+    assert device.voltage == pytest.approx(1.0, abs=0.01)
+    assert bed.stop()
+    assert device.voltage == 0.0
