@@ -9,6 +9,7 @@ import errno
 import io
 import math
 import os
+import re
 import secrets
 import select
 import socket
@@ -100,7 +101,7 @@ class SerialLine:
         local = "://" not in url
         try:
             self._port: Any = _opened(url, baud)
-        except (OSError, ValueError, KeyError) as reason:  # KeyError: pyserial's, of an option that it does not know
+        except (OSError, ValueError, KeyError, re.error) as reason:  # the last two are pyserial's, of what a URL says
             raise _not_opened(url, reason) from None
         try:
             self._file: int | None = self._port.fileno()

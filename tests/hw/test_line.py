@@ -110,6 +110,7 @@ def test_an_address_at_which_nobody_listens() -> None:
         ("wire://x", "invalid URL, protocol 'wire' not known",
          "such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217://HOST:PORT"),
         ("loop://?x=y", "unknown option: 'x'", "such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217://HOST:PORT"),
+        ("hwgrep://[", "unterminated character set at position 0", "is there someone who listens at that address?"),
         ("socket://localhost", "it names no port", "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
         ("socket://localhost:0", "it names no port", "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
         ("socket://:7000", "it names no host", "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
