@@ -43,10 +43,11 @@ Question = TypeVar("Question")
 
 
 def listening() -> Callable[[], bool]:
-    """Hear signals from here on; whether one has asked to stop."""
+    """Hear signals from here on, but those that `nohup` or a shell had ignored; whether one has asked to stop."""
     heard: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda which, _: heard.append(which))
+        if number == signal.SIGTERM or signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, lambda which, _: heard.append(which))
     with contextlib.suppress(AttributeError, OSError):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.environ.get(_STARTED_BY, str(os.getppid())) != str(os.getppid()):  # who started it was gone before
