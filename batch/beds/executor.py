@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from batch import shard
+from batch.beds.known import Known
 from batch.beds.made import Made, made
 from batch.executors import Outcome
 from batch.folder import Folder
@@ -75,17 +76,11 @@ class OnBeds:
         self._waiting: deque[Task] = deque()
         self._told: dict[str, str] = {}
         self.about = ", ".join(dict.fromkeys(ports.by_joint.values()))
-        self.exchanges: dict[tuple[int, int], dict[str, np.ndarray]] = {}
-        """Records by section's experiment and row, and joint, of the cases that were driven, taken up, or known."""
-        self.beds: dict[str, list[dict[str, str]]] = {joint: [] for joint in ports.by_joint}
-        """By joint, name and firmware of the beds that it was on."""
+        self.known = Known(ports.by_joint)
         self.driving: Driving | None = None
         self._done = 0
         self.ports = ports.by_joint
         self.lock_step, self.baud = ports.lock_step, ports.baud
-        self.tick_hz = float("nan")
-        self.ticks_hz: dict[tuple[int, int], float] = {}
-        """Of the ticks of a case's beds; `tick_hz` of the last one's."""
 
     @property
     def under_way(self) -> int:
@@ -97,6 +92,10 @@ class OnBeds:
         for path in folder.beds.glob("*.records"):
             with contextlib.suppress(records.Unsound, OSError):
                 self.check(records.read(path).head.get("ports", {}), f"{folder.path} holds cases of this campaign")
+
+    def know_all(self) -> None:
+        """Know of the cases, too, that an earlier run of the campaign has done."""
+        self.known.add_all(self._folder.beds)
 
     def submit(self, task: Task) -> None:
         self._waiting.append(task)
@@ -151,7 +150,7 @@ class OnBeds:
         except OSError as reason:
             message = f"the records of case #{row}, {reason.filename or path}: {reason.strerror or reason}"
             raise Problem(error("E413", message, help="is the disk full? who may write there?")) from None
-        self._know(section.experiment, row, found.head, found.exchanges)
+        self.known.add(section.experiment, row, found.head, found.exchanges)
         why = "" if found.whole else "the host was gone"
         with contextlib.suppress(OSError, ValueError, KeyError):
             why = str(json.loads(told.read_text(encoding="utf-8"))["why"]) or why
@@ -161,25 +160,6 @@ class OnBeds:
         at = float(found.outputs[2]) / ticks.base_hz
         self._say(f"case #{section.prepared.experiment.cases.table[row]}, t = {at:g} s: {why}")
         return found, f"t = {at:g} s: {why}"
-
-    def _know(self, experiment: int, row: int, head: Mapping[str, Any], exchanges: Sequence[np.ndarray]) -> None:
-        """Keep what a case's records say of its beds."""
-        self.exchanges[experiment, row] = dict(zip(head["joints"], exchanges, strict=True))
-        self.tick_hz = self.ticks_hz[experiment, row] = float(head["tick_hz"])
-        for joint, about in zip(head["joints"], head["beds"], strict=True):
-            if about not in self.beds[joint]:
-                self.beds[joint].append(about)
-
-    def know_all(self) -> None:
-        """Know of the cases, too, that an earlier run of the campaign has done."""
-        for path in sorted(self._folder.beds.glob("*.records")):
-            experiment, _, row = path.stem.partition("-")
-            if (int(experiment), int(row)) in self.exchanges:
-                continue
-            with contextlib.suppress(records.Unsound, OSError):
-                found = records.read(path)
-                rows = [found.rows[found.rows["bed"] == bed] for bed in range(len(found.head["joints"]))]
-                self._know(int(experiment), int(row), found.head, rows)
 
     def _drive(self, section: Section, row: int, path: Path, told: Path) -> None:
         """Raises Problem, OSError, and KeyboardInterrupt when the case's process has stopped the beds."""
@@ -192,7 +172,7 @@ class OnBeds:
         begun = [name for name in transcripts.values() if not Path(name).exists()]
         asked = Asked(
             plan=plan, row=row, ports=dict(ports.by_joint), records=str(path), lock_step=ports.lock_step,
-            baud=ports.baud, rest=ports.rest if self.exchanges else 0.0, transcripts=transcripts, clear=ports.clear,
+            baud=ports.baud, rest=ports.rest if self.known.cases else 0.0, transcripts=transcripts, clear=ports.clear,
             head={"key": section.key(), "ports": dict(ports.by_joint)},
         )  # fmt: skip
         structure, schedule = experiment.structure, experiment.structure.schedule

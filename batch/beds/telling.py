@@ -52,14 +52,13 @@ def timings(executor: OnBeds) -> dict[str, Timing]:
     """By joint, over all cases that were driven or taken up; nothing of beds in lock-step, which have no time."""
     found = {}
     for joint in executor.ports:
-        cases = {case: rows[joint] for case, rows in executor.exchanges.items() if joint in rows}
+        cases = executor.known.of(joint)
         if cases and not executor.lock_step:
             # a bed's ticks, and the host's clock, begin anew with a case
-            hz = {case: executor.ticks_hz.get(case, executor.tick_hz) for case in cases}
-            drifts = [timing(rows, hz[case]).drift for case, rows in cases.items()]
+            drifts = [timing(rows, hz).drift for hz, rows in cases]
             known = [drift for drift in drifts if math.isfinite(drift)]
             drift = float(np.median(known)) if known else math.nan
-            found[joint] = replace(timing(np.concatenate([*cases.values()]), math.nan), drift=drift)
+            found[joint] = replace(timing(np.concatenate([rows for _, rows in cases]), math.nan), drift=drift)
     return found
 
 
@@ -80,7 +79,7 @@ def kept_time(executor: OnBeds) -> list[str]:
             f"{found.waited:,}); unanswered: {found.unanswered:,}; the bed's clock: {off(found.drift)}"
         )
         if abs(found.drift) > WORST:
-            hz = executor.tick_hz
+            hz = executor.known.of(joint)[-1][0]
             lines.append(
                 f"  warning: the bed says that it ticks at {hz:g} Hz, and ticks at {(1.0 + found.drift) * hz:.4g} Hz: "
                 "its deadman and slew limits are not what it says; mend its timer, or its configuration"
@@ -91,7 +90,7 @@ def kept_time(executor: OnBeds) -> list[str]:
                 "commands were held longer than was computed: `met bed jitter` and `met bed probe` say more of the line"
             )
     for joint in executor.ports if executor.lock_step else ():
-        silent = sum(int(((rows[joint]["flags"] & ANSWERED) == 0).sum()) for rows in executor.exchanges.values())
+        silent = sum(int(((rows["flags"] & ANSWERED) == 0).sum()) for _, rows in executor.known.of(joint))
         if silent:
             lines.append(f"{joint}: unanswered: {silent:,}; such a run has not the bits of another")
     return lines
@@ -103,7 +102,7 @@ def beside(executor: OnBeds) -> Mapping[str, Any]:
     kept = timings(executor)
     return {"beds": [
         {"joint": joint, "port": port, "baud": executor.baud, "lock_step": executor.lock_step,
-         "beds": executor.beds[joint], "timing": _figures(kept[joint]) if joint in kept else None}
+         "beds": executor.known.beds[joint], "timing": _figures(kept[joint]) if joint in kept else None}
         for joint, port in executor.ports.items()
     ]}  # fmt: skip
 

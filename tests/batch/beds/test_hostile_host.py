@@ -304,7 +304,7 @@ def known(*cases: np.ndarray, hz: tuple[float, ...], lock_step: bool) -> OnBeds:
     executor = OnBeds(Ports({"shoulder": "line"}, 921600, lock_step))
     for n, (rows, each) in enumerate(zip(cases, hz, strict=True)):
         head = {"joints": ["shoulder"], "beds": [{"name": "one", "firmware": "00"}], "tick_hz": each}
-        executor._know(n, 0, head, [rows])
+        executor.known.add(n, 0, head, [rows])
     return executor
 
 

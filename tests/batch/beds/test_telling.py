@@ -12,6 +12,7 @@ import pytest
 import batch
 import ic
 from batch.beds.executor import Driving, OnBeds, Ports
+from batch.beds.known import Case
 from batch.beds.telling import Telling, kept_time, timings
 from batch.beds.telling import beside as written_beside
 from batch.folder import Folder
@@ -109,12 +110,12 @@ def test_a_quiet_run_tells_nothing(capsys: pytest.CaptureFixture[str]) -> None:
 def test_the_clock_of_a_bed_goes_on_from_case_to_case() -> None:
     """And the host's begins anew: each case has a drift of its own."""
     executor = OnBeds(Ports({"shoulder": "/dev/ttyUSB0"}, 921600))
-    executor.tick_hz = 1000.0
     first, second = rows_of(200), rows_of(200)
     second["tick"] += 54_321
     second["due"] = second["due"] * (1.0 + 1e-4)
     second["began"], second["ended"] = second["due"], second["due"]
-    executor.exchanges = {(0, 0): {"shoulder": first}, (0, 1): {"shoulder": second}}
+    for row, rows in enumerate((first, second)):
+        executor.known.cases[0, row] = Case(1000.0, {"shoulder": rows})
     found = timings(executor)["shoulder"]
     assert found.exchanges == 398
     assert found.drift == pytest.approx(-0.5e-4, rel=1e-3)
@@ -122,8 +123,7 @@ def test_the_clock_of_a_bed_goes_on_from_case_to_case() -> None:
 
 def told(rows: np.ndarray, hz: float) -> list[str]:
     executor = OnBeds(Ports({"shoulder": "/dev/ttyUSB0"}, 921600))
-    executor.tick_hz = hz
-    executor.exchanges = {(0, 0): {"shoulder": rows}}
+    executor.known.cases[0, 0] = Case(hz, {"shoulder": rows})
     return kept_time(executor)
 
 

@@ -1,0 +1,56 @@
+"""What the records of a campaign's cases say of its beds: which they were, and every exchange with them."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hw import records
+from met.frozen import frozen
+
+
+@frozen
+class Case:
+    """tick_hz: of its beds' ticks;  exchanges: its records, by joint."""
+
+    tick_hz: float
+    exchanges: Mapping[str, np.ndarray]
+
+
+class Known:
+    """Of the cases that were driven, taken up, or done by an earlier run; by the numbers of experiment and row.
+
+    beds  by joint, name and firmware of those that it was on
+    """
+
+    def __init__(self, joints: Iterable[str]) -> None:
+        self.cases: dict[tuple[int, int], Case] = {}
+        self.beds: dict[str, list[dict[str, str]]] = {joint: [] for joint in joints}
+
+    def add(self, experiment: int, row: int, head: Mapping[str, Any], exchanges: Sequence[np.ndarray]) -> None:
+        """A case. head: what stands before its records;  exchanges: by bed."""
+        by_joint = dict(zip(head["joints"], exchanges, strict=True))
+        self.cases[experiment, row] = Case(float(head["tick_hz"]), by_joint)
+        for joint, about in zip(head["joints"], head["beds"], strict=True):
+            if about not in self.beds[joint]:
+                self.beds[joint].append(about)
+
+    def add_all(self, folder: Path) -> None:
+        """Those in a folder that are not known yet."""
+        for path in sorted(folder.glob("*.records")):
+            experiment, _, row = path.stem.partition("-")
+            if (int(experiment), int(row)) in self.cases:
+                continue
+            with contextlib.suppress(records.Unsound, OSError):
+                found = records.read(path)
+                if found.head:
+                    rows = [found.rows[found.rows["bed"] == bed] for bed in range(len(found.head["joints"]))]
+                    self.add(int(experiment), int(row), found.head, rows)
+
+    def of(self, joint: str) -> list[tuple[float, np.ndarray]]:
+        """Of each case on a joint's bed: Hz of its ticks, and its records."""
+        return [(case.tick_hz, case.exchanges[joint]) for case in self.cases.values() if joint in case.exchanges]
