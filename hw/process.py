@@ -11,7 +11,6 @@ It hears when it is interrupted or terminated, and is terminated when who starte
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import json
 import os
 import select
@@ -30,8 +29,6 @@ from met.render import to_json
 PAUSE = 0.1
 """s between two looks at how far it is, while nothing is said."""
 
-_PR_SET_PDEATHSIG = 1
-
 _STARTED_BY = "MET_STARTED_BY"
 """The variable of the environment that has the number of who started the process: an orphan's parent need not be 1, nor
 is a parent of that number gone in a container."""
@@ -48,8 +45,7 @@ def listening() -> Callable[[], bool]:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         if number == signal.SIGTERM or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, lambda which, _: heard.append(which))
-    with contextlib.suppress(AttributeError, OSError):
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    realtime.end_with_parent(signal.SIGTERM)
     if os.environ.get(_STARTED_BY, str(os.getppid())) != str(os.getppid()):  # who started it was gone before
         os.kill(os.getpid(), signal.SIGTERM)
     return lambda: bool(heard)

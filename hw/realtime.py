@@ -4,14 +4,17 @@ not swapped, and no collection of garbage. It is not hard real time: what was la
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import gc
 import os
+import signal
 
 PRIORITY = 50
 """Among processes of SCHED_FIFO: above the kernel's threaded interrupts of most systems no further is needed."""
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
+_PR_SET_PDEATHSIG = 1
 
 
 def take_precedence() -> list[str]:
@@ -33,6 +36,19 @@ def take_precedence() -> list[str]:
             f"`{_allow('memlock', 'unlimited')}` allows it"
         )
     return refused
+
+
+def put_first(process: int) -> None:
+    """Have another process, with threads that it will start, go before this one, where that is allowed: a bed's
+    firmware that runs here, whose deadman else speaks up on a busy machine."""
+    with contextlib.suppress(AttributeError, OSError):
+        os.sched_setscheduler(process, os.SCHED_FIFO, os.sched_param(PRIORITY + 1))
+
+
+def end_with_parent(number: signal.Signals) -> None:
+    """Have the system send this process a signal when its parent is no more, where it can."""
+    with contextlib.suppress(AttributeError, OSError):
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
 
 
 def _locked() -> int:

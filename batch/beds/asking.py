@@ -51,7 +51,7 @@ def meant(
 
 
 def _meant(word: str, plan: Plan | None, names: tuple[str, ...]) -> Meant:
-    joint, port = _split(word)
+    joint, port = split(word)
     if plan is None:
         return Meant(port)
     experiment = on_beds(plan, names or None)[0]
@@ -59,16 +59,20 @@ def _meant(word: str, plan: Plan | None, names: tuple[str, ...]) -> Meant:
     if joint in joints:
         return Meant(port, experiment, joint)
     if joint:
-        on = ", ".join(f"`{each}`" for each in joints)
-        said = f"port `{word}`: run `{experiment.name}` has no joint `{joint}` on a bed"
-        raise Problem(error("E418", said, help=f"on a bed there: {on}"))
+        raise on_none(word, joint, joints)
     if len(joints) > 1:
         each = " or ".join(f"`--port {joint}={word}`" for joint in joints)
         raise Problem(error("E418", f"port `{word}`: of which joint?", help=f"say {each}"))
     return Meant(port, experiment, joints[0])
 
 
-def _split(word: str) -> tuple[str, str]:
+def split(word: str) -> tuple[str, str]:
     """Joint and port of `JOINT=PORT`, or none and `PORT`, which may have a `=` in its path or address."""
     joint, equals, port = word.partition("=")
     return (joint, port) if equals and joint.isidentifier() and not os.path.exists(word) else ("", word)
+
+
+def on_none(word: str, joint: str, joints: Sequence[str]) -> Problem:
+    """Of a port that is given to another joint than those on beds."""
+    on = ", ".join(f"`{each}`" for each in joints)
+    return Problem(error("E418", f"port `{word}`: joint `{joint}` is on no bed here", help=f"on a bed here: {on}"))

@@ -32,7 +32,7 @@ from met.frozen import frozen
 from met.plan import Plan
 from met.run import FAILED
 
-NO_FATE = ("E407", "E413")
+ANOTHER, FULL = "E407", "E413"
 """What says nothing of a bed that is armed: another transcript, a full disk. What else is wrong is what came of it."""
 
 
@@ -186,12 +186,12 @@ class OnBeds:
                 ended = line.get("ended", ended)
         except Problem as problem:
             code = problem.diagnostics[0].code
-            ended = {"why": problem.diagnostics[0].message}
-            if code == "E407" or not _recorded(path):  # nothing came of it, and it is driven anew
-                ended = None
+            if code == ANOTHER or not _recorded(path):  # nothing came of it, and it is driven anew
                 for name in (path, *map(Path, begun)):
                     name.unlink(missing_ok=True)
-            if code in NO_FATE or ended is None:
+                raise
+            ended = {"why": problem.diagnostics[0].message}
+            if code == FULL:
                 raise
         finally:
             self.driving = None

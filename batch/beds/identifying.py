@@ -17,7 +17,7 @@ from ic.printing.columns import columns, quantity
 from met import models, plan_file
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.plan import Experiment, Formula, Plan
+from met.plan import Experiment, Formula, Plan, Substitution
 from met.program.plant import bed_values
 
 if TYPE_CHECKING:
@@ -224,7 +224,7 @@ def included(
     head = re.sub(r"\W", "_", joint)
     [use] = (each for each in experiment.structure.substitutions if each.joint == joint)
     [servo] = (each for each in experiment.structure.servos if each.joint == joint)
-    bed = [*(f"{name} = {head}_{name}" for name in UNITS), *_believed(experiment, joint)]
+    bed = [*(f"{name} = {head}_{name}" for name in UNITS), *_believed(experiment, use)]
     motor = (f"{own} = {head}_{name}; " for name, own in OF_SERVO.items())
     uses = (
         [f"substitute {joint} {{", f"    bed = {use.bed}(", *_packed([f"{each}," for each in bed[:-1]] + bed[-1:], 8),
@@ -253,11 +253,10 @@ def included(
     return formatted(str(deck), "\n".join(lines) + "\n")
 
 
-def _believed(experiment: Experiment, joint: str) -> list[str]:
+def _believed(experiment: Experiment, use: Substitution) -> list[str]:
     """What else the deck says of the bed."""
     said = {path.rpartition(".")[2]: each for path, each in experiment.parameters.items()
-            if path.startswith(f"{joint}.bed.") and each.origin.kind == "deck"}  # fmt: skip
-    [use] = (each for each in experiment.structure.substitutions if each.joint == joint)
+            if path.startswith(f"{use.joint}.bed.") and each.origin.kind == "deck"}  # fmt: skip
     own = [f"{name} = {quantity(each.value, each.unit)}" for name, each in said.items()
            if name not in UNITS and not each.origin.note and isinstance(each.value, float)]  # fmt: skip
     faults = [f"faults = {word}" for word, values in models.find("bed", use.bed).presets.items()

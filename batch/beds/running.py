@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from batch.archive.read import ArchiveFile
-from batch.beds.asking import on_beds
+from batch.beds.asking import on_beds, on_none, split
 from batch.beds.executor import OnBeds, Ports
 from batch.beds.telling import Telling, beside, kept_time
 from batch.campaign import Campaign, Wires, prepare
@@ -31,12 +30,11 @@ def ports_of(given: Sequence[str], experiments: Sequence[Experiment]) -> dict[st
     joints = list(dict.fromkeys(each.joint for one in experiments for each in one.structure.substitutions))
     found: dict[str, str] = {}
     for word in given:
-        joint, equals, port = word.partition("=")
-        if equals and joint not in joints and re.fullmatch(r"\w+", joint):
-            helps = f"those that are: {', '.join(joints)}"
-            raise Problem(error("E418", f"port `{word}`: joint `{joint}` is on no bed here", help=helps))
-        if not equals or joint not in joints:
-            joint, port = (joints[0] if len(joints) == 1 else ""), word
+        joint, port = split(word)
+        if joint and joint not in joints:
+            raise on_none(word, joint, joints)
+        if not joint and len(joints) == 1:
+            joint = joints[0]
         if not joint:
             own = " ".join(f"--port {each}=..." for each in joints)
             raise Problem(error("E418", f"port `{word}`: of which joint?", help=f"each has its own: `{own}`"))

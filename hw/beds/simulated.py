@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
-import os
 import secrets
 import select
 import signal
@@ -13,6 +11,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -28,8 +27,6 @@ from met.diagnostic import Problem, error
 
 WITHIN = 20.0
 """s in which its process must be there."""
-
-_PR_SET_PDEATHSIG = 1
 
 
 class SimulatedBed(WireBed):
@@ -67,7 +64,7 @@ class SimulatedBed(WireBed):
             self._process = subprocess.Popen(
                 [str(self._built), "--line", str(number)], pass_fds=[number], start_new_session=True
             )
-        _put_first(self._process.pid)
+        realtime.put_first(self._process.pid)
         return SocketLine(ours)
 
     def _in_an_emulator(self) -> Line:
@@ -75,10 +72,10 @@ class SimulatedBed(WireBed):
             path = Path(folder) / "line"
             self._process = subprocess.Popen(
                 qemu(self._built, path), stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                start_new_session=True, preexec_fn=_end_with_parent,
+                start_new_session=True, preexec_fn=partial(realtime.end_with_parent, signal.SIGKILL),
             )  # fmt: skip
             if not self._lock_step:
-                _put_first(self._process.pid)
+                realtime.put_first(self._process.pid)
             end = time.monotonic() + WITHIN
             while True:
                 connection = socket.socket(socket.AF_UNIX)
@@ -125,19 +122,6 @@ class SocketLine:
     def close(self) -> None:
         with contextlib.suppress(OSError):
             self._connection.close()
-
-
-def _end_with_parent() -> None:
-    """In a process that does not end by itself when its line does."""
-    with contextlib.suppress(AttributeError, OSError):
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-
-
-def _put_first(process: int) -> None:
-    """Have a process, with threads that it will start, go before others, where that is allowed: else its deadman speaks
-    up on a busy machine."""
-    with contextlib.suppress(AttributeError, OSError):
-        os.sched_setscheduler(process, os.SCHED_FIFO, os.sched_param(realtime.PRIORITY + 1))
 
 
 def _lost(why: str | None) -> Problem:

@@ -11,12 +11,11 @@ it is hard real time: it says how this machine did under the load that it had.
 from __future__ import annotations
 
 import gc
-import os
 import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import cache, partial
 from pathlib import Path
 
@@ -24,13 +23,12 @@ import numpy as np
 
 import ic
 from benchmarks.benchmark import Benchmark, Target, Untaken
-from hw import records
+from hw import realtime, records
 from hw.build import build
 from hw.case import Asked, pace_of
 from hw.driven import LANES, Driven
 from hw.ports import FIRMWARE, config_of
 from hw.process import talk
-from hw.realtime import PRIORITY
 from hw.timing import Timing, timing
 from met import plan_file
 from met.plan import Experiment, Plan
@@ -90,8 +88,7 @@ def _at(line: str, made: Experiment) -> Iterator[str]:
     program = build("host", config_of(bed_values(made, "joint2", 0), period, lock_step=False),
                     plant_c(made, "joint2", period=period))  # fmt: skip
     with subprocess.Popen([program], stdout=subprocess.PIPE, text=True) as process:
-        with suppress(AttributeError, OSError):
-            os.sched_setscheduler(process.pid, os.SCHED_FIFO, os.sched_param(PRIORITY + 1))
+        realtime.put_first(process.pid)
         assert process.stdout is not None
         try:
             yield process.stdout.readline().strip()

@@ -74,3 +74,10 @@ def on_pty() -> Iterator[Callable[..., str]]:
 def said(problem: Problem) -> str:
     """As the command line prints it, without the count."""
     return re.sub(r"\n*\d+ errors?\n\Z", "", render(problem.diagnostics, problem.sources)).rstrip("\n")
+
+
+def refusal(do: Callable[[], object]) -> str:
+    """What is said where something is refused."""
+    with pytest.raises(Problem) as caught:
+        do()
+    return said(caught.value)

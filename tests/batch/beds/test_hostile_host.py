@@ -355,7 +355,7 @@ def test_a_joint_that_is_on_no_bed_is_told() -> None:
     done = run("wired", "shuolder=emulated")
     assert done.stderr == """\
 error[E418]: port `shuolder=emulated`: joint `shuolder` is on no bed here
- = help: those that are: shoulder
+ = help: on a bed here: `shoulder`
 
 1 error
 """

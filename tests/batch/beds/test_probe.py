@@ -117,12 +117,12 @@ error[E418]: port `qemu`: of which joint?
  = help: say `--port shoulder=qemu` or `--port elbow=qemu`
 """),
     ("deck.ic wired --port elbow=firmware", """\
-error[E418]: port `elbow=firmware`: run `wired` has no joint `elbow` on a bed
- = help: on a bed there: `shoulder`
+error[E418]: port `elbow=firmware`: joint `elbow` is on no bed here
+ = help: on a bed here: `shoulder`
 """),
     ("deck.ic both --port wrist=firmware", """\
-error[E418]: port `wrist=firmware`: run `both` has no joint `wrist` on a bed
- = help: on a bed there: `shoulder`, `elbow`
+error[E418]: port `wrist=firmware`: joint `wrist` is on no bed here
+ = help: on a bed here: `shoulder`, `elbow`
 """),
     ("--port elbow=firmware", """\
 error[E425]: port `firmware` simulates a deck's bed, and there is no deck

@@ -22,7 +22,7 @@ import pytest
 
 import batch
 import ic
-from hw import loop, records
+from hw import loop, realtime, records
 from hw.bed import Fault, State
 from hw.beds import emulated
 from hw.beds.serial_line import SerialBed
@@ -63,8 +63,7 @@ class BedHost:
                         plant_c(experiment, "shoulder", period=PERIOD))  # fmt: skip
         self._log = log
         self.process = subprocess.Popen([program, "--log", log], stdout=subprocess.PIPE, text=True)
-        with contextlib.suppress(OSError):
-            os.sched_setscheduler(self.process.pid, os.SCHED_FIFO, os.sched_param(51))
+        realtime.put_first(self.process.pid)
         assert self.process.stdout is not None
         self.terminal = self.process.stdout.readline().strip()
 
