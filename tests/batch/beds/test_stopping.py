@@ -97,7 +97,7 @@ def host(here: Path) -> Iterator[BedHost]:
 
 def command(terminal: str) -> list[str]:
     return [sys.executable, "-m", "met.cli", "bed", "run", "deck.ic", "wired", "--port", terminal, "-o", "a.h5",
-            "--no-picture"]  # fmt: skip
+            "--no-picture", "--clear"]  # fmt: skip
 
 
 def running(terminal: str, here: Path, *words: str) -> subprocess.Popen[str]:
