@@ -10,12 +10,16 @@ and `of` (the unit of the channel that a metric watches).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal
 
 from met.frozen import frozen
 
 Shape = Literal["number", "vector", "list", "word", "text"]
+
+Only = tuple[str, tuple[str, ...]]
+"""Where a part of a servo is there: the name of one of its parameters that is a word, and under which words."""
 
 
 @frozen(kw_only=True)
@@ -27,7 +31,7 @@ class Parameter:
     A list, a word or a text (in quotes; for the compiler alone, no plan holds one) cannot vary in a sweep.
     `needed_for` names the kinds of command of a servo under which it must be written, default or not, and lie above
     `above_where_needed` where that is given. `of_servo` names
-    the parameter of the joint's servo that a bed's parameter is where a deck does not write it.
+    the parameter of the joint's servo that a bed's parameter is where a deck does not write it. `only` is for servos'.
     """
 
     name: str
@@ -45,6 +49,12 @@ class Parameter:
     above_where_needed: float | None = None
     of_servo: str = ""
     source: str = ""
+    only: Only | None = None
+
+
+def there(part: Parameter | Memory | State | Signal, words: Mapping[str, str]) -> bool:
+    """Whether a part of a servo is there under these words, by the names of their parameters."""
+    return part.only is None or words.get(part.only[0]) in part.only[1]
 
 
 def under(parameter: Parameter, command: str) -> Parameter:
@@ -62,6 +72,7 @@ class Memory:
     unit: str
     doc: str
     start: float = 0.0
+    only: Only | None = None
 
 
 @frozen(kw_only=True)
@@ -72,6 +83,7 @@ class State:
     unit: str
     doc: str
     start: float = 0.0
+    only: Only | None = None
 
 
 @frozen(kw_only=True)
@@ -81,3 +93,4 @@ class Signal:
     name: str
     unit: str
     doc: str
+    only: Only | None = None

@@ -102,7 +102,13 @@ class Command:
 
 @frozen
 class ServoUse:
-    """A servo on a joint: the definition's name in the deck, the model, the command, ticks of base rate a tick."""
+    """A servo on a joint: the definition's name in the deck, the model, the command.
+
+    divisor     base ticks a tick of its control law; of one that is continuous, and where there is none, a step of the
+                dynamics
+    words       those of its parameters on which parts of the model depend (`Servo.deciding`): name and word
+    continuous  whether its control law is a part of the derivative
+    """
 
     joint: str
     definition: str
@@ -110,6 +116,8 @@ class ServoUse:
     command: Command | None
     divisor: int
     place: Place | None = None
+    words: tuple[tuple[str, str], ...] = ()
+    continuous: bool = False
 
 
 @frozen

@@ -171,6 +171,12 @@ def _check_uses(structure: Structure, where: str) -> None:
         elif use.command.kind not in servo.commands or use.command.kind not in COMMAND_UNIT:
             known = ", ".join(servo.commands) or "none"
             raise Damaged(f"{path}.command.kind", f"{use.model} takes no command `{use.command.kind}`, but {known}")
+        if unknown := [name for name, _ in use.words if name not in servo.deciding]:
+            raise Damaged(f"{path}.words", f"no part of a {use.model} depends on a word `{unknown[0]}`")
+        if use.continuous and (servo.control is None or servo.clocked):
+            raise Damaged(f"{path}.continuous", f"a {use.model} has no continuous law")
+        if use.continuous and use.divisor != structure.schedule.dynamics:
+            raise Damaged(f"{path}.divisor", "of a continuous law it should be that of the dynamics")
     names: list[str] = []
     for index, environment in enumerate(structure.environment):
         _name(environment.name, f"{where}.environment[{index}].name", names)
@@ -215,6 +221,8 @@ def _check_substitutions(structure: Structure, where: str) -> None:
         first = structure.substitutions[0]
         if use.law != first.law:
             raise Damaged(f"{path}.law", f"it should be {first.law}, that of the first substituted joint")
+        if servo.continuous:
+            raise Damaged(f"{path}.joint", f"the servo of joint `{use.joint}` is continuous: a bed's has a rate")
         if servo.divisor != servos[first.joint].divisor:
             message = f"the servo of joint `{use.joint}` should tick with that of `{first.joint}`, the first on a bed"
             raise Damaged(f"{path}.joint", message)
@@ -352,6 +360,9 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
     for use in structure.servos:
         if use.command is not None and use.command.model in TABLES:
             _check_table(experiment, f"{use.joint}.servo.command", TABLES[use.command.model], where)
+        for name, word in use.words:
+            if parameters[f"{use.joint}.servo.{name}"].value != word:
+                raise Damaged(f"{where}.{use.joint}.servo.{name}", f"it should be {word}, as the structure says")
     _check_bodies(experiment, where)
 
 

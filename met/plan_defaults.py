@@ -71,7 +71,7 @@ def declared(structure: Structure) -> Iterator[Declared]:
         yield f"initial.{joint.name}.qd", joint_unit("joint/s", joint), None, None
     for use in structure.servos:
         joint = kinds[use.joint]
-        for parameter in models.find("servo", use.model, use.place).parameters:
+        for parameter in models.servo_parts(use).parameters:
             held = parameter if use.command is None else under(parameter, use.command.kind)
             yield from _numbers(f"{use.joint}.servo", held, joint_unit(parameter.unit, joint))
         if use.command is not None:

@@ -15,7 +15,16 @@ from ic.meaning.models import find_bare_model, find_model, refuse_values, use_mo
 from ic.meaning.owner import Owner
 from ic.meaning.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
 from ic.meaning.resolve import Definition
-from ic.meaning.schedule import Rate, base_rate, check_stability, divisor, fastest_rate, make_schedule
+from ic.meaning.schedule import (
+    CONTINUOUS,
+    Rate,
+    Ticks,
+    base_rate,
+    check_stability,
+    divisor,
+    fastest_rate,
+    make_schedule,
+)
 from ic.meaning.scope import Scope
 from ic.meaning.servos import RATE, Use, check_rest, check_start, fixed_rate, resolve_servos
 from ic.meaning.substitution import check_ticks, resolve_substitutions
@@ -80,10 +89,10 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     for use in uses:
         check_rest(scope, use)
         check_start(scope, use)
-    schedule, divisors = _schedule(scope, run, block, rates, uses, duration)
+    schedule, ticks = _schedule(scope, run, block, rates, uses, duration)
     if schedule is None or integrator is None:
         return None
-    check_ticks(scope, substitutions, divisors, schedule)
+    check_ticks(scope, substitutions, ticks, schedule)
     _keep_settings(scope, block, arm, integrator, rates, schedule)
     fastest = {}
     on_beds = [each.joint for each in substitutions]
@@ -98,8 +107,8 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
                                    f"{use.joint}.servo")
         if h_lambda is not None:
             stability[use.joint] = h_lambda
-    servos = tuple(ServoUse(use.joint, use.definition, use.servo.name, use.command, divisors[use.joint], use.place)
-                   for use in uses)
+    servos = tuple(ServoUse(use.joint, use.definition, use.servo.name, use.command, ticks[use.joint].divisor, use.place,
+                            use.words, ticks[use.joint].continuous) for use in uses)  # fmt: skip
     structure = Structure(
         arm.name, arm.links, arm.joints, servos, environment, (), products, integrator.name, schedule, (),
         substitutions,
@@ -366,7 +375,7 @@ def _rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate]:
             scope.complaints.error("D116", f"no rate `{part.name}`", part.place,
                                    help=[*did_you_mean(part.name, RATES), known_words("rates", RATES)])
             continue
-        rate = fixed_rate(scope, owner, part, f"`{part.name}`", part.name)
+        rate = fixed_rate(scope, owner, part, f"`{part.name}`", part.name, continuous=part.name == "servos")
         if rate is not None:
             rates[part.name] = rate
     if "dynamics" not in body.items and item.body is not None:
@@ -375,12 +384,12 @@ def _rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate]:
 
 
 def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], uses: list[Use],
-              duration: float | None) -> tuple[Schedule | None, dict[str, int]]:
+              duration: float | None) -> tuple[Schedule | None, dict[str, Ticks]]:
     dynamics = rates.get("dynamics")
     rates_item = block.get("rates")
     body = rates_item.body if rates_item is not None else None
     for use in uses:
-        if use.rate is None and use.servo.tick is not None and body is not None and "servos" not in body.items:
+        if use.rate is None and use.has_law and body is not None and "servos" not in body.items:
             assert rates_item is not None
             scope.complaints.error("D118", "no rate of the servos", rates_item.place,
                                    help="write `servos = 1 kHz;`, or a `rate` in each servo's definition")
@@ -388,26 +397,32 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
         return None, {}
     shared = rates.get("servos")
     own = [use.rate for use in uses if use.rate is not None]
-    others = [rate for rate in (shared, *own) if rate is not None]
+    others = [rate for rate in (shared, *own) if rate is not None and rate.hz != CONTINUOUS]
     record = rates.get("record") or dynamics
     base = base_rate([dynamics, record, *others], rates.get("base"))
     written = "base" in rates
     schedule = make_schedule(scope.complaints, dynamics, record, base, others, duration,
                              place_of(block.items["duration"].value or Name((), block.items["duration"].place)),
                              base_written=written)
-    divisors = {}
+    ticks = {}
     everyone = [dynamics, record, *others]
     for use in uses:
-        rate = use.rate or (shared if use.servo.tick is not None else None) or dynamics
-        divisors[use.joint] = divisor(scope.complaints, rate, base, everyone, written=written)
+        rate = use.rate or (shared if use.has_law else None) or dynamics
+        continuous = rate.hz == CONTINUOUS
+        if continuous and use.servo.clocked:
+            scope.complaints.error("D106", f"the law of `{use.servo.name}` needs a clock: it cannot be continuous",
+                                   rate.place, also=[Label(use.place, "used here")], help="write a rate in Hz")
+        if continuous:
+            rate = dynamics
+        ticks[use.joint] = Ticks(divisor(scope.complaints, rate, base, everyone, written=written), continuous)
     if record.hz > dynamics.hz:
         scope.complaints.remark(
             "D167", f"`record` is faster than the dynamics: rows repeat, {record.hz / dynamics.hz:g} for each step",
             record.place, also=[Label(dynamics.place, "a step of the dynamics")],
             help="record at the rate of the dynamics, or slower")
-    if shared is not None and shared.hz and not uses:
+    if shared is not None and shared.hz != CONTINUOUS and not uses:
         divisor(scope.complaints, shared, base, everyone, written=written)
-    return schedule, divisors
+    return schedule, ticks
 
 
 __all__ = ["KEYS", "RATE", "RATES", "Call", "Resolved", "resolve_run"]

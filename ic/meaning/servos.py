@@ -14,9 +14,17 @@ from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, 
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item, open_call, overlay
-from ic.meaning.models import check_keys, find_bare_model, find_model, refuse_values, use_model, word_of
+from ic.meaning.models import (
+    check_keys,
+    find_bare_model,
+    find_model,
+    refuse_values,
+    use_model,
+    word_of,
+    word_written,
+)
 from ic.meaning.owner import Owner, Settled
-from ic.meaning.schedule import Rate
+from ic.meaning.schedule import CONTINUOUS, Rate
 from ic.meaning.scope import Scope
 from ic.meaning.trajectories import use_file, with_file_named
 from ic.meaning.unit_words import in_deck
@@ -45,7 +53,10 @@ BESIDE = "write `model = {};`, and its parameters beside it"
 
 @frozen
 class Use:
-    """A servo on a joint. rate None: the run's `rates.servos`. parameters None: some failed, which was told."""
+    """A servo on a joint. rate None: the run's `rates.servos`. parameters None: some failed, which was told.
+
+    words  those on which parts of the model depend
+    """
 
     joint: str
     definition: str
@@ -54,6 +65,11 @@ class Use:
     rate: Rate | None
     parameters: dict[str, Any] | None
     place: Place
+    words: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def has_law(self) -> bool:
+        return self.servo.control is not None
 
 
 def resolve_servos(scope: Scope, body: Block, arm: Arm) -> tuple[list[Use], frozenset[str]]:
@@ -126,14 +142,16 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
     if command is not None:
         _check_needed(scope, owner, servo, command, block, place)
     rate = None
-    if servo.tick is None and block.get("rate") is not None:
+    if servo.control is None and block.get("rate") is not None:
         scope.complaints.error("D150", f"the model `{servo.name}` has no computer that ticks, so no rate",
                                block.items["rate"].place, help="leave `rate` out")
     elif block.get("rate") is not None:
-        rate = fixed_rate(scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`")
+        rate = fixed_rate(scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`",
+                          continuous=True)
     scope.setting(f"{item.name}.servo.model", servo.name, item=model)
     scope.whole[f"{item.name}.servo.model"] = f"decides the program: vary `{item.name}.servo` over definitions"
-    return Use(item.name, name, servo, command, rate, parameters, item.place)
+    words = tuple((each.name, word_written(each, block)) for each in servo.parameters if each.name in servo.deciding)
+    return Use(item.name, name, servo, command, rate, parameters, item.place, words)
 
 
 def moving_kind(scope: Scope, item: Item, arm: Arm, so: str) -> str | None:
@@ -245,15 +263,16 @@ def _unit_written(found: Iterable[Settled], wanted: str) -> tuple[str, float]:
     return wanted, 1.0
 
 
-def fixed_rate(scope: Scope, owner: Owner, item: Item, label: str, name: str = "rate") -> Rate | None:
-    """A rate in Hz, which no sweep can vary."""
-    if word_of(item.value) == "continuous":
-        scope.complaints.error(
-            "D106",
-            "a continuous rate is not in this version",
-            place_of(item.value or Name((), item.place)),
-            help="write a rate in Hz, up to that of the dynamics",
-        )
+def fixed_rate(
+    scope: Scope, owner: Owner, item: Item, label: str, name: str = "rate", *, continuous: bool = False
+) -> Rate | None:
+    """A rate in Hz, which no sweep can vary; `CONTINUOUS` Hz where it may be `continuous`, and is."""
+    if word_of(item.value) == "continuous" and not isinstance(item.value, Call):
+        place = place_of(item.value or Name((), item.place))
+        if continuous:
+            return Rate(label, CONTINUOUS, place)
+        scope.complaints.error("D106", f"`{name}` cannot be continuous: only the law of a servo can", place,
+                               help="write a rate in Hz")
         return None
     wanted = replace(RATE, name=name)
     hz = scope.constant(owner, wanted, item)

@@ -27,7 +27,7 @@ HOW = {
 OTHERS = ("channels", "designs", "dh", "distributions", "functions", "shapes", "substitute", "sweep", "units")
 """What else `met doc` has a page on (ic/printing/subjects.py)."""
 
-FIELDS = ("name", "unit", "doc", "default", "above", "at_least", "below", "at_most", "shape", "words", "source")
+FIELDS = ("name", "unit", "doc", "default", "above", "at_least", "below", "at_most", "shape", "words", "source", "only")
 """What a program is told of a parameter."""
 
 WORDS = {
@@ -97,7 +97,7 @@ def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
     for words in ("commands", "unit", "order", "real_limit"):
         if hasattr(model, words):
             told[words] = getattr(model, words)
-    for words in ("memory", "states", "signals"):
+    for words in models.HELD:
         told[words] = [{"name": p.name, "unit": p.unit, "doc": p.doc} for p in getattr(model, words, ())]
     return told
 
@@ -116,7 +116,8 @@ def how(kind: models.Kind, model: Any) -> str:
 def shown_of(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
     """What there is of a servo, bed or law to be recorded: in words, then name, unit and meaning of each."""
     for words, text in (
-        ("memory", "Held by its computer from tick to tick"),
+        ("outputs", "Given by its law, at its ticks"),
+        ("integrals", "Integrated by its law"),
         ("states", "Integrated with the motion"),
         ("signals", "Shown at every instant"),
     ):
@@ -182,6 +183,7 @@ def range_(parameter: Parameter) -> str:
 
 
 def meaning(parameter: Parameter) -> str:
-    """What it is, and where its number comes from."""
+    """What it is, where its number comes from, and with which word it is there."""
+    only = "" if parameter.only is None else f"; with {parameter.only[0]} = {' or '.join(parameter.only[1])}"
     shape = {"vector": "three numbers; ", "list": "a list; ", "text": "in quotes; "}.get(parameter.shape, "")
-    return f"{shape}{parameter.doc}" + (f" ({parameter.source})" if parameter.source else "")
+    return f"{shape}{parameter.doc}{only}" + (f" ({parameter.source})" if parameter.source else "")

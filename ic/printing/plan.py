@@ -175,13 +175,14 @@ def _schedule(experiment: Experiment) -> Iterator[str]:
         return what, f"{number(base / divisor)} Hz", "every tick" if divisor == 1 else f"every {divisor} ticks", times
 
     rows = []
-    divisors: dict[tuple[str, int], list[str]] = {}
+    laws: dict[tuple[str, int, bool], list[str]] = {}
     for use in structure.servos:
-        if models.find("servo", use.model).tick is not None:
-            divisors.setdefault((use.definition, use.divisor), []).append(use.joint)
-    for (definition, divisor), joints in divisors.items():
+        if models.find("servo", use.model).control is not None:
+            laws.setdefault((use.definition, use.divisor, use.continuous), []).append(use.joint)
+    for (definition, divisor, continuous), joints in laws.items():
         where = f"servo {definition} of {', '.join(joints)}"
-        rows.append(row(where, divisor, count(schedule.ticks // divisor + 1, "tick")))
+        ticks = row(where, divisor, count(schedule.ticks // divisor + 1, "tick"))
+        rows.append((where, "continuous", "", "a part of each step") if continuous else ticks)
     steps = f"{count(schedule.ticks // schedule.dynamics, 'step')} of {number(schedule.step * 1e3)} ms"
     rows.append(row("dynamics", schedule.dynamics, f"{steps}, {structure.integrator}"))
     rows.append(row("record", schedule.record, count(schedule.rows, "row")))

@@ -6,7 +6,8 @@ from the case's memory where a sweep varies it (`PARAMETER` cells, computed once
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -20,8 +21,8 @@ from met.frozen import frozen
 from met.integrators.integrator import Integrator
 from met.metrics.metric import Metric
 from met.plan import Experiment, Formula, Joint, ServoUse, Structure
-from met.program.values import Values, answer, parameters
-from met.servos.servo import Drive, JointMotion, Servo
+from met.program.values import Values, answer, parameters, returned
+from met.servos.servo import Asked, Drive, JointMotion, Parts, Servo
 from met.substitution import Bed, Law
 from met.trace import Graph, Real, Scalar
 
@@ -35,21 +36,25 @@ ReadCell = Callable[[str], Real]
 class Actuator:
     """A servo at work on a moving joint: its declaration, use, and number in the order of moving joints.
 
+    parts    what there is of it in this use
     level    of its dry friction, where it is the same at all times and for all cases, N m (N); None where it varies
     gives    whether it may give the joint's acceleration
+    levels   of the dry friction on its states, by name, as `level`
     """
 
     index: int
     use: ServoUse
     servo: Servo
     profile: Profile | None
+    parts: Parts
     level: float | None
     gives: bool
+    levels: Mapping[str, float | None]
 
     @property
-    def dry(self) -> bool:
-        """Whether any case may have dry friction at this joint, so that the joint may stick."""
-        return self.level != 0.0
+    def ticks(self) -> bool:
+        """Whether it has a computer that ticks."""
+        return self.servo.control is not None and not self.parts.continuous
 
     @property
     def path(self) -> str:
@@ -114,15 +119,15 @@ class Machine:
         return tuple(actuator for actuator in self.actuators if actuator is not None)
 
     @cached_property
-    def between(self) -> tuple[Actuator, ...]:
-        """Those that tick between instants: faster than the dynamics, or slower and no multiple of them."""
-        return tuple(actuator for actuator in self.working if actuator.use.divisor % self.structure.schedule.dynamics)
+    def states(self) -> tuple[str, ...]:
+        """Channels of the states that servos integrate, in the order of `Motion.x`."""
+        return tuple(f"{actuator.path}.{state.name}" for actuator in self.working for state in actuator.parts.states)
 
     @cached_property
-    def sticking(self) -> tuple[Actuator, ...]:
-        """The actuators with dry friction; a substituted joint's is the bed's."""
-        on_bed = [actuator.index for actuator, _, _ in self.mounted]
-        return tuple(actuator for actuator in self.working if actuator.dry and actuator.index not in on_bed)
+    def between(self) -> tuple[Actuator, ...]:
+        """Those that tick between instants: faster than the dynamics, or slower and no multiple of them."""
+        step = self.structure.schedule.dynamics
+        return tuple(each for each in self.working if each.ticks and each.use.divisor % step)
 
     @cached_property
     def mounted(self) -> tuple[tuple[Actuator, Bed, Law], ...]:
@@ -145,8 +150,19 @@ class Machine:
 
     def servo_values(self, actuator: Actuator, read: ReadCell) -> Values:
         return parameters(
-            actuator.owner, actuator.path, actuator.servo.parameters, lambda path: self.value(path, read)
+            actuator.owner, actuator.path, actuator.parts.parameters, lambda path: self.value(path, read)
         )
+
+    def asked(self, actuator: Actuator, read: ReadCell, time: Real) -> Asked:
+        """What the joint's command asks at a time; kind "none" where it has none."""
+        if actuator.profile is None:
+            return Asked("none", 0.0, 0.0)
+        p = parameters(
+            f"command `{actuator.profile.name}` of {actuator.owner}", f"{actuator.path}.command",
+            actuator.profile.parameters, lambda path: self.value(path, read),
+        )  # fmt: skip
+        value, slope = answer(actuator.owner, actuator.profile.course, p, time)
+        return Asked(actuator.asked, value, slope)
 
     def tree(self, read: ReadCell) -> Tree:
         """The arm as the dynamics see it: built once where no case varies it, else kept in the case's memory."""
@@ -214,21 +230,28 @@ class Machine:
     def _actuator(self, index: int, use: ServoUse) -> Actuator:
         servo = models.find("servo", use.model, use.place)
         profile = models.find("command", use.command.model, use.place) if use.command is not None else None
-        bare = Actuator(index, use, servo, profile, None, False)
-        drive, level = self._probe(bare)
+        bare = Actuator(index, use, servo, profile, models.servo_parts(use), None, False, {})
+        drive, level, levels = self._probe(bare)
         if drive.given is not None and level != 0.0:
             message = f"{bare.owner} gives both an acceleration and dry friction"
             help = "a joint that is told its acceleration has no use for friction"
             raise Problem(error("E219", message, use.place, help=help))
-        return Actuator(index, use, servo, profile, level, drive.given is not None)
+        return replace(bare, level=level, gives=drive.given is not None, levels=levels)
 
-    def _probe(self, actuator: Actuator) -> tuple[Drive, float | None]:
-        """The servo's physics recorded once, to see what it uses; and its level of dry friction, where known now."""
-        graph = Graph()
-        servo = actuator.servo
-        held = Values(actuator.owner, {memory.name: graph.input(memory.name) for memory in servo.memory})
-        states = Values(actuator.owner, {state.name: graph.input(state.name) for state in servo.states})
+    def _probe(self, actuator: Actuator) -> tuple[Drive, float | None, dict[str, float | None]]:
+        """The servo's physics recorded once, to see what it uses; and its levels of dry friction, where known now."""
+        graph, parts = Graph(), actuator.parts
+        named = [*(output.name for output in parts.outputs), *(state.name for state in parts.integrals)]
+        held = Values(actuator.owner, {name: graph.input(name) for name in named})
+        states = Values(actuator.owner, {state.name: graph.input(state.name) for state in parts.natural})
         q, qd, time, begin = (graph.input(name) for name in ("q", "qd", "time", "begin"))
         joint = JointMotion(q, qd, time, begin, actuator.asked)
-        drive = answer(actuator.owner, servo.drive, self.servo_values(actuator, graph.input), held, states, joint)
-        return drive, graph.value(drive.dry.ref) if isinstance(drive.dry, Scalar) else float(drive.dry)
+        p = self.servo_values(actuator, graph.input)
+        drive = answer(actuator.owner, actuator.servo.drive, p, held, states, joint)
+
+        def level(value: Real) -> float | None:
+            return graph.value(value.ref) if isinstance(value, Scalar) else float(value)
+
+        unknown = set(drive.friction) - {state.name for state in parts.natural}
+        returned(actuator.owner, "friction", dict.fromkeys(unknown, 0.0), ())
+        return drive, level(drive.dry), {name: level(value) for name, value in drive.friction.items()}

@@ -1,10 +1,10 @@
 """Rigid gearbox servo: a PI rate loop drives a DC motor through a rigid gearbox with sticking friction.
 
     w = N qd                                          motor rate; everything here is on the motor's side
-    e = N qd_cmd - w                                  rate error, at a tick
-    V* = Kp e + Ki I,  V = clip(V*, +-V_max)          held to the next tick
-    I' = I + T e, held where V* is beyond the limit and e would push it further
-    tau_m = clip(Kt (V - Kt w)/R, +-tau_max)          continuous; tau_max does not stop the integral
+    e = N qd_cmd - w                                  rate error
+    V* = Kp e + Ki I,  V = clip(V*, +-V_max)          at a tick, held to the next; or continuous
+    dI/dt = e, 0 where V* is beyond the limit and e would push it further; I+ = I + T dI/dt at a tick
+    tau_m = clip(Kt (V - Kt w)/R, +-tau_max)          at every stage; tau_max does not stop the integral
     tau = N (tau_m - friction),  friction = s F_c + F_v w,  s in {0, +1, -1} (stuck, forward, backward)
 
 The rotor's inertia N^2 J_m moves with the joint. Figure 3 and table 1 of Hill, Hopping and Price (1989).
@@ -16,29 +16,25 @@ command sets the voltage that gives this torque at the rate seen, without fricti
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
-from met.parameter import Memory, Parameter, Signal
+from met.parameter import Memory, Parameter, Signal, State
 from met.servos.motor import Motor, torque
-from met.servos.servo import Asked, Drive, JointMotion, Seen, Servo
+from met.servos.servo import Asked, Control, Drive, JointMotion, Seen, Servo
 from met.trace import Real, both, clip, either, where
 
 
-def tick(p: Any, held: Any, seen: Seen) -> Mapping[str, Real]:
-    """One tick of the servo's computer: voltage and integral for the time to the next tick."""
+def control(p: Any, held: Any, seen: Seen) -> Control:
+    """The rate loop: the motor's voltage."""
     if seen.asked.kind == "torque":
         torque_m = seen.asked.value / p.ratio
         voltage = p.resistance * torque_m / p.kt + p.kt * p.ratio * seen.qd
-        return {"voltage": clip(voltage, -p.v_max, p.v_max), "integral": held.integral}
+        return Control({"voltage": clip(voltage, -p.v_max, p.v_max)}, {"integral": 0.0})
 
     error = p.ratio * (_rate_asked(p, seen.q, seen.asked) - seen.qd)
     wanted = p.kp * error + p.ki * held.integral
     winding_up = either(both(wanted > p.v_max, error > 0.0), both(wanted < -p.v_max, error < 0.0))
-    return {
-        "voltage": clip(wanted, -p.v_max, p.v_max),
-        "integral": where(winding_up, held.integral, held.integral + seen.period * error),
-    }
+    return Control({"voltage": clip(wanted, -p.v_max, p.v_max)}, {"integral": where(winding_up, 0.0, error)})
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
@@ -105,15 +101,13 @@ SERVO = Servo(
             doc="gain from position error to rate asked, used under a position command alone",
         ),
     ),
-    memory=(
-        Memory(name="voltage", unit="V", doc="voltage on the drive motor"),
-        Memory(name="integral", unit="rad", doc="integral of the motor's rate error"),
-    ),
+    outputs=(Memory(name="voltage", unit="V", doc="voltage on the drive motor"),),
+    integrals=(State(name="integral", unit="rad", doc="integral of the motor's rate error"),),
     signals=(
         Signal(name="motor_rate", unit="rad/s", doc="rate of the motor's shaft"),
         Signal(name="motor_torque", unit="N*m", doc="motor torque, before friction"),
     ),
-    tick=tick,
+    control=control,
     drive=drive,
     fastest=fastest,
     motor=motor,
