@@ -216,6 +216,10 @@ def _check_substitutions(structure: Structure, where: str) -> None:
         servo = servos[use.joint]
         if not models.has_motor(models.find("servo", servo.model, servo.place)):
             raise Damaged(f"{path}.joint", f"the servo of joint `{use.joint}`, {servo.model}, has no motor for a bed")
+        only = models.find("servo", servo.model, servo.place).motor_only
+        if only is not None and dict(servo.words).get(only[0], only[1][0]) not in only[1]:
+            message = f"the servo of joint `{use.joint}` has another `{only[0]}` than {only[1][0]}"
+            raise Damaged(f"{path}.joint", message)
         for kind in ("bed", "law"):
             models.find(kind, getattr(use, kind), use.place)
         first = structure.substitutions[0]

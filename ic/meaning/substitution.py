@@ -93,6 +93,13 @@ def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use])
             "take the place of", item.place, also=[Label(use.place, "its servo")],
             help=known_words("servo models that have a motor", sorted(known)))
         return None
+    only = use.servo.motor_only
+    if only is not None and (word := dict(use.words).get(only[0], only[1][0])) not in only[1]:
+        scope.complaints.error(
+            "D176", f"the servo of joint `{item.name}` has `{only[0]} = {word}`, and a motor on a bed has "
+            f"{' or '.join(f'`{each}`' for each in only[1])} alone", item.place, also=[Label(use.place, "its servo")],
+            help=f"write `{only[0]} = {only[1][0]};`, or leave the joint to its servo")
+        return None
     block = item.body or Block()
     check_keys(scope, block, DEFAULTS, Owner(f"`substitute {item.name}`", item.place, ""))
     bed, law = (_model(scope, each, block.get(each), item) for each in DEFAULTS)

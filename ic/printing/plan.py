@@ -180,9 +180,9 @@ def _schedule(experiment: Experiment) -> Iterator[str]:
         if models.find("servo", use.model).control is not None:
             laws.setdefault((use.definition, use.divisor, use.continuous), []).append(use.joint)
     for (definition, divisor, continuous), joints in laws.items():
-        where = f"servo {definition} of {', '.join(joints)}"
-        ticks = row(where, divisor, count(schedule.ticks // divisor + 1, "tick"))
-        rows.append((where, "continuous", "", "a part of each step") if continuous else ticks)
+        what = f"servo {definition} of {', '.join(joints)}"
+        ticks = count(schedule.ticks // divisor + 1, "tick")
+        rows.append((what, "continuous", "", "a part of each step") if continuous else row(what, divisor, ticks))
     steps = f"{count(schedule.ticks // schedule.dynamics, 'step')} of {number(schedule.step * 1e3)} ms"
     rows.append(row("dynamics", schedule.dynamics, f"{steps}, {structure.integrator}"))
     rows.append(row("record", schedule.record, count(schedule.rows, "row")))

@@ -18,7 +18,7 @@ from dataclasses import field
 from typing import Any
 
 from met.frozen import frozen
-from met.parameter import Memory, Parameter, Signal, State, there
+from met.parameter import Memory, Only, Parameter, Signal, State, there
 from met.servos.motor import Motor
 from met.trace import Real, Truth
 
@@ -126,6 +126,7 @@ class Servo:
                arm it carries; for the plan's stability figure. None: no such bound
     motor      (p) -> the motor that a bed may take the place of (met/substitution): the servo's computer then sets
                `voltage`, one of its outputs, on the bed. None: there is none to substitute
+    motor_only word and value of it under which that is so; None: under all
     follows    whether the joint goes with its command whatever the arm, so that a position command that begins
                elsewhere than the joint makes it jump, which is told (D169)
     at_rest    (p) -> whether its joint must begin at rest: another initial rate is an error. None: it need not
@@ -146,6 +147,7 @@ class Servo:
     fastest: Callable[[Any], Real] | None = None
     follows: bool = False
     motor: Callable[[Any], Motor] | None = None
+    motor_only: Only | None = None
     at_rest: Callable[[Any], Truth] | None = None
 
     @property
