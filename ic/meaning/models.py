@@ -10,6 +10,7 @@ from ic.grammar.syntax import Call, Expression, Name
 from ic.meaning.complaints import an, belongs, known_words
 from ic.meaning.merge import Block, Item
 from ic.meaning.owner import Owner
+from ic.meaning.relations import check_relations
 from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
 from met import models
@@ -94,6 +95,11 @@ def use_model(scope: Scope, owner: Owner, parameters: Iterable[Parameter], body:
             values[wanted.name] = scope.numbers(owner, wanted, item)
         elif wanted.shape == "word":
             values[wanted.name] = scope.word(owner, wanted, item, record=True)
+        elif wanted.decides:
+            values[wanted.name] = scope.decisive(owner, wanted, item)
         else:
             values[wanted.name] = scope.number(owner, wanted, item)
-    return None if any(value is None for value in values.values()) else values
+    if any(value is None for value in values.values()):
+        return None
+    check_relations(scope, owner, parameters, body, values)
+    return values

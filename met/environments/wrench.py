@@ -51,7 +51,7 @@ ENVIRONMENT = Environment(
     name="wrench",
     doc=__doc__,
     parameters=(
-        Parameter(name="link", shape="word", doc="link that it acts on"),
+        Parameter(name="link", shape="word", names="link", doc="link that it acts on"),
         Parameter(name="force", unit="N", shape="vector", default=ZERO, doc="force"),
         Parameter(name="moment", unit="N*m", shape="vector", default=ZERO, doc="moment, besides that of the force"),
         Parameter(name="point", unit="m", shape="vector", default=ZERO, doc="where the force acts, link frame"),
