@@ -18,6 +18,9 @@ from met.frozen import frozen
 WORLD = "world"
 """A word that may stand for a link: the ground, whose frame is the world's."""
 
+ZEROS = (0.0, 0.0, 0.0)
+"""Default of three numbers that need not be written."""
+
 Shape = Literal["number", "vector", "list", "word", "text"]
 
 
