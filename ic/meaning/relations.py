@@ -49,6 +49,7 @@ def check_names(scope: Scope, item_place: Place, parameters: Iterable[Parameter]
         if values[wanted.name] == WORLD and WORLD in known["link"]:
             scope.complaints.error("D159", f"`{WORLD}` is the ground here, and a link of arm `{arm}`", place,
                                    help="give the link another name")
+            return
         if values[wanted.name] in (*known[wanted.names], *wanted.words, *lost):
             continue
         names = [*known[wanted.names], *wanted.words]
