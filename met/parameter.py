@@ -16,6 +16,12 @@ from typing import Literal
 
 from met.frozen import frozen
 
+WORLD = "world"
+"""A word that may stand for a link: the ground, whose frame is the world's."""
+
+ZEROS = (0.0, 0.0, 0.0)
+"""Default of three numbers that need not be written."""
+
 Shape = Literal["number", "vector", "list", "word", "text"]
 
 Only = tuple[str, tuple[str, ...]]
@@ -32,6 +38,14 @@ class Parameter:
     `needed_for` names the kinds of command of a servo under which it must be written, default or not, and lie above
     `above_where_needed` where that is given. `of_servo` names
     the parameter of the joint's servo that a bed's parameter is where a deck does not write it. `only` is for servos'.
+
+    names        of an environment's word: it names one of the arm's links or moving joints, or is one of `words`. Where
+                 it is a joint, the unit words `joint` and `effort` of the model's other parameters are this joint's
+    decides      of a number: it decides the program, as a word does, and is a plain float when the model is recorded
+    direction    of a vector: its length does not count, so it may not be nothing
+    less_than    of a number: the parameter that it is less than, in every case
+    rises        of a list: its numbers rise, and there is one at least
+    as_many_as   of a list: the list that it has a number for each of; it may be empty where that is its default
     """
 
     name: str
@@ -49,6 +63,12 @@ class Parameter:
     above_where_needed: float | None = None
     of_servo: str = ""
     source: str = ""
+    names: Literal["", "link", "joint"] = ""
+    decides: bool = False
+    direction: bool = False
+    less_than: str = ""
+    rises: bool = False
+    as_many_as: str = ""
     only: Only | None = None
 
 

@@ -16,13 +16,14 @@ from typing import Any
 import numpy as np
 
 from met import models, units
+from met import plan_relations as relations
 from met import plan_rest as rest
 from met.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.outputs import tolerable
 from met.parameter import Parameter
 from met.plan import Coordinate, Experiment, Formula, Quantity, Requirement, Structure
 from met.plan_codec import Damaged
-from met.plan_defaults import INERTIA, declared, heads_of_models
+from met.plan_defaults import INERTIA, declared, heads_of_models, of_environment
 from met.trace.graph import TRUTHS, Formulas
 
 NAME = re.compile(r"[^\W\d]\w*")
@@ -350,7 +351,7 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
     structure, parameters = experiment.structure, experiment.parameters
     known: set[str] = set()
     models_of = heads_of_models(structure)
-    for path, unit, _, parameter in declared(structure):
+    for path, unit, _, parameter in declared(experiment):
         if path in known:
             raise Damaged(where, f"two things are called `{path}`")
         known.add(path)
@@ -367,6 +368,7 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
         for name, word in use.words:
             if parameters[f"{use.joint}.servo.{name}"].value != word:
                 raise Damaged(f"{where}.{use.joint}.servo.{name}", f"it should be {word}, as the structure says")
+    relations.check_uses(experiment, of_environment(structure), where)
     _check_bodies(experiment, where)
 
 
@@ -390,7 +392,8 @@ def _check_quantity(quantity: Quantity, unit: str, parameter: Parameter | None, 
         raise Damaged(f"{where}.unit", f"it should be {unit}")
     value, shape = quantity.value, parameter.shape if parameter is not None else "number"
     if shape == "word":
-        words = parameter.words if parameter is not None else ()
+        assert parameter is not None
+        words = () if parameter.names else parameter.words
         if not isinstance(value, str) or (words and value not in words):
             raise Damaged(f"{where}.value", "it should be a word" + (f": {', '.join(words)}" if words else ""))
     elif shape == "list":
@@ -470,7 +473,7 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
     for joint in structure.moving:
         axis = [f"{joint.name}.axis.{letter}" for letter in "xyz"]
         tests.append((f"{joint.name}.axis", axis, _is_axis, "its length should be 1"))
-    tests += rest.tests(experiment)
+    tests += [*rest.tests(experiment), *relations.tests(experiment, of_environment(structure))]
     varied = []
     for path, paths, holds, message in tests:
         if any(path not in experiment.parameters for path in paths):
@@ -480,7 +483,7 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
             varied.append((path, values, holds, message))
         elif not holds(np.array([values], dtype=float))[0]:
             raise Damaged(f"{where}.{path}", message)
-    for path, _, _, parameter in declared(structure):
+    for path, _, _, parameter in declared(experiment):
         quantity = experiment.parameters.get(path)
         if parameter is not None and quantity is not None and isinstance(quantity.value, Formula):
             for holds, message in _bounds(parameter):

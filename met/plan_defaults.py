@@ -16,7 +16,7 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity | None]]:
     """Paths that the experiment lacks, each with its model's default or the servo's value, None where neither is."""
     defaults: dict[str, Quantity] = {}
-    for path, unit, default, parameter in declared(experiment.structure):
+    for path, unit, default, parameter in declared(experiment):
         if path in experiment.parameters:
             continue
         found = None if default is None else Quantity(default, unit, Origin("default", note="not in the plan file"))
@@ -31,7 +31,7 @@ def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity |
 def unknown_parameters(experiment: Experiment) -> Iterator[tuple[str, str | None]]:
     """Paths under a model of the experiment that its declaration does not have, with the nearest that it has."""
     structure = experiment.structure
-    known = {path for path, *_ in declared(structure)}
+    known = {path for path, *_ in declared(experiment)}
     heads = heads_of_models(structure)
     for path in experiment.parameters:
         if path not in known and path.startswith(heads):
@@ -52,8 +52,15 @@ Declared = tuple[str, str, float | tuple[float, ...] | str | None, Parameter | N
 """Path, SI unit and default of a parameter, and its model's declaration; None for the arm's own."""
 
 
-def declared(structure: Structure) -> Iterator[Declared]:
-    """Every parameter of a structure (head of `met.plan`)."""
+def of_environment(structure: Structure) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
+    """What the paths of each environment model's parameters begin with, and their declarations."""
+    for use in structure.environment:
+        yield f"environment.{use.name}", models.find("environment", use.model, use.place).parameters
+
+
+def declared(experiment: Experiment) -> Iterator[Declared]:
+    """Every parameter that an experiment of this structure has (head of `met.plan`)."""
+    structure = experiment.structure
     for link in structure.links:
         yield f"links.{link.name}.mass", "kg", None, None
         for axis in "xyz":
@@ -86,9 +93,12 @@ def declared(structure: Structure) -> Iterator[Declared]:
             for parameter in model.parameters:
                 if parameter.shape != "text":  # for the compiler alone
                     yield from _numbers(f"{on_bed.joint}.{head}", parameter, joint_unit(parameter.unit, joint))
-    for environment in structure.environment:
-        for parameter in models.find("environment", environment.model, environment.place).parameters:
-            yield from _numbers(f"environment.{environment.name}", parameter, parameter.unit)
+    for prefix, parameters in of_environment(structure):
+        named = next((f"{prefix}.{parameter.name}" for parameter in parameters if parameter.names == "joint"), None)
+        about = experiment.parameters.get(named) if named is not None else None
+        on = kinds.get(str(about.value)) if about is not None else None
+        for parameter in parameters:
+            yield from _numbers(prefix, parameter, parameter.unit if on is None else joint_unit(parameter.unit, on))
     watched = channels(structure) if structure.metrics else {}
     for metric in structure.metrics:
         of = watched[metric.of].unit if metric.of in watched else "1"

@@ -131,7 +131,7 @@ ENVIRONMENT = Environment(
     name="$name",
     doc=__doc__,
     parameters=(
-        Parameter(name="link", shape="word", doc="link that is held back"),
+        Parameter(name="link", shape="word", names="link", doc="link that is held back"),
         Parameter(name="damping", unit="N*s/m", at_least=0.0, doc="force per velocity"),
         Parameter(name="point", unit="m", shape="vector", default=(0.0, 0.0, 0.0), doc="where it acts, link frame"),
     ),

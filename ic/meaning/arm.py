@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-
 from ic.grammar.syntax import Call, Expression, Name, Unary
 from ic.meaning.bodies import check_body, check_moved
 from ic.meaning.complaints import belongs, known_words
@@ -16,6 +14,7 @@ from ic.meaning.foreign import refused
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, refuse_values, word_of
 from ic.meaning.owner import Owner
+from ic.meaning.relations import no_direction
 from ic.meaning.resolve import RESERVED, Definition
 from ic.meaning.scope import Scope
 from ic.meaning.shapes import SHAPES, Solid
@@ -287,7 +286,7 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
     written = scope.vector(owner, AXIS, item if named is None else replace(item, value=None), given=named)
     if written is None:
         return
-    scope.checks.hold(written, _no_direction, code="D097", message=f"the axis of {owner.label} has no direction",
+    scope.checks.hold(written, no_direction, code="D097", message=f"the axis of {owner.label} has no direction",
                       place=_value_at(item), needs=(owner.join("axis"),),
                       help="write numbers of ordinary size, not all of them zero")
     x, y, z = written
@@ -295,13 +294,6 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
     if isinstance(length, Scalar) or 0.0 < length < math.inf:
         parts = zip("xyz", written, strict=True)
         scope.remake({owner.join(f"axis.{name}"): part / length for name, part in parts}, item)
-
-
-def _no_direction(parts: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """Which rows [n, 3] point nowhere, or have a length that no double holds."""
-    with np.errstate(over="ignore", under="ignore"):
-        length = np.sqrt((parts * parts).sum(axis=1))
-    return ~((length > 0.0) & (length < np.inf)), []
 
 
 def _named_axis(value: Expression | None) -> tuple[float, float, float] | None:

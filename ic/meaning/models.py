@@ -10,6 +10,7 @@ from ic.grammar.syntax import Call, Expression, Name
 from ic.meaning.complaints import an, belongs, known_words
 from ic.meaning.merge import Block, Item
 from ic.meaning.owner import Owner
+from ic.meaning.relations import check_relations
 from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
 from met import models
@@ -107,8 +108,9 @@ def use_model(scope: Scope, owner: Owner, parameters: Iterable[Parameter], body:
     Of those that are there only under a word (`Parameter.only`), those under the words of this body.
     """
     parameters = tuple(parameters)
-    check_keys(scope, body, [*(p.name for p in parameters), *extra], owner)
     words = {p.name: word_written(p, body) for p in parameters if p.shape == "word"}
+    known = [p.name for p in parameters if there(p, words) or body.get(p.name) is not None]
+    check_keys(scope, body, [*known, *extra], owner)
     values: dict[str, Any] = {}
     for wanted in parameters:
         item = body.get(wanted.name)
@@ -121,6 +123,11 @@ def use_model(scope: Scope, owner: Owner, parameters: Iterable[Parameter], body:
             values[wanted.name] = scope.numbers(owner, wanted, item)
         elif wanted.shape == "word":
             values[wanted.name] = scope.word(owner, wanted, item, record=True)
+        elif wanted.decides:
+            values[wanted.name] = scope.decisive(owner, wanted, item)
         else:
             values[wanted.name] = scope.number(owner, wanted, item)
-    return None if any(value is None for value in values.values()) else values
+    if any(value is None for value in values.values()):
+        return None
+    check_relations(scope, owner, [each for each in parameters if each.name in values], body, values)
+    return values

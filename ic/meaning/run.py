@@ -14,6 +14,7 @@ from ic.meaning.merge import Block, Item
 from ic.meaning.models import find_bare_model, find_model, refuse_values, use_model, word_of
 from ic.meaning.owner import Owner
 from ic.meaning.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
+from ic.meaning.relations import check_names
 from ic.meaning.resolve import Definition
 from ic.meaning.schedule import (
     CONTINUOUS,
@@ -34,7 +35,7 @@ from met import models, units
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import EnvironmentUse, Requirement, Schedule, ServoUse, Structure, Tolerance
+from met.plan import EnvironmentUse, JointKind, Requirement, Schedule, ServoUse, Structure, Tolerance
 from met.trace import Real, Scalar
 from met.units import PURE
 
@@ -273,20 +274,23 @@ def _environment_use(scope: Scope, item: Item, arm: Arm, duration: float | None)
     environment = find_model(scope, "environment", name, place_of(item.value))
     if environment is None or refuse_values(scope, item.value, [p.name for p in environment.parameters]):
         return None
+    owner = replace(owner, joint=_kind_of_joint(environment, item.body or Block(), arm))
     values = use_model(scope, owner, environment.parameters, item.body or Block())
     if values is not None:
-        names = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
-        for wanted in environment.parameters:
-            known = names.get(wanted.name)
-            if wanted.shape == "word" and known is not None and values[wanted.name] not in (*known, *arm.lost):
-                given = (item.body or Block()).get(wanted.name)
-                place = place_of(given.value) if given is not None and given.value is not None else item.place
-                scope.complaints.error("D159", f"no {wanted.name} `{values[wanted.name]}` in arm `{arm.name}`", place,
-                                       help=[*did_you_mean(values[wanted.name], known),
-                                             known_words(f"{wanted.name}s", known)])
+        known = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
+        check_names(scope, item.place, environment.parameters, item.body or Block(), values, arm=arm.name, known=known,
+                    lost=arm.lost)
         if duration is not None:
             _remark_idle(scope, environment, item, values, duration)
     return EnvironmentUse(item.name, environment.name, None, item.place)
+
+
+def _kind_of_joint(environment: Any, body: Block, arm: Arm) -> JointKind:
+    """Of the joint that the model names: what the unit words `joint` and `effort` mean."""
+    named = next((p.name for p in environment.parameters if p.names == "joint"), "")
+    given = body.get(named)
+    word = word_of(given.value) if given is not None else None
+    return next((joint.kind for joint in arm.moving if joint.name == word), "revolute")
 
 
 def _remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str, Any], duration: float) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from types import MappingProxyType, SimpleNamespace
@@ -341,9 +340,7 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     if profile.from_file:
         use_file(scope, course, profile, opened, owner.path.removesuffix(".servo"))
         return Command(kind, profile.name)
-    values = use_model(scope, course, profile.parameters, opened)
-    if values is not None and profile.name == "table":
-        _check_table(scope, opened, values)
+    use_model(scope, course, profile.parameters, opened)
     return Command(kind, profile.name)
 
 
@@ -356,28 +353,6 @@ def _asked(scope: Scope, command: Call) -> Expression:
     if isinstance(inner, Name) and inner.text in models.available("command") and not scope.names.knows(inner.text):
         return Call(inner, (), (), None, inner.place)
     return inner
-
-
-def _check_table(scope: Scope, body: Block, values: dict[str, Any]) -> None:
-    """Times rise, and there are as many values."""
-    times, heights = values["times"], values["values"]
-    at, also = body.items["times"], body.items["values"]
-    at_place = place_of(at.value) if at.value is not None else at.place
-    also_place = place_of(also.value) if also.value is not None else also.place
-    if len(times) != len(heights):
-        scope.complaints.error("D154", f"a table of {len(times)} times and {len(heights)} values", at_place,
-                               also=[Label(also_place, "values")], help="each time has its value")
-    elif not times:
-        scope.complaints.error("D155", "a table with no points", at_place, help="a table has one point at least")
-    for n, (before, after) in enumerate(itertools.pairwise(times)):
-        if not after > before:
-            scope.complaints.error(
-                "D156",
-                f"times of a table rise, and number {n + 2}, {after:g} s, follows {before:g} s",
-                at_place,
-                help="sort the points; for a jump, two times close together",
-            )
-            break
 
 
 def check_servo_definition(scope: Scope, name: str) -> None:

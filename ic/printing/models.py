@@ -27,7 +27,8 @@ HOW = {
 OTHERS = ("channels", "designs", "dh", "distributions", "functions", "shapes", "substitute", "sweep", "units")
 """What else `met doc` has a page on (ic/printing/subjects.py)."""
 
-FIELDS = ("name", "unit", "doc", "default", "above", "at_least", "below", "at_most", "shape", "words", "source", "only")
+FIELDS = ("name", "unit", "doc", "default", "above", "at_least", "below", "at_most", "shape", "words", "names",
+          "source", "only")
 """What a program is told of a parameter."""
 
 WORDS = {
@@ -170,11 +171,15 @@ def default(parameter: Parameter) -> str:
         return "needed"
     if isinstance(value, str):
         return value
+    if value == ():
+        return "none"
     return vector(value, "1") if isinstance(value, tuple) else number(value)
 
 
 def range_(parameter: Parameter) -> str:
     """The bounds in SI, or the words that are possible."""
+    if parameter.names:
+        return " | ".join((f"a {parameter.names}", *parameter.words))
     if parameter.words:
         return " | ".join(parameter.words)
     whole = ["whole"] if parameter.whole else []
@@ -186,4 +191,5 @@ def meaning(parameter: Parameter) -> str:
     """What it is, where its number comes from, and with which word it is there."""
     only = "" if parameter.only is None else f"; with {parameter.only[0]} = {' or '.join(parameter.only[1])}"
     shape = {"vector": "three numbers; ", "list": "a list; ", "text": "in quotes; "}.get(parameter.shape, "")
+    shape = "the same in all cases; " if parameter.decides else shape
     return f"{shape}{parameter.doc}{only}" + (f" ({parameter.source})" if parameter.source else "")

@@ -7,7 +7,6 @@ from contextlib import AbstractContextManager
 
 from met.dynamics.recursion import Solved, solve
 from met.dynamics.tree import Tree
-from met.environments.environment import Vector
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
 from met.program.machine import Actuator, Machine, ReadCell
@@ -15,6 +14,7 @@ from met.program.values import Values, answer, parameters, returned
 from met.program.world import ArmWorld
 from met.servos.servo import Control, Drive, JointMotion, Seen
 from met.trace import Real, Truth, not_, where
+from met.vectors import Vector
 
 
 @frozen
@@ -185,7 +185,7 @@ def _environment(
     machine: Machine, tree: Tree, read: ReadCell, y: Motion, time: Real, begin: Real
 ) -> tuple[Vector, list[Real], dict[str, tuple[Vector, Vector]]]:
     """Sum of all loads: gravity (world), torque a joint, wrench a link (moment about its origin, force; link axes)."""
-    world = ArmWorld(machine, tree, y.q, y.qd, time, begin)
+    world = ArmWorld(machine, read, tree, y.q, y.qd, time, begin)
     gravity: list[Real] = [0.0, 0.0, 0.0]
     torques: list[Real] = [0.0 for _ in machine.joints]
     wrenches: dict[str, tuple[Vector, Vector]] = {}
@@ -199,6 +199,8 @@ def _environment(
             number = world._number(joint)
             torques[number] = torques[number] + torque
         for force in loads.forces:
+            if world.is_ground(force.link):
+                continue
             moment, total = world.link(force.link).wrench(force.force, force.moment, force.point)
             if force.link in wrenches:
                 before = wrenches[force.link]

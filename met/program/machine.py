@@ -25,6 +25,7 @@ from met.program.values import Values, answer, parameters, returned
 from met.servos.servo import Asked, Drive, JointMotion, Parts, Servo
 from met.substitution import Bed, Law
 from met.trace import Graph, Real, Scalar
+from met.vectors import Vector
 
 PARAMETER, TREE = "parameter:", "tree:"
 """Prefixes of the cells that hold a case's own parameters, and what of the tree follows from them."""
@@ -148,6 +149,21 @@ class Machine:
         value = self.experiment.parameters[path].value
         return read(PARAMETER + path) if isinstance(value, Formula) else value
 
+    def mass(self, link: str, read: ReadCell) -> Real:
+        """Of a link, kg."""
+        mass: Real = self.value(f"links.{link}.mass", read)
+        return mass
+
+    def com(self, link: str, read: ReadCell) -> Vector:
+        """A link's centre of mass in its frame, m."""
+        x, y, z = (self.value(f"links.{link}.com.{axis}", read) for axis in "xyz")
+        return x, y, z
+
+    def inertia(self, link: str, read: ReadCell) -> tuple[Real, Real, Real, Real, Real, Real]:
+        """xx, yy, zz, xy, xz, yz of a link about its centre of mass in its axes, kg m^2."""
+        entries = (self.value(f"links.{link}.inertia.{entry}", read) for entry in ("xx", "yy", "zz", "xy", "xz", "yz"))
+        return tuple(entries)
+
     def servo_values(self, actuator: Actuator, read: ReadCell) -> Values:
         return parameters(
             actuator.owner, actuator.path, actuator.parts.parameters, lambda path: self.value(path, read)
@@ -199,9 +215,6 @@ class Machine:
         bodies = []
         for link in self._link_order():
             joint = joints[link.name]
-            inertia = tuple(
-                self.value(f"links.{link.name}.inertia.{entry}", read) for entry in ("xx", "yy", "zz", "xy", "xz", "yz")
-            )
             bodies.append(
                 Body(
                     name=link.name,
@@ -212,9 +225,9 @@ class Machine:
                     rpy=vector(f"{joint.name}.rpy"),
                     axis=(0.0, 0.0, 1.0) if joint.kind == "fixed" else vector(f"{joint.name}.axis"),
                     pivot=vector(f"{joint.name}.pivot") if self._has_pivot(joint) else (0.0, 0.0, 0.0),
-                    mass=self.value(f"links.{link.name}.mass", read),
-                    com=vector(f"links.{link.name}.com"),
-                    inertia=inertia,
+                    mass=self.mass(link.name, read),
+                    com=self.com(link.name, read),
+                    inertia=self.inertia(link.name, read),
                 )
             )
         return Tree.build(tuple(bodies), tuple(joint.name for joint in self.joints))

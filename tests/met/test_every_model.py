@@ -79,6 +79,15 @@ SMALLEST: dict[tuple[str, str], dict[str, str]] = {
     ("environment", "gravity"): {},
     ("environment", "joint_damping"): {"environment": "grease = joint_damping { damping = 1 N*m*s/rad; };"},
     ("environment", "wrench"): {"environment": "push = wrench { link = tip; force = [1, 2, 3] N; until = 0.1 s; };"},
+    ("environment", "spring"): {"environment": "line = spring { link = tip; stiffness = 90 N/m; length = 1 m; };"},
+    ("environment", "bushing"): {
+        "environment": "mount = bushing { link = tip; to = bar; to_at = [1, 0, 0] m; stiffness = [90, 50, 10] N/m;"
+        "  turning = [5, 6, 7] N*m/rad; };"
+    },
+    ("environment", "plume"): {
+        "environment": "jet = plume { link = tip; width = 0.2 m; height = 0.1 m; nozzle = [1, 0, 2] m;"
+        "  axis = [0, 0, -1]; thrust = 50 N; exponent = 5; duty = 50 %; period = 0.03 s; };"
+    },
     **{("command", name): {"servos": DRIVEN.format(asked("rate", name))} for name in COURSES},
     ("metric", "final"): {"metric": "final { of = hinge.q; }"},
     ("metric", "max"): {"metric": "max { of = hinge.qd; }"},
