@@ -48,7 +48,7 @@ error[D141]: servo `drive` has no `kpp`
    |                  ^^^
    = help: did you mean `kp`?
    = help: it has: ratio, kp, ki, v_max, k_position, resistance, kt, tau_max, j_m, f_c, f_v, friction, model, command, rate
-"""
+"""  # noqa: E501
 
 
 def test_two_unknown_keys_are_two_mistakes(tmp_path: Path) -> None:
