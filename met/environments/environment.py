@@ -28,6 +28,8 @@ class World(Protocol):
     position(link, point)  world position of a point given in the link's frame (m)
     velocity(link, point)  its velocity in the world (m/s)
     to_world(link, vector) a vector given in the link's axes, in the world's
+    orientation(link)    the matrix of that, three rows
+    rate(link)           its angular velocity, world axes (rad/s)
     """
 
     time: Real
@@ -42,6 +44,8 @@ class World(Protocol):
     def position(self, link: str, point: Vector = (0.0, 0.0, 0.0)) -> Vector: ...
     def velocity(self, link: str, point: Vector = (0.0, 0.0, 0.0)) -> Vector: ...
     def to_world(self, link: str, vector: Vector) -> Vector: ...
+    def orientation(self, link: str) -> tuple[Vector, Vector, Vector]: ...
+    def rate(self, link: str) -> Vector: ...
 
 
 @frozen
@@ -75,6 +79,8 @@ class Environment:
     loads  (p, world) -> Loads. A parameter of shape "word" whose name is `joint` or `link` names one of the arm's.
     idle   (p, duration) -> the parameters because of which it never acts in a run of that length (s), and why, in
            words; None where it may act. Asked where all its numbers are constants. None: it always may
+    pushes the parameter that names the one link that it acts upon: a deck that names one which is part of the ground
+           is warned. "": none does
     """
 
     name: str
@@ -82,3 +88,4 @@ class Environment:
     parameters: tuple[Parameter, ...] = ()
     loads: Callable[[Any, World], Loads]
     idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None
+    pushes: str = ""

@@ -64,4 +64,5 @@ ENVIRONMENT = Environment(
     ),
     loads=loads,
     idle=idle,
+    pushes="link",
 )

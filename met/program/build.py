@@ -12,6 +12,7 @@ from collections.abc import Callable
 from met.channel import Channel
 from met.parameter import Memory, State
 from met.plan import Experiment
+from met.program import base
 from met.program.machine import PARAMETER, Actuator, Machine
 from met.program.observe import derived
 from met.program.step import EVENTS, Step
@@ -95,6 +96,8 @@ class Builder:
         for joint in self.joints:
             for name in ("q", "qd"):
                 tape.write(f"{joint}.{name}", self.machine.value(f"initial.{joint}.{name}", tape.read))
+        if self.machine.structure.free:
+            base.start(self.machine, tape)
         for actuator in self.machine.working:
             parts: tuple[Memory | State, ...] = (*actuator.servo.memory, *actuator.servo.states)
             for part in parts:

@@ -10,6 +10,7 @@ from met.dynamics.tree import Tree
 from met.environments.environment import Vector
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
+from met.program.base import Base, base_of, slopes
 from met.program.machine import Actuator, Machine, ReadCell
 from met.program.values import Values, answer, parameters, returned
 from met.program.world import ArmWorld
@@ -27,6 +28,7 @@ class Derivative:
     solved   the recursion's own results
     drives   what each servo does, by joint number; None for a passive joint
     gravity  acceleration of free fall, of all environment models, world axes, m/s^2
+    base     where the base is and how it moves
     """
 
     slope: Slope
@@ -35,6 +37,7 @@ class Derivative:
     solved: Solved
     drives: tuple[Drive | None, ...]
     gravity: Vector
+    base: Base
 
 
 def derivative(
@@ -61,9 +64,9 @@ def derivative(
             None if actuator is None else drive_of(machine, actuator, read, y, held[i], time, begin)
             for i, actuator in enumerate(machine.actuators)
         )
-    tree = machine.tree(read)
+    tree, base, n = machine.tree(read), base_of(machine, read, y, time), len(machine.joints)
     with part("environment"):
-        gravity, torques, wrenches = _environment(machine, tree, read, y, time, begin)
+        gravity, torques, wrenches = _environment(machine, tree, read, y, base, time, begin)
 
     told = told or {}
     given: list[Real] = []
@@ -91,23 +94,27 @@ def derivative(
     with part("dynamics"):
         solved = solve(
             tree,
-            y.q,
-            y.qd,
+            y.q[:n],
+            y.qd[:n],
             tau=tuple(a - b for a, b in zip(smooth, dry, strict=True)),
             qdd=tuple(given),
             mode=tuple(mode),
             rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
-            gravity=gravity,
+            gravity=base.to_base(gravity),
+            base_acceleration=(base.wd, base.a),
+            base_rate=base.w,
             wrenches=wrenches,
             velocity_products=machine.structure.velocity_products,
         )
+    qd, qdd = slopes(base, solved.base_acceleration, y) if machine.structure.free else ((), ())
     return Derivative(
-        slope=Slope(y.qd, solved.qdd, _slopes(machine, drives)),
+        slope=Slope((*y.qd[:n], *qd), (*solved.qdd, *qdd), _slopes(machine, drives)),
         tau=tuple(a - b for a, b in zip(solved.tau, torques, strict=True)),
         need=tuple(a - b for a, b in zip(smooth, solved.tau_load, strict=True)),
         solved=solved,
         drives=drives,
         gravity=gravity,
+        base=base,
     )
 
 
@@ -141,10 +148,10 @@ def _slopes(machine: Machine, drives: Sequence[Drive | None]) -> tuple[Real, ...
 
 
 def _environment(
-    machine: Machine, tree: Tree, read: ReadCell, y: Motion, time: Real, begin: Real
+    machine: Machine, tree: Tree, read: ReadCell, y: Motion, base: Base, time: Real, begin: Real
 ) -> tuple[Vector, list[Real], dict[str, tuple[Vector, Vector]]]:
     """Sum of all loads: gravity (world), torque a joint, wrench a link (moment about its origin, force; link axes)."""
-    world = ArmWorld(machine, tree, y.q, y.qd, time, begin)
+    world = ArmWorld(machine, tree, y, base, time, begin)
     gravity: list[Real] = [0.0, 0.0, 0.0]
     torques: list[Real] = [0.0 for _ in machine.joints]
     wrenches: dict[str, tuple[Vector, Vector]] = {}

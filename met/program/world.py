@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from met.diagnostic import Problem, error
-from met.dynamics.kinematics import LinkMotion, link_motions
+from met.dynamics.kinematics import LinkMotion
+from met.dynamics.spatial import Matrix
 from met.dynamics.tree import Tree
 from met.environments.environment import Vector
+from met.integrators.integrator import Motion
+from met.program.base import Base, motions
 from met.program.machine import Machine
 from met.trace import Real
 
@@ -13,15 +16,14 @@ from met.trace import Real
 class ArmWorld:
     """A `met.environments.environment.World` at one stage."""
 
-    def __init__(
-        self, machine: Machine, tree: Tree, q: tuple[Real, ...], qd: tuple[Real, ...], time: Real, begin: Real
-    ) -> None:
+    def __init__(self, machine: Machine, tree: Tree, y: Motion, base: Base, time: Real, begin: Real) -> None:
         self.time, self.begin = time, begin
         self.step = machine.structure.schedule.step
         self.joints = tuple(joint.name for joint in machine.joints)
         self.links = tuple(link.name for link in machine.structure.links)
         self._sliding = {joint.name: joint.kind == "prismatic" for joint in machine.joints}
-        self._tree, self._q, self._qd = tree, q, qd
+        n = len(self.joints)
+        self._tree, self._q, self._qd, self._base = tree, y.q[:n], y.qd[:n], base
         self._motions: dict[str, LinkMotion] | None = None
 
     def slides(self, joint: str) -> bool:
@@ -42,9 +44,15 @@ class ArmWorld:
     def to_world(self, link: str, vector: Vector) -> Vector:
         return self.link(link).to_world(vector)
 
+    def orientation(self, link: str) -> Matrix:
+        return self.link(link).pose.R
+
+    def rate(self, link: str) -> Vector:
+        return self.link(link).rate()
+
     def link(self, link: str) -> LinkMotion:
         if self._motions is None:
-            self._motions = link_motions(self._tree, self._q, self._qd)
+            self._motions = motions(self._tree, self._q, self._qd, self._base)
         if link not in self._motions:
             message = f"an environment model asks for link `{link}`, which the arm does not have"
             raise Problem(error("E218", message, help=f"links: {', '.join(self.links)}"))
