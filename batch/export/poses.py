@@ -11,11 +11,12 @@ from batch.archive.read import Stored, reading
 from batch.export.picking import Case
 from batch.output import quoted
 from met.diagnostic import Problem, error
-from met.dynamics.kinematics import link_motions, quaternion
+from met.dynamics.kinematics import link_motions
 from met.dynamics.spatial import HERE, Pose, compose, inverse
 from met.frozen import frozen
 from met.plan import Experiment, Formula, Plan
 from met.program.machine import PARAMETER, Machine
+from met.rotation import quaternion
 
 POSITION = "q"
 

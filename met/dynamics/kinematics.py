@@ -8,7 +8,6 @@ from met.dynamics.joints import Step
 from met.dynamics.spatial import (
     HERE,
     ZERO,
-    Matrix,
     Pose,
     Real,
     Vector,
@@ -21,7 +20,6 @@ from met.dynamics.spatial import (
 )
 from met.dynamics.tree import Tree
 from met.frozen import frozen
-from met.trace import sqrt, where
 
 
 @frozen
@@ -77,29 +75,6 @@ def link_motions(
         outer, motion = (root_pose, root_rates) if frame.joint < 0 else (poses[frame.joint], rates[frame.joint])
         result[name] = LinkMotion(compose(outer, frame.pose), *fixed_motion(motion, frame.pose))
     return result
-
-
-def quaternion(R: Matrix) -> tuple[Real, Real, Real, Real]:
-    """The unit quaternion (w, x, y, z) of a rotation, w >= 0: R turns a vector u as q u q* does.
-
-    Of 4 q q' every entry is a sum of entries of R; the row with the largest diagonal entry, which is at least 1, is
-    divided by its root (Shepperd, "Quaternion from rotation matrix", 1978), so nothing is lost near any rotation.
-    """
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R
-    rows = (
-        (1.0 + xx + yy + zz, zy - yz, xz - zx, yx - xy),
-        (zy - yz, 1.0 + xx - yy - zz, xy + yx, xz + zx),
-        (xz - zx, xy + yx, 1.0 - xx + yy - zz, yz + zy),
-        (yx - xy, xz + zx, yz + zy, 1.0 - xx - yy + zz),
-    )
-    best, size = rows[0], rows[0][0]
-    for k, row in enumerate(rows[1:], 1):
-        more = row[k] > size
-        best = tuple(where(more, new, old) for new, old in zip(row, best, strict=True))
-        size = where(more, row[k], size)
-    scale = where(best[0] < 0.0, -0.5, 0.5) / sqrt(size)
-    w, x, y, z = (scale * part for part in best)
-    return w, x, y, z
 
 
 def joint_poses(tree: Tree, steps: Sequence[Step], base: Pose = HERE) -> tuple[Pose, ...]:

@@ -42,6 +42,7 @@ from met.plan import BASE
 from met.program import cells
 from met.program.courses import TIME
 from met.program.machine import PARAMETER, Machine, ReadCell
+from met.rotation import Quaternion, composed, quaternion_rpy
 from met.trace import Scalar, Truth, cos, sin, sqrt, where
 from met.trace.program import Tape
 
@@ -50,8 +51,6 @@ COORDINATES = ("base:x", "base:y", "base:z", *TURNS)
 """Of a free base; their cells are named as a joint's are: `base:x.q`, `base:x.qd`."""
 
 ORIENTATION = tuple(f"base:orientation.{part}" for part in "wxyz")
-
-Quaternion = tuple[Real, Real, Real, Real]
 
 
 @frozen
@@ -124,7 +123,7 @@ def start(machine: Machine, tape: Tape) -> None:
         x, y, z = (machine.value(f"initial.base.{name}.{axis}", tape.read) for axis in "xyz")
         return x, y, z
 
-    turn = _quaternion_rpy(*given("rpy"))
+    turn = quaternion_rpy(*given("rpy"))
     _write(tape, True, turn)
     w = turn_vector_back(rotation_quaternion(*turn), given("rate"))
     for name, q, qd in zip(COORDINATES, (*given("position"), *ZERO), (*given("velocity"), *w), strict=True):
@@ -152,14 +151,14 @@ def keep_orientation(machine: Machine, tape: Tape, copy: str) -> None:
 def turn(machine: Machine, tape: Tape, active: Truth, y: Motion, copy: str = "") -> None:
     """Takes the turn of a (sub)step that ends at y into the orientation, of which `copy` was its beginning."""
     if machine.structure.free:
-        _write(tape, active, _composed(_read(tape.read, copy), y.q[-3:]))
+        _write(tape, active, _turned(_read(tape.read, copy), y.q[-3:]))
 
 
 def _free(read: ReadCell, y: Motion) -> Base:
     theta, v, w = y.q[-3:], y.qd[-6:-3], y.qd[-3:]
     there = _read(read, "")
     if not all(is_zero(part) for part in theta):
-        there = _composed(there, theta)
+        there = _turned(there, theta)
     R = rotation_quaternion(*there)
     return Base(Pose(R, y.q[-6:-3]), w, turn_vector_back(R, v), turned=_slope(theta, w))  # type: ignore[arg-type]
 
@@ -174,19 +173,12 @@ def _slope(theta: tuple[Real, ...], w: tuple[Real, ...]) -> Vector:
     return add(w, add(scale(0.5, once), scale(b, cross(theta, once))))  # type: ignore[arg-type]
 
 
-def _composed(q: Quaternion, theta: tuple[Real, ...]) -> Quaternion:
+def _turned(q: Quaternion, theta: tuple[Real, ...]) -> Quaternion:
     """q o exp(theta), of length 1."""
     size, half, s = _half_turn(theta)
-    c = where(size == 0.0, 1.0, cos(half))
     along = where(size == 0.0, 0.5, 0.5 * s / half)
-    w, x, y, z = q
-    a, b, d = (along * part for part in theta)
-    product = (
-        w * c - (x * a + y * b + z * d),
-        w * a + x * c + (y * d - z * b),
-        w * b + y * c + (z * a - x * d),
-        w * d + z * c + (x * b - y * a),
-    )
+    x, y, z = (along * part for part in theta)
+    product = composed(q, (where(size == 0.0, 1.0, cos(half)), x, y, z))
     shrink = 1.0 / sqrt(sum((part * part for part in product[1:]), product[0] * product[0]))
     w, x, y, z = (shrink * part for part in product)
     return w, x, y, z
@@ -198,17 +190,6 @@ def _half_turn(theta: tuple[Real, ...]) -> tuple[Real, Real, Real]:
     size = x * x + y * y + z * z
     half = where(size == 0.0, 1.0, 0.5 * sqrt(size))
     return size, half, sin(half)
-
-
-def _quaternion_rpy(roll: Real, pitch: Real, yaw: Real) -> Quaternion:
-    """The unit quaternion of R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    (cr, sr), (cp, sp), (cy, sy) = ((cos(0.5 * angle), sin(0.5 * angle)) for angle in (roll, pitch, yaw))
-    return (
-        cy * cp * cr + sy * sp * sr,
-        cy * cp * sr - sy * sp * cr,
-        cy * sp * cr + sy * cp * sr,
-        sy * cp * cr - cy * sp * sr,
-    )
 
 
 def _read(read: ReadCell, copy: str) -> Quaternion:

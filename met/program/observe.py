@@ -12,7 +12,7 @@ from functools import cached_property
 from met.channel import WXYZ, XYZ, Channel
 from met.dynamics.effective_inertia import effective_inertia
 from met.dynamics.energy import Energy, energy
-from met.dynamics.kinematics import LinkMotion, jacobian, quaternion
+from met.dynamics.kinematics import LinkMotion, jacobian
 from met.dynamics.recursion import Wrench, reactions
 from met.dynamics.spatial import Vector, choose
 from met.dynamics.tree import Tree
@@ -20,6 +20,7 @@ from met.integrators.integrator import Motion
 from met.program.base import Base, motions
 from met.program.evaluation import Derivative
 from met.program.machine import Machine
+from met.rotation import quaternion
 from met.trace import Real
 
 
