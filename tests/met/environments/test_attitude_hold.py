@@ -1,4 +1,4 @@
-"""A body that is held in an attitude: the moment itself, and against the damped oscillator that it is for small angles."""
+"""A body that is held in an attitude: the moment itself, and the damped oscillator that it is for small angles."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ run it {
         base.rpy  = [0.0001, -0.0002, 0.0003] rad;
         base.rate = [0.0002, 0, -0.0001] rad/s;
     }
-    environment { hold = attitude_hold { stiffness = [8, 9, 10] N*m/rad; damping = [2, 12, 1] N*m*s/rad; axes = link; }; }
+    environment { h = attitude_hold { stiffness = [8, 9, 10] N*m/rad; damping = [2, 12, 1] N*m*s/rad; axes = link; }; }
     rates { dynamics = 200 Hz; record = 10 Hz; }
     duration = 5 s;
     record = [links.base.orientation, links.base.rate];
@@ -50,9 +50,10 @@ def test_small_angles_about_each_axis_are_a_damped_oscillator(tmp_path: Path, ax
 
 
 def test_it_turns_a_body_from_anywhere_to_where_it_is_wanted(tmp_path: Path) -> None:
-    text = changed(DECK, ("[0.0001, -0.0002, 0.0003] rad", "[100, -40, 150] deg"), ("duration = 5 s", "duration = 60 s"),
-                   ("axes = link", "rpy = [20, 30, -50] deg; limit = [0.5, 0.6, 0.7] N*m; damping = [3, 4, 5] N*m*s/rad"),
-                   ("damping = [2, 12, 1] N*m*s/rad; ", ""))
+    limited = "rpy = [20, 30, -50] deg; limit = [0.5, 0.6, 0.7] N*m; damping = [3, 4, 5] N*m*s/rad"
+    far = ("[0.0001, -0.0002, 0.0003] rad", "[100, -40, 150] deg")
+    text = changed(DECK, far, ("duration = 5 s", "duration = 60 s"), ("damping = [2, 12, 1] N*m*s/rad; ", ""),
+                   ("axes = link", limited))
     run = engine.run(experiment(tmp_path, text))
     R = np.array(rotation_rpy(*np.radians([20.0, 30.0, -50.0])), float)
     w, x, y, z = run.signals["links.base.orientation"][0, -1]
@@ -100,11 +101,11 @@ def test_a_rate_that_is_no_number_is_not_hidden_by_the_limit() -> None:
 def test_one_that_holds_nothing_is_told(tmp_path: Path) -> None:
     text = changed(DECK, ("stiffness = [8, 9, 10] N*m/rad; damping = [2, 12, 1] N*m*s/rad; ", ""))
     assert told(check(tmp_path, text)) == """\
-warning[D168]: environment `hold` never acts: it has neither stiffness nor damping
+warning[D168]: environment `h` never acts: it has neither stiffness nor damping
  --> deck.ic:8:19
   |
-8 |     environment { hold = attitude_hold { axes = link; }; }
-  |                   ^^^^
+8 |     environment { h = attitude_hold { axes = link; }; }
+  |                   ^
   = help: change that, or leave it out
 
 1 warning
@@ -116,12 +117,12 @@ def test_one_on_a_base_that_does_not_yield_is_told(tmp_path: Path) -> None:
     text = changed(DECK, ("base = free;", "base = prescribed { yaw = sine(amplitude = 1 deg, frequency = 1 Hz); };"),
                    (told_of, "    }\n"))
     assert told(check(tmp_path, text)) == """\
-warning[D256]: environment `hold` changes nothing: link `base` moves as it is told
+warning[D256]: environment `h` changes nothing: link `base` moves as it is told
  --> deck.ic:6:19
   |
-6 |     environment { hold = attitude_hold { stiffness = [8, 9, 10] N*m/rad; damping = [2, 12, 1] N*m*s/rad; axes = li...
-  |                   ^^^^
+6 |     environment { h = attitude_hold { stiffness = [8, 9, 10] N*m/rad; damping = [2, 12, 1] N*m*s/rad; axes = link; }; }
+  |                   ^
   = help: write `base = free;` in the run, or name a link that a joint moves
 
 1 warning
-"""  # noqa: E501 - a deck is as wide as it is
+"""
