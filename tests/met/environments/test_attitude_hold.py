@@ -22,7 +22,7 @@ run it {
         base.rpy  = [0.0001, -0.0002, 0.0003] rad;
         base.rate = [0.0002, 0, -0.0001] rad/s;
     }
-    environment { h = attitude_hold { stiffness = [8, 9, 10] N*m/rad; damping = [2, 12, 1] N*m*s/rad; axes = link; }; }
+    environment { h = attitude_hold { stiffness = [8,9,10] N*m/rad; damping = [2, 12, 1] N*m*s/rad; axes = link; } }
     rates { dynamics = 200 Hz; record = 10 Hz; }
     duration = 5 s;
     record = [links.base.orientation, links.base.rate];
@@ -99,12 +99,12 @@ def test_a_rate_that_is_no_number_is_not_hidden_by_the_limit() -> None:
 
 
 def test_one_that_holds_nothing_is_told(tmp_path: Path) -> None:
-    text = changed(DECK, ("stiffness = [8, 9, 10] N*m/rad; damping = [2, 12, 1] N*m*s/rad; ", ""))
+    text = changed(DECK, ("stiffness = [8,9,10] N*m/rad; damping = [2, 12, 1] N*m*s/rad; ", ""))
     assert told(check(tmp_path, text)) == """\
 warning[D168]: environment `h` never acts: it has neither stiffness nor damping
  --> deck.ic:8:19
   |
-8 |     environment { h = attitude_hold { axes = link; }; }
+8 |     environment { h = attitude_hold { axes = link; } }
   |                   ^
   = help: change that, or leave it out
 
@@ -120,7 +120,7 @@ def test_one_on_a_base_that_does_not_yield_is_told(tmp_path: Path) -> None:
 warning[D256]: environment `h` changes nothing: link `base` moves as it is told
  --> deck.ic:6:19
   |
-6 |     environment { h = attitude_hold { stiffness = [8, 9, 10] N*m/rad; damping = [2, 12, 1] N*m*s/rad; axes = link; }; }
+6 |     environment { h = attitude_hold { stiffness = [8,9,10] N*m/rad; damping = [2, 12, 1] N*m*s/rad; axes = link; } }
   |                   ^
   = help: write `base = free;` in the run, or name a link that a joint moves
 
