@@ -21,7 +21,7 @@ from met import plan_rest as rest
 from met.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.outputs import tolerable
 from met.parameter import Parameter
-from met.plan import Coordinate, Experiment, Formula, Quantity, Requirement, Structure
+from met.plan import BASE, COMPONENTS, Coordinate, Experiment, Formula, Quantity, Requirement, Structure
 from met.plan_codec import Damaged
 from met.plan_defaults import INERTIA, declared, heads_of_models, of_environment
 from met.trace.graph import TRUTHS, Formulas
@@ -53,6 +53,7 @@ def check(experiments: Iterable[Experiment]) -> None:
         _group_name(experiment, f"{where}.name", names)
         names.append(experiment.name)
         _check_arm(experiment.structure, f"{where}.structure")
+        _check_base(experiment.structure, f"{where}.structure")
         _check_schedule(experiment.structure, f"{where}.structure")
         _check_uses(experiment.structure, f"{where}.structure")
         _check_record(experiment.structure, f"{where}.structure.record")
@@ -111,7 +112,7 @@ def _check_arm(structure: Structure, where: str) -> None:
     """Links and joints are a tree that stands on the base."""
     links: list[str] = []
     for index, link in enumerate(structure.links):
-        _name(link.name, f"{where}.links[{index}].name", ["base", *links])
+        _name(link.name, f"{where}.links[{index}].name", links)
         links.append(link.name)
     if not links:
         raise Damaged(f"{where}.links", "there is none")
@@ -122,15 +123,15 @@ def _check_arm(structure: Structure, where: str) -> None:
         _name(joint.name, f"{path}.name", names)
         names.append(joint.name)
         for end, name in (("parent", joint.parent), ("child", joint.child)):
-            if name not in links and not (end == "parent" and name == "base"):
+            if name not in (BASE, *links) or (end == "child" and name == BASE):
                 raise Damaged(f"{path}.{end}", f"there is no link `{name}`")
         if joint.child in parents:
             raise Damaged(f"{path}.child", f"link `{joint.child}` is another joint's child already")
         parents[joint.child] = joint.parent
     for index, name in enumerate(links):
-        if name not in parents:
+        if name not in parents and name != BASE:
             raise Damaged(f"{where}.links[{index}]", f"no joint holds link `{name}`")
-    standing = {"base"}
+    standing = {BASE}
     for joint_index, joint in enumerate(structure.joints):
         passed: set[str] = set()
         at = joint.child
@@ -140,6 +141,25 @@ def _check_arm(structure: Structure, where: str) -> None:
             passed.add(at)
             at = parents[at]
         standing |= passed
+
+
+def _check_base(structure: Structure, where: str) -> None:
+    """A base that moves is a link; its courses are those of components, and its turns keep the velocity products."""
+    base, links = structure.base, [link.name for link in structure.links]
+    if base is None:
+        return
+    if BASE not in links:
+        raise Damaged(f"{where}.base", f"there is no link `{BASE}`, and it moves")
+    if base.kind == "free" and base.courses:
+        raise Damaged(f"{where}.base.courses", "a free base has none")
+    known = list(COMPONENTS)
+    for index, course in enumerate(base.courses):
+        if course.component not in known:
+            raise Damaged(f"{where}.base.courses[{index}].component", f"it should be one of {', '.join(known)}")
+        known = known[known.index(course.component) + 1 :]
+        models.find("command", course.model, base.place)
+    if not structure.velocity_products and base.turns:
+        raise Damaged(f"{where}.velocity_products", "a base that turns needs them")
 
 
 def _check_schedule(structure: Structure, where: str) -> None:
@@ -368,6 +388,9 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
         for name, word in use.words:
             if parameters[f"{use.joint}.servo.{name}"].value != word:
                 raise Damaged(f"{where}.{use.joint}.servo.{name}", f"it should be {word}, as the structure says")
+    for course in structure.base.courses if structure.base is not None else ():
+        if course.model in TABLES:
+            _check_table(experiment, f"base.{course.component}", TABLES[course.model], where)
     relations.check_uses(experiment, of_environment(structure), where)
     _check_bodies(experiment, where)
 
@@ -473,6 +496,9 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
     for joint in structure.moving:
         axis = [f"{joint.name}.axis.{letter}" for letter in "xyz"]
         tests.append((f"{joint.name}.axis", axis, _is_axis, "its length should be 1"))
+    if structure.free:
+        masses = [f"links.{name}.mass" for name in structure.ground]
+        tests.append((f"links.{BASE}.mass", masses, _is_some, "the base moves freely and has no mass"))
     tests += [*rest.tests(experiment), *relations.tests(experiment, of_environment(structure))]
     varied = []
     for path, paths, holds, message in tests:
@@ -512,6 +538,10 @@ def _check_varied(
 
 def _is_mass(values: np.ndarray) -> np.ndarray:
     return (values[:, 0] >= 0.0) & np.isfinite(values[:, 0])
+
+
+def _is_some(values: np.ndarray) -> np.ndarray:
+    return np.asarray(values.sum(axis=1) > 0.0)
 
 
 def _is_axis(values: np.ndarray) -> np.ndarray:

@@ -8,9 +8,12 @@ from met import models
 from met.channel import channels, joint_unit, watched_unit
 from met.diagnostic import nearest
 from met.parameter import Parameter, under
-from met.plan import Experiment, Origin, Quantity, Structure
+from met.plan import COMPONENTS, Experiment, Joint, Origin, Quantity, Structure
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
+
+OF_FREE_BASE = (("position", "m"), ("rpy", "rad"), ("velocity", "m/s"), ("rate", "rad/s"))
+"""Of the initial state of a free base: vectors, world axes."""
 
 
 def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity | None]]:
@@ -43,6 +46,7 @@ def heads_of_models(structure: Structure) -> tuple[str, ...]:
     return (
         *(f"{use.joint}.servo." for use in structure.servos),
         *(f"{use.joint}.{kind}." for use in structure.substitutions for kind in ("bed", "law")),
+        *(f"base.{course.component}." for course in (structure.base.courses if structure.base else ())),
         *(f"environment.{use.name}." for use in structure.environment),
         *(f"metrics.{use.name}." for use in structure.metrics),
     )
@@ -76,6 +80,7 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
     for joint in structure.moving:
         yield f"initial.{joint.name}.q", joint_unit("joint", joint), None, None
         yield f"initial.{joint.name}.qd", joint_unit("joint/s", joint), None, None
+    yield from _of_base(structure)
     for use in structure.servos:
         joint = kinds[use.joint]
         for parameter in models.servo_parts(use).parameters:
@@ -104,6 +109,25 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
         of = watched[metric.of].unit if metric.of in watched else "1"
         for parameter in models.find("metric", metric.model, metric.place).parameters:
             yield from _numbers(f"metrics.{metric.name}", parameter, watched_unit(parameter.unit, of))
+
+
+def _of_base(structure: Structure) -> Iterator[Declared]:
+    """Of a base that moves: its initial state, or its courses."""
+    if structure.free:
+        for name, unit in OF_FREE_BASE:
+            for axis in "xyz":
+                yield f"initial.base.{name}.{axis}", unit, None, None
+    for course in structure.base.courses if structure.base is not None else ():
+        model = models.find("command", course.model, structure.base.place if structure.base else None)
+        for parameter in model.parameters:
+            unit = joint_unit(parameter.unit, component(course.component), "position")
+            yield from _numbers(f"base.{course.component}", parameter, unit)
+
+
+def component(name: str) -> Joint:
+    """A component of the base's pose as the joint that would move so: for its units."""
+    kind = "prismatic" if COMPONENTS.index(name) < 3 else "revolute"
+    return Joint(name, kind, "", "")  # type: ignore[arg-type]
 
 
 def _numbers(prefix: str, parameter: Parameter, unit: str) -> Iterator[Declared]:

@@ -4,6 +4,7 @@ Plain arithmetic on `Real = float | Scalar`: no arrays, so that a trace sees eve
 
     Vector     (x, y, z)
     Matrix     three rows; R_AB turns components in B into components in A
+    Quaternion (w, x, y, z), of unit length: it turns a vector u as q u q* does
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from met.trace import Real, atan2, cos, sin, sqrt, where
 Vector = tuple[Real, Real, Real]
 Matrix = tuple[Vector, Vector, Vector]
 Turn = tuple[Real, Real]
+Quaternion = tuple[Real, Real, Real, Real]
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -125,7 +127,7 @@ def rotation_quaternion(w: Real, x: Real, y: Real, z: Real) -> Matrix:
     )
 
 
-def quaternion(R: Matrix) -> tuple[Real, Real, Real, Real]:
+def quaternion(R: Matrix) -> Quaternion:
     """The unit quaternion (w, x, y, z) of a rotation, w >= 0: R turns a vector u as q u q* does.
 
     Of 4 q q' every entry is a sum of entries of R; the row with the largest diagonal entry, which is at least 1, is
@@ -146,6 +148,29 @@ def quaternion(R: Matrix) -> tuple[Real, Real, Real, Real]:
     scale = where(best[0] < 0.0, -0.5, 0.5) / sqrt(size)
     w, x, y, z = (scale * part for part in best)
     return w, x, y, z
+
+
+def quaternion_rpy(roll: Real, pitch: Real, yaw: Real) -> Quaternion:
+    """The unit quaternion of turns about the fixed x, y, z axes in that order, rad: Rz(yaw) Ry(pitch) Rx(roll)."""
+    (cr, sr), (cp, sp), (cy, sy) = ((cos(0.5 * angle), sin(0.5 * angle)) for angle in (roll, pitch, yaw))
+    return (
+        cy * cp * cr + sy * sp * sr,
+        cy * cp * sr - sy * sp * cr,
+        cy * sp * cr + sy * cp * sr,
+        sy * cp * cr - cy * sp * sr,
+    )
+
+
+def composed(a: Quaternion, b: Quaternion) -> Quaternion:
+    """a o b: first the turn b, then a."""
+    w, x, y, z = a
+    c, i, j, k = b
+    return (
+        w * c - (x * i + y * j + z * k),
+        w * i + x * c + (y * k - z * j),
+        w * j + y * c + (z * i - x * k),
+        w * k + z * c + (x * j - y * i),
+    )
 
 
 def rotation_vector(R: Matrix) -> Vector:

@@ -22,7 +22,7 @@ from ic.meaning.values import place_of
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import Joint, Link
+from met.plan import BASE, Joint, Link
 from met.trace import Real, Scalar, sqrt
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -104,10 +104,6 @@ def _stray(scope: Scope, item: Item, block: Block) -> None:
 
 def _link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
     owner = Owner(f"link `{item.name}`", item.place, f"links.{item.name}", homes=homes)
-    if item.name == "base":
-        scope.complaints.error("D084", "`base` is the ground that the arm stands on, so no link may be called so",
-                               item.place, help="give the link another name")
-        return None
     if item.detail:
         scope.complaints.error("D085", f"`{item.detail[0].text}` after the name of a link", item.detail[0].place,
                                help=f"write `link {item.name} {{ ... }}`")
@@ -217,14 +213,14 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str,
                                help=[*(did_you_mean(kind, JOINT_KINDS) if kind else ()),
                                      f"write `joint {item.name} revolute {{ ... }}`, or prismatic, or fixed"])
         return None
-    if item.name in RESERVED:
+    if item.name in (*RESERVED, BASE):
         scope.complaints.error("D166", f"`{item.name}` begins paths of its own, so no joint may be called so",
                                item.place, help="give the joint another name")
         return None
     body = item.body
     check_keys(scope, body, JOINT_KEYS, owner, NOT_OF_A_JOINT)
-    parent = _end(scope, owner, "parent", body.get("parent"), {"base": None, **links})
-    child = _end(scope, owner, "child", body.get("child"), links)
+    parent = _end(scope, owner, "parent", body.get("parent"), {BASE: None, **links})
+    child = _end(scope, owner, "child", body.get("child"), {name: None for name in links if name != BASE})
     if body.get("dh") is not None:
         use_dh(scope, owner, kind, body.items["dh"], body)
     else:
@@ -249,7 +245,7 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping
     name = None if isinstance(item.value, Call) else word_of(item.value)
     if name in known:
         return name
-    if name == "base":
+    if name == BASE:
         scope.complaints.error("D093", "the base cannot be a child", _value_at(item),
                                help="turn the joint round: `parent = base;`")
     elif name is None:
@@ -324,8 +320,8 @@ def check_tree(scope: Scope, name: str, links: list[Link], joints: list[Joint], 
                 help="a closed chain is not in this version; a branch is a parent with two children")
             continue
         holder[joint.child] = joint
-    failed = {link.name for link in links} - set(holder)
-    settled = {"base"} | failed
+    failed = {link.name for link in links} - set(holder) - {BASE}
+    settled = {BASE} | failed
     for link in links:
         chain: list[Joint] = []
         at = link.name

@@ -9,6 +9,7 @@ from typing import Any
 
 from ic.grammar.syntax import Call, Name, Word
 from ic.meaning.arm import Arm, resolve_arm
+from ic.meaning.base import INITIAL, check_base, initial_base, remark_ground, resolve_base
 from ic.meaning.complaints import belongs, known_words
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import find_bare_model, find_model, refuse_values, use_model, word_of
@@ -35,11 +36,11 @@ from met import models, units
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import EnvironmentUse, JointKind, Requirement, Schedule, ServoUse, Structure, Tolerance
+from met.plan import BASE, Base, EnvironmentUse, JointKind, Requirement, Schedule, ServoUse, Structure, Tolerance
 from met.trace import Real, Scalar
 from met.units import PURE
 
-KEYS = ("arm", "servos", "initial", "environment", "rates", "integrator", "duration", "record", "tolerances",
+KEYS = ("arm", "base", "servos", "initial", "environment", "rates", "integrator", "duration", "record", "tolerances",
         "seed")
 BLOCKS = ("servos", "initial", "environment", "rates", "tolerances")
 RATES = ("dynamics", "servos", "record", "base")
@@ -83,10 +84,12 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     if arm is None:
         return None
     scope.gone = arm.lost
+    base, arm = resolve_base(scope, block.get("base"), arm)
     uses, scope.lost = resolve_servos(scope, _body(scope, block.get("servos")), arm)
     substitutions = resolve_substitutions(scope, block, arm, uses)
-    environment, products = _environment(scope, _body(scope, block.get("environment")), arm, duration)
+    environment, products = _environment(scope, _body(scope, block.get("environment")), arm, base, duration)
     _initial(scope, _body(scope, block.get("initial")), arm)
+    initial_base(scope, _body(scope, block.get("initial")), base)
     for use in uses:
         check_rest(scope, use)
         check_start(scope, use)
@@ -112,8 +115,9 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
                             use.words, ticks[use.joint].continuous) for use in uses)  # fmt: skip
     structure = Structure(
         arm.name, arm.links, arm.joints, servos, environment, (), products, integrator.name, schedule, (),
-        substitutions,
+        substitutions, base,
     )  # fmt: skip
+    check_base(scope, base, structure, _body(scope, block.get("environment")), block.get("base"))
     metrics = resolve_metrics(scope, block, structure)
     record = resolve_record(scope, run, block.get("record"), structure)
     structure = replace(structure, metrics=metrics, record=record)
@@ -227,7 +231,7 @@ def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
 
 
 def _environment(
-    scope: Scope, body: Block, arm: Arm, duration: float | None
+    scope: Scope, body: Block, arm: Arm, base: Base | None, duration: float | None
 ) -> tuple[tuple[EnvironmentUse, ...], bool]:
     uses = []
     products = True
@@ -240,7 +244,7 @@ def _environment(
             owner = Owner("the environment", item.place, "environment")
             products = scope.word(owner, ON_OFF, item) != "off"
         else:
-            use = _environment_use(scope, item, arm, duration)
+            use = _environment_use(scope, item, arm, base, duration)
             if use is not None:
                 uses.append(use)
     for statement in body.statements:
@@ -249,7 +253,9 @@ def _environment(
     return tuple(uses), products
 
 
-def _environment_use(scope: Scope, item: Item, arm: Arm, duration: float | None) -> EnvironmentUse | None:
+def _environment_use(
+    scope: Scope, item: Item, arm: Arm, base: Base | None, duration: float | None
+) -> EnvironmentUse | None:
     owner = Owner(f"environment `{item.name}`", item.place, f"environment.{item.name}", homes=item.homes)
     name = word_of(item.value)
     if item.name == "gravity" and name in (None, "gravity", *scope.definitions.lets):
@@ -282,6 +288,8 @@ def _environment_use(scope: Scope, item: Item, arm: Arm, duration: float | None)
                     lost=arm.lost)
         if duration is not None:
             _remark_idle(scope, environment, item, values, duration)
+        if environment.pushes and (base is None or base.kind != "free"):
+            remark_ground(scope, item, arm, base, environment.pushes, values[environment.pushes])
     return EnvironmentUse(item.name, environment.name, None, item.place)
 
 
@@ -310,12 +318,14 @@ def _remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str
 def _initial(scope: Scope, body: Block, arm: Arm) -> None:
     known = dict.fromkeys(("q", "qd"), "")
     known |= {f"{joint.name}.{name}": "" for joint in arm.moving for name in ("q", "qd")}
+    of_base = dict.fromkeys(INITIAL if any(link.name == BASE for link in arm.links) else (), "")
     for item in body.items.values():
         if not item.kind and item.name.partition(".")[0] in arm.lost:
             continue
-        if item.kind or item.name not in known:
+        if item.kind or item.name not in (*known, *INITIAL):
+            there = (*known, *of_base)
             scope.complaints.error("D114", f"no initial `{item.name}`", item.place,
-                                   help=[*did_you_mean(item.name, known), known_words("there is", known)])
+                                   help=[*did_you_mean(item.name, there), known_words("there is", there)])
     for name, unit in (("q", "joint"), ("qd", "joint/s")):
         wanted = Parameter(name=name, unit=unit, default=0.0, doc=f"initial {name}")
         general = body.get(name)

@@ -320,12 +320,24 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     spot = replace(owner, label=told, called=told, place=place, path=f"{owner.path}.command", local="command",
                    homes=item.homes, command=kind)
     assert kind in COMMAND_UNIT
+    value = replace(item, name="command")
+    model = use_course(scope, spot, inner, value, doc=f"{kind} asked", column=owner.path.removesuffix(".servo"))
+    return None if model is None else Command(kind, model)
+
+
+def use_course(scope: Scope, spot: Owner, inner: Expression, item: Item, *, doc: str, column: str,
+               body: Block | None = None) -> str | None:
+    """A value, or a course in time, entered in the scope under the path of `spot`: its model; None where there is none.
+
+    item    the entry that says it, whose expression is, or holds, `inner`;  body: what of the course is written apart
+    doc     what a value means;  column: of a CSV file, unless one is named
+    """
     name = word_of(inner) if isinstance(inner, Call) else None
     if name is None or name in ("sqrt", "sin", "cos", "min", "max"):
         constant = models.find_own("command")["constant"]
         (value,) = constant.parameters
-        scope.number(spot, replace(value, doc=f"{kind} asked"), replace(item, name="command"), expression=inner)
-        return Command(kind, "constant")
+        scope.number(spot, replace(value, doc=doc), item, expression=inner)
+        return "constant"
     assert isinstance(inner, Call)
     profile = find_model(scope, "command", name, inner.name.place)
     if profile is None:
@@ -333,15 +345,17 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     inner = with_file_named(inner) if profile.from_file else inner
     if refuse_values(scope, inner, [p.name for p in profile.written]):
         return None
-    _, body = open_call(inner, None, scope.complaints)
-    opened = Block({key: replace(part, homes=item.homes, overrides=item.overrides)
-                    for key, part in (body or Block()).items.items()}, (body or Block()).statements)
+    _, named = open_call(inner, None, scope.complaints)
+    inside = {key: replace(part, homes=item.homes, overrides=item.overrides)
+              for key, part in (named or Block()).items.items()}
+    apart = body or Block()
+    opened = Block(inside | dict(apart.items), (*(named or Block()).statements, *apart.statements))
     course = replace(spot, label=f"`{name}`", called=None, place=inner.name.place)
     if profile.from_file:
-        use_file(scope, course, profile, opened, owner.path.removesuffix(".servo"))
-        return Command(kind, profile.name)
+        use_file(scope, course, profile, opened, column)
+        return profile.name
     use_model(scope, course, profile.parameters, opened)
-    return Command(kind, profile.name)
+    return profile.name
 
 
 def _asked(scope: Scope, command: Call) -> Expression:
@@ -350,6 +364,11 @@ def _asked(scope: Scope, command: Call) -> Expression:
     if isinstance(inner, String):
         raise Problem(error("D151", "a command is about a value or a course in time, and this is text", inner.place,
                             help=f"write `{command.name.text}(trajectory(...))` for a column of a CSV file"))
+    return course_named(scope, inner)
+
+
+def course_named(scope: Scope, inner: Expression) -> Expression:
+    """The name of a course alone, and of nothing else, is that course with nothing written."""
     if isinstance(inner, Name) and inner.text in models.available("command") and not scope.names.knows(inner.text):
         return Call(inner, (), (), None, inner.place)
     return inner

@@ -88,6 +88,8 @@ class Environment:
     loads  (p, world) -> Loads
     idle   (p, duration) -> the parameters because of which it never acts in a run of that length (s), and why, in
            words; None where it may act. Asked where all its numbers are constants. None: it always may
+    pushes the parameter that names the one link that it acts upon: a deck that names one which is part of the ground
+           is warned. "": none does
     """
 
     name: str
@@ -95,3 +97,4 @@ class Environment:
     parameters: tuple[Parameter, ...] = ()
     loads: Callable[[Any, World], Loads]
     idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None
+    pushes: str = ""

@@ -48,4 +48,5 @@ ENVIRONMENT = Environment(
     ),
     loads=loads,
     idle=idle,
+    pushes="link",
 )

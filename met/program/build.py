@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 
 from met.channel import Channel
 from met.plan import Experiment
+from met.program import base
 from met.program.evaluation import law
 from met.program.machine import PARAMETER, Actuator, Machine
 from met.program.observe import derived
@@ -95,6 +96,8 @@ class Builder:
         for joint in self.joints:
             for name in ("q", "qd"):
                 tape.write(f"{joint}.{name}", self.machine.value(f"initial.{joint}.{name}", tape.read))
+        if self.machine.structure.free:
+            base.start(self.machine, tape)
         for actuator in self.machine.working:
             self._start_servo(tape, actuator)
         for name, metric, _ in self.machine.metrics:

@@ -9,6 +9,7 @@ from met.dynamics.recursion import Solved, solve
 from met.dynamics.tree import Tree
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
+from met.program.base import Base, base_of, slopes_of_base
 from met.program.machine import Actuator, Machine, ReadCell
 from met.program.values import Values, answer, parameters, returned
 from met.program.world import ArmWorld
@@ -28,6 +29,7 @@ class Derivative:
     solved   the recursion's own results
     shown    what servos show of this stage, by channel
     gravity  acceleration of free fall, of all environment models, world axes, m/s^2
+    base     where the base is and how it moves
     """
 
     slope: Slope
@@ -36,6 +38,7 @@ class Derivative:
     solved: Solved
     shown: Mapping[str, Real]
     gravity: Vector
+    base: Base
 
 
 def derivative(
@@ -64,9 +67,9 @@ def derivative(
             for i, actuator in enumerate(machine.actuators)
         )
     drives = tuple(None if each is None else each.drive for each in driven)
-    tree = machine.tree(read)
+    tree, base, n = machine.tree(read), base_of(machine, read, y, time), len(machine.joints)
     with part("environment"):
-        gravity, torques, wrenches = _environment(machine, tree, read, y, time, begin)
+        gravity, torques, wrenches = _environment(machine, tree, read, y, base, time, begin)
 
     told = told or {}
     given: list[Real] = []
@@ -94,25 +97,29 @@ def derivative(
     with part("dynamics"):
         solved = solve(
             tree,
-            y.q,
-            y.qd,
+            y.q[:n],
+            y.qd[:n],
             tau=tuple(a - b for a, b in zip(smooth, dry, strict=True)),
             qdd=tuple(given),
             mode=tuple(mode),
             rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
-            gravity=gravity,
+            gravity=base.to_base(gravity),
+            base_acceleration=(base.wd, base.a),
+            base_rate=base.w,
             wrenches=wrenches,
             velocity_products=machine.structure.velocity_products,
         )
     slopes, state_needs = _slopes(machine, driven, friction)
     needs = {joint.name: a - b for joint, a, b in zip(machine.joints, smooth, solved.tau_load, strict=True)}
+    qd, qdd = slopes_of_base(base, solved.base_acceleration, y) if machine.structure.free else ((), ())
     return Derivative(
-        slope=Slope(y.qd, solved.qdd, slopes),
+        slope=Slope((*y.qd[:n], *qd), (*solved.qdd, *qdd), slopes),
         tau=tuple(a - b for a, b in zip(solved.tau, torques, strict=True)),
         need=needs | state_needs,
         solved=solved,
         shown={path: value for each in driven if each is not None for path, value in each.shown.items()},
         gravity=gravity,
+        base=base,
     )
 
 
@@ -182,10 +189,10 @@ def _slopes(
 
 
 def _environment(
-    machine: Machine, tree: Tree, read: ReadCell, y: Motion, time: Real, begin: Real
+    machine: Machine, tree: Tree, read: ReadCell, y: Motion, base: Base, time: Real, begin: Real
 ) -> tuple[Vector, list[Real], dict[str, tuple[Vector, Vector]]]:
     """Sum of all loads: gravity (world), torque a joint, wrench a link (moment about its origin, force; link axes)."""
-    world = ArmWorld(machine, read, tree, y.q, y.qd, time, begin)
+    world = ArmWorld(machine, read, tree, y, base, time, begin)
     gravity: list[Real] = [0.0, 0.0, 0.0]
     torques: list[Real] = [0.0 for _ in machine.joints]
     wrenches: dict[str, tuple[Vector, Vector]] = {}

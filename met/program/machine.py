@@ -15,16 +15,18 @@ from met import models
 from met.channel import Channel, channels
 from met.commands.profile import Profile
 from met.diagnostic import Problem, error
+from met.dynamics.spatial import Six
 from met.dynamics.tree import Body, Tree
 from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Integrator
 from met.metrics.metric import Metric
-from met.plan import Experiment, Formula, Joint, ServoUse, Structure
+from met.plan import BASE, Experiment, Formula, Joint, ServoUse, Structure
+from met.program.courses import recorded
 from met.program.values import Values, answer, parameters, returned
 from met.servos.servo import Asked, Drive, JointMotion, Parts, Servo
 from met.substitution import Bed, Law
-from met.trace import Graph, Real, Scalar
+from met.trace import Formulas, Graph, Real, Scalar
 from met.vectors import Vector
 
 PARAMETER, TREE = "parameter:", "tree:"
@@ -140,6 +142,11 @@ class Machine:
         )  # fmt: skip
 
     @cached_property
+    def courses(self) -> Formulas:
+        """Of a prescribed base: how it moves, as formulas of time (`met.program.courses`)."""
+        return recorded(self.experiment)
+
+    @cached_property
     def varying(self) -> tuple[str, ...]:
         """Paths of the parameters that vary with the case."""
         return tuple(sorted(path for path, q in self.experiment.parameters.items() if isinstance(q.value, Formula)))
@@ -211,6 +218,12 @@ class Machine:
         def vector(path: str) -> tuple[Real, Real, Real]:
             return tuple(self.value(f"{path}.{axis}", read) for axis in "xyz")
 
+        def inertia(link: str) -> Six:
+            xx, yy, zz, xy, xz, yz = (
+                self.value(f"links.{link}.inertia.{entry}", read) for entry in ("xx", "yy", "zz", "xy", "xz", "yz")
+            )
+            return xx, yy, zz, xy, xz, yz
+
         joints = {joint.child: joint for joint in self.structure.joints}
         bodies = []
         for link in self._link_order():
@@ -220,7 +233,7 @@ class Machine:
                     name=link.name,
                     joint=joint.name,
                     kind=joint.kind,
-                    parent=-1 if joint.parent == "base" else numbers[joint.parent],
+                    parent=-1 if joint.parent == BASE else numbers[joint.parent],
                     at=vector(f"{joint.name}.at"),
                     rpy=vector(f"{joint.name}.rpy"),
                     axis=(0.0, 0.0, 1.0) if joint.kind == "fixed" else vector(f"{joint.name}.axis"),
@@ -230,7 +243,11 @@ class Machine:
                     inertia=self.inertia(link.name, read),
                 )
             )
-        return Tree.build(tuple(bodies), tuple(joint.name for joint in self.joints))
+        if any(link.name == BASE for link in self.structure.links):
+            head = f"links.{BASE}"
+            mass = self.value(f"{head}.mass", read)
+            bodies.append(Body(BASE, "", "fixed", -1, mass=mass, com=vector(f"{head}.com"), inertia=inertia(BASE)))
+        return Tree.build(tuple(bodies), tuple(joint.name for joint in self.joints), free=self.structure.free)
 
     def _has_pivot(self, joint: Joint) -> bool:
         return f"{joint.name}.pivot.x" in self.experiment.parameters

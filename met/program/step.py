@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from met.integrators.integrator import Motion, Slope
-from met.program import cells, friction
+from met.program import base, cells, friction
 from met.program.asking import Question, advanced, asked, inconstant
 from met.program.evaluation import Derivative, derivative, driven_by
 from met.program.machine import Actuator, Machine
@@ -44,9 +44,10 @@ class Step:
         self.beds = Substituted(machine, self.loads, wire=wire, late=late)
         self.schedule = machine.structure.schedule
         self.joints = tuple(joint.name for joint in machine.joints)
+        self.coordinates = base.coordinates(machine)
         self.states = machine.states
         self.sticking = sticking(machine)
-        self._asked = asked(machine.integrator, len(self.joints), len(self.states), self.schedule.step)
+        self._asked = asked(machine.integrator, len(self.coordinates), len(self.states), self.schedule.step)
         self._derive = Call(Phase("derive", self.derive))
         self._slope = Call(Phase("slope", self.slope))
         self._decide = (
@@ -157,30 +158,33 @@ class Step:
         """The derivative at the state, with everything that is recorded of it, and whether all is well with it."""
         y = self._state(tape)
         found = self._derivative(tape, y, tape.read("fraction"))
-        for i, joint in enumerate(self.joints):
-            tape.write(f"{joint}.qdd", found.slope.qdd[i])
-            tape.write(f"{joint}.tau", found.tau[i])
+        for i, name in enumerate(self.coordinates):
+            tape.write(f"{name}.qdd", found.slope.qdd[i])
+            if name in self.joints:
+                tape.write(f"{name}.tau", found.tau[i])
         for name in self._needs:
             tape.write(f"need:{name}", found.need[name])
         for name, slope in zip(self.states, found.slope.xd, strict=True):
             tape.write(f"slope:{name}", slope)
         for channel, value in found.shown.items():
             tape.write(channel, value)
-        singular: Real = 0.0
+        singular: Real = where(found.solved.base_singular, float(len(self.joints) + 1), 0.0)
         for i in reversed(range(len(self.joints))):
             singular = where(found.solved.singular[i], float(i + 1), singular)
         tape.write("singular", singular)
         # Infinities that cancel leave not a number, so a plain sum misses none; a sum of numbers that is none only
         # makes `judge` look.
-        hidden = [found.need[name] for name in self._needs]
-        total: Real = sum((*found.slope.qdd, *found.slope.xd, *y.q, *y.qd, *hidden), 0.0)
+        parts = (*found.slope.qdd, *found.slope.xd, *y.q, *y.qd, *(found.need[name] for name in self._needs))
+        total: Real = sum((*parts, *base.orientation(self.machine, tape)), 0.0)
         tape.write_mask("suspect", either(not_(isfinite(total)), singular != 0.0))
 
     def slope(self, tape: Tape) -> None:
         """The derivative at a stage on the way, its slopes alone."""
         found = self._derivative(tape, self._state(tape, STAGE), tape.read(f"{STAGE}fraction"))
-        for joint, qdd in zip(self.joints, found.slope.qdd, strict=True):
+        for joint, qdd in zip(self.coordinates, found.slope.qdd, strict=True):
             tape.write(f"{STAGE}{joint}.qdd", qdd)
+        for joint, qd in zip(self.coordinates[len(self.joints):], found.slope.qd[len(self.joints):], strict=True):
+            tape.write(f"{STAGE}{joint}.qd", qd)  # of a turn no rate of the state
         for name, slope in zip(self.states, found.slope.xd, strict=True):
             tape.write(f"{STAGE}slope:{name}", slope)
 
@@ -197,6 +201,10 @@ class Step:
         """
         cause: Real = 0.0
         number: Real = 0.0
+        if base.free(self.machine):
+            told = [f"{name}.{part}" for name in base.free(self.machine) for part in ("qdd", "q", "qd")]
+            of_base = sum((tape.read(name) for name in told), sum(base.orientation(self.machine, tape), 0.0))
+            cause, number = where(isfinite(of_base), cause, NOT_FINITE), float(len(self.joints))
         for i, joint in reversed(list(enumerate(self.joints))):
             told = [f"{joint}.qdd", f"{joint}.q", f"{joint}.qd"]
             told += [f"need:{name}" for name in self._needs if name == joint or name.startswith(f"{joint}.servo.")]
@@ -223,7 +231,8 @@ class Step:
     def observed(self, tape: Tape) -> Observed:
         """The arm at an instant, with the derivative that `derive` took of it."""
         y = self._state(tape)
-        return Observed(self.machine, self.machine.tree(tape.read), y, lambda: self._derivative(tape, y, 0.0))
+        stands = base.base_of(self.machine, tape.read, y, tape.read("instant"))
+        return Observed(self.machine, self.machine.tree(tape.read), y, stands, lambda: self._derivative(tape, y, 0.0))
 
     def _derivative(
         self, tape: Tape, y: Motion, fraction: Real, told: dict[int, Real] | None = None
@@ -275,7 +284,7 @@ class Step:
             question = self._integrate(tape, settled, fraction)
             if not isinstance(question, Question):
                 raise inconstant(self.machine.integrator)
-            cells.store(tape, True, self.joints, self.states, question.there, STAGE)
+            cells.store(tape, True, self.coordinates, self.states, question.there, STAGE)
             tape.write(f"{STAGE}fraction", fraction + question.share * (1.0 - fraction))
 
         return body
@@ -291,10 +300,12 @@ class Step:
                 raise inconstant(self.machine.integrator)
             if self.sticking:
                 crossed = any_of(friction.crossings(self._sliding(tape), y_new))
-                cells.store(tape, True, self.joints, self.states, y, FROM)
+                cells.store(tape, True, self.coordinates, self.states, y, FROM)
+                base.keep_orientation(self.machine, tape, FROM)
                 tape.write_mask("crossing", both(active, crossed))
                 tape.write_mask("again", False)
-            cells.store(tape, active, self.joints, self.states, y_new)
+            cells.store(tape, active, self.coordinates, self.states, y_new)
+            base.turn(self.machine, tape, active, y_new)
 
         return body
 
@@ -302,15 +313,15 @@ class Step:
         """Runs the integrator with the first `settled` slopes from cells, up to the next question or to its end."""
         y = self._state(tape)
         if settled:
-            for joint in self.joints:
+            for joint in self.coordinates:
                 for part in ("qd", "qdd"):
                     tape.write(f"k{settled}:{joint}.{part}", tape.read(f"{STAGE}{joint}.{part}"))
             for name in self.states:
                 tape.write(f"k{settled}:{name}", tape.read(f"{STAGE}slope:{name}"))
         answers = [
             Slope(
-                tuple(tape.read(f"k{n}:{joint}.qd") for joint in self.joints),
-                tuple(tape.read(f"k{n}:{joint}.qdd") for joint in self.joints),
+                tuple(tape.read(f"k{n}:{joint}.qd") for joint in self.coordinates),
+                tuple(tape.read(f"k{n}:{joint}.qdd") for joint in self.coordinates),
                 tuple(tape.read(f"k{n}:{name}") for name in self.states),
             )
             for n in range(1, settled + 1)
@@ -322,7 +333,7 @@ class Step:
         """The first stage's slope, as `derive` left it; qd are the rates then."""
         return Slope(
             qd,
-            tuple(tape.read(f"{joint}.qdd") for joint in self.joints),
+            tuple(tape.read(f"{joint}.qdd") for joint in self.coordinates),
             tuple(tape.read(f"slope:{name}") for name in self.states),
         )
 
@@ -336,7 +347,7 @@ class Step:
         reached = friction.split_at_rest(
             y,
             self._first_slope(tape, y.qd),
-            self._state(tape),
+            cells.state(tape, self.coordinates, self.states),
             left * self.schedule.step,
             self._sliding(tape),
             may_split=may_split,
@@ -347,7 +358,8 @@ class Step:
         cells.count(tape, both(active, may_split), "splits")
         cells.count(tape, both(active, may_split), "friction.splits")
         cells.count(tape, both(active, not_(may_split)), "friction.clamped")
-        cells.store(tape, active, self.joints, self.states, reached.y)
+        cells.store(tape, active, self.coordinates, self.states, reached.y)
+        base.turn(self.machine, tape, active, reached.y, FROM)
 
     def carry(self, tape: Tape) -> None:
         """The slope of the step just done, for servos that tick before the next; none for what is at rest and rubs."""
@@ -366,16 +378,18 @@ class Step:
     # What the phases share.
 
     def _state(self, tape: Tape, copy: str = "") -> Motion:
-        return cells.state(tape, self.joints, self.states, copy)
+        """The state, or a copy of it: a stage's as it is, another where a (sub)step begins."""
+        y = cells.state(tape, self.coordinates, self.states, copy)
+        return y if copy == STAGE else base.begun(self.machine, y)
 
     def _friction(self, tape: Tape) -> dict[str, Real]:
         return {each.name: tape.read(f"friction:{each.name}") for each in self.sticking}
 
     def _sliding(self, tape: Tape) -> list[Real | None]:
         """Friction modes as crossings count them: zero, so that it never crosses, where a case has no friction."""
-        modes: list[Real | None] = [None] * (len(self.joints) + len(self.states))
+        modes: list[Real | None] = [None] * (len(self.coordinates) + len(self.states))
         for each in self.sticking:
             mode = tape.read(f"friction:{each.name}")
-            number = each.number + (len(self.joints) if each.state else 0)
+            number = each.number + (len(self.coordinates) if each.state else 0)
             modes[number] = where(self.rubs(tape, each.name), mode, 0.0)
         return modes

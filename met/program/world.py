@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from met.diagnostic import Problem, error
-from met.dynamics.kinematics import LinkMotion, link_motions
+from met.dynamics.kinematics import LinkMotion
 from met.dynamics.spatial import HERE
 from met.dynamics.tree import Tree
+from met.integrators.integrator import Motion
 from met.parameter import WORLD
+from met.program.base import Base, motions
 from met.program.machine import Machine, ReadCell
 from met.trace import Real
 from met.vectors import ZERO, Matrix, Vector
@@ -16,8 +18,7 @@ class ArmWorld:
     """A `met.environments.environment.World` at one stage."""
 
     def __init__(
-        self, machine: Machine, read: ReadCell, tree: Tree, q: tuple[Real, ...], qd: tuple[Real, ...], time: Real,
-        begin: Real,
+        self, machine: Machine, read: ReadCell, tree: Tree, y: Motion, base: Base, time: Real, begin: Real
     ) -> None:
         self.time, self.begin = time, begin
         self.step = machine.structure.schedule.step
@@ -25,7 +26,8 @@ class ArmWorld:
         self.links = tuple(link.name for link in machine.structure.links)
         self._sliding = {joint.name: joint.kind == "prismatic" for joint in machine.joints}
         self._machine, self._read = machine, read
-        self._tree, self._q, self._qd = tree, q, qd
+        n = len(self.joints)
+        self._tree, self._q, self._qd, self._base = tree, y.q[:n], y.qd[:n], base
         self._motions: dict[str, LinkMotion] | None = None
 
     def slides(self, joint: str) -> bool:
@@ -69,7 +71,7 @@ class ArmWorld:
         if self.is_ground(link):
             return LinkMotion(HERE, ZERO, ZERO)
         if self._motions is None:
-            self._motions = link_motions(self._tree, self._q, self._qd)
+            self._motions = motions(self._tree, self._q, self._qd, self._base)
         if link not in self._motions:
             message = f"an environment model asks for link `{link}`, which the arm does not have"
             raise Problem(error("E218", message, help=f"links: {', '.join(self.links)}"))

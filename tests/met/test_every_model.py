@@ -76,6 +76,9 @@ SMALLEST: dict[tuple[str, str], dict[str, str]] = {
     ("servo", "ideal"): {"servos": "hinge = follow { command = rate(0.5 rad/s); };"},
     ("servo", "passive"): {"more": "servo rub { model = passive; friction = 1 N*m; }", "servos": "hinge = rub;"},
     ("servo", "locked"): {"more": "servo lock { model = locked; release = 0.1 s; }", "servos": "hinge = lock;"},
+    ("environment", "attitude_hold"): {
+        "environment": "hold = attitude_hold { link = tip; stiffness = [3, 4, 5] N*m/rad; axes = world; };"
+    },
     ("environment", "gravity"): {},
     ("environment", "joint_damping"): {"environment": "grease = joint_damping { damping = 1 N*m*s/rad; };"},
     ("environment", "wrench"): {"environment": "push = wrench { link = tip; force = [1, 2, 3] N; until = 0.1 s; };"},
