@@ -20,6 +20,7 @@ from ic.meaning.schedule import Rate, base_rate, check_stability, divisor, faste
 from ic.meaning.scope import Scope
 from ic.meaning.servos import RATE, Use, check_rest, check_start, fixed_rate, resolve_servos
 from ic.meaning.substitution import check_ticks, resolve_substitutions
+from ic.meaning.tables import use_table
 from ic.meaning.tolerances import resolve_tolerances
 from ic.meaning.values import Value, Values, place_of
 from met import models, units
@@ -263,10 +264,15 @@ def _environment_use(scope: Scope, item: Item, arm: Arm, duration: float | None)
                                      known_words("models", sorted(models.available("environment")))])
         return None
     environment = find_model(scope, "environment", name, place_of(item.value))
-    if environment is None or refuse_values(scope, item.value, [p.name for p in environment.parameters]):
+    if environment is None or refuse_values(scope, item.value, [p.name for p in environment.written]):
         return None
     owner = replace(owner, joint=_kind_of_joint(environment, item.body or Block(), arm))
-    values = use_model(scope, owner, environment.parameters, item.body or Block())
+    body = item.body or Block()
+    if environment.from_file and body.get("file") is not None:
+        values = use_table(scope, owner, environment, body)
+    else:
+        values = use_model(scope, owner, environment.parameters, body,
+                           extra=[each.name for each in environment.written[len(environment.parameters):]])
     if values is not None:
         known = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
         check_names(scope, item.place, environment.parameters, item.body or Block(), values, arm=arm.name, known=known,

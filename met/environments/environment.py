@@ -81,6 +81,9 @@ class Loads:
     forces: tuple[Force, ...] = ()
 
 
+FILE = Parameter(name="file", shape="text", default="none", doc="CSV file whose columns the lists are, in their stead")
+
+
 @frozen(kw_only=True)
 class Environment:
     """The declaration of an environment model; one a file.
@@ -88,6 +91,8 @@ class Environment:
     loads  (p, world) -> Loads
     idle   (p, duration) -> the parameters because of which it never acts in a run of that length (s), and why, in
            words; None where it may act. Asked where all its numbers are constants. None: it always may
+    from_file  a deck may write `file` in the stead of the lists: they are then the columns of their names, and the
+           list that rises is the column `time`
     """
 
     name: str
@@ -95,3 +100,9 @@ class Environment:
     parameters: tuple[Parameter, ...] = ()
     loads: Callable[[Any, World], Loads]
     idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None
+    from_file: bool = False
+
+    @property
+    def written(self) -> tuple[Parameter, ...]:
+        """The parameters as a deck writes them."""
+        return (*self.parameters, FILE) if self.from_file else self.parameters

@@ -78,6 +78,9 @@ SMALLEST: dict[tuple[str, str], dict[str, str]] = {
     ("servo", "locked"): {"more": "servo lock { model = locked; release = 0.1 s; }", "servos": "hinge = lock;"},
     ("environment", "gravity"): {},
     ("environment", "joint_damping"): {"environment": "grease = joint_damping { damping = 1 N*m*s/rad; };"},
+    ("environment", "wrench_table"): {
+        "environment": "load = wrench_table { link = tip; times = [0, 0.1, 0.15] s; force_z = [0, 9, 2] N; };"
+    },
     ("environment", "wrench"): {"environment": "push = wrench { link = tip; force = [1, 2, 3] N; until = 0.1 s; };"},
     ("environment", "spring"): {"environment": "line = spring { link = tip; stiffness = 90 N/m; length = 1 m; };"},
     ("environment", "bushing"): {
