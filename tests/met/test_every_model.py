@@ -87,6 +87,10 @@ SMALLEST: dict[tuple[str, str], dict[str, str]] = {
         "environment": "mount = bushing { link = tip; to = bar; to_at = [1, 0, 0] m; stiffness = [90, 50, 10] N/m;"
         "  turning = [5, 6, 7] N*m/rad; };"
     },
+    ("environment", "joint_stop"): {
+        "environment": "end = joint_stop { joint = slide; lower = -1 mm; upper = 5 mm; stiffness = 900 N/m;"
+        "  dissipation = 0.5 s/m; };"
+    },
     ("environment", "plume"): {
         "environment": "jet = plume { link = tip; width = 0.2 m; height = 0.1 m; nozzle = [1, 0, 2] m;"
         "  axis = [0, 0, -1]; thrust = 50 N; exponent = 5; duty = 50 %; period = 0.03 s; };"
