@@ -77,6 +77,9 @@ SMALLEST: dict[tuple[str, str], dict[str, str]] = {
     ("servo", "passive"): {"more": "servo rub { model = passive; friction = 1 N*m; }", "servos": "hinge = rub;"},
     ("servo", "locked"): {"more": "servo lock { model = locked; release = 0.1 s; }", "servos": "hinge = lock;"},
     ("environment", "gravity"): {},
+    ("environment", "gravity_gradient"): {
+        "environment": "orbit = gravity_gradient { radius = 6778 km; frame = orbital; };"
+    },
     ("environment", "joint_damping"): {"environment": "grease = joint_damping { damping = 1 N*m*s/rad; };"},
     ("environment", "wrench_table"): {
         "environment": "load = wrench_table { link = tip; times = [0, 0.1, 0.15] s; force_z = [0, 9, 2] N; };"
