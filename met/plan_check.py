@@ -371,6 +371,7 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
     structure, parameters = experiment.structure, experiment.parameters
     known: set[str] = set()
     models_of = heads_of_models(structure)
+    relations.check_uses(experiment, of_environment(structure), where)  # first, for units go by a model's joint
     for path, unit, _, parameter in declared(experiment):
         if path in known:
             raise Damaged(where, f"two things are called `{path}`")
@@ -391,7 +392,6 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
     for course in structure.base.courses if structure.base is not None else ():
         if course.model in TABLES:
             _check_table(experiment, f"base.{course.component}", TABLES[course.model], where)
-    relations.check_uses(experiment, of_environment(structure), where)
     _check_bodies(experiment, where)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ic.grammar.syntax import Name
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block
 from ic.meaning.owner import XYZ, Owner
@@ -37,27 +38,30 @@ def check_relations(scope: Scope, owner: Owner, parameters: Iterable[Parameter],
             _check_list(scope, owner, wanted, body, values, place)
 
 
-def check_names(scope: Scope, item_place: Place, parameters: Iterable[Parameter], body: Block,
-                values: Mapping[str, Any], *, arm: str, known: Mapping[str, list[str]], lost: Iterable[str]) -> None:
-    """Tells of words that should name a link or joint of the arm. known: those that there are, by kind; lost: those
-    that failed, of which nothing can be said."""
+def check_names(scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: Block, *, arm: str,
+                known: Mapping[str, list[str]], lost: Iterable[str]) -> dict[str, str]:
+    """Tells of words that should name a link or joint of the arm; the words, as written or by default.
+
+    known  what there is, by kind;  lost  what failed, of which nothing can be said
+    """
+    words: dict[str, str] = {}
     for wanted in parameters:
-        if not wanted.names:
-            continue
-        given = body.get(wanted.name)
-        place = place_of(given.value) if given is not None and given.value is not None else item_place
-        if values[wanted.name] == WORLD and WORLD in known["link"]:
+        item = body.get(wanted.name)
+        named = isinstance(item.value, Name) if item is not None else isinstance(wanted.default, str)
+        if not wanted.names or not named:
+            continue  # no word at all is told of where words are read
+        word = item.value.text if item is not None and isinstance(item.value, Name) else str(wanted.default)
+        names, place = [*known[wanted.names], *wanted.words], _place(owner, body, wanted.name)
+        if word == WORLD and WORLD in known["link"] and WORLD not in words.values():
             scope.complaints.error("D159", f"`{WORLD}` is the ground here, and a link of arm `{arm}`", place,
                                    help="give the link another name")
-            return
-        if values[wanted.name] in (*known[wanted.names], *wanted.words, *lost):
-            continue
-        names = [*known[wanted.names], *wanted.words]
-        scope.complaints.error("D159", f"no {wanted.names} `{values[wanted.name]}` in arm `{arm}`", place,
-                               help=[*did_you_mean(values[wanted.name], names),
-                                     known_words(f"{wanted.names}s", known[wanted.names]),
-                                     *([f"or {' or '.join(f'`{word}`' for word in wanted.words)}"]
-                                       if wanted.words else [])])
+        elif word not in (*names, *lost):
+            others = [f"or {' or '.join(f'`{each}`' for each in wanted.words)}"] if wanted.words else []
+            scope.complaints.error("D159", f"no {wanted.names} `{word}` in arm `{arm}`", place,
+                                   help=[*did_you_mean(word, names),
+                                         known_words(f"{wanted.names}s", known[wanted.names]), *others])
+        words[wanted.name] = word
+    return words
 
 
 def no_direction(parts: np.ndarray) -> tuple[np.ndarray, list[str]]:

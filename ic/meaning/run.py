@@ -30,13 +30,14 @@ from ic.meaning.schedule import (
 from ic.meaning.scope import Scope
 from ic.meaning.servos import RATE, Use, check_rest, check_start, fixed_rate, resolve_servos
 from ic.meaning.substitution import check_ticks, resolve_substitutions
+from ic.meaning.tables import use_table
 from ic.meaning.tolerances import resolve_tolerances
 from ic.meaning.values import Value, Values, place_of
 from met import models, units
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import BASE, Base, EnvironmentUse, JointKind, Requirement, Schedule, ServoUse, Structure, Tolerance
+from met.plan import BASE, Base, EnvironmentUse, Requirement, Schedule, ServoUse, Structure, Tolerance
 from met.trace import Real, Scalar
 from met.units import PURE
 
@@ -278,27 +279,28 @@ def _environment_use(
                                      known_words("models", sorted(models.available("environment")))])
         return None
     environment = find_model(scope, "environment", name, place_of(item.value))
-    if environment is None or refuse_values(scope, item.value, [p.name for p in environment.parameters]):
+    if environment is None or refuse_values(scope, item.value, [p.name for p in environment.written]):
         return None
-    owner = replace(owner, joint=_kind_of_joint(environment, item.body or Block(), arm))
-    values = use_model(scope, owner, environment.parameters, item.body or Block())
-    if values is not None:
-        known = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
-        check_names(scope, item.place, environment.parameters, item.body or Block(), values, arm=arm.name, known=known,
-                    lost=arm.lost)
-        if duration is not None:
-            _remark_idle(scope, environment, item, values, duration)
-        if environment.pushes and (base is None or base.kind != "free"):
-            remark_ground(scope, item, arm, base, environment.pushes, values[environment.pushes])
+    body = item.body or Block()
+    known = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
+    named = check_names(scope, owner, environment.parameters, body, arm=arm.name, known=known, lost=arm.lost)
+    about = next((named[p.name] for p in environment.parameters if p.names == "joint" and p.name in named), None)
+    if about is not None:  # what the unit words `joint` and `effort` mean
+        kinds = {joint.name: joint.kind for joint in arm.moving}
+        if about not in kinds:  # which was told: without its joint, nothing can be said of the model's units
+            scope.checks.fail(owner.path)
+            return EnvironmentUse(item.name, environment.name, None, item.place)
+        owner = replace(owner, joint=kinds[about])
+    if environment.from_file and body.get("file") is not None:
+        values = use_table(scope, owner, environment, body)
+    else:
+        values = use_model(scope, owner, environment.parameters, body,
+                           extra=[each.name for each in environment.written[len(environment.parameters):]])
+    if values is not None and duration is not None:
+        _remark_idle(scope, environment, item, values, duration)
+    if values is not None and environment.pushes and (base is None or base.kind != "free"):
+        remark_ground(scope, item, arm, base, environment.pushes, values[environment.pushes])
     return EnvironmentUse(item.name, environment.name, None, item.place)
-
-
-def _kind_of_joint(environment: Any, body: Block, arm: Arm) -> JointKind:
-    """Of the joint that the model names: what the unit words `joint` and `effort` mean."""
-    named = next((p.name for p in environment.parameters if p.names == "joint"), "")
-    given = body.get(named)
-    word = word_of(given.value) if given is not None else None
-    return next((joint.kind for joint in arm.moving if joint.name == word), "revolute")
 
 
 def _remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str, Any], duration: float) -> None:

@@ -81,6 +81,9 @@ class Loads:
     forces: tuple[Force, ...] = ()
 
 
+FILE = Parameter(name="file", shape="text", default="none", doc="CSV file whose columns the lists are, in their stead")
+
+
 @frozen(kw_only=True)
 class Environment:
     """The declaration of an environment model; one a file.
@@ -90,6 +93,8 @@ class Environment:
            words; None where it may act. Asked where all its numbers are constants. None: it always may
     pushes the parameter that names the one link that it acts upon: a deck that names one which is part of the ground
            is warned. "": none does
+    from_file  a deck may write `file` in the stead of the lists: they are then the columns of their names, and the
+           list that rises is the column `time`
     """
 
     name: str
@@ -98,3 +103,9 @@ class Environment:
     loads: Callable[[Any, World], Loads]
     idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None
     pushes: str = ""
+    from_file: bool = False
+
+    @property
+    def written(self) -> tuple[Parameter, ...]:
+        """The parameters as a deck writes them."""
+        return (*self.parameters, FILE) if self.from_file else self.parameters

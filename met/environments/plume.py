@@ -154,7 +154,7 @@ ENVIRONMENT = Environment(
         ),
         Parameter(
             name="reaction", shape="word", words=("off", "on"), default="off",
-            doc="whether the thruster pushes the link that it is on",
+            doc="whether the thruster pushes the link that it is on; the ground does not feel it",
         ),
         *firing.FIRING,
     ),

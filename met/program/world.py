@@ -55,13 +55,13 @@ class ArmWorld:
         return self.link(link).rate()
 
     def mass(self, link: str) -> Real:
-        return self._machine.mass(link, self._read)
+        return self._machine.mass(self._own(link), self._read)
 
     def com(self, link: str) -> Vector:
-        return self._machine.com(link, self._read)
+        return self._machine.com(self._own(link), self._read)
 
     def inertia(self, link: str) -> tuple[Real, Real, Real, Real, Real, Real]:
-        return self._machine.inertia(link, self._read)
+        return self._machine.inertia(self._own(link), self._read)
 
     def is_ground(self, link: str) -> bool:
         """Whether this names the ground. Where the arm has a link of that name, no model's parameter is that word."""
@@ -72,10 +72,13 @@ class ArmWorld:
             return LinkMotion(HERE, ZERO, ZERO)
         if self._motions is None:
             self._motions = motions(self._tree, self._q, self._qd, self._base)
-        if link not in self._motions:
+        return self._motions[self._own(link)]
+
+    def _own(self, link: str) -> str:
+        if link not in self.links:
             message = f"an environment model asks for link `{link}`, which the arm does not have"
             raise Problem(error("E218", message, help=f"links: {', '.join(self.links)}"))
-        return self._motions[link]
+        return link
 
     def _number(self, joint: str) -> int:
         if joint not in self.joints:

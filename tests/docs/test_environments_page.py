@@ -12,6 +12,7 @@ from scipy.integrate import dblquad
 from ic.formatting.formatter import formatted
 from met import models
 from tests.ic.small_decks import check, told
+from tests.met.environments.test_joint_stop import given_back
 from tests.met.environments.test_plume import EXPONENT, THRUST, felt
 from tests.met.environments.worlds import Link
 
@@ -47,6 +48,13 @@ def test_its_table_of_a_plates_cells_is_what_the_model_gives() -> None:
             force = felt(link, nozzle=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), width=1.0, height=1.0, cells=cells,
                          exponent=6.0)[0][2]  # fmt: skip
             assert float(told_error.removesuffix(" %")) == float(f"{100.0 * abs(force / exact - 1.0):.1g}")
+
+
+def test_its_table_of_what_stops_give_back_is_that_of_the_closed_form() -> None:
+    (heads,) = re.findall(r"^\| a v \| (.*) \|$", PAGE, re.MULTILINE)
+    (row,) = re.findall(r"^\| v'/v \| (.*) \|$", PAGE, re.MULTILINE)
+    for av, share in zip(heads.split(" | "), row.split(" | "), strict=True):
+        assert share == f"{given_back(float(av), 1.0) / float(av):.3f}"
 
 
 def test_it_names_every_model() -> None:

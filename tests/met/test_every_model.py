@@ -80,12 +80,22 @@ SMALLEST: dict[tuple[str, str], dict[str, str]] = {
         "environment": "hold = attitude_hold { link = tip; stiffness = [3, 4, 5] N*m/rad; axes = world; };"
     },
     ("environment", "gravity"): {},
+    ("environment", "gravity_gradient"): {
+        "environment": "orbit = gravity_gradient { radius = 6778 km; frame = orbital; };"
+    },
     ("environment", "joint_damping"): {"environment": "grease = joint_damping { damping = 1 N*m*s/rad; };"},
+    ("environment", "wrench_table"): {
+        "environment": "load = wrench_table { link = tip; times = [0, 0.1, 0.15] s; force_z = [0, 9, 2] N; };"
+    },
     ("environment", "wrench"): {"environment": "push = wrench { link = tip; force = [1, 2, 3] N; until = 0.1 s; };"},
     ("environment", "spring"): {"environment": "line = spring { link = tip; stiffness = 90 N/m; length = 1 m; };"},
     ("environment", "bushing"): {
         "environment": "mount = bushing { link = tip; to = bar; to_at = [1, 0, 0] m; stiffness = [90, 50, 10] N/m;"
         "  turning = [5, 6, 7] N*m/rad; };"
+    },
+    ("environment", "joint_stop"): {
+        "environment": "end = joint_stop { joint = slide; lower = -1 mm; upper = 5 mm; stiffness = 900 N/m;"
+        "  dissipation = 0.5 s/m; };"
     },
     ("environment", "plume"): {
         "environment": "jet = plume { link = tip; width = 0.2 m; height = 0.1 m; nozzle = [1, 0, 2] m;"
