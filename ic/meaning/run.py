@@ -29,7 +29,7 @@ from ic.meaning.schedule import (
 )
 from ic.meaning.scope import Scope
 from ic.meaning.servos import RATE, Use, check_rest, check_start, fixed_rate, resolve_servos
-from ic.meaning.substitution import check_ticks, resolve_substitutions
+from ic.meaning.substitution import check_brakes, check_ticks, resolve_substitutions
 from ic.meaning.tables import use_table
 from ic.meaning.tolerances import resolve_tolerances
 from ic.meaning.values import Value, Values, place_of
@@ -98,6 +98,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     if schedule is None or integrator is None:
         return None
     check_ticks(scope, substitutions, ticks, schedule)
+    check_brakes(scope, substitutions, environment)
     _keep_settings(scope, block, arm, integrator, rates, schedule)
     fastest = {}
     on_beds = [each.joint for each in substitutions]

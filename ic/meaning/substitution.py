@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -19,7 +19,7 @@ from ic.meaning.values import place_of
 from met import models
 from met.diagnostic import Label, Place
 from met.parameter import Parameter
-from met.plan import Origin, Schedule, Substitution
+from met.plan import EnvironmentUse, Origin, Schedule, Substitution
 
 DEFAULTS: dict[models.Kind, str] = {"bed": "emulated", "law": "velocity_tracking"}
 USAGE = "write `substitute JOINT { bed = BED(...);  law = LAW(...); }`"
@@ -65,6 +65,18 @@ def check_ticks(scope: Scope, found: tuple[Substitution, ...], ticks: Mapping[st
                 also=[Label(found[0].place, f"{rates[1]:g} Hz")],
                 help=["all substituted joints of a run are solved together: give their servos the same `rate`",
                       "or substitute them in two runs"])
+
+
+def check_brakes(scope: Scope, found: tuple[Substitution, ...], environment: Iterable[EnvironmentUse]) -> None:
+    """No model puts dry friction on a joint whose motor is on a bed: there friction is the bed's."""
+    for use in environment:
+        rubs = models.find("environment", use.model).rubs
+        joint = scope.parameters.get(f"environment.{use.name}.{rubs}") if rubs else None
+        for each in found:
+            if joint is not None and joint.value == each.joint and use.place is not None and each.place is not None:
+                scope.complaints.error("D244", f"`{use.name}` puts friction on joint `{each.joint}`, whose motor is on a "
+                                       "bed", use.place, also=[Label(each.place, "on a bed")],
+                                       help="leave it out: on a bed, friction is the bed's")
 
 
 def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use]) -> tuple[Substitution, Place] | None:

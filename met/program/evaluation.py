@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 
 from met.dynamics.recursion import Solved, solve
 from met.dynamics.tree import Tree
+from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
 from met.program.base import Base, base_of, slopes_of_base
@@ -69,7 +70,7 @@ def derivative(
     drives = tuple(None if each is None else each.drive for each in driven)
     tree, base, n = machine.tree(read), base_of(machine, read, y, time), len(machine.joints)
     with part("environment"):
-        gravity, torques, wrenches = _environment(machine, tree, read, y, base, time, begin)
+        loads = _environment(machine, tree, read, y, base, time, begin)
 
     told = told or {}
     given: list[Real] = []
@@ -89,10 +90,10 @@ def derivative(
             in_torque_mode = s != 0.0
         mode.append(in_torque_mode)
         given.append(drive.qdd if drive is not None else 0.0)
-        dry.append(0.0 if drive is None or s is None else s * drive.dry)
+        dry.append(0.0 if s is None else s * level_of(machine, i, drive, loads))
 
     smooth = [
-        torques[i] + (0.0 if drive is None or i in told else drive.torque) for i, drive in enumerate(drives)
+        loads.torques[i] + (0.0 if drive is None or i in told else drive.torque) for i, drive in enumerate(drives)
     ]
     with part("dynamics"):
         solved = solve(
@@ -103,10 +104,10 @@ def derivative(
             qdd=tuple(given),
             mode=tuple(mode),
             rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
-            gravity=base.to_base(gravity),
+            gravity=base.to_base(loads.gravity),
             base_acceleration=(base.wd, base.a),
             base_rate=base.w,
-            wrenches=wrenches,
+            wrenches=loads.wrenches,
             velocity_products=machine.structure.velocity_products,
         )
     slopes, state_needs = _slopes(machine, driven, friction)
@@ -114,11 +115,11 @@ def derivative(
     qd, qdd = slopes_of_base(base, solved.base_acceleration, y) if machine.structure.free else ((), ())
     return Derivative(
         slope=Slope((*y.qd[:n], *qd), (*solved.qdd, *qdd), slopes),
-        tau=tuple(a - b for a, b in zip(solved.tau, torques, strict=True)),
+        tau=tuple(a - b for a, b in zip(solved.tau, loads.torques, strict=True)),
         need=needs | state_needs,
         solved=solved,
         shown={path: value for each in driven if each is not None for path, value in each.shown.items()},
-        gravity=gravity,
+        gravity=loads.gravity,
         base=base,
     )
 
@@ -188,15 +189,50 @@ def _slopes(
     return tuple(slopes), needs
 
 
+@frozen
+class _Loads:
+    """The sum of all loads.
+
+    gravity   world axes, m/s^2;  torques: one a moving joint, N m (N)
+    wrenches  by link: moment about its frame's origin, and force, link axes
+    dry       dry friction on joints, by name, N m (N)
+    """
+
+    gravity: Vector
+    torques: list[Real]
+    wrenches: dict[str, tuple[Vector, Vector]]
+    dry: dict[str, Real]
+
+
+def level_of(machine: Machine, joint: int, drive: Drive | None, loads: _Loads) -> Real:
+    """The level of dry friction at a joint: its servo's, and brakes'."""
+    name = machine.joints[joint].name
+    if drive is None:
+        return loads.dry[name]
+    return drive.dry + loads.dry[name] if name in loads.dry else drive.dry
+
+
+def brakes(
+    machine: Machine, read: ReadCell, y: Motion, time: Real, begin: Real
+) -> dict[str, Real]:
+    """Dry friction that environment models put on joints at state y, by name, N m (N)."""
+    if not machine.braked:
+        return {}
+    tree, base = machine.tree(read), base_of(machine, read, y, time)
+    return _environment(machine, tree, read, y, base, time, begin, [m for m in machine.environment if m[1].rubs]).dry
+
+
 def _environment(
-    machine: Machine, tree: Tree, read: ReadCell, y: Motion, base: Base, time: Real, begin: Real
-) -> tuple[Vector, list[Real], dict[str, tuple[Vector, Vector]]]:
-    """Sum of all loads: gravity (world), torque a joint, wrench a link (moment about its origin, force; link axes)."""
+    machine: Machine, tree: Tree, read: ReadCell, y: Motion, base: Base, time: Real, begin: Real,
+    models: Sequence[tuple[str, Environment]] | None = None,
+) -> _Loads:  # fmt: skip
+    """Sum of the loads of these models; of all, where None."""
     world = ArmWorld(machine, read, tree, y, base, time, begin)
     gravity: list[Real] = [0.0, 0.0, 0.0]
     torques: list[Real] = [0.0 for _ in machine.joints]
     wrenches: dict[str, tuple[Vector, Vector]] = {}
-    for name, model in machine.environment:
+    dry: dict[str, Real] = {}
+    for name, model in machine.environment if models is None else models:
         prefix = f"environment.{name}"
         owner = f"environment model `{model.name}` (as `{name}`)"
         p = parameters(owner, prefix, model.parameters, lambda path: machine.value(path, read))
@@ -205,6 +241,9 @@ def _environment(
         for joint, torque in loads.torques.items():
             number = world._number(joint)
             torques[number] = torques[number] + torque
+        returned(owner, "dry", loads.dry, [getattr(p, model.rubs)] if model.rubs else [])
+        for joint, level in loads.dry.items():
+            dry[joint] = dry[joint] + level if joint in dry else level
         for force in loads.forces:
             if world.is_ground(force.link):
                 continue
@@ -214,4 +253,4 @@ def _environment(
                 moment = tuple(a + b for a, b in zip(before[0], moment, strict=True))  # type: ignore[assignment]
                 total = tuple(a + b for a, b in zip(before[1], total, strict=True))  # type: ignore[assignment]
             wrenches[force.link] = (moment, total)
-    return (gravity[0], gravity[1], gravity[2]), torques, wrenches
+    return _Loads((gravity[0], gravity[1], gravity[2]), torques, wrenches, dry)

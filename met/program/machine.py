@@ -102,6 +102,14 @@ class Machine:
         return tuple((use.name, models.find("environment", use.model)) for use in self.structure.environment)
 
     @cached_property
+    def braked(self) -> frozenset[str]:
+        """Joints on which environment models put dry friction."""
+        return frozenset(
+            str(self.experiment.parameters[f"environment.{name}.{model.rubs}"].value)
+            for name, model in self.environment if model.rubs
+        )  # fmt: skip
+
+    @cached_property
     def metrics(self) -> tuple[tuple[str, Metric, Channel], ...]:
         return tuple(
             (use.name, models.find("metric", use.model), self.channels[use.of]) for use in self.structure.metrics
@@ -262,8 +270,10 @@ class Machine:
         profile = models.find("command", use.command.model, use.place) if use.command is not None else None
         bare = Actuator(index, use, servo, profile, models.servo_parts(use), None, False, {})
         drive, level, levels = self._probe(bare)
-        if drive.given is not None and level != 0.0:
+        if drive.given is not None and (level != 0.0 or use.joint in self.braked):
             message = f"{bare.owner} gives both an acceleration and dry friction"
+            if level == 0.0:
+                message = f"{bare.owner} gives an acceleration, and a brake is on the joint"
             help = "a joint that is told its acceleration has no use for friction"
             raise Problem(error("E219", message, use.place, help=help))
         return replace(bare, level=level, gives=drive.given is not None, levels=levels)

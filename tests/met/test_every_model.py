@@ -50,6 +50,15 @@ run it {{
 }}
 sweep cases of it {{ vary initial.hinge.q = linspace(-1, 1, 7) rad; }}
 """
+ELASTIC = """servo elastic like gearbox {
+    model = compliant_gearbox;  stiffness = 5000 N*m/rad;  damping = 5 N*m*s/rad;  backlash = 0.001 rad;  loss = 0.1;
+    f_c_joint = 0.2 N*m;  command = rate(0.5 rad/s);
+}"""
+CASCADE = """servo stages {
+    model = cascade;  ratio = 100;  k_position = 5 s^-1;  kp = 0.5 A*s/rad;  ki = 2 A/rad;  ki_current = 50 V/(A*s);
+    resistance = 1 ohm;  inductance = 10 mH;  kt = 0.05 N*m/A;  j_m = 1e-4 kg*m^2;  f_c = 0.005 N*m;
+    stiffness = 5000 N*m/rad;  command = rate(0.5 rad/s);
+}"""
 DRIVEN = "hinge = gearbox {{ command = {}; }};"
 COURSES = {
     "constant": "0.5 UNIT",
@@ -73,6 +82,8 @@ def asked(command: str, course: str) -> str:
 
 SMALLEST: dict[tuple[str, str], dict[str, str]] = {
     ("servo", "rigid_gearbox"): {"servos": DRIVEN.format("rate(0.5 rad/s)")},
+    ("servo", "compliant_gearbox"): {"more": ELASTIC, "servos": "hinge = elastic;"},
+    ("servo", "cascade"): {"more": CASCADE, "servos": "hinge = stages;"},
     ("servo", "ideal"): {"servos": "hinge = follow { command = rate(0.5 rad/s); };"},
     ("servo", "passive"): {"more": "servo rub { model = passive; friction = 1 N*m; }", "servos": "hinge = rub;"},
     ("servo", "locked"): {"more": "servo lock { model = locked; release = 0.1 s; }", "servos": "hinge = lock;"},
@@ -83,6 +94,7 @@ SMALLEST: dict[tuple[str, str], dict[str, str]] = {
     ("environment", "gravity_gradient"): {
         "environment": "orbit = gravity_gradient { radius = 6778 km; frame = orbital; };"
     },
+    ("environment", "brake"): {"environment": "hold = brake { joint = hinge; torque = 1 N*m; from = 0.1 s; };"},
     ("environment", "joint_damping"): {"environment": "grease = joint_damping { damping = 1 N*m*s/rad; };"},
     ("environment", "wrench_table"): {
         "environment": "load = wrench_table { link = tip; times = [0, 0.1, 0.15] s; force_z = [0, 9, 2] N; };"
@@ -183,8 +195,8 @@ def test_every_servo_takes_every_course_of_every_command_that_it_knows(
     for command in models.find("servo", servo).commands:
         text = f"time [s], hinge [{UNITS[command]}]\n0, 0\n0.1, 0.5\n0.2, 0.2\n"
         (tmp_path / "moves.csv").write_text(text, encoding="utf-8")
-        name = "gearbox" if servo == "rigid_gearbox" else "follow"
-        uses = {"servos": f"hinge = {name} {{ command = {asked(command, course)}; }};"}
+        name = {"ideal": "follow", "compliant_gearbox": "elastic", "cascade": "stages"}.get(servo, "gearbox")
+        uses = {"more": ELASTIC + CASCADE, "servos": f"hinge = {name} {{ command = {asked(command, course)}; }};"}
         deck = experiment(tmp_path, DECK.format(**PLAIN | uses), select=["it"])
         rows, _ = execute(build(deck), {}, deck.structure.schedule.ticks)
         assert np.isfinite(rows).all() and np.ptp(rows[:, 0]) > 0.0, command
