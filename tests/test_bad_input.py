@@ -223,7 +223,7 @@ def test_a_misspelt_deck_is_told_with_the_one_that_was_meant(
     assert capsys.readouterr().err == """\
 error[D173]: no deck `two_lnk.ic`
  = help: did you mean `two_link.ic`?
- = help: standard decks: panda.ic, puma_560.ic, stanford_arm.ic, two_link.ic
+ = help: standard decks: free_flyer.ic, panda.ic, puma_560.ic, stanford_arm.ic, two_link.ic
 
 1 error
 """

@@ -153,7 +153,8 @@ def _course(scope: Scope, item: Item) -> str | None:
     told = f"`{item.name}` of the base"
     spot = Owner(told, item.place, f"{BASE}.{item.name}", homes=item.homes, joint=component(item.name).kind,
                  command="position", called=told)
-    model = use_course(scope, spot, inner, item, doc=f"{item.name} of the base", column=item.name, body=item.body)
+    model = use_course(scope, spot, inner, item, doc=f"{item.name} of the base", column=item.name, kind="component",
+                       body=item.body)
     if model is not None:
         scope.setting(f"{BASE}.{item.name}.model", model, item=item)
         path = f"{BASE}.{item.name}"

@@ -31,24 +31,31 @@ def with_file_named(call: Call) -> Call:
     return replace(call, positional=(), named=((Word(FILE.name, named.place), named), *call.named))
 
 
-def use_file(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: str) -> dict[str, Any] | None:
-    """Every parameter of a profile that reads a file, entered in the scope; None where one is missing or wrong."""
+def use_file(
+    scope: Scope, owner: Owner, profile: Profile, body: Block, name: str, kind: str = "joint"
+) -> dict[str, Any] | None:
+    """Every parameter of a profile that reads a file, entered in the scope; None where one is missing or wrong.
+
+    name  of the column, unless another is named: that of the joint, or of what `kind` says
+    """
     others = [each for each in profile.parameters if each.name not in LISTS]
     check_keys(scope, body, [each.name for each in profile.written], owner)
     values = use_model(scope, owner, others, Block({key: item for key, item in body.items.items()
                                                     if key in [each.name for each in others]}))
-    for name in (FILE.name, COLUMN.name, *LISTS):
-        scope.whole[owner.join(name)] = "is read from a file, and is one for the whole sweep"
+    for each in (FILE.name, COLUMN.name, *LISTS):
+        scope.whole[owner.join(each)] = "is read from a file, and is one for the whole sweep"
     columns: dict[str, tuple[float, ...]] | None = None
     with scope.complaints.gather():
-        columns = _columns(scope, owner, profile, body, joint)
+        columns = _columns(scope, owner, profile, body, name, kind)
     if columns is None:
-        for name in LISTS:
-            scope.checks.fail(owner.join(name))
+        for each in LISTS:
+            scope.checks.fail(owner.join(each))
     return None if values is None or columns is None else {**values, **columns}
 
 
-def _columns(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: str) -> dict[str, tuple[float, ...]]:
+def _columns(
+    scope: Scope, owner: Owner, profile: Profile, body: Block, own: str, kind: str
+) -> dict[str, tuple[float, ...]]:
     """The two lists. Raises Problem."""
     item = body.get(FILE.name)
     if item is None:
@@ -58,7 +65,7 @@ def _columns(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: s
                             place_of(item.value) if item.value is not None else item.place,
                             help=f'write `file = "{item.value.text if isinstance(item.value, Name) else "NAME.csv"}"`'))
     named = item.value
-    wanted, place = _column_name(owner, body.get(COLUMN.name), joint), named.place
+    wanted, place = _column_name(owner, body.get(COLUMN.name), own), named.place
     if body.get(COLUMN.name) is not None:
         place = place_of(body.items[COLUMN.name].value or named)
     table = scope.definitions.csv_files.get(named)
@@ -71,10 +78,10 @@ def _columns(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: s
         if column is None:
             why = "the times of the rows stand in a column `time [s]`" if column_name == TIME else ""
             if at is named.place and not why:
-                why = "that of the joint's name is taken, unless `column = \"NAME\"` names another"
+                why = f"that of the {kind}'s name is taken, unless `column = \"NAME\"` names another"
             raise missing_column(table, column_name, at, why)
         text, dimension = scope.unit(owner, declared)
-        label = here if column_name == TIME else Label(named.place, f"read here for joint `{joint}`")
+        label = here if column_name == TIME else Label(named.place, f"read here for {kind} `{own}`")
         columns[name] = table.numbers(column, text, dimension, label)
         if name == LISTS[0]:
             table.rising(column, columns[name])
@@ -86,7 +93,7 @@ def _columns(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: s
                             f"{'s' if not table.rows else ''}", table.columns[0].place, also=[here],
                             help=f"a trajectory has {FEWEST} at least; `table` takes a single point"))
     scope.setting(owner.join(FILE.name), table.file, item=item)
-    scope.setting(owner.join(COLUMN.name), wanted, item=body.get(COLUMN.name), note="the joint's name")
+    scope.setting(owner.join(COLUMN.name), wanted, item=body.get(COLUMN.name), note=f"the {kind}'s name")
     return columns
 
 
