@@ -155,7 +155,8 @@ def _check_base(structure: Structure, where: str) -> None:
     known = list(COMPONENTS)
     for index, course in enumerate(base.courses):
         if course.component not in known:
-            raise Damaged(f"{where}.base.courses[{index}].component", f"it should be one of {', '.join(known)}")
+            listed = ", ".join(COMPONENTS)
+            raise Damaged(f"{where}.base.courses[{index}].component", f"it should be one of {listed}, in this order")
         known = known[known.index(course.component) + 1 :]
         models.find("command", course.model, base.place)
     if not structure.velocity_products and base.turns:

@@ -326,11 +326,11 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
 
 
 def use_course(scope: Scope, spot: Owner, inner: Expression, item: Item, *, doc: str, column: str,
-               body: Block | None = None) -> str | None:
+               kind: str = "joint", body: Block | None = None) -> str | None:
     """A value, or a course in time, entered in the scope under the path of `spot`: its model; None where there is none.
 
     item    the entry that says it, whose expression is, or holds, `inner`;  body: what of the course is written apart
-    doc     what a value means;  column: of a CSV file, unless one is named
+    doc     what a value means;  column: of a CSV file, unless one is named: the name of the joint, or what `kind` says
     """
     name = word_of(inner) if isinstance(inner, Call) else None
     if name is None or name in ("sqrt", "sin", "cos", "min", "max"):
@@ -352,7 +352,7 @@ def use_course(scope: Scope, spot: Owner, inner: Expression, item: Item, *, doc:
     opened = Block(inside | dict(apart.items), (*(named or Block()).statements, *apart.statements))
     course = replace(spot, label=f"`{name}`", called=None, place=inner.name.place)
     if profile.from_file:
-        use_file(scope, course, profile, opened, column)
+        use_file(scope, course, profile, opened, column, kind)
         return profile.name
     use_model(scope, course, profile.parameters, opened)
     return profile.name

@@ -74,8 +74,8 @@ def check_brakes(scope: Scope, found: tuple[Substitution, ...], environment: Ite
         joint = scope.parameters.get(f"environment.{use.name}.{rubs}") if rubs else None
         for each in found:
             if joint is not None and joint.value == each.joint and use.place is not None and each.place is not None:
-                scope.complaints.error("D244", f"`{use.name}` puts friction on joint `{each.joint}`, whose motor is on a "
-                                       "bed", use.place, also=[Label(each.place, "on a bed")],
+                message = f"`{use.name}` puts friction on joint `{each.joint}`, whose motor is on a bed"
+                scope.complaints.error("D244", message, use.place, also=[Label(each.place, "on a bed")],
                                        help="leave it out: on a bed, friction is the bed's")
 
 
