@@ -112,6 +112,12 @@ def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use])
             f"{' or '.join(f'`{each}`' for each in only[1])} alone", item.place, also=[Label(use.place, "its servo")],
             help=f"write `{only[0]} = {only[1][0]};`, or leave the joint to its servo")
         return None
+    if use.sensors:
+        scope.complaints.error(
+            "D246", f"the servo of joint `{item.name}` has a sensor, and its motor is on a bed, which has its own",
+            item.place, also=[Label(each.place, "the sensor") for each in use.sensors if each.place],
+            help="leave the sensor out in this run: `remove QUANTITY;`, or a servo `like` it without")
+        return None
     block = item.body or Block()
     check_keys(scope, block, DEFAULTS, Owner(f"`substitute {item.name}`", item.place, ""))
     bed, law = (_model(scope, each, block.get(each), item) for each in DEFAULTS)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 
 from met.dynamics.recursion import Solved, solve
 from met.dynamics.tree import Tree
 from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
+from met.program import sensing
 from met.program.base import Base, base_of, slopes_of_base
 from met.program.machine import Actuator, Machine, ReadCell
 from met.program.values import Values, answer, parameters, returned
 from met.program.world import ArmWorld
-from met.servos.servo import Control, Drive, JointMotion, Seen
+from met.servos.servo import Asked, Control, Drive, JointMotion, Seen
 from met.trace import Real, Truth, not_, where
 from met.vectors import Vector
 
@@ -126,7 +128,7 @@ def derivative(
 
 @frozen
 class Driven:
-    """A servo at a stage: its physics, the slopes of its states and law, and what it shows, by channel."""
+    """A servo at a stage: its physics, the slopes of its states, law and sensors, and what it shows, by channel."""
 
     drive: Drive
     slopes: Mapping[str, Real]
@@ -141,24 +143,28 @@ def driven_by(
     A continuous law is asked here, for this stage; `held` is then not read.
     """
     servo, parts, owner = actuator.servo, actuator.parts, actuator.owner
-    own = {state.name: y.x[machine.states.index(f"{actuator.path}.{state.name}")] for state in parts.states}
-    natural = Values(owner, {state.name: own[state.name] for state in parts.natural})
+    own = {name: y.x[machine.states.index(name)] for name in actuator.states}
+    natural = Values(owner, {state.name: own[f"{actuator.path}.{state.name}"] for state in parts.natural})
     p = machine.servo_values(actuator, read)
     q, qd = y.q[actuator.index], y.qd[actuator.index]
     slopes: dict[str, Real] = {}
     shown: dict[str, Real] = {}
+    seen = Seen(q, qd, Asked("none", 0.0, 0.0), 0.0, time, natural)
+    of_sensors = sensing.slopes(machine, actuator, read, seen, own)
     if parts.continuous:
-        asked = machine.asked(actuator, read, time)
-        integrals = {state.name: own[state.name] for state in parts.integrals}
-        found = law(actuator, p, Values(owner, integrals), Seen(q, qd, asked, 0.0, time, natural))
+        seen = sensing.through(machine, actuator, read, replace(seen, asked=machine.asked(actuator, read, time)), own)
+        integrals = {state.name: own[f"{actuator.path}.{state.name}"] for state in parts.integrals}
+        found = law(actuator, p, Values(owner, integrals), seen)
         held = Values(owner, {**found.outputs, **integrals})
         slopes.update(found.slopes)
-        shown.update({"command": asked.value} if actuator.profile is not None else {}, **found.outputs)
+        shown.update({"command": seen.asked.value} if actuator.profile is not None else {}, **found.outputs)
+        shown.update({f"sensor.{each.use.of}": sensing.truth(seen, each.use.of) for each in actuator.sensors})
     motion = JointMotion(q, qd, time, begin, actuator.asked)
     drive = answer(owner, servo.drive, p, held, natural, motion)
     slopes.update(returned(owner, "slopes", drive.slopes, (state.name for state in parts.natural)))
     shown.update(returned(owner, "signals", drive.signals, (signal.name for signal in parts.signals)))
-    return Driven(drive, slopes, {f"{actuator.path}.{name}": value for name, value in shown.items()})
+    by_channel = {f"{actuator.path}.{name}": slope for name, slope in slopes.items()}
+    return Driven(drive, by_channel | of_sensors, {f"{actuator.path}.{name}": x for name, x in shown.items()})
 
 
 def law(actuator: Actuator, p: Values, held: Values, seen: Seen) -> Control:
@@ -180,11 +186,12 @@ def _slopes(
     for actuator in machine.working:
         each = driven[actuator.index]
         assert each is not None
-        for state in actuator.parts.states:
-            channel, slope = f"{actuator.path}.{state.name}", each.slopes[state.name]
+        for channel in actuator.states:
+            slope = each.slopes[channel]
             if channel in friction:
                 s, needs[channel] = friction[channel], slope
-                slope = where(s == 0.0, 0.0, slope - s * each.drive.friction[state.name])
+                level = each.drive.friction[channel.removeprefix(f"{actuator.path}.")]
+                slope = where(s == 0.0, 0.0, slope - s * level)
             slopes.append(slope)
     return tuple(slopes), needs
 

@@ -375,8 +375,7 @@ class Step:
     def _carried(self, actuator: Actuator) -> list[tuple[str, str]]:
         """What of a servo's joint is carried forward between instants, and the cells: its rate, the servo's states."""
         joint = self.joints[actuator.index]
-        states = [f"{actuator.path}.{state.name}" for state in actuator.parts.natural]
-        return [(joint, f"{joint}.qd"), *((name, name) for name in states)]
+        return [(joint, f"{joint}.qd"), *((name, name) for name in actuator.states)]
 
     # What the phases share.
 
