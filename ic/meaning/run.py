@@ -11,6 +11,7 @@ from ic.grammar.syntax import Call, Name, Word
 from ic.meaning.arm import Arm, resolve_arm
 from ic.meaning.base import INITIAL, check_base, initial_base, remark_ground, resolve_base
 from ic.meaning.complaints import belongs, known_words
+from ic.meaning.failures import check_failures
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import find_bare_model, find_model, refuse_values, use_model, word_of
 from ic.meaning.owner import Owner
@@ -99,6 +100,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         return None
     check_ticks(scope, substitutions, ticks, schedule)
     check_brakes(scope, substitutions, environment)
+    check_failures(scope, uses, ticks, substitutions, environment)
     _keep_settings(scope, block, arm, integrator, rates, schedule)
     fastest = {}
     on_beds = [each.joint for each in substitutions]

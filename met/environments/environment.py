@@ -91,12 +91,22 @@ FILE = Parameter(name="file", shape="text", default="none", doc="CSV file whose 
 class Environment:
     """The declaration of an environment model; one a file.
 
-    loads  (p, world) -> Loads
+    loads  (p, world) -> Loads. None: it is no load
     idle   (p, duration) -> the parameters because of which it never acts in a run of that length (s), and why, in
            words; None where it may act. Asked where all its numbers are constants. None: it always may
     pushes the parameter that names the one link that it acts upon: a deck that names one which is part of the ground
            is warned. "": none does
     rubs   the parameter that names the one joint on which it puts dry friction. "": none does
+
+    What it may do to the servo of one joint, such as to let it fail:
+
+    servo_of  the parameter that names the joint
+    loose  (p, step) -> how far the servo has let go of the joint in a step, from 0, not at all, to 1; step has `begin`,
+           when it began, and `step`, its length (s)
+    gives  (p, time, outputs, full) -> outputs of the servo's law, by name, in the stead of these. full: with what the
+           servo's limits allow (`Servo.full`)
+    sees   (p, time, of, value, last) -> what the law sees of the quantity `of` in the stead of this value; last: what
+           it saw at its last tick
     from_file  a deck may write `file` in the stead of the lists: they are then the columns of their names, and the
            list that rises is the column `time`
     """
@@ -104,10 +114,14 @@ class Environment:
     name: str
     doc: str
     parameters: tuple[Parameter, ...] = ()
-    loads: Callable[[Any, World], Loads]
+    loads: Callable[[Any, World], Loads] | None = None
     idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None
     pushes: str = ""
     rubs: str = ""
+    servo_of: str = ""
+    loose: Callable[[Any, Any], Real] | None = None
+    gives: Callable[[Any, Real, Mapping[str, Real], Mapping[str, Real]], Mapping[str, Real]] | None = None
+    sees: Callable[[Any, Real, str, Real, Real], Real] | None = None
     from_file: bool = False
 
     @property

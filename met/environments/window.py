@@ -7,10 +7,18 @@ window that begins and ends with steps is met exactly.
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
-from met.environments.environment import World
 from met.parameter import Parameter
 from met.trace import Real, clip, maximum
+
+
+class Step(Protocol):
+    """A step of the dynamics: the time at which it began, and its length, s."""
+
+    begin: Real
+    step: float
+
 
 WINDOW = (
     Parameter(name="from", unit="s", default=0.0, doc="time at which it begins"),
@@ -18,12 +26,12 @@ WINDOW = (
 )
 
 
-def share(world: World, begins: Real, ends: Real) -> Real:
+def share(world: Step, begins: Real, ends: Real) -> Real:
     """The share of the step that lies in begins <= t < ends; 0 where `ends` is the earlier."""
     return maximum(0.0, passed(world, ends) - passed(world, begins))
 
 
-def passed(world: World, time: Real) -> Real:
+def passed(world: Step, time: Real) -> Real:
     """The share of the step that lies before this time."""
     return clip((time - world.begin) / world.step, 0.0, 1.0)
 

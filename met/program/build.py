@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 
 from met.channel import Channel
 from met.plan import Experiment
-from met.program import base, sensing
+from met.program import base, failing, sensing
 from met.program.evaluation import law
 from met.program.machine import PARAMETER, Actuator, Machine
 from met.program.observe import derived
@@ -116,7 +116,10 @@ class Builder:
             tape.write(f"{actuator.path}.{name}", value)
         states = Values(actuator.owner, {state.name: starts[state.name] for state in parts.natural})
         q, qd = self._state_of(tape, self.joints[actuator.index])
-        sensing.start(self.machine, tape, actuator, Seen(q, qd, Asked("none", 0.0, 0.0), 0.0, 0.0, states))
+        seen = Seen(q, qd, Asked("none", 0.0, 0.0), 0.0, 0.0, states)
+        sensing.start(self.machine, tape, actuator, seen)
+        for of in failing.quantities(actuator) if actuator.use.joint in self.machine.failing else ():
+            tape.write(f"saw:{actuator.use.joint}.{of}", sensing.truth(seen, of))
 
     def end(self, tape: Tape) -> None:
         for name in OUTPUTS:
@@ -156,7 +159,12 @@ class Builder:
             q, qd = self._carried(tape, actuator) if between else self._state_of(tape, joint)
         states = {each.name: state(f"{actuator.path}.{each.name}") for each in actuator.parts.natural}
         seen = self.seen(actuator, q, qd, asked, tape.time, states)
-        self.compute(tape, actuator, sensing.ticked(self.machine, tape, actuator, seen, state))
+        seen = sensing.ticked(self.machine, tape, actuator, seen, state)
+        if joint in self.machine.failing:
+            seen = failing.seen(self.machine, actuator, tape.read, seen, f"saw:{joint}.")
+            for of in failing.quantities(actuator):
+                tape.write(f"saw:{joint}.{of}", sensing.truth(seen, of))
+        self.compute(tape, actuator, seen)
 
     def seen(
         self, actuator: Actuator, q: Real, qd: Real, asked: Asked, time: Real, states: Mapping[str, Real] | None = None
@@ -169,7 +177,8 @@ class Builder:
         """What the servo's computer does with what it sees and is asked: new outputs, integrals a tick on."""
         parts, period = actuator.parts, seen.period
         held = Values(actuator.owner, {part.name: tape.read(f"{actuator.path}.{part.name}") for part in parts.memory})
-        found = law(actuator, self.machine.servo_values(actuator, tape.read), held, seen)
+        p = self.machine.servo_values(actuator, tape.read)
+        found = failing.given(self.machine, actuator, tape.read, p, seen.time, law(actuator, p, held, seen))
         for name, slope in found.slopes.items():
             path = f"{actuator.path}.{name}"
             tape.write(path, tape.read(path) + period * slope)

@@ -11,13 +11,13 @@ from met.dynamics.tree import Tree
 from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
-from met.program import sensing
+from met.program import failing, sensing
 from met.program.base import Base, base_of, slopes_of_base
 from met.program.machine import Actuator, Machine, ReadCell
 from met.program.values import Values, answer, parameters, returned
 from met.program.world import ArmWorld
 from met.servos.servo import Asked, Control, Drive, JointMotion, Seen
-from met.trace import Real, Truth, not_, where
+from met.trace import Real, Truth, both, not_, where
 from met.vectors import Vector
 
 
@@ -153,14 +153,20 @@ def driven_by(
     of_sensors = sensing.slopes(machine, actuator, read, seen, own)
     if parts.continuous:
         seen = sensing.through(machine, actuator, read, replace(seen, asked=machine.asked(actuator, read, time)), own)
+        seen = failing.seen(machine, actuator, read, seen, None)
         integrals = {state.name: own[f"{actuator.path}.{state.name}"] for state in parts.integrals}
         found = law(actuator, p, Values(owner, integrals), seen)
+        found = failing.given(machine, actuator, read, p, seen.time, found)
         held = Values(owner, {**found.outputs, **integrals})
         slopes.update(found.slopes)
         shown.update({"command": seen.asked.value} if actuator.profile is not None else {}, **found.outputs)
         shown.update({f"sensor.{each.use.of}": sensing.truth(seen, each.use.of) for each in actuator.sensors})
-    motion = JointMotion(q, qd, time, begin, actuator.asked)
+    coupled = failing.coupled(machine, actuator, read, begin)
+    motion = JointMotion(q, qd, time, begin, actuator.asked, 1.0 if coupled is None else coupled)
     drive = answer(owner, servo.drive, p, held, natural, motion)
+    if coupled is not None:
+        given = None if drive.given is None else both(drive.given, coupled > 0.0)
+        drive = replace(drive, torque=coupled * drive.torque, dry=coupled * drive.dry, given=given)
     slopes.update(returned(owner, "slopes", drive.slopes, (state.name for state in parts.natural)))
     shown.update(returned(owner, "signals", drive.signals, (signal.name for signal in parts.signals)))
     by_channel = {f"{actuator.path}.{name}": slope for name, slope in slopes.items()}
@@ -243,6 +249,8 @@ def _environment(
         prefix = f"environment.{name}"
         owner = f"environment model `{model.name}` (as `{name}`)"
         p = parameters(owner, prefix, model.parameters, lambda path: machine.value(path, read))
+        if model.loads is None:
+            continue
         loads = answer(owner, model.loads, p, world)
         gravity = [a + b for a, b in zip(gravity, loads.gravity, strict=True)]
         for joint, torque in loads.torques.items():

@@ -137,6 +137,16 @@ class Machine:
         )  # fmt: skip
 
     @cached_property
+    def failing(self) -> dict[str, list[tuple[str, Environment]]]:
+        """Environment models about a servo, by its joint, with the deck's names for them."""
+        found: dict[str, list[tuple[str, Environment]]] = {}
+        for name, model in self.environment:
+            if model.servo_of:
+                joint = str(self.experiment.parameters[f"environment.{name}.{model.servo_of}"].value)
+                found.setdefault(joint, []).append((name, model))
+        return found
+
+    @cached_property
     def metrics(self) -> tuple[tuple[str, Metric, Channel], ...]:
         return tuple(
             (use.name, models.find("metric", use.model), self.channels[use.of]) for use in self.structure.metrics
@@ -304,6 +314,8 @@ class Machine:
                 message = f"{bare.owner} gives an acceleration, and a brake is on the joint"
             help = "a joint that is told its acceleration has no use for friction"
             raise Problem(error("E219", message, use.place, help=help))
+        if level != 0.0 and any(model.loose is not None for _, model in self.failing.get(use.joint, ())):
+            level = None  # it comes and goes
         return replace(bare, level=level, gives=drive.given is not None, levels=levels)
 
     def _fitted(self, use: ServoUse, sensor: SensorUse) -> Fitted:

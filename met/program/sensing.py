@@ -61,7 +61,7 @@ def through(machine: Machine, actuator: Actuator, read: ReadCell, seen: Seen, ow
         sensed = Sensed(truth(seen, fitted.use.of), 0.0, never)
         p, states = values(machine, fitted, read), _states(fitted, own.__getitem__)
         reading = answer(fitted.owner, fitted.sensor.read, p, Values(fitted.owner, {}), states, sensed)
-        seen = _with(actuator, seen, fitted.use.of, reading.value)
+        seen = replaced(actuator, seen, fitted.use.of, reading.value)
     return seen
 
 
@@ -81,7 +81,7 @@ def ticked(machine: Machine, tape: Tape, actuator: Actuator, seen: Seen, state: 
         for name, number in reading.held.items():
             tape.write(f"{fitted.path}.{name}", number)
         tape.write(fitted.path, reading.value)
-        found = _with(actuator, found, fitted.use.of, reading.value)
+        found = replaced(actuator, found, fitted.use.of, reading.value)
     return found
 
 
@@ -94,7 +94,7 @@ def _states(fitted: Fitted, state: Callable[[str], Real]) -> Values:
     return Values(fitted.owner, {part.name: state(f"{fitted.path}.{part.name}") for part in fitted.states})
 
 
-def _with(actuator: Actuator, seen: Seen, of: str, value: Real) -> Seen:
+def replaced(actuator: Actuator, seen: Seen, of: str, value: Real) -> Seen:
     """What is seen, with this quantity replaced."""
     if of in ("q", "qd"):
         return replace(seen, q=value) if of == "q" else replace(seen, qd=value)

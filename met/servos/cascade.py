@@ -105,6 +105,11 @@ def fastest(p: Any) -> Real:
     return maximum(electric, sqrt(p.stiffness / (p.ratio * p.ratio * p.j_m)))
 
 
+def full(p: Any) -> Mapping[str, Real]:
+    """The largest current."""
+    return {"current_cmd": p.i_max}
+
+
 SERVO = Servo(
     name="cascade",
     doc=__doc__,
@@ -152,4 +157,5 @@ SERVO = Servo(
     drive=drive,
     begin=begin,
     fastest=fastest,
+    full=full,
 )

@@ -45,7 +45,7 @@ def geared(p: Any, states: Any, joint: JointMotion, tau_m: Real, shown: Mapping[
     w = states.motor_rate
     rate = w / p.ratio - joint.qd
     T = gear.torque(p, states.deflection, rate)
-    at_motor = T / p.ratio
+    at_motor = joint.coupled * T / p.ratio
     rubs = friction(p, w, states, at_motor)
     return Drive(
         torque=T - p.f_v_joint * joint.qd,
@@ -90,4 +90,5 @@ SERVO = Servo(
     drive=drive,
     begin=begin,
     fastest=fastest,
+    full=rate_loop.full,
 )  # fmt: skip

@@ -46,6 +46,11 @@ def rate_loop(p: Any, integral: Real, asked: Asked, *, q: Real, qd: Real) -> Con
     return Control({"voltage": clip(wanted, -p.v_max, p.v_max)}, {"integral": where(winding_up, 0.0, error)})
 
 
+def full(p: Any) -> dict[str, Real]:
+    """The largest voltage."""
+    return {"voltage": p.v_max}
+
+
 def _rate_asked(p: Any, q: Real, asked: Asked) -> Real:
     if asked.kind == "position":
         return asked.slope + p.k_position * (asked.value - q)

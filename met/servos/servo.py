@@ -72,6 +72,8 @@ class JointMotion:
     time     of the stage, s
     begin    time at which the dynamics step began that the stage is part of, s: for what changes from step to step
     command  kind of the joint's command, known while the servo is recorded; "none" where it has none
+    coupled  how far the servo has hold of its joint, 1 unless something lets it go: what does not reach the joint does
+             not act back on states of the servo either. Of torque and friction on the joint the engine takes its share
     """
 
     q: Real
@@ -79,6 +81,7 @@ class JointMotion:
     time: Real
     begin: Real = 0.0
     command: str = "none"
+    coupled: Real = 1.0
 
 
 @frozen
@@ -127,6 +130,7 @@ class Servo:
     motor      (p) -> the motor that a bed may take the place of (met/substitution): the servo's computer then sets
                `voltage`, one of its outputs, on the bed. None: there is none to substitute
     motor_only word and value of it under which that is so; None: under all
+    full       (p) -> outputs of the law at full drive, by name, for what makes a drive run away. None: there is no such
     follows    whether the joint goes with its command whatever the arm, so that a position command that begins
                elsewhere than the joint makes it jump, which is told (D169)
     at_rest    (p) -> whether its joint must begin at rest: another initial rate is an error. None: it need not
@@ -145,6 +149,7 @@ class Servo:
     drive: Callable[[Any, Any, Any, JointMotion], Drive]
     begin: Callable[[Any, Real, Real], Mapping[str, Real]] | None = None
     fastest: Callable[[Any], Real] | None = None
+    full: Callable[[Any], Mapping[str, Real]] | None = None
     follows: bool = False
     motor: Callable[[Any], Motor] | None = None
     motor_only: Only | None = None

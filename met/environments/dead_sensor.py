@@ -1,0 +1,46 @@
+"""A sensor that is dead for a time: the joint's law sees nothing of a quantity, or what it saw last.
+
+    zero   the law sees 0
+    last   the law sees what it saw at its last tick before
+
+at times from <= t < until. It is the last thing on the way to the law: behind the servo's own sensor, if it has one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from met.environments.environment import Environment
+from met.environments.window import WINDOW, never
+from met.parameter import Parameter
+from met.trace import Real, both, where
+
+
+def sees(p: Any, time: Real, of: str, value: Real, last: Real) -> Real:
+    if of != p.of:
+        return value
+    dead = both(time >= getattr(p, "from"), time < p.until)
+    return where(dead, 0.0 if p.reads == "zero" else last, value)
+
+
+def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
+    return never(getattr(p, "from"), p.until, duration)
+
+
+ENVIRONMENT = Environment(
+    name="dead_sensor",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="joint", shape="word", names="joint", doc="joint whose law does not see"),
+        Parameter(
+            name="of", shape="word", doc="quantity that is not seen: q, qd, or a state of the servo such as motor_rate"
+        ),
+        Parameter(
+            name="reads", shape="word", words=("zero", "last"), default="zero", doc="what the law sees in its stead"
+        ),
+        *WINDOW,
+    ),
+    idle=idle,
+    servo_of="joint",
+    sees=sees,
+)

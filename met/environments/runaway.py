@@ -1,0 +1,43 @@
+"""A drive that runs away for a time: whatever its law gives, full drive comes out, one way or the other.
+
+    output = level * what the servo's limits allow        at times from <= t < until
+
+Of a law that is sampled, from its first tick in this window on. Voltage of `rigid_gearbox` and `compliant_gearbox` is
+then level v_max, current asked of `cascade` level i_max, which must be finite. Integrals go on as if nothing had
+failed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from met.environments.environment import Environment
+from met.environments.window import WINDOW, never
+from met.parameter import Parameter
+from met.trace import Real, both, where
+
+
+def gives(p: Any, time: Real, outputs: Mapping[str, Real], full: Mapping[str, Real]) -> Mapping[str, Real]:
+    runs = both(time >= getattr(p, "from"), time < p.until)
+    return {name: where(runs, p.level * full[name], value) for name, value in outputs.items()}
+
+
+def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
+    return never(getattr(p, "from"), p.until, duration)
+
+
+ENVIRONMENT = Environment(
+    name="runaway",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="joint", shape="word", names="joint", doc="joint whose drive runs away"),
+        Parameter(
+            name="level", default=1.0, at_least=-1.0, at_most=1.0, doc="share of full drive, negative the other way"
+        ),
+        *WINDOW,
+    ),
+    idle=idle,
+    servo_of="joint",
+    gives=gives,
+)

@@ -1,0 +1,73 @@
+"""What environment models do to the servo of a joint: let it go, put other outputs on it, keep it from seeing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from met.diagnostic import Problem, error
+from met.environments.environment import Environment
+from met.frozen import frozen
+from met.program.machine import Actuator, Machine, ReadCell
+from met.program.sensing import replaced, truth
+from met.program.values import Values, answer, parameters, returned
+from met.servos.servo import Control, Seen
+from met.trace import Real
+
+
+@frozen
+class Step:
+    """A step of the dynamics: when it began and its length, s."""
+
+    begin: Real
+    step: float
+
+
+def coupled(machine: Machine, actuator: Actuator, read: ReadCell, begin: Real) -> Real | None:
+    """How far the servo has hold of its joint in the step that began then; None where nothing lets it go, ever."""
+    held: Real | None = None
+    step = Step(begin, machine.structure.schedule.step)
+    for owner, model, p in _about(machine, actuator, read):
+        if model.loose is not None:
+            own = 1.0 - answer(owner, model.loose, p, step)
+            held = own if held is None else held * own
+    return held
+
+
+def given(machine: Machine, actuator: Actuator, read: ReadCell, p: Values, time: Real, found: Control) -> Control:
+    """What comes out of the servo's law."""
+    for owner, model, own in _about(machine, actuator, read):
+        if model.gives is None:
+            continue
+        if actuator.servo.full is None:
+            message = f"{owner}: {actuator.owner} has no drive that could run away"
+            raise Problem(error("E219", message, actuator.use.place, help="leave it out for this joint"))
+        full = answer(actuator.owner, actuator.servo.full, p)
+        outputs = answer(owner, model.gives, own, time, found.outputs, full)
+        found = replace(found, outputs=returned(owner, "gives", outputs, found.outputs))
+    return found
+
+
+def seen(machine: Machine, actuator: Actuator, read: ReadCell, seen: Seen, last: str | None) -> Seen:
+    """What the law sees. last: what cells begin with that hold what it saw at its last tick; None: there is none."""
+    for owner, model, p in _about(machine, actuator, read):
+        if model.sees is None:
+            continue
+        for of in quantities(actuator):
+            before = math.nan if last is None else read(f"{last}{of}")
+            seen = replaced(actuator, seen, of, answer(owner, model.sees, p, seen.time, of, truth(seen, of), before))
+    return seen
+
+
+def quantities(actuator: Actuator) -> tuple[str, ...]:
+    """What a law sees of its joint."""
+    return ("q", "qd", *(state.name for state in actuator.parts.natural))
+
+
+def _about(machine: Machine, actuator: Actuator, read: ReadCell) -> Iterator[tuple[str, Environment, Values]]:
+    """The models that are about this servo: what to call each, its declaration, its parameters."""
+    for name, model in machine.failing.get(actuator.use.joint, ()):
+        owner = f"environment model `{model.name}` (as `{name}`)"
+        p = parameters(owner, f"environment.{name}", model.parameters, lambda path: machine.value(path, read))
+        yield owner, model, p
