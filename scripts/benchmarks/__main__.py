@@ -16,6 +16,7 @@ from benchmarks import (
     differences,
     evaluation,
     hybrid,
+    ladder,
     report,
     stepping,
     whole_process,
@@ -26,7 +27,7 @@ from benchmarks.machine import machine, told
 RATIOS = SimpleNamespace(
     TITLE="ratios of throughput over many cases, each on one core and in the same turns", BENCHMARKS=evaluation.RATIOS
 )
-SUBJECTS = (RATIOS, evaluation, stepping, hybrid, bed, compiling, whole_process, campaigns, differences)
+SUBJECTS = (RATIOS, evaluation, stepping, ladder, hybrid, bed, compiling, whole_process, campaigns, differences)
 """In the order of the report: ratios first, since they change least with machine and load."""
 
 TURNS, QUICK = 15, 3

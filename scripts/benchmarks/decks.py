@@ -1,8 +1,9 @@
-"""Decks of the arms that are measured, every joint driven by a `rigid_gearbox` with friction that sticks."""
+"""Decks of the arms that are measured; every joint has a `rigid_gearbox` with friction that sticks, or another."""
 
 from __future__ import annotations
 
 import tempfile
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -30,14 +31,39 @@ COMMANDS = {
 }
 
 
+@dataclass(frozen=True)
+class Variant:
+    """What a deck has otherwise.
+
+    servo        keys of the servo that each joint has, in the stead of the gearbox's
+    like         whether these are besides the gearbox's
+    command      what each joint is told, "" for a servo that takes no command
+    environment  entries besides gravity;  base: of a run;  body: mass and inertia of the base's link
+    rate         of dynamics and servos
+    """
+
+    servo: str = ""
+    like: bool = True
+    command: str | None = None
+    environment: str = ""
+    base: str = "fixed"
+    rate: str = "1 kHz"
+    body: str = "mass = 1000 kg; inertia = [900, 1000, 1100] kg*m^2;"
+
+
 @cache
-def experiment(arm: Arm, command: str, record: bool = False) -> Experiment:
+def experiment(arm: Arm, command: str, record: bool = False, variant: Variant | None = None) -> Experiment:
     """512 cases from 512 poses, 2 s in steps of 1 ms, servos at 1 kHz. command: `steady` or `reversing`.
 
     record   keeps q and qd of each step; else as little as a deck may
+    variant  another servo, environment or base
     """
     text, start = COMMANDS[command]
-    lines, uses, states, poses = [SERVO, "arm measured {"], [], [], []
+    of = variant or Variant()
+    text = text if of.command is None else of.command
+    told = f"command = {text};" if text else ""
+    lines, uses, states, poses = [SERVO, f"servo used {'like gearbox ' * of.like}{{ {of.servo} }}"], [], [], []
+    lines += ["arm measured {", *([f"    link base {{ {of.body} }}"] if of.base != "fixed" else [])]
     for i, body in enumerate(arm.bodies()):
         vectors = {
             "at": (body.at, "m"), "rpy": (body.rpy, "rad"), "com": (body.com, "m"), "inertia": (body.inertia, "kg*m^2"),
@@ -53,15 +79,16 @@ def experiment(arm: Arm, command: str, record: bool = False) -> Experiment:
             f"{axis} }}"
         )
         if body.kind != "fixed":
-            uses.append(f"{body.joint} = gearbox {{ command = {text.format(phase=f'{0.7 * i:.1f}')}; }}")
+            uses.append(f"{body.joint} = used {{ {told.format(phase=f'{0.7 * i:.1f}')} }}")
             states.append(f"{body.joint}.qd = {start} rad/s;")
             poses.append(f"initial.{body.joint}.q = linspace({-3.0 + 0.1 * i:g}, {3.0 - 0.07 * i:g}, {CASES}) rad;")
     lines += [
         "}", "run one {", "    arm = measured;",
         f"    servos {{ {' '.join(uses)} }}",
         f"    initial {{ {' '.join(states)} }}",
-        f"    environment {{ gravity = [{', '.join(map(str, GRAVITY))}] m/s^2; }}",
-        "    rates { dynamics = 1 kHz; servos = 1 kHz; record = 1 kHz; }",
+        f"    environment {{ gravity = [{', '.join(map(str, GRAVITY))}] m/s^2; {of.environment} }}",
+        *([f"    base = {of.base}"] if of.base != "fixed" else []),
+        f"    rates {{ dynamics = {of.rate}; servos = {of.rate}; record = 1 kHz; }}",
         "    duration = 2 s;",
         "    record = [q, qd];" if record else f"    record = [{arm.joints[0]}.q];",
         "}",
