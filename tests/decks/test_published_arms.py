@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 import ic
 from ic.text.files import LIBRARY
 from met import run as engine
+from met.channel import recordable
 from met.dynamics.kinematics import link_motions
 from met.plan import Experiment
 from met.program.machine import Machine
@@ -143,7 +145,8 @@ def test_the_arms_weigh_what_is_published() -> None:
         ("ets_vii.ic ets_vii_reach", published.ETS_VII, 140.38),
     ):
         made = compiled(what)
-        found = [value(made, f"links.{link.name}.mass") for link in made.structure.links]
+        links = [link.name for link in made.structure.links if link.name != "base"]
+        found = [value(made, f"links.{name}.mass") for name in links]
         assert found[: len(parts)] == [part.mass for part in parts] and set(found[len(parts) :]) == {0.0}
         assert sum(found) == pytest.approx(mass, abs=1e-9)
     assert sum(part.mass for part in published.SHUTTLE) == pytest.approx(905.0 * POUND, rel=0.03)  # NASA's figure
@@ -222,3 +225,20 @@ def test_the_joints_of_the_r3_keep_step_below_the_librarys_limits() -> None:
     limits = np.array([3.0, 1.5, 5.0, 3.1, 3.1, 4.1])
     assert (np.abs(qd).max(axis=0) < limits * 1.02).all()  # the way in to a rate goes beyond it by some per cent
     assert np.abs(qd[:, 4]).max() > 3.1
+
+
+@pytest.mark.parametrize("deck", [
+    "ets_vii.ic ets_vii_afloat", "shuttle_arm.ic shuttle_arm_afloat", "station_arm.ic station_arm_afloat",
+])  # fmt: skip
+def test_an_arm_that_moves_on_a_free_base_keeps_what_momentum_there_was(deck: str) -> None:
+    """None: the base turns and shifts the other way. Against what the links have by themselves."""
+    made = compiled(deck)
+    record = recordable(made.structure)
+    found = engine.run(replace(made, structure=replace(made.structure, record=(
+        *record["momentum"], *record["links.base.velocity"], *record["links.base.rate"],
+    )))).signals  # fmt: skip
+    mass = value(made, "links.base.mass")
+    size = mass * np.abs(found["links.base.velocity"]).max()
+    assert size > 0.1 and np.abs(found["momentum.linear"]).max() < 2e-5 * size
+    turning = value(made, "links.base.inertia.xx") * np.abs(found["links.base.rate"]).max()
+    assert np.abs(found["momentum.angular"]).max() < 2e-3 * turning
