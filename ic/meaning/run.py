@@ -106,7 +106,8 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     on_beds = [each.joint for each in substitutions]
     for use in uses:
         if use.parameters is not None and use.joint not in on_beds:  # there the motor is no part of the step
-            x = fastest_rate(scope, use.servo, use.parameters, f"{use.joint}.servo")
+            x = fastest_rate(scope, use.servo, use.parameters, f"{use.joint}.servo",
+                             continuous=ticks[use.joint].continuous)
             if x is not None:
                 fastest[use.joint] = (use, x)
     stability: dict[str, Real] = {}

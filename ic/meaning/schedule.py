@@ -142,17 +142,21 @@ def make_schedule(complaints: Complaints, dynamics: Rate, record: Rate, base: Ra
     return Schedule(base.hz, step, row, whole)
 
 
-def fastest_rate(scope: Scope, servo: Any, parameters: Mapping[str, Any], path: str) -> Real | None:
+def fastest_rate(
+    scope: Scope, servo: Any, parameters: Mapping[str, Any], path: str, *, continuous: bool = False
+) -> Real | None:
     """The fastest rate constant of a joint under its servo (`Servo.fastest`); None where the servo does not know it.
 
-    path   of the servo: where a parameter of it is out of its range, that is told, and nothing is computed of it
+    path        of the servo: where a parameter of it is out of its range, that is told, and nothing is computed of it
+    continuous  whether its law is, so that its gains count
     """
-    if servo.fastest is None or scope.checks.failed(path):
+    bound = servo.fastest_law if continuous and servo.fastest_law is not None else servo.fastest
+    if bound is None or scope.checks.failed(path):
         return None
     from types import SimpleNamespace
 
     with scope.complaints.gather():
-        found: Real = servo.fastest(SimpleNamespace(**parameters))
+        found: Real = bound(SimpleNamespace(**parameters))
         return found
     return None
 

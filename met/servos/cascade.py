@@ -105,6 +105,11 @@ def fastest(p: Any) -> Real:
     return maximum(electric, sqrt(p.stiffness / (p.ratio * p.ratio * p.j_m)))
 
 
+def fastest_law(p: Any) -> Real:
+    """As `fastest`, or the rate loop on the motor by itself: (Kt Kp + F_v)/J_m, 1/s."""
+    return maximum(fastest(p), (p.kt * p.kp + p.f_v) / p.j_m)
+
+
 def full(p: Any) -> Mapping[str, Real]:
     """The largest current."""
     return {"current_cmd": p.i_max}
@@ -157,5 +162,6 @@ SERVO = Servo(
     drive=drive,
     begin=begin,
     fastest=fastest,
+    fastest_law=fastest_law,
     full=full,
 )

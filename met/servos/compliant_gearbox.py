@@ -62,6 +62,11 @@ def begin(p: Any, q: Real, qd: Real) -> Mapping[str, Real]:
     return starts | ({"bristle": 0.0} if p.friction == "lugre" else {})
 
 
+def fastest_law(p: Any) -> Real:
+    """As `fastest`, or the rate loop on the motor by itself, 1/s."""
+    return maximum(fastest(p), rate_loop.fastest(p))
+
+
 def fastest(p: Any) -> Real:
     """The motor with the joint held, 1/s: its damping, or the gear's frequency. Against a light joint it is faster."""
     inertia = p.ratio * p.ratio * p.j_m
@@ -90,5 +95,6 @@ SERVO = Servo(
     drive=drive,
     begin=begin,
     fastest=fastest,
+    fastest_law=fastest_law,
     full=rate_loop.full,
 )  # fmt: skip

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import Any
 
 from met.parameter import Memory, Parameter, State
-from met.servos.motor import TABLE_1
+from met.servos.motor import TABLE_1, damping
 from met.servos.servo import Asked, Control
 from met.trace import Real, both, clip, either, where
 
@@ -44,6 +44,11 @@ def rate_loop(p: Any, integral: Real, asked: Asked, *, q: Real, qd: Real) -> Con
     wanted = p.kp * error + p.ki * integral
     winding_up = either(both(wanted > p.v_max, error > 0.0), both(wanted < -p.v_max, error < 0.0))
     return Control({"voltage": clip(wanted, -p.v_max, p.v_max)}, {"integral": where(winding_up, 0.0, error)})
+
+
+def fastest(p: Any) -> Real:
+    """The rate loop on a motor by itself, of a continuous law: (Kt^2/R + F_v + Kt Kp/R)/J_m, 1/s."""
+    return (damping(p.kt, p.resistance, p.f_v) + p.kt * p.kp / p.resistance) / p.j_m
 
 
 def full(p: Any) -> dict[str, Real]:

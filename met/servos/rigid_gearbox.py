@@ -75,6 +75,7 @@ SERVO = Servo(
     control=control,
     drive=drive,
     fastest=fastest,
+    fastest_law=rate_loop.fastest,
     full=rate_loop.full,
     motor=motor,
     motor_only=("friction", ("coulomb",)),

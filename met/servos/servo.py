@@ -130,6 +130,7 @@ class Servo:
     motor      (p) -> the motor that a bed may take the place of (met/substitution): the servo's computer then sets
                `voltage`, one of its outputs, on the bed. None: there is none to substitute
     motor_only word and value of it under which that is so; None: under all
+    fastest_law  (p) -> the same under a law that is continuous, whose gains then count. None: `fastest`
     full       (p) -> outputs of the law at full drive, by name, for what makes a drive run away. None: there is no such
     follows    whether the joint goes with its command whatever the arm, so that a position command that begins
                elsewhere than the joint makes it jump, which is told (D169)
@@ -149,6 +150,7 @@ class Servo:
     drive: Callable[[Any, Any, Any, JointMotion], Drive]
     begin: Callable[[Any, Real, Real], Mapping[str, Real]] | None = None
     fastest: Callable[[Any], Real] | None = None
+    fastest_law: Callable[[Any], Real] | None = None
     full: Callable[[Any], Mapping[str, Real]] | None = None
     follows: bool = False
     motor: Callable[[Any], Motor] | None = None
