@@ -21,19 +21,17 @@ from ic.beginnings.models import MODELS
 from ic.formatting.formatter import formatted
 from met import cli, models
 from tests.met import test_every_model as every
+from tests.met.small_models import SMALLEST, Small
 
 ROOT = Path(__file__).parents[3]
 USES = {
-    "servo": {
-        "more": "servo mine { model = begun; gain = 20 N*m*s/rad; limit = 5 N*m; rotor = 0.2 kg*m^2; }",
-        "servos": "hinge = mine { command = rate(0.5 rad/s); };",
-    },
-    "environment": {"environment": "drag = begun { link = tip; damping = 3 N*s/m; };"},
-    "command": {"servos": every.DRIVEN.format("rate(begun(to = 0.5 rad/s, over = 0.1 s))")},
-    "metric": {"metric": "begun { of = slide.qd; }"},
-    "integrator": {"integrator": "begun"},
+    "servo": Small({"gain": 20.0, "limit": 5.0, "rotor": 0.2}),
+    "environment": Small({"link": "tip", "damping": 3.0}),
+    "command": Small({"to": 0.5, "over": 0.1}),
+    "metric": Small(),
+    "integrator": Small(),
 }
-"""The model `begun` of each kind in the small deck that every model of MET's own must run from."""
+"""What the small deck that every model of MET's own must run from says of the model `begun` of each kind."""
 
 
 @pytest.fixture(autouse=True)
@@ -114,7 +112,7 @@ def test_a_model_does_what_every_model_must(
     kind: models.Kind, begin: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begin(kind)
-    monkeypatch.setitem(every.SMALLEST, (kind, "begun"), USES[kind])
+    monkeypatch.setitem(SMALLEST, (kind, "begun"), USES[kind])
     every.test_a_model_declares_what_its_numbers_are(kind, "begun")
     every.test_it_runs_from_a_small_deck_and_its_bits_depend_on_the_case_alone(kind, "begun", tmp_path)
 
