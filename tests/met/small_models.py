@@ -174,10 +174,10 @@ class Use:
         defaulted = parameter.default is not None or bool(parameter.of_servo)
         return not defaulted or self.command in parameter.needed_for
 
-    def unit(self, parameter: Parameter) -> str:
-        """Its SI unit here, as a deck writes it; "" for a pure number."""
-        text = in_deck(self._unit(parameter)[0])
-        return "" if text == "1" else text
+    def unit(self, parameter: Parameter, *, declared: bool = False) -> str:
+        """Its SI unit here, as a deck writes it, or as messages name it; "" for a pure number."""
+        text = self._unit(parameter)[0]
+        return "" if text == "1" else text if declared else in_deck(text)
 
     def dimension(self, parameter: Parameter) -> Dimension:
         return self._unit(parameter)[1]

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from types import SimpleNamespace
 from typing import Any, get_type_hints
 
 import numpy as np
+import pytest
 
 from met import trace
 from met.environments.environment import World
@@ -27,6 +29,7 @@ from met.substitution.balance import Balanced
 from met.substitution.bed import Wire
 from met.substitution.law import Told
 from met.trace import Formulas, Graph, Mask, Real, Scalar
+from tests.met.declarations.values import holds
 from tests.met.small_models import Use
 
 Draw = Callable[[], float]
@@ -36,11 +39,21 @@ SINES = (trace.sin, trace.cos, trace.tan, trace.asin, trace.acos, trace.atan, tr
 """What models may call whose plain form is the platform's, and whose recorded form is MET's own."""
 
 
-def sines_of_its_own(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of `SINES` whose plain form is MET's own too, so that all answers must be the same to the last bit.
+def use_sines_of_ones_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Makes `SINES` the same functions to floats and to recorded numbers, wherever models have them from.
 
-    How far it is from the platform's is for tests/met/trace/test_accuracy.py.
+    So answers are compared to the last bit. How far these are from the platform's is for
+    tests/met/trace/test_accuracy.py.
     """
+    for function in SINES:
+        own = _replayed(function)
+        for module in list(sys.modules.values()):
+            if getattr(module, "__dict__", {}).get(function.__name__) is function:
+                monkeypatch.setattr(module, function.__name__, own)
+
+
+def _replayed(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function whose plain form is its recorded one, replayed."""
     names = ("y", "x") if function is trace.atan2 else ("x",)
     graph = Graph()
     formulas = Formulas.of(graph, [function(*map(graph.input, names))])
@@ -94,17 +107,6 @@ class Numbers:
         else:
             found = self.rng.normal() * size
         return float(round(found)) if parameter.whole else found
-
-
-def holds(parameter: Parameter, value: float) -> bool:
-    """Whether a number is within the declared range."""
-    return (
-        (parameter.above is None or value > parameter.above)
-        and (parameter.at_least is None or value >= parameter.at_least)
-        and (parameter.below is None or value < parameter.below)
-        and (parameter.at_most is None or value <= parameter.at_most)
-        and (not parameter.whole or value == round(value))
-    )
 
 
 def differences(call: Callable[[Numbers], Any], seed: int) -> list[str]:

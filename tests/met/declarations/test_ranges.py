@@ -22,53 +22,11 @@ from met.parameter import Parameter
 from met.plan import Experiment
 from met.plan_codec import Damaged
 from tests.ic.small_decks import check, experiment, told
-from tests.met.declarations.both_ways import holds
-from tests.met.small_models import EVERY, SMALLEST, Small, Use, Value, smallest, uses
+from tests.met.declarations.values import NUMBERS, bounds, errors, inner, paths, shaped
+from tests.met.small_models import EVERY, SMALLEST, Small, Use, smallest, uses
 
-NUMBERS = ("number", "vector", "list")
 UNSTABLE = {"D104"}
 """What else a number may be refused for: one at its bound may make a servo too fast for the step."""
-
-
-def bounds(parameter: Parameter) -> Iterator[tuple[float, float, str]]:
-    """(inside, outside, words that a message has of it): each bound with the numbers on its two sides."""
-    up, down = math.inf, -math.inf
-    # a whole number's neighbours are whole, so that one bound alone is broken
-    next_up, next_down = ((lambda x: x + 1.0), (lambda x: x - 1.0)) if parameter.whole else (
-        (lambda x: math.nextafter(x, up)), (lambda x: math.nextafter(x, down)))  # fmt: skip
-    if parameter.above is not None:
-        yield next_up(parameter.above), parameter.above, f"above {parameter.above:g}"
-    if parameter.at_least is not None and (parameter.above is None or parameter.above < parameter.at_least):
-        yield parameter.at_least, next_down(parameter.at_least), f"at least {parameter.at_least:g}"
-    if parameter.below is not None:
-        yield next_down(parameter.below), parameter.below, f"below {parameter.below:g}"
-    if parameter.at_most is not None:
-        yield parameter.at_most, next_up(parameter.at_most), f"at most {parameter.at_most:g}"
-    if parameter.whole:
-        inside = inner(parameter)
-        yield inside, math.nextafter(inside, up), "whole"
-
-
-def inner(parameter: Parameter) -> float:
-    """A number well inside the range."""
-    edges = (parameter.above, parameter.at_least, parameter.below, parameter.at_most)
-    known = [x for x in edges if x is not None]
-    tries = (1.0, 0.5, sum(known) / max(len(known), 1), *(x + d for x in known for d in (1.0, -1.0)))
-    return next(x for x in tries if holds(parameter, x))
-
-
-def shaped(parameter: Parameter, use: Use, number: float) -> Value:
-    """A value of the parameter's shape with this number in it, the last one of several."""
-    if parameter.shape == "number":
-        return number
-    count = 3 if parameter.shape == "vector" else len(use.values.get(parameter.name, (0.0,)))
-    return (inner(parameter),) * (count - 1) + (number,)
-
-
-def paths(use: Use, parameter: Parameter) -> list[str]:
-    """Where the parameter's numbers stand in a plan."""
-    path = f"{use.head}.{parameter.name}"
-    return [f"{path}.{axis}" for axis in "xyz"] if parameter.shape == "vector" else [path]
 
 
 def ranged(kind: models.Kind, name: str) -> Iterator[tuple[Use, Parameter]]:
@@ -85,9 +43,9 @@ def refused(folder: Path, use: Use, parameter: Parameter, deck: str, written: st
             settings: tuple[str, ...] = (), select: str = "it") -> None:  # fmt: skip
     """The deck is refused for one number alone: by code, parameter and bound, and at the place where it is written."""
     found = check(folder, deck, select=[select], set=settings)
-    errors = [each for each in found.diagnostics if each.severity == "error" and each.code not in UNSTABLE]
-    assert [each.code for each in errors] == ["D077"], (parameter.name, written, told(found))
-    message, at = errors[0].message, errors[0].at
+    refusals = [each for each in errors(found) if each.code not in UNSTABLE]
+    assert [each.code for each in refusals] == ["D077"], (parameter.name, written, told(found))
+    message, at = refusals[0].message, refusals[0].at
     assert message.startswith(f"`{parameter.name}` of {use.label} must be "), message
     assert words in message and message.endswith(ends), (words, message)
     assert at is not None
@@ -101,7 +59,7 @@ def test_a_number_at_its_bound_is_taken_as_it_is(kind: models.Kind, name: str, t
         for inside, _, _ in bounds(parameter):
             text = use.text(parameter, shaped(parameter, use, inside))
             found = check(tmp_path, use.put(tmp_path).deck({parameter.name: text}), select=["it"])
-            assert {each.code for each in found.diagnostics if each.severity == "error"} <= UNSTABLE, told(found)
+            assert {each.code for each in errors(found)} <= UNSTABLE, told(found)
             if found.plan is not None:
                 value = found.plan.experiments[0].parameters[paths(use, parameter)[-1]].value
                 assert (value[-1] if isinstance(value, tuple) else value) == inside, parameter.name
@@ -158,10 +116,10 @@ def test_what_comes_out_as_no_number_or_infinite_is_refused(
         deck = use.put(tmp_path).deck({parameter.name: text}, before="let way = 1;\n", cases="vary way = [1, 0];")
         shown = "nan" if "*" in expression else "inf"
         found = check(tmp_path, deck, select=["cases"])
-        errors = [each for each in found.diagnostics if each.severity == "error" and each.code not in UNSTABLE]
-        assert [each.code for each in errors] == ["D077"], (parameter.name, told(found))
-        assert errors[0].at is not None and errors[0].at.text.startswith(f"this is {shown}"), errors[0]
-        assert errors[0].message.startswith(f"`{parameter.name}` of {use.label} must be "), errors[0]
+        refusals = [each for each in errors(found) if each.code not in UNSTABLE]
+        assert [each.code for each in refusals] == ["D077"], (parameter.name, told(found))
+        assert refusals[0].at is not None and refusals[0].at.text.startswith(f"this is {shown}"), refusals[0]
+        assert refusals[0].message.startswith(f"`{parameter.name}` of {use.label} must be "), refusals[0]
 
 
 def changed(deck: Experiment, path: str, value: object) -> Experiment:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,12 +20,7 @@ DRAWS = 25
 
 @pytest.fixture(autouse=True)
 def one_sine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sines and the like are the same functions to floats and to recorded numbers, wherever models have them from."""
-    for function in both_ways.SINES:
-        own = both_ways.sines_of_its_own(function)
-        for module in list(sys.modules.values()):
-            if getattr(module, "__dict__", {}).get(function.__name__) is function:
-                monkeypatch.setattr(module, function.__name__, own)
+    both_ways.use_sines_of_ones_own(monkeypatch)
 
 
 @pytest.mark.parametrize(("kind", "name"), EVERY)
