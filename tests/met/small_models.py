@@ -9,18 +9,17 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, get_args
 
-from ic.meaning.unit_words import in_deck, unit_here
 from met import models
-from met.channel import COMMAND_UNIT, MOTION
 from met.frozen import frozen
 from met.parameter import Parameter, under
 from met.plan import JointKind
-from met.units import Dimension
+from met.units import PURE, Dimension, parse_unit
 
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
 EVERY = [(kind, name) for kind in KINDS for name in models.find_own(kind)]
@@ -174,20 +173,16 @@ class Use:
         defaulted = parameter.default is not None or bool(parameter.of_servo)
         return not defaulted or self.command in parameter.needed_for
 
-    def unit(self, parameter: Parameter, *, declared: bool = False) -> str:
-        """Its SI unit here, as a deck writes it, or as messages name it; "" for a pure number."""
-        text = self._unit(parameter)[0]
-        return "" if text == "1" else text if declared else in_deck(text)
+    def unit(self, parameter: Parameter) -> str:
+        """Its SI unit here, as a deck writes it; "" for a pure number."""
+        words = WORDS[JOINTS[self.joint]]
+        of = in_words(WATCHED[self.small.of], words)
+        asked = in_words(ASKED[self.command], words) if self.command else ""
+        text = in_words(parameter.unit, {**words, "command": asked, "of": of})
+        return "" if parse_unit(text).dimension == PURE else text
 
     def dimension(self, parameter: Parameter) -> Dimension:
-        return self._unit(parameter)[1]
-
-    def _unit(self, parameter: Parameter) -> tuple[str, Dimension]:
-        kind = JOINTS[self.joint]
-        of = unit_here(WATCHED[self.small.of], kind, None, None)[0]
-        # a bed and an environment are of no joint's units; a servo's parameters are of no command's
-        command = self.command if self.kind == "command" else None
-        return unit_here(parameter.unit, kind, command, of if self.kind == "metric" else None)
+        return parse_unit(self.unit(parameter) or "1").dimension
 
     def text(self, parameter: Parameter, value: Value) -> str:
         """A value in SI as a deck writes it."""
@@ -237,20 +232,40 @@ class Use:
     def put(self, folder: Path) -> Use:
         """Writes the file that a course from a file reads, beside the deck; gives itself."""
         if getattr(self.model, "from_file", False):
-            unit = unit_here(COMMAND_UNIT[self.command], JOINTS[self.joint], None, None)[0]
+            unit = in_words(ASKED[self.command], WORDS[JOINTS[self.joint]])
             rows = "".join(f"{t}, {x}\n" for t, x in zip(TIMES, (0.0, 0.5, 0.2), strict=True))
             text = f"time [s], {self.joint} [{unit}]\n{rows}"
             (folder / str(self.small.values["file"])).write_text(text, encoding="utf-8")
         return self
 
 
-WATCHED = {name: unit for name, unit, _ in MOTION}
+# What units mean here, said once more than in MET itself.
+
+WATCHED = {"q": "joint", "qd": "joint/s", "qdd": "joint/s^2", "tau": "effort"}
 """Declared units of what a metric here may watch."""
+
+ASKED = {"rate": "joint/s", "position": "joint", "torque": "effort", "acceleration": "joint/s^2"}
+"""Declared units of what commands ask."""
+
+WORDS = {"revolute": {"joint": "rad", "effort": "N*m"}, "prismatic": {"joint": "m", "effort": "N"}}
+"""What the words of declared units are on a joint."""
+
+
+def in_words(unit: str, words: Mapping[str, str]) -> str:
+    """A declared unit with its words replaced, as a deck can write it behind a number: `m/(N*m)`, `s^-1`."""
+
+    def factor(found: re.Match[str]) -> str:
+        text = words.get(found[0], found[0])
+        alone = unit[:found.start()][-1:] != "/" and unit[found.end():][:1] != "^"
+        return text if alone or text.isalpha() else f"({text})"
+
+    text = re.sub(r"[A-Za-z]+", factor, unit)
+    return text.removeprefix("1/") + "^-1" if re.fullmatch(r"1/[a-z]+", text) else text
 
 
 def value_of(command: str, joint: str) -> str:
     """What a command of this kind asks of a joint, as a deck writes it."""
-    return f"0.5 {unit_here(COMMAND_UNIT[command], JOINTS[joint], None, None)[0]}"
+    return f"0.5 {in_words(ASKED[command], WORDS[JOINTS[joint]])}"
 
 
 def carrier(kind: str, command: str) -> str:
@@ -264,7 +279,7 @@ def commands(kind: str, model: Any) -> tuple[str, ...]:
     if kind == "servo":
         return model.commands or ("",)
     if kind == "command":
-        return tuple(COMMAND_UNIT)
+        return tuple(ASKED)
     return ("rate",) if kind in ("bed", "law") else ("",)
 
 
