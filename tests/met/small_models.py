@@ -150,13 +150,14 @@ class Use:
 
     @property
     def values(self) -> dict[str, Value]:
-        """What the smallest deck writes, in SI, by parameter."""
-        return {**self.small.values, **self.words}
+        """What the smallest deck writes, in SI, by parameter; of those that are there."""
+        known = [parameter.name for parameter in self.parameters()]
+        return {name: value for name, value in {**self.small.values, **self.words}.items() if name in known}
 
     def parameters(self) -> tuple[Parameter, ...]:
         """The parameters that a deck may write here, with the bounds that hold here.
 
-        All that the model has. One that is there under some words or commands alone is to be left out here elsewhere.
+        All that the model has: the one place to leave out what is there under some words (`words`) or commands alone.
         """
         return tuple(under(parameter, self.command) for parameter in models.written(self.model))
 

@@ -29,6 +29,8 @@ def parameters(model: Any) -> tuple[Parameter, ...]:
 
 def test_every_model_has_a_small_deck() -> None:
     assert sorted(SMALLEST) == sorted(EVERY)
+    for (kind, name), small in SMALLEST.items():
+        assert small.values.keys() <= {parameter.name for parameter in models.written(models.find(kind, name))}, name
 
 
 @pytest.mark.parametrize(("kind", "name"), EVERY)
