@@ -181,17 +181,15 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
         use = servos.get(joint.name)
         if use is None:
             continue
-        servo = models.find("servo", use.model)
+        of_servo = models.servo_parts(use)
         kind = use.command.kind if use.command is not None else None
         if kind is not None:
             unit = joint_unit(COMMAND_UNIT[kind], joint)
             add(f"{joint.name}.servo.command", unit, f"{kind} asked of the servo", use.divisor, joint.name)
-        for memory in servo.memory:
-            unit = joint_unit(memory.unit, joint, kind)
-            add(f"{joint.name}.servo.{memory.name}", unit, memory.doc, use.divisor, joint.name)
-        for part in (*servo.states, *servo.signals):
-            unit = joint_unit(part.unit, joint, kind)
-            add(f"{joint.name}.servo.{part.name}", unit, part.doc, dynamics, joint.name)
+        for divisor, held in ((use.divisor, of_servo.memory), (dynamics, (*of_servo.states, *of_servo.shown))):
+            for part in held:
+                unit = joint_unit(part.unit, joint, kind)
+                add(f"{joint.name}.servo.{part.name}", unit, part.doc, divisor, joint.name)
         if joint.name in on_beds:
             bed, law = (models.find(kind, getattr(on_beds[joint.name], kind)) for kind in ("bed", "law"))
             for name, unit, doc in of_bed(bed):

@@ -14,20 +14,26 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cache
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from met import units
 from met.diagnostic import Place, Problem, did_you_mean, error
 from met.entry_points import offered
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import Structure
+from met.plan import ServoUse, Structure
+
+if TYPE_CHECKING:
+    from met.servos.servo import Parts
 
 Kind = Literal["servo", "environment", "command", "metric", "integrator", "bed", "law"]
 
 
 OF_ONES_OWN = ("a model of your own is known once its package is installed, `pip install -e FOLDER`; `met new` writes "
                "such a package")
+
+HELD = ("memory", "outputs", "integrals", "states", "signals")
+"""Where declarations say what a model holds and shows."""
 
 FAULTS = "faults"
 """The parameter of a bed that a deck writes as a word: what its presets are called."""
@@ -138,7 +144,7 @@ def _check_names(kind: Kind, model: Any, found_at: str) -> None:
 
     own = {"bed": OF_BED, "law": OF_LAW + OF_OBSERVER}.get(kind, ())
     taken = [name for name, *_ in own] or ["command"]
-    shown = [part.name for group in ("memory", "states", "signals") for part in getattr(model, group, ())]
+    shown = [part.name for group in HELD for part in getattr(model, group, ())]
     for names in ([*taken, *shown], [parameter.name for parameter in getattr(model, "parameters", ())]):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
@@ -149,7 +155,7 @@ def _check_names(kind: Kind, model: Any, found_at: str) -> None:
 def _check_units(model: Any, found_at: str) -> None:
     """Every declared unit can be read."""
     words = {word: units.parse_unit("1") for word in ("joint", "effort", "command", "of")}
-    for part in (p for group in ("parameters", "memory", "states", "signals") for p in getattr(model, group, ())):
+    for part in (p for group in ("parameters", *HELD) for p in getattr(model, group, ())):
         try:
             units.parse_unit(part.unit, words)
         except ValueError as reason:
@@ -206,7 +212,14 @@ def written(model: Any) -> tuple[Parameter, ...]:
 
 def has_motor(servo: Any) -> bool:
     """Whether a bed may take the place of this servo's motor: it has one, and its computer sets the voltage."""
-    return servo.motor is not None and any(memory.name == "voltage" for memory in servo.memory)
+    return servo.motor is not None and any(output.name == "voltage" for output in servo.outputs)
+
+
+def servo_parts(use: ServoUse) -> Parts:
+    """What there is of a servo in this use of it."""
+    from met.servos.servo import parts
+
+    return parts(find("servo", use.model, use.place), dict(use.words), continuous=use.continuous)
 
 
 def parameter(model: Any, name: str) -> Parameter | None:

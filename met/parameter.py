@@ -10,12 +10,22 @@ and `of` (the unit of the channel that a metric watches).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal
 
 from met.frozen import frozen
 
+WORLD = "world"
+"""A word that may stand for a link: the ground, whose frame is the world's."""
+
+ZEROS = (0.0, 0.0, 0.0)
+"""Default of three numbers that need not be written."""
+
 Shape = Literal["number", "vector", "list", "word", "text"]
+
+Only = tuple[str, tuple[str, ...]]
+"""Where a part of a servo is there: the name of one of its parameters that is a word, and under which words."""
 
 
 @frozen(kw_only=True)
@@ -27,7 +37,15 @@ class Parameter:
     A list, a word or a text (in quotes; for the compiler alone, no plan holds one) cannot vary in a sweep.
     `needed_for` names the kinds of command of a servo under which it must be written, default or not, and lie above
     `above_where_needed` where that is given. `of_servo` names
-    the parameter of the joint's servo that a bed's parameter is where a deck does not write it.
+    the parameter of the joint's servo that a bed's parameter is where a deck does not write it. `only` is for servos'.
+
+    names        of an environment's word: it names one of the arm's links or moving joints, or is one of `words`. Where
+                 it is a joint, the unit words `joint` and `effort` of the model's other parameters are this joint's
+    decides      of a number: it decides the program, as a word does, and is a plain float when the model is recorded
+    direction    of a vector: its length does not count, so it may not be nothing
+    less_than    of a number: the parameter that it is less than, in every case
+    rises        of a list: its numbers rise, and there is one at least
+    as_many_as   of a list: the list that it has a number for each of; it may be empty where that is its default
     """
 
     name: str
@@ -45,6 +63,18 @@ class Parameter:
     above_where_needed: float | None = None
     of_servo: str = ""
     source: str = ""
+    names: Literal["", "link", "joint"] = ""
+    decides: bool = False
+    direction: bool = False
+    less_than: str = ""
+    rises: bool = False
+    as_many_as: str = ""
+    only: Only | None = None
+
+
+def there(part: Parameter | Memory | State | Signal, words: Mapping[str, str]) -> bool:
+    """Whether a part of a servo is there under these words, by the names of their parameters."""
+    return part.only is None or words.get(part.only[0]) in part.only[1]
 
 
 def under(parameter: Parameter, command: str) -> Parameter:
@@ -62,6 +92,7 @@ class Memory:
     unit: str
     doc: str
     start: float = 0.0
+    only: Only | None = None
 
 
 @frozen(kw_only=True)
@@ -72,6 +103,7 @@ class State:
     unit: str
     doc: str
     start: float = 0.0
+    only: Only | None = None
 
 
 @frozen(kw_only=True)
@@ -81,3 +113,4 @@ class Signal:
     name: str
     unit: str
     doc: str
+    only: Only | None = None

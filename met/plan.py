@@ -18,6 +18,8 @@ Parameters are named by paths, the ones a deck uses inside a run:
     <joint>.bed.<parameter>                as the bed declares that the joint's motor is on
     <joint>.law.<parameter>                as the law declares that drives the bed's load
     initial.<joint>.q|qd                   rad, rad/s (m, m/s)
+    initial.base.position|velocity.x|y|z   of a free base, world axes, m, m/s; .rpy (rad, fixed x-y-z), .rate (rad/s)
+    base.<component>.<parameter>           of a prescribed base, as the profile declares that gives this component
     environment.<name>.<parameter>         as the environment model declares; uniform gravity is `gravity`, `g`
     metrics.<name>.<parameter>             as the metric declares
 
@@ -26,7 +28,7 @@ A vector parameter of a model is three numbers, `.x .y .z`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import field
 from typing import Literal
 
@@ -37,6 +39,12 @@ from met.frozen import frozen
 from met.trace.graph import Formulas
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
+
+BASE = "base"
+"""The link that the arm stands on. It has no joint, and matter only where a deck gives it some."""
+
+COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
+"""Of the pose of a prescribed base: m, and rad about fixed x, y, z."""
 
 REPEAT, SEED = "noise:repeat", "noise:seed"
 """Inputs of a program besides coordinates: no path of a deck's has a colon."""
@@ -83,13 +91,37 @@ class Link:
 
 @frozen
 class Joint:
-    """Connects `parent` (a link, or "base") to `child`, along or about its axis."""
+    """Connects `parent` (a link, the base too) to `child`, along or about its axis."""
 
     name: str
     kind: JointKind
     parent: str
     child: str
     place: Place | None = None
+
+
+@frozen
+class Course:
+    """One of `COMPONENTS` of a prescribed base, and the model of its course in time."""
+
+    component: str
+    model: str
+
+
+@frozen
+class Base:
+    """A base that moves: as its courses say, component by component (those left out stay 0), or freely."""
+
+    kind: Literal["prescribed", "free"]
+    courses: tuple[Course, ...] = ()
+    place: Place | None = None
+
+    @property
+    def turns(self) -> bool:
+        """Whether it may turn: it is free, or one of its angles is no constant."""
+        return self.kind == "free" or any(
+            course.component in COMPONENTS[3:] and course.model != "constant" for course in self.courses
+        )
 
 
 @frozen
@@ -102,7 +134,13 @@ class Command:
 
 @frozen
 class ServoUse:
-    """A servo on a joint: the definition's name in the deck, the model, the command, ticks of base rate a tick."""
+    """A servo on a joint: the definition's name in the deck, the model, the command.
+
+    divisor     base ticks a tick of its control law; of one that is continuous, and where there is none, a step of the
+                dynamics
+    words       those of its parameters on which parts of the model depend (`Servo.deciding`): name and word
+    continuous  whether its control law is a part of the derivative
+    """
 
     joint: str
     definition: str
@@ -110,6 +148,8 @@ class ServoUse:
     command: Command | None
     divisor: int
     place: Place | None = None
+    words: tuple[tuple[str, str], ...] = ()
+    continuous: bool = False
 
 
 @frozen
@@ -225,7 +265,10 @@ class Recorded:
 
 @frozen
 class Structure:
-    """All that decides which program is compiled, values apart."""
+    """All that decides which program is compiled, values apart.
+
+    base  None: it is fixed. A base that moves is among the links
+    """
 
     arm: str
     links: tuple[Link, ...]
@@ -238,6 +281,17 @@ class Structure:
     schedule: Schedule
     record: tuple[Recorded, ...]
     substitutions: tuple[Substitution, ...] = ()
+    base: Base | None = None
+
+    @property
+    def free(self) -> bool:
+        """Whether the base moves freely."""
+        return self.base is not None and self.base.kind == "free"
+
+    @property
+    def ground(self) -> tuple[str, ...]:
+        """The links that do not move against the base: itself, where it is one, and what fixed joints hold on it."""
+        return ground(self.links, self.joints)
 
     @property
     def history_bytes(self) -> int:
@@ -248,6 +302,15 @@ class Structure:
     def moving(self) -> tuple[Joint, ...]:
         """The joints that have a coordinate, in the order of `joints`: the order of every `joint` dimension."""
         return tuple(joint for joint in self.joints if joint.kind != "fixed")
+
+
+def ground(links: Iterable[Link], joints: Iterable[Joint]) -> tuple[str, ...]:
+    """`Structure.ground` of these links and joints."""
+    found = {BASE}
+    fixed = {joint.child: joint.parent for joint in joints if joint.kind == "fixed"}
+    while more := {child for child, parent in fixed.items() if parent in found} - found:
+        found |= more
+    return tuple(link.name for link in links if link.name in found)
 
 
 @frozen

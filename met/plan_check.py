@@ -16,13 +16,14 @@ from typing import Any
 import numpy as np
 
 from met import models, units
+from met import plan_relations as relations
 from met import plan_rest as rest
 from met.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.outputs import tolerable
 from met.parameter import Parameter
-from met.plan import Coordinate, Experiment, Formula, Quantity, Requirement, Structure
+from met.plan import BASE, COMPONENTS, Coordinate, Experiment, Formula, Quantity, Requirement, Structure
 from met.plan_codec import Damaged
-from met.plan_defaults import INERTIA, declared, heads_of_models
+from met.plan_defaults import INERTIA, declared, heads_of_models, of_environment
 from met.trace.graph import TRUTHS, Formulas
 
 NAME = re.compile(r"[^\W\d]\w*")
@@ -52,6 +53,7 @@ def check(experiments: Iterable[Experiment]) -> None:
         _group_name(experiment, f"{where}.name", names)
         names.append(experiment.name)
         _check_arm(experiment.structure, f"{where}.structure")
+        _check_base(experiment.structure, f"{where}.structure")
         _check_schedule(experiment.structure, f"{where}.structure")
         _check_uses(experiment.structure, f"{where}.structure")
         _check_record(experiment.structure, f"{where}.structure.record")
@@ -110,7 +112,7 @@ def _check_arm(structure: Structure, where: str) -> None:
     """Links and joints are a tree that stands on the base."""
     links: list[str] = []
     for index, link in enumerate(structure.links):
-        _name(link.name, f"{where}.links[{index}].name", ["base", *links])
+        _name(link.name, f"{where}.links[{index}].name", links)
         links.append(link.name)
     if not links:
         raise Damaged(f"{where}.links", "there is none")
@@ -121,15 +123,15 @@ def _check_arm(structure: Structure, where: str) -> None:
         _name(joint.name, f"{path}.name", names)
         names.append(joint.name)
         for end, name in (("parent", joint.parent), ("child", joint.child)):
-            if name not in links and not (end == "parent" and name == "base"):
+            if name not in (BASE, *links) or (end == "child" and name == BASE):
                 raise Damaged(f"{path}.{end}", f"there is no link `{name}`")
         if joint.child in parents:
             raise Damaged(f"{path}.child", f"link `{joint.child}` is another joint's child already")
         parents[joint.child] = joint.parent
     for index, name in enumerate(links):
-        if name not in parents:
+        if name not in parents and name != BASE:
             raise Damaged(f"{where}.links[{index}]", f"no joint holds link `{name}`")
-    standing = {"base"}
+    standing = {BASE}
     for joint_index, joint in enumerate(structure.joints):
         passed: set[str] = set()
         at = joint.child
@@ -139,6 +141,25 @@ def _check_arm(structure: Structure, where: str) -> None:
             passed.add(at)
             at = parents[at]
         standing |= passed
+
+
+def _check_base(structure: Structure, where: str) -> None:
+    """A base that moves is a link; its courses are those of components, and its turns keep the velocity products."""
+    base, links = structure.base, [link.name for link in structure.links]
+    if base is None:
+        return
+    if BASE not in links:
+        raise Damaged(f"{where}.base", f"there is no link `{BASE}`, and it moves")
+    if base.kind == "free" and base.courses:
+        raise Damaged(f"{where}.base.courses", "a free base has none")
+    known = list(COMPONENTS)
+    for index, course in enumerate(base.courses):
+        if course.component not in known:
+            raise Damaged(f"{where}.base.courses[{index}].component", f"it should be one of {', '.join(known)}")
+        known = known[known.index(course.component) + 1 :]
+        models.find("command", course.model, base.place)
+    if not structure.velocity_products and base.turns:
+        raise Damaged(f"{where}.velocity_products", "a base that turns needs them")
 
 
 def _check_schedule(structure: Structure, where: str) -> None:
@@ -171,6 +192,12 @@ def _check_uses(structure: Structure, where: str) -> None:
         elif use.command.kind not in servo.commands or use.command.kind not in COMMAND_UNIT:
             known = ", ".join(servo.commands) or "none"
             raise Damaged(f"{path}.command.kind", f"{use.model} takes no command `{use.command.kind}`, but {known}")
+        if unknown := [name for name, _ in use.words if name not in servo.deciding]:
+            raise Damaged(f"{path}.words", f"no part of a {use.model} depends on a word `{unknown[0]}`")
+        if use.continuous and (servo.control is None or servo.clocked):
+            raise Damaged(f"{path}.continuous", f"a {use.model} has no continuous law")
+        if use.continuous and use.divisor != structure.schedule.dynamics:
+            raise Damaged(f"{path}.divisor", "of a continuous law it should be that of the dynamics")
     names: list[str] = []
     for index, environment in enumerate(structure.environment):
         _name(environment.name, f"{where}.environment[{index}].name", names)
@@ -210,11 +237,17 @@ def _check_substitutions(structure: Structure, where: str) -> None:
         servo = servos[use.joint]
         if not models.has_motor(models.find("servo", servo.model, servo.place)):
             raise Damaged(f"{path}.joint", f"the servo of joint `{use.joint}`, {servo.model}, has no motor for a bed")
+        only = models.find("servo", servo.model, servo.place).motor_only
+        if only is not None and dict(servo.words).get(only[0], only[1][0]) not in only[1]:
+            message = f"the servo of joint `{use.joint}` has another `{only[0]}` than {only[1][0]}"
+            raise Damaged(f"{path}.joint", message)
         for kind in ("bed", "law"):
             models.find(kind, getattr(use, kind), use.place)
         first = structure.substitutions[0]
         if use.law != first.law:
             raise Damaged(f"{path}.law", f"it should be {first.law}, that of the first substituted joint")
+        if servo.continuous:
+            raise Damaged(f"{path}.joint", f"the servo of joint `{use.joint}` is continuous: a bed's has a rate")
         if servo.divisor != servos[first.joint].divisor:
             message = f"the servo of joint `{use.joint}` should tick with that of `{first.joint}`, the first on a bed"
             raise Damaged(f"{path}.joint", message)
@@ -338,7 +371,8 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
     structure, parameters = experiment.structure, experiment.parameters
     known: set[str] = set()
     models_of = heads_of_models(structure)
-    for path, unit, _, parameter in declared(structure):
+    relations.check_uses(experiment, of_environment(structure), where)  # first, for units go by a model's joint
+    for path, unit, _, parameter in declared(experiment):
         if path in known:
             raise Damaged(where, f"two things are called `{path}`")
         known.add(path)
@@ -352,6 +386,12 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
     for use in structure.servos:
         if use.command is not None and use.command.model in TABLES:
             _check_table(experiment, f"{use.joint}.servo.command", TABLES[use.command.model], where)
+        for name, word in use.words:
+            if parameters[f"{use.joint}.servo.{name}"].value != word:
+                raise Damaged(f"{where}.{use.joint}.servo.{name}", f"it should be {word}, as the structure says")
+    for course in structure.base.courses if structure.base is not None else ():
+        if course.model in TABLES:
+            _check_table(experiment, f"base.{course.component}", TABLES[course.model], where)
     _check_bodies(experiment, where)
 
 
@@ -375,7 +415,8 @@ def _check_quantity(quantity: Quantity, unit: str, parameter: Parameter | None, 
         raise Damaged(f"{where}.unit", f"it should be {unit}")
     value, shape = quantity.value, parameter.shape if parameter is not None else "number"
     if shape == "word":
-        words = parameter.words if parameter is not None else ()
+        assert parameter is not None
+        words = () if parameter.names else parameter.words
         if not isinstance(value, str) or (words and value not in words):
             raise Damaged(f"{where}.value", "it should be a word" + (f": {', '.join(words)}" if words else ""))
     elif shape == "list":
@@ -466,7 +507,10 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
     for joint in structure.moving:
         axis = [f"{joint.name}.axis.{letter}" for letter in "xyz"]
         tests.append((f"{joint.name}.axis", axis, _is_axis, "its length should be 1"))
-    tests += rest.tests(experiment)
+    if structure.free:
+        masses = [f"links.{name}.mass" for name in structure.ground]
+        tests.append((f"links.{BASE}.mass", masses, _is_some, "the base moves freely and has no mass"))
+    tests += [*rest.tests(experiment), *relations.tests(experiment, of_environment(structure))]
     varied = []
     for path, paths, holds, message in tests:
         if any(path not in experiment.parameters for path in paths):
@@ -476,7 +520,7 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
             varied.append((path, values, holds, message))
         elif not holds(np.array([values], dtype=float))[0]:
             raise Damaged(f"{where}.{path}", message)
-    for path, _, _, parameter in declared(structure):
+    for path, _, _, parameter in declared(experiment):
         quantity = experiment.parameters.get(path)
         if parameter is not None and quantity is not None and isinstance(quantity.value, Formula):
             for holds, message in _bounds(parameter):
@@ -505,6 +549,10 @@ def _check_varied(
 
 def _is_mass(values: np.ndarray) -> np.ndarray:
     return (values[:, 0] >= 0.0) & np.isfinite(values[:, 0])
+
+
+def _is_some(values: np.ndarray) -> np.ndarray:
+    return np.asarray(values.sum(axis=1) > 0.0)
 
 
 def _is_axis(values: np.ndarray) -> np.ndarray:

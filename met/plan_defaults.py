@@ -8,15 +8,18 @@ from met import models
 from met.channel import channels, joint_unit, watched_unit
 from met.diagnostic import nearest
 from met.parameter import Parameter, under
-from met.plan import Experiment, Origin, Quantity, Structure
+from met.plan import COMPONENTS, Experiment, Joint, Origin, Quantity, Structure
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
+
+OF_FREE_BASE = (("position", "m"), ("rpy", "rad"), ("velocity", "m/s"), ("rate", "rad/s"))
+"""Of the initial state of a free base: vectors, world axes."""
 
 
 def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity | None]]:
     """Paths that the experiment lacks, each with its model's default or the servo's value, None where neither is."""
     defaults: dict[str, Quantity] = {}
-    for path, unit, default, parameter in declared(experiment.structure):
+    for path, unit, default, parameter in declared(experiment):
         if path in experiment.parameters:
             continue
         found = None if default is None else Quantity(default, unit, Origin("default", note="not in the plan file"))
@@ -31,7 +34,7 @@ def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity |
 def unknown_parameters(experiment: Experiment) -> Iterator[tuple[str, str | None]]:
     """Paths under a model of the experiment that its declaration does not have, with the nearest that it has."""
     structure = experiment.structure
-    known = {path for path, *_ in declared(structure)}
+    known = {path for path, *_ in declared(experiment)}
     heads = heads_of_models(structure)
     for path in experiment.parameters:
         if path not in known and path.startswith(heads):
@@ -43,6 +46,7 @@ def heads_of_models(structure: Structure) -> tuple[str, ...]:
     return (
         *(f"{use.joint}.servo." for use in structure.servos),
         *(f"{use.joint}.{kind}." for use in structure.substitutions for kind in ("bed", "law")),
+        *(f"base.{course.component}." for course in (structure.base.courses if structure.base else ())),
         *(f"environment.{use.name}." for use in structure.environment),
         *(f"metrics.{use.name}." for use in structure.metrics),
     )
@@ -52,8 +56,15 @@ Declared = tuple[str, str, float | tuple[float, ...] | str | None, Parameter | N
 """Path, SI unit and default of a parameter, and its model's declaration; None for the arm's own."""
 
 
-def declared(structure: Structure) -> Iterator[Declared]:
-    """Every parameter of a structure (head of `met.plan`)."""
+def of_environment(structure: Structure) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
+    """What the paths of each environment model's parameters begin with, and their declarations."""
+    for use in structure.environment:
+        yield f"environment.{use.name}", models.find("environment", use.model, use.place).parameters
+
+
+def declared(experiment: Experiment) -> Iterator[Declared]:
+    """Every parameter that an experiment of this structure has (head of `met.plan`)."""
+    structure = experiment.structure
     for link in structure.links:
         yield f"links.{link.name}.mass", "kg", None, None
         for axis in "xyz":
@@ -69,9 +80,10 @@ def declared(structure: Structure) -> Iterator[Declared]:
     for joint in structure.moving:
         yield f"initial.{joint.name}.q", joint_unit("joint", joint), None, None
         yield f"initial.{joint.name}.qd", joint_unit("joint/s", joint), None, None
+    yield from _of_base(structure)
     for use in structure.servos:
         joint = kinds[use.joint]
-        for parameter in models.find("servo", use.model, use.place).parameters:
+        for parameter in models.servo_parts(use).parameters:
             held = parameter if use.command is None else under(parameter, use.command.kind)
             yield from _numbers(f"{use.joint}.servo", held, joint_unit(parameter.unit, joint))
         if use.command is not None:
@@ -86,14 +98,36 @@ def declared(structure: Structure) -> Iterator[Declared]:
             for parameter in model.parameters:
                 if parameter.shape != "text":  # for the compiler alone
                     yield from _numbers(f"{on_bed.joint}.{head}", parameter, joint_unit(parameter.unit, joint))
-    for environment in structure.environment:
-        for parameter in models.find("environment", environment.model, environment.place).parameters:
-            yield from _numbers(f"environment.{environment.name}", parameter, parameter.unit)
+    for prefix, parameters in of_environment(structure):
+        named = next((f"{prefix}.{parameter.name}" for parameter in parameters if parameter.names == "joint"), None)
+        about = experiment.parameters.get(named) if named is not None else None
+        on = kinds.get(str(about.value)) if about is not None else None
+        for parameter in parameters:
+            yield from _numbers(prefix, parameter, parameter.unit if on is None else joint_unit(parameter.unit, on))
     watched = channels(structure) if structure.metrics else {}
     for metric in structure.metrics:
         of = watched[metric.of].unit if metric.of in watched else "1"
         for parameter in models.find("metric", metric.model, metric.place).parameters:
             yield from _numbers(f"metrics.{metric.name}", parameter, watched_unit(parameter.unit, of))
+
+
+def _of_base(structure: Structure) -> Iterator[Declared]:
+    """Of a base that moves: its initial state, or its courses."""
+    if structure.free:
+        for name, unit in OF_FREE_BASE:
+            for axis in "xyz":
+                yield f"initial.base.{name}.{axis}", unit, None, None
+    for course in structure.base.courses if structure.base is not None else ():
+        model = models.find("command", course.model, structure.base.place if structure.base else None)
+        for parameter in model.parameters:
+            unit = joint_unit(parameter.unit, component(course.component), "position")
+            yield from _numbers(f"base.{course.component}", parameter, unit)
+
+
+def component(name: str) -> Joint:
+    """A component of the base's pose as the joint that would move so: for its units."""
+    kind = "prismatic" if COMPONENTS.index(name) < 3 else "revolute"
+    return Joint(name, kind, "", "")  # type: ignore[arg-type]
 
 
 def _numbers(prefix: str, parameter: Parameter, unit: str) -> Iterator[Declared]:

@@ -229,7 +229,10 @@ def _cause(experiment: Experiment, failure: float, number: float, tick: float) -
     assert OUTPUTS[:3] == ("failure", "failure.joint", "failure.tick")
     if failure == 0.0:
         return ""
-    joint = experiment.structure.moving[int(number)]
+    moving = experiment.structure.moving
+    if int(number) == len(moving):
+        return _cause_of_base(experiment, failure, tick)
+    joint = moving[int(number)]
     prismatic = joint.kind == "prismatic"
     unit = "kg" if prismatic else "kg m^2"
     head = f"t = {tick / experiment.structure.schedule.base_hz:g} s: joint {joint.name}: "
@@ -250,4 +253,20 @@ def _cause(experiment: Experiment, failure: float, number: float, tick: float) -
         f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: a step too long for "
         f"the servo or the arm (see the stability figures of `met plan`; try a faster rate for the dynamics), or a "
         f"model that divides by zero."
+    )
+
+
+def _cause_of_base(experiment: Experiment, failure: float, tick: float) -> str:
+    """Why a case failed by its free base, in words."""
+    base = experiment.structure.base
+    head = f"t = {tick / experiment.structure.schedule.base_hz:g} s: the base: "
+    where = f" ({base.place.file}:{base.place.line})" if base is not None and base.place else ""
+    if failure == SINGULAR:
+        return (
+            f"{head}it moves freely and has no inertia in some direction, so its acceleration is undefined{where}. "
+            f"Give link base mass, and a shape or inertia."
+        )
+    return (
+        f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: a step too long for "
+        f"what acts on it (try a faster rate for the dynamics), or a model that divides by zero."
     )

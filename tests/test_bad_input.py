@@ -164,13 +164,13 @@ error[D144]: no joint `wirst` in arm `one`
         "rate(0.1 rad/s)",
         "rate(table(times = [0, 1, 2] s, values = [0, 1] rad/s))",
         """\
-error[D154]: a table of 3 times and 2 values
- --> deck.ic:8:63
+error[D154]: `values` of `table` has 2 numbers, and `times` 3
+ --> deck.ic:8:85
   |
 8 | servo drive like rigid_gearbox { command = rate(table(times = [0, 1, 2] s, values = [0, 1] rad/s)); }
-  |                                                               ^^^^^^^^^^^
- ::: deck.ic:8:85  values
-  = help: each time has its value
+  |                                                                                     ^^^^^^^^^^^^
+ ::: deck.ic:8:63  `times`
+  = help: they go together, one to one
 
 1 error
 """,
@@ -223,7 +223,7 @@ def test_a_misspelt_deck_is_told_with_the_one_that_was_meant(
     assert capsys.readouterr().err == """\
 error[D173]: no deck `two_lnk.ic`
  = help: did you mean `two_link.ic`?
- = help: standard decks: panda.ic, puma_560.ic, stanford_arm.ic, two_link.ic
+ = help: standard decks: ets_vii.ic, manutec_r3.ic, manutec_r3_one_axis.ic, panda.ic, puma_560.ic, shuttle_arm.ic, stanford_arm.ic, station_arm.ic, two_link.ic
 
 1 error
 """

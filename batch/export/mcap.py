@@ -9,7 +9,7 @@
     /<signal>    of a signal, a field for each joint and component: `/qd.elbow`, `/reaction/force.elbow.x`
 
 Of several cases each has frames and topics of its own, under its prefix, as `/case7/qd`; all but the first are ghosts.
-The case of a link `world` aside, frames hang on `world`, which is the base.
+The case of a link `world` aside, frames hang on `world`, which is the base, or what a base that is a link moves in.
 """
 
 from __future__ import annotations
@@ -81,9 +81,10 @@ def too_many(cases: int, asked: str, helps: Sequence[str]) -> Diagnostic:
 
 
 def root(arms: Sequence[Arm]) -> str:
-    """The frame of the base."""
-    taken = any(arm.prefix + name == "world" for arm in arms for name in arm.poses)
-    return "base" if taken else "world"  # no link may be called `base`
+    """The frame that nothing moves: the first of these names that is no link's."""
+    taken = {arm.prefix + name for arm in arms for name in arm.poses}
+    names = itertools.chain(("world", "base", "ground"), (f"world_{number}" for number in itertools.count(2)))
+    return next(name for name in names if name not in taken)
 
 
 def topic(arm: Arm, name: str) -> str:
@@ -233,7 +234,7 @@ def _transforms(arm: Arm, base: str, times: Sequence[int], here: slice) -> list[
     moved = []
     for link, pose in arm.poses.items():
         parent = arm.parents[link]
-        names = (base if parent == "base" else arm.prefix + parent, arm.prefix + link)
+        names = (arm.prefix + parent if parent in arm.poses else base, arm.prefix + link)
         moved.append((*names, pose.position[here].tolist(), pose.orientation[here].tolist()))
     out = []
     for row, time in enumerate(times[here]):

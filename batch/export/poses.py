@@ -1,4 +1,7 @@
-"""Where the links of a case are at each of its rows: from the q that was recorded, and the case's own parameters."""
+"""Where the links of a case are at each of its rows: from the q that was recorded, and the case's own parameters.
+
+So it is with a base that is prescribed; of a free one position and orientation must be recorded too.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +14,20 @@ from batch.archive.read import Stored, reading
 from batch.export.picking import Case
 from batch.output import quoted
 from met.diagnostic import Problem, error
-from met.dynamics.kinematics import link_motions, quaternion
-from met.dynamics.spatial import HERE, Pose, compose, inverse
+from met.dynamics.spatial import HERE, IDENTITY, Pose, compose, inverse, rotation_quaternion, sub
 from met.frozen import frozen
-from met.plan import Experiment, Formula, Plan
+from met.plan import BASE, Experiment, Formula, Plan
+from met.program.base import Base, motions, prescribed
 from met.program.machine import PARAMETER, Machine
+from met.vectors import quaternion
 
 POSITION = "q"
+
+OF_FREE_BASE = (f"links.{BASE}.position", f"links.{BASE}.orientation")
+"""What is recorded of where a free base is."""
+
+INSTANT = 1e-6
+"""Share of a step by which a row's time may be rounded below its instant."""
 
 
 @frozen
@@ -27,9 +37,9 @@ class Arm:
     prefix    before the names of its frames and topics; "" where it is alone
     values    its parameters by path, in SI; the numbers among them
     first     the same of the case in which shapes are as the plan has them
-    parents   of each link: the link, or "base", that carries it
-    poses     of each link in its parent, by row
-    place     of each link's origin in the world at the first row, m
+    parents   of each link: the link, or "base", that carries it; "" of the base, where it is a link
+    poses     of each link in its parent, by row; of the base in the world
+    place     of each link's origin from the base's at the first row, world axes, m
     travel    of each joint that slides: the stretch of q, 0 in it, that this case uses, m
     """
 
@@ -64,14 +74,20 @@ def arm_of(plan: Plan, case: Case, prefix: str) -> Arm:
         values = parameters(experiment, varied)
         first = parameters(experiment, {each.path: each.values[0] for each in experiment.cases.coordinates})
         joints = experiment.structure.moving
-    q = positions(case, [joint.name for joint in joints])
+    q = positions(case, [joint.name for joint in joints], free=experiment.structure.free)
     with reading(group.path):
-        world = world_poses(experiment, values, q)
+        base = HERE
+        if experiment.structure.free:
+            base = free_pose(*(case.signal(name).astype(np.float64) for name in OF_FREE_BASE))
+        elif experiment.structure.base is not None:
+            base = prescribed_pose(experiment, values, case.time)
+        world = world_poses(experiment, values, q, base)
         parents = {joint.child: joint.parent for joint in experiment.structure.joints}
+        parents |= {BASE: ""} if BASE in world else {}
         within = {name: compose(inverse(world.get(parents[name], HERE)), pose) for name, pose in world.items()}
         poses = {name: moved(pose, len(case.time)) for name, pose in within.items()}
         links = [link.name for link in experiment.structure.links]
-        place = {name: moved(world[name], len(case.time)).position for name in links}
+        place = {name: moved(Pose(IDENTITY, sub(world[name].p, base.p)), len(case.time)).position for name in links}
     start = {name: rows[0] if len(rows) else np.zeros(3) for name, rows in place.items()}
     travel = {joint.name: (float(rows.min(initial=0.0)), float(rows.max(initial=0.0)))
               for joint, rows in zip(joints, q, strict=True) if joint.kind == "prismatic"}  # fmt: skip
@@ -94,15 +110,18 @@ def _plain(value: Any) -> Any:
     return float(value) if np.ndim(value) == 0 else value
 
 
-def positions(case: Case, joints: Sequence[str]) -> list[np.ndarray]:
-    """q of each of these joints by row, as one signal of all or a signal of each. Raises Problem E370."""
+def positions(case: Case, joints: Sequence[str], *, free: bool = False) -> list[np.ndarray]:
+    """q of each of these joints by row, as one signal of all or a signal of each. Raises Problem E370: free, where what
+    tells of a free base is missing too."""
     signals = {variable.name: variable for variable in case.group.role("signal")}
     found = {joint: _position(case, joint, signals) for joint in joints}
     missing = [joint for joint, q in found.items() if q is None]
-    if missing:
-        which = "q" if len(missing) == len(joints) else ", ".join(f"{joint}.q" for joint in missing)
+    of_base = [name for name in OF_FREE_BASE if free and name not in signals]
+    if missing or of_base:
+        every = missing and len(missing) == len(joints)
+        which = ", ".join([*(["q"] if every else [f"{joint}.q" for joint in missing]), *of_base])
         message = f"the arm of case #{case.number} of `{case.asked}` cannot be shown: {which} was not recorded"
-        helps = ("`record = [q, ...]` in the run keeps where its joints are; then run it again",
+        helps = (lacking_help(free=bool(of_base)),
                  f"`met export {quoted(case.group.path)} -o FILE.csv` needs no positions")  # fmt: skip
         raise Problem(error("E370", message, help=helps))
     return [q for q in found.values() if q is not None]
@@ -117,13 +136,35 @@ def _position(case: Case, joint: str, signals: Mapping[str, Stored]) -> np.ndarr
     return None
 
 
-def world_poses(experiment: Experiment, values: Mapping[str, Any], q: Sequence[Any]) -> dict[str, Pose]:
+def lacking_help(*, free: bool) -> str:
+    """What to record. free: also of the base."""
+    more = ", ".join(("q", *OF_FREE_BASE)) if free else "q, ..."
+    return f"`record = [{more}]` in the run keeps where its joints{' and its base' * free} are; then run it again"
+
+
+def free_pose(position: np.ndarray, orientation: np.ndarray) -> Pose:
+    """A free base's pose from its recorded numbers: (..., 3) and (..., 4)."""
+    p, q = np.moveaxis(position, -1, 0), np.moveaxis(orientation, -1, 0)
+    return Pose(rotation_quaternion(q[0], q[1], q[2], q[3]), (p[0], p[1], p[2]))
+
+
+def prescribed_pose(experiment: Experiment, values: Mapping[str, Any], time: np.ndarray) -> Pose:
+    """A prescribed base's pose at rows of these times, s: that of the step's instant, as all that is recorded."""
+    memory = {PARAMETER + path: value for path, value in values.items()}
+    step = experiment.structure.schedule.step
+    instant: Any = np.floor(time / step + INSTANT) * step
+    return prescribed(Machine(experiment), memory.__getitem__, instant).pose
+
+
+def world_poses(
+    experiment: Experiment, values: Mapping[str, Any], q: Sequence[Any], base: Pose = HERE
+) -> dict[str, Pose]:
     """Every link's frame in the world, whose numbers are those of all rows at once where they change."""
     machine = Machine(experiment)
     memory = {PARAMETER + path: value for path, value in values.items()}
     machine.keep_tree(memory.__getitem__, memory.__setitem__)
-    motions = link_motions(machine.tree(memory.__getitem__), q, [0.0] * len(q))
-    return {name: motion.pose for name, motion in motions.items()}
+    found = motions(machine.tree(memory.__getitem__), q, [0.0] * len(q), Base(base))
+    return {name: motion.pose for name, motion in found.items()}
 
 
 def moved(pose: Pose, rows: int | tuple[int, ...]) -> Moved:

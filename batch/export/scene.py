@@ -19,7 +19,7 @@ from batch.export.poses import Arm
 from batch.export.wire import plain
 from batch.plotting.sheet import COLOURS
 from met.dynamics.spatial import IDENTITY, Pose, compose, rotation_rpy
-from met.plan import Joint, Link
+from met.plan import BASE, Joint, Link
 
 Vector = tuple[float, float, float]
 
@@ -65,9 +65,10 @@ def scene(arm: Arm, root: str, ghost: bool, size: float) -> Any:
     carrier = {joint.child: joint for joint in structure.joints}
     out = SceneUpdate()
     grey = _colour(JOINTS, opacity)
-    ground = _entity(out, root, f"{arm.prefix}base")
-    _draw(ground, [(ORIGIN, _at(arm, joint)) for joint in carried.get("base", ())], grey)
-    _draw(ground, _rails(arm, carried.get("base", ())), grey)
+    if all(link.name != BASE for link in structure.links):
+        ground = _entity(out, root, f"{arm.prefix}{BASE}")
+        _draw(ground, [(ORIGIN, _at(arm, joint)) for joint in carried.get(BASE, ())], grey)
+        _draw(ground, _rails(arm, carried.get(BASE, ())), grey)
     for number, link in enumerate(structure.links):
         entity = _entity(out, arm.prefix + link.name, arm.prefix + link.name)
         colour = _colour(LINKS[number % len(LINKS)], opacity)

@@ -10,11 +10,21 @@ import numpy as np
 import xarray
 
 from batch.archive.read import Group
-from batch.export.poses import POSITION, moved, parameters, world_poses
+from batch.export.poses import (
+    OF_FREE_BASE,
+    POSITION,
+    free_pose,
+    lacking_help,
+    moved,
+    parameters,
+    prescribed_pose,
+    world_poses,
+)
 from batch.notebook.quantities import number
 from batch.notebook.source import experiment, places
 from batch.notebook.table import CASE, NO_HISTORIES, RECORDED, asked, missing, path_of
 from met.diagnostic import Problem, error
+from met.dynamics.spatial import HERE, Pose
 from met.plan import Experiment
 
 LINK = "link"
@@ -59,8 +69,10 @@ def _frames(path: Path, data: xarray.Dataset, group: Group, own: Experiment, lin
     by_case = (-1, *(1,) * (len(shape) - 1)) if RECORDED in dims else ()
     varied = {v.path: group.at(v.name, found).reshape(by_case) for v in group.role("coordinate")}
     rows = [each.values for each in q]
-    world = world_poses(own, parameters(own, varied), rows)
-    unknown = np.isnan(sum(rows, np.zeros(shape)))
+    values = parameters(own, varied)
+    base = _base(data, own, instants, values)
+    world = world_poses(own, values, rows, base)
+    unknown = np.isnan(sum((*rows, *base.p), np.zeros(shape)))
     poses = [moved(world[link], shape) for link in links]
     kept: dict[str, Any] = {}
     for name, array in instants.coords.items():
@@ -102,16 +114,29 @@ def _positions(data: xarray.Dataset, own: Experiment) -> tuple[xarray.DataArray,
     units = {joint.name: "m" if joint.kind == "prismatic" else "rad" for joint in own.structure.moving}
     found = {joint: _position(data, joint, unit) for joint, unit in units.items()}
     lacking = [joint for joint, q in found.items() if q is None]
-    if lacking:
-        which = POSITION if len(lacking) == len(found) else ", ".join(f"{joint}.{POSITION}" for joint in lacking)
+    of_base = [name for name in OF_FREE_BASE if own.structure.free and name not in data]
+    if lacking or of_base:
+        every = lacking and len(lacking) == len(found)
+        which = ", ".join([*([POSITION] if every else [f"{joint}.{POSITION}" for joint in lacking]), *of_base])
         message = f"the links of `{asked(data)}` cannot be placed: {which} is not in this Dataset"
         recorded = {channel for each in own.structure.record for channel in each.channels}
-        helps = "`record = [q, ...]` in the run keeps where its joints are; then run it again"
+        helps = lacking_help(free=bool(of_base))
         if recorded.issuperset(f"{joint}.{POSITION}" for joint in lacking) and RECORDED not in data.coords:
             helps = NO_HISTORIES
         raise Problem(error("E370", message, help=helps))
     alike: tuple[xarray.DataArray, ...] = xarray.broadcast(*(q for q in found.values() if q is not None))
     return tuple(q.transpose(RECORDED, ..., missing_dims="ignore") for q in alike)
+
+
+def _base(data: xarray.Dataset, own: Experiment, instants: xarray.DataArray, values: Mapping[str, Any]) -> Pose:
+    """Where the base is, by the instants' dimensions."""
+    if own.structure.base is None:
+        return HERE
+    if own.structure.free:
+        position, orientation = (data[name].transpose(*instants.dims, ...).values for name in OF_FREE_BASE)
+        return free_pose(position.astype(np.float64), orientation.astype(np.float64))
+    time = xarray.broadcast(instants["time"], instants)[0].transpose(*instants.dims)
+    return prescribed_pose(own, values, time.values)
 
 
 def _position(data: xarray.Dataset, joint: str, unit: str) -> xarray.DataArray | None:

@@ -154,7 +154,8 @@ def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Fact, ...
         structure, base = experiment.structure, experiment.structure.schedule.base_hz
         for use in structure.servos:
             command = f", told a {use.command.kind} ({use.command.model})" if use.command is not None else ""
-            servos.setdefault(f"{use.model} at {base / use.divisor:g} Hz{command}", {})[use.joint] = None
+            rate = "continuous" if use.continuous else f"at {base / use.divisor:g} Hz"
+            servos.setdefault(f"{use.model} {rate}{command}", {})[use.joint] = None
         for on_bed in structure.substitutions:
             others.setdefault(f"bed of {on_bed.joint}", {})[f"{on_bed.bed}, law {on_bed.law}"] = None
         for environment in structure.environment:

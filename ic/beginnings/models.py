@@ -48,21 +48,20 @@ Say here what the model is, with its equations and their source, and what it is 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from met.parameter import Memory, Parameter, Signal
 from met.servos import Servo
-from met.servos.servo import Drive, JointMotion, Seen
+from met.servos.servo import Control, Drive, JointMotion, Seen
 from met.trace import Real, clip
 
 # These functions are called while the program is built, with recorded numbers: no `if` on a number, but
 # `where(condition, a, b)` of met.trace; no `min` or math.sin, but `minimum`, `sin`. docs/models.md has the table.
 
 
-def tick(p: Any, held: Any, seen: Seen) -> Mapping[str, Real]:
-    """The servo's computer, at its rate: gives the new value of every Memory below."""
-    return {"qd_cmd": seen.asked.value}
+def control(p: Any, held: Any, seen: Seen) -> Control:
+    """The servo's computer, at its rate: gives every output below."""
+    return Control({"qd_cmd": seen.asked.value})
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
@@ -86,9 +85,9 @@ SERVO = Servo(
         Parameter(name="limit", unit="effort", above=0.0, doc="largest torque"),
         Parameter(name="rotor", unit="effort*s^2/joint", above=0.0, doc="inertia of the drive, seen at the joint"),
     ),
-    memory=(Memory(name="qd_cmd", unit="joint/s", doc="rate asked at the last tick"),),
+    outputs=(Memory(name="qd_cmd", unit="joint/s", doc="rate asked"),),
     signals=(Signal(name="wanted", unit="effort", doc="torque that would be given without the limit"),),
-    tick=tick,
+    control=control,
     drive=drive,
     fastest=fastest,
 )
@@ -132,7 +131,7 @@ ENVIRONMENT = Environment(
     name="$name",
     doc=__doc__,
     parameters=(
-        Parameter(name="link", shape="word", doc="link that is held back"),
+        Parameter(name="link", shape="word", names="link", doc="link that is held back"),
         Parameter(name="damping", unit="N*s/m", at_least=0.0, doc="force per velocity"),
         Parameter(name="point", unit="m", shape="vector", default=(0.0, 0.0, 0.0), doc="where it acts, link frame"),
     ),

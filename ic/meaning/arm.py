@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-
 from ic.grammar.syntax import Call, Expression, Name, Unary
 from ic.meaning.bodies import check_body, check_moved
 from ic.meaning.complaints import belongs, known_words
@@ -16,6 +14,7 @@ from ic.meaning.foreign import refused
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, refuse_values, word_of
 from ic.meaning.owner import Owner
+from ic.meaning.relations import no_direction
 from ic.meaning.resolve import RESERVED, Definition
 from ic.meaning.scope import Scope
 from ic.meaning.shapes import SHAPES, Solid
@@ -23,7 +22,7 @@ from ic.meaning.values import place_of
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import Joint, Link
+from met.plan import BASE, Joint, Link
 from met.trace import Real, Scalar, sqrt
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -105,10 +104,6 @@ def _stray(scope: Scope, item: Item, block: Block) -> None:
 
 def _link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
     owner = Owner(f"link `{item.name}`", item.place, f"links.{item.name}", homes=homes)
-    if item.name == "base":
-        scope.complaints.error("D084", "`base` is the ground that the arm stands on, so no link may be called so",
-                               item.place, help="give the link another name")
-        return None
     if item.detail:
         scope.complaints.error("D085", f"`{item.detail[0].text}` after the name of a link", item.detail[0].place,
                                help=f"write `link {item.name} {{ ... }}`")
@@ -218,14 +213,14 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str,
                                help=[*(did_you_mean(kind, JOINT_KINDS) if kind else ()),
                                      f"write `joint {item.name} revolute {{ ... }}`, or prismatic, or fixed"])
         return None
-    if item.name in RESERVED:
+    if item.name in (*RESERVED, BASE):
         scope.complaints.error("D166", f"`{item.name}` begins paths of its own, so no joint may be called so",
                                item.place, help="give the joint another name")
         return None
     body = item.body
     check_keys(scope, body, JOINT_KEYS, owner, NOT_OF_A_JOINT)
-    parent = _end(scope, owner, "parent", body.get("parent"), {"base": None, **links})
-    child = _end(scope, owner, "child", body.get("child"), links)
+    parent = _end(scope, owner, "parent", body.get("parent"), {BASE: None, **links})
+    child = _end(scope, owner, "child", body.get("child"), {name: None for name in links if name != BASE})
     if body.get("dh") is not None:
         use_dh(scope, owner, kind, body.items["dh"], body)
     else:
@@ -250,7 +245,7 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping
     name = None if isinstance(item.value, Call) else word_of(item.value)
     if name in known:
         return name
-    if name == "base":
+    if name == BASE:
         scope.complaints.error("D093", "the base cannot be a child", _value_at(item),
                                help="turn the joint round: `parent = base;`")
     elif name is None:
@@ -287,7 +282,7 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
     written = scope.vector(owner, AXIS, item if named is None else replace(item, value=None), given=named)
     if written is None:
         return
-    scope.checks.hold(written, _no_direction, code="D097", message=f"the axis of {owner.label} has no direction",
+    scope.checks.hold(written, no_direction, code="D097", message=f"the axis of {owner.label} has no direction",
                       place=_value_at(item), needs=(owner.join("axis"),),
                       help="write numbers of ordinary size, not all of them zero")
     x, y, z = written
@@ -295,13 +290,6 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
     if isinstance(length, Scalar) or 0.0 < length < math.inf:
         parts = zip("xyz", written, strict=True)
         scope.remake({owner.join(f"axis.{name}"): part / length for name, part in parts}, item)
-
-
-def _no_direction(parts: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """Which rows [n, 3] point nowhere, or have a length that no double holds."""
-    with np.errstate(over="ignore", under="ignore"):
-        length = np.sqrt((parts * parts).sum(axis=1))
-    return ~((length > 0.0) & (length < np.inf)), []
 
 
 def _named_axis(value: Expression | None) -> tuple[float, float, float] | None:
@@ -332,8 +320,8 @@ def check_tree(scope: Scope, name: str, links: list[Link], joints: list[Joint], 
                 help="a closed chain is not in this version; a branch is a parent with two children")
             continue
         holder[joint.child] = joint
-    failed = {link.name for link in links} - set(holder)
-    settled = {"base"} | failed
+    failed = {link.name for link in links} - set(holder) - {BASE}
+    settled = {BASE} | failed
     for link in links:
         chain: list[Joint] = []
         at = link.name

@@ -10,11 +10,12 @@ from ic.grammar.syntax import Call, Expression, Name
 from ic.meaning.complaints import an, belongs, known_words
 from ic.meaning.merge import Block, Item
 from ic.meaning.owner import Owner
+from ic.meaning.relations import check_relations
 from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
 from met import models
-from met.diagnostic import Place, Problem, did_you_mean
-from met.parameter import Parameter
+from met.diagnostic import Label, Place, Problem, did_you_mean
+from met.parameter import Only, Parameter, there
 
 
 def word_of(expression: Expression | None) -> str | None:
@@ -24,6 +25,26 @@ def word_of(expression: Expression | None) -> str | None:
     if isinstance(expression, Name) and len(expression.path) == 1:
         return expression.path[0].text
     return None
+
+
+def word_written(wanted: Parameter, body: Block) -> str:
+    """The word that a body writes for a parameter, else its default."""
+    item = body.get(wanted.name)
+    written = word_of(item.value) if item is not None else wanted.default
+    return written if isinstance(written, str) else ""
+
+
+def _check_unused(
+    scope: Scope, owner: Owner, wanted: Parameter, only: Only, body: Block, words: Mapping[str, str]
+) -> None:
+    """Tells a parameter that its word leaves out, unless that word was written over another, which may have had it."""
+    item, word = body.get(wanted.name), body.get(only[0])
+    if item is None or (word is not None and word.overrides):
+        return
+    also = [Label(place_of(word.value), "chosen here")] if word is not None and word.value is not None else []
+    needed = " or ".join(f"`{only[0]} = {each};`" for each in only[1])
+    scope.complaints.error("D141", f"{owner.label} has no `{wanted.name}` with `{only[0]} = {words[only[0]]}`",
+                           item.place, also=also, help=f"it is there with {needed}")
 
 
 def refuse_values(scope: Scope, expression: Expression | None, names: Iterable[str]) -> bool:
@@ -82,18 +103,31 @@ def find_model(scope: Scope, kind: models.Kind, name: str | None, place: Place) 
 
 def use_model(scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: Block,
               extra: Iterable[str] = ()) -> dict[str, Any] | None:
-    """Every parameter of a model used with this body, entered in the scope; None where one is missing or wrong."""
+    """Every parameter of a model used with this body, entered in the scope; None where one is missing or wrong.
+
+    Of those that are there only under a word (`Parameter.only`), those under the words of this body.
+    """
     parameters = tuple(parameters)
-    check_keys(scope, body, [*(p.name for p in parameters), *extra], owner)
+    words = {p.name: word_written(p, body) for p in parameters if p.shape == "word"}
+    known = [p.name for p in parameters if there(p, words) or body.get(p.name) is not None]
+    check_keys(scope, body, [*known, *extra], owner)
     values: dict[str, Any] = {}
     for wanted in parameters:
         item = body.get(wanted.name)
+        if wanted.only is not None and not there(wanted, words):
+            _check_unused(scope, owner, wanted, wanted.only, body, words)
+            continue
         if wanted.shape == "vector":
             values[wanted.name] = scope.vector(owner, wanted, item)
         elif wanted.shape == "list":
             values[wanted.name] = scope.numbers(owner, wanted, item)
         elif wanted.shape == "word":
             values[wanted.name] = scope.word(owner, wanted, item, record=True)
+        elif wanted.decides:
+            values[wanted.name] = scope.decisive(owner, wanted, item)
         else:
             values[wanted.name] = scope.number(owner, wanted, item)
-    return None if any(value is None for value in values.values()) else values
+    if any(value is None for value in values.values()):
+        return None
+    check_relations(scope, owner, [each for each in parameters if each.name in values], body, values)
+    return values

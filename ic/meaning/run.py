@@ -9,27 +9,39 @@ from typing import Any
 
 from ic.grammar.syntax import Call, Name, Word
 from ic.meaning.arm import Arm, resolve_arm
+from ic.meaning.base import INITIAL, check_base, initial_base, remark_ground, resolve_base
 from ic.meaning.complaints import belongs, known_words
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import find_bare_model, find_model, refuse_values, use_model, word_of
 from ic.meaning.owner import Owner
 from ic.meaning.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
+from ic.meaning.relations import check_names
 from ic.meaning.resolve import Definition
-from ic.meaning.schedule import Rate, base_rate, check_stability, divisor, fastest_rate, make_schedule
+from ic.meaning.schedule import (
+    CONTINUOUS,
+    Rate,
+    Ticks,
+    base_rate,
+    check_stability,
+    divisor,
+    fastest_rate,
+    make_schedule,
+)
 from ic.meaning.scope import Scope
 from ic.meaning.servos import RATE, Use, check_rest, check_start, fixed_rate, resolve_servos
 from ic.meaning.substitution import check_ticks, resolve_substitutions
+from ic.meaning.tables import use_table
 from ic.meaning.tolerances import resolve_tolerances
 from ic.meaning.values import Value, Values, place_of
 from met import models, units
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import EnvironmentUse, Requirement, Schedule, ServoUse, Structure, Tolerance
+from met.plan import BASE, Base, EnvironmentUse, Requirement, Schedule, ServoUse, Structure, Tolerance
 from met.trace import Real, Scalar
 from met.units import PURE
 
-KEYS = ("arm", "servos", "initial", "environment", "rates", "integrator", "duration", "record", "tolerances",
+KEYS = ("arm", "base", "servos", "initial", "environment", "rates", "integrator", "duration", "record", "tolerances",
         "seed")
 BLOCKS = ("servos", "initial", "environment", "rates", "tolerances")
 RATES = ("dynamics", "servos", "record", "base")
@@ -73,17 +85,19 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     if arm is None:
         return None
     scope.gone = arm.lost
+    base, arm = resolve_base(scope, block.get("base"), arm)
     uses, scope.lost = resolve_servos(scope, _body(scope, block.get("servos")), arm)
     substitutions = resolve_substitutions(scope, block, arm, uses)
-    environment, products = _environment(scope, _body(scope, block.get("environment")), arm, duration)
+    environment, products = _environment(scope, _body(scope, block.get("environment")), arm, base, duration)
     _initial(scope, _body(scope, block.get("initial")), arm)
+    initial_base(scope, _body(scope, block.get("initial")), base)
     for use in uses:
         check_rest(scope, use)
         check_start(scope, use)
-    schedule, divisors = _schedule(scope, run, block, rates, uses, duration)
+    schedule, ticks = _schedule(scope, run, block, rates, uses, duration)
     if schedule is None or integrator is None:
         return None
-    check_ticks(scope, substitutions, divisors, schedule)
+    check_ticks(scope, substitutions, ticks, schedule)
     _keep_settings(scope, block, arm, integrator, rates, schedule)
     fastest = {}
     on_beds = [each.joint for each in substitutions]
@@ -98,12 +112,13 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
                                    f"{use.joint}.servo")
         if h_lambda is not None:
             stability[use.joint] = h_lambda
-    servos = tuple(ServoUse(use.joint, use.definition, use.servo.name, use.command, divisors[use.joint], use.place)
-                   for use in uses)
+    servos = tuple(ServoUse(use.joint, use.definition, use.servo.name, use.command, ticks[use.joint].divisor, use.place,
+                            use.words, ticks[use.joint].continuous) for use in uses)  # fmt: skip
     structure = Structure(
         arm.name, arm.links, arm.joints, servos, environment, (), products, integrator.name, schedule, (),
-        substitutions,
+        substitutions, base,
     )  # fmt: skip
+    check_base(scope, base, structure, _body(scope, block.get("environment")), block.get("base"))
     metrics = resolve_metrics(scope, block, structure)
     record = resolve_record(scope, run, block.get("record"), structure)
     structure = replace(structure, metrics=metrics, record=record)
@@ -217,7 +232,7 @@ def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
 
 
 def _environment(
-    scope: Scope, body: Block, arm: Arm, duration: float | None
+    scope: Scope, body: Block, arm: Arm, base: Base | None, duration: float | None
 ) -> tuple[tuple[EnvironmentUse, ...], bool]:
     uses = []
     products = True
@@ -230,7 +245,7 @@ def _environment(
             owner = Owner("the environment", item.place, "environment")
             products = scope.word(owner, ON_OFF, item) != "off"
         else:
-            use = _environment_use(scope, item, arm, duration)
+            use = _environment_use(scope, item, arm, base, duration)
             if use is not None:
                 uses.append(use)
     for statement in body.statements:
@@ -239,7 +254,9 @@ def _environment(
     return tuple(uses), products
 
 
-def _environment_use(scope: Scope, item: Item, arm: Arm, duration: float | None) -> EnvironmentUse | None:
+def _environment_use(
+    scope: Scope, item: Item, arm: Arm, base: Base | None, duration: float | None
+) -> EnvironmentUse | None:
     owner = Owner(f"environment `{item.name}`", item.place, f"environment.{item.name}", homes=item.homes)
     name = word_of(item.value)
     if item.name == "gravity" and name in (None, "gravity", *scope.definitions.lets):
@@ -262,21 +279,27 @@ def _environment_use(scope: Scope, item: Item, arm: Arm, duration: float | None)
                                      known_words("models", sorted(models.available("environment")))])
         return None
     environment = find_model(scope, "environment", name, place_of(item.value))
-    if environment is None or refuse_values(scope, item.value, [p.name for p in environment.parameters]):
+    if environment is None or refuse_values(scope, item.value, [p.name for p in environment.written]):
         return None
-    values = use_model(scope, owner, environment.parameters, item.body or Block())
-    if values is not None:
-        names = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
-        for wanted in environment.parameters:
-            known = names.get(wanted.name)
-            if wanted.shape == "word" and known is not None and values[wanted.name] not in (*known, *arm.lost):
-                given = (item.body or Block()).get(wanted.name)
-                place = place_of(given.value) if given is not None and given.value is not None else item.place
-                scope.complaints.error("D159", f"no {wanted.name} `{values[wanted.name]}` in arm `{arm.name}`", place,
-                                       help=[*did_you_mean(values[wanted.name], known),
-                                             known_words(f"{wanted.name}s", known)])
-        if duration is not None:
-            _remark_idle(scope, environment, item, values, duration)
+    body = item.body or Block()
+    known = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
+    named = check_names(scope, owner, environment.parameters, body, arm=arm.name, known=known, lost=arm.lost)
+    about = next((named[p.name] for p in environment.parameters if p.names == "joint" and p.name in named), None)
+    if about is not None:  # what the unit words `joint` and `effort` mean
+        kinds = {joint.name: joint.kind for joint in arm.moving}
+        if about not in kinds:  # which was told: without its joint, nothing can be said of the model's units
+            scope.checks.fail(owner.path)
+            return EnvironmentUse(item.name, environment.name, None, item.place)
+        owner = replace(owner, joint=kinds[about])
+    if environment.from_file and body.get("file") is not None:
+        values = use_table(scope, owner, environment, body)
+    else:
+        values = use_model(scope, owner, environment.parameters, body,
+                           extra=[each.name for each in environment.written[len(environment.parameters):]])
+    if values is not None and duration is not None:
+        _remark_idle(scope, environment, item, values, duration)
+    if values is not None and environment.pushes and (base is None or base.kind != "free"):
+        remark_ground(scope, item, arm, base, environment.pushes, values[environment.pushes])
     return EnvironmentUse(item.name, environment.name, None, item.place)
 
 
@@ -297,12 +320,14 @@ def _remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str
 def _initial(scope: Scope, body: Block, arm: Arm) -> None:
     known = dict.fromkeys(("q", "qd"), "")
     known |= {f"{joint.name}.{name}": "" for joint in arm.moving for name in ("q", "qd")}
+    of_base = dict.fromkeys(INITIAL if any(link.name == BASE for link in arm.links) else (), "")
     for item in body.items.values():
         if not item.kind and item.name.partition(".")[0] in arm.lost:
             continue
-        if item.kind or item.name not in known:
+        if item.kind or item.name not in (*known, *INITIAL):
+            there = (*known, *of_base)
             scope.complaints.error("D114", f"no initial `{item.name}`", item.place,
-                                   help=[*did_you_mean(item.name, known), known_words("there is", known)])
+                                   help=[*did_you_mean(item.name, there), known_words("there is", there)])
     for name, unit in (("q", "joint"), ("qd", "joint/s")):
         wanted = Parameter(name=name, unit=unit, default=0.0, doc=f"initial {name}")
         general = body.get(name)
@@ -366,7 +391,7 @@ def _rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate]:
             scope.complaints.error("D116", f"no rate `{part.name}`", part.place,
                                    help=[*did_you_mean(part.name, RATES), known_words("rates", RATES)])
             continue
-        rate = fixed_rate(scope, owner, part, f"`{part.name}`", part.name)
+        rate = fixed_rate(scope, owner, part, f"`{part.name}`", part.name, continuous=part.name == "servos")
         if rate is not None:
             rates[part.name] = rate
     if "dynamics" not in body.items and item.body is not None:
@@ -375,12 +400,12 @@ def _rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate]:
 
 
 def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], uses: list[Use],
-              duration: float | None) -> tuple[Schedule | None, dict[str, int]]:
+              duration: float | None) -> tuple[Schedule | None, dict[str, Ticks]]:
     dynamics = rates.get("dynamics")
     rates_item = block.get("rates")
     body = rates_item.body if rates_item is not None else None
     for use in uses:
-        if use.rate is None and use.servo.tick is not None and body is not None and "servos" not in body.items:
+        if use.rate is None and use.has_law and body is not None and "servos" not in body.items:
             assert rates_item is not None
             scope.complaints.error("D118", "no rate of the servos", rates_item.place,
                                    help="write `servos = 1 kHz;`, or a `rate` in each servo's definition")
@@ -388,26 +413,32 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
         return None, {}
     shared = rates.get("servos")
     own = [use.rate for use in uses if use.rate is not None]
-    others = [rate for rate in (shared, *own) if rate is not None]
+    others = [rate for rate in (shared, *own) if rate is not None and rate.hz != CONTINUOUS]
     record = rates.get("record") or dynamics
     base = base_rate([dynamics, record, *others], rates.get("base"))
     written = "base" in rates
     schedule = make_schedule(scope.complaints, dynamics, record, base, others, duration,
                              place_of(block.items["duration"].value or Name((), block.items["duration"].place)),
                              base_written=written)
-    divisors = {}
+    ticks = {}
     everyone = [dynamics, record, *others]
     for use in uses:
-        rate = use.rate or (shared if use.servo.tick is not None else None) or dynamics
-        divisors[use.joint] = divisor(scope.complaints, rate, base, everyone, written=written)
+        rate = use.rate or (shared if use.has_law else None) or dynamics
+        continuous = rate.hz == CONTINUOUS
+        if continuous and use.servo.clocked:
+            scope.complaints.error("D106", f"the law of `{use.servo.name}` needs a clock: it cannot be continuous",
+                                   rate.place, also=[Label(use.place, "used here")], help="write a rate in Hz")
+        if continuous:
+            rate = dynamics
+        ticks[use.joint] = Ticks(divisor(scope.complaints, rate, base, everyone, written=written), continuous)
     if record.hz > dynamics.hz:
         scope.complaints.remark(
             "D167", f"`record` is faster than the dynamics: rows repeat, {record.hz / dynamics.hz:g} for each step",
             record.place, also=[Label(dynamics.place, "a step of the dynamics")],
             help="record at the rate of the dynamics, or slower")
-    if shared is not None and shared.hz and not uses:
+    if shared is not None and shared.hz != CONTINUOUS and not uses:
         divisor(scope.complaints, shared, base, everyone, written=written)
-    return schedule, divisors
+    return schedule, ticks
 
 
 __all__ = ["KEYS", "RATE", "RATES", "Call", "Resolved", "resolve_run"]

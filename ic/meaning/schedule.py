@@ -25,6 +25,10 @@ MOST_TICKS = 10**12  # what a plan may have (met/plan_check): thirty years at a 
 WARN_ABOVE = 0.5  # of h lambda: above it, a step sees less than the decay it should follow
 
 
+CONTINUOUS = math.inf
+"""The `Rate.hz` of a servo's law that is continuous."""
+
+
 @frozen
 class Rate:
     """A rate as written: whose it is, in words, how often (Hz), and where."""
@@ -32,6 +36,14 @@ class Rate:
     label: str
     hz: float
     place: Place
+
+
+@frozen
+class Ticks:
+    """When the law of a servo acts: every so many base ticks; continuous, as a part of each step of the dynamics."""
+
+    divisor: int
+    continuous: bool
 
 
 def exact(value: float) -> Fraction:

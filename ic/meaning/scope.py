@@ -174,10 +174,29 @@ class Scope:
             self.checks.fail(path)
         return number
 
+    def decisive(self, owner: Owner, wanted: Parameter, item: Item | None) -> float | None:
+        """A model's number that decides the program, the same in all cases."""
+        path = owner.join(wanted.name)
+        if item is None and isinstance(wanted.default, (int, float)):
+            unit = self.unit(owner, wanted)[0]
+            self.beside[path] = Settled(float(wanted.default), unit, Origin("default"), wanted.doc)
+        elif item is None:
+            self._missing(owner, wanted)
+        elif self.constant(owner, wanted, item) is None:
+            self.beside.pop(path, None)
+        self.whole[path] = "decides the program: write a run for each, and `sweep NAME = ONE + OTHER;`"
+        if path not in self.beside:
+            return None
+        self.parameters[path] = self.beside.pop(path)
+        return self.parameters[path].value  # type: ignore[return-value]  # a number, by the two lines above
+
     def numbers(self, owner: Owner, wanted: Parameter, item: Item | None) -> tuple[float, ...] | None:
         """A list of any length, the same in all cases."""
         path = owner.join(wanted.name)
         self.whole[path] = "is a list, which does not vary: write a run for each, and `sweep NAME = ONE + OTHER;`"
+        if item is None and isinstance(wanted.default, tuple):
+            self.parameters[path] = Settled(wanted.default, self.unit(owner, wanted)[0], Origin("default"), wanted.doc)
+            return wanted.default
         if item is None:
             self._missing(owner, wanted)
             return None
@@ -216,7 +235,7 @@ class Scope:
             word, origin = wanted.default, Origin("default")
         else:
             named = item.value.text if isinstance(item.value, Name) else None
-            if named is None or (wanted.words and named not in wanted.words):
+            if named is None or (wanted.words and not wanted.names and named not in wanted.words):
                 place = place_of(item.value) if item.value is not None else item.place
                 helps = [*(did_you_mean(named, wanted.words) if named else ()),
                          "one of: " + ", ".join(wanted.words) if wanted.words else "write a name, without quotes"]
@@ -369,7 +388,8 @@ class Scope:
             value = coordinate.value.number
             self._check_instead(owner, wanted, coordinate.value, coordinate.path)
         assert value is not None
-        if origin.kind != "default" or value != math.inf:  # a model's own default may be: never
+        endless = not isinstance(value, Scalar) and math.isinf(value)
+        if origin.kind != "default" or not endless:  # a model's own default may be: never
             self._check_range(owner, wanted, value, place, path, needs)
         kept = self.parameters if record else self.beside
         if record or owner.called is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from types import MappingProxyType, SimpleNamespace
@@ -14,9 +13,17 @@ from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, 
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item, open_call, overlay
-from ic.meaning.models import check_keys, find_bare_model, find_model, refuse_values, use_model, word_of
+from ic.meaning.models import (
+    check_keys,
+    find_bare_model,
+    find_model,
+    refuse_values,
+    use_model,
+    word_of,
+    word_written,
+)
 from ic.meaning.owner import Owner, Settled
-from ic.meaning.schedule import Rate
+from ic.meaning.schedule import CONTINUOUS, Rate
 from ic.meaning.scope import Scope
 from ic.meaning.trajectories import use_file, with_file_named
 from ic.meaning.unit_words import in_deck
@@ -45,7 +52,10 @@ BESIDE = "write `model = {};`, and its parameters beside it"
 
 @frozen
 class Use:
-    """A servo on a joint. rate None: the run's `rates.servos`. parameters None: some failed, which was told."""
+    """A servo on a joint. rate None: the run's `rates.servos`. parameters None: some failed, which was told.
+
+    words  those on which parts of the model depend
+    """
 
     joint: str
     definition: str
@@ -54,6 +64,11 @@ class Use:
     rate: Rate | None
     parameters: dict[str, Any] | None
     place: Place
+    words: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def has_law(self) -> bool:
+        return self.servo.control is not None
 
 
 def resolve_servos(scope: Scope, body: Block, arm: Arm) -> tuple[list[Use], frozenset[str]]:
@@ -126,14 +141,16 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
     if command is not None:
         _check_needed(scope, owner, servo, command, block, place)
     rate = None
-    if servo.tick is None and block.get("rate") is not None:
+    if servo.control is None and block.get("rate") is not None:
         scope.complaints.error("D150", f"the model `{servo.name}` has no computer that ticks, so no rate",
                                block.items["rate"].place, help="leave `rate` out")
     elif block.get("rate") is not None:
-        rate = fixed_rate(scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`")
+        rate = fixed_rate(scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`",
+                          continuous=True)
     scope.setting(f"{item.name}.servo.model", servo.name, item=model)
     scope.whole[f"{item.name}.servo.model"] = f"decides the program: vary `{item.name}.servo` over definitions"
-    return Use(item.name, name, servo, command, rate, parameters, item.place)
+    words = tuple((each.name, word_written(each, block)) for each in servo.parameters if each.name in servo.deciding)
+    return Use(item.name, name, servo, command, rate, parameters, item.place, words)
 
 
 def moving_kind(scope: Scope, item: Item, arm: Arm, so: str) -> str | None:
@@ -247,15 +264,16 @@ def _unit_written(found: Iterable[Settled], wanted: str) -> tuple[str, float]:
     return wanted, 1.0
 
 
-def fixed_rate(scope: Scope, owner: Owner, item: Item, label: str, name: str = "rate") -> Rate | None:
-    """A rate in Hz, which no sweep can vary."""
-    if word_of(item.value) == "continuous":
-        scope.complaints.error(
-            "D106",
-            "a continuous rate is not in this version",
-            place_of(item.value or Name((), item.place)),
-            help="write a rate in Hz, up to that of the dynamics",
-        )
+def fixed_rate(
+    scope: Scope, owner: Owner, item: Item, label: str, name: str = "rate", *, continuous: bool = False
+) -> Rate | None:
+    """A rate in Hz, which no sweep can vary; `CONTINUOUS` Hz where it may be `continuous`, and is."""
+    if word_of(item.value) == "continuous" and not isinstance(item.value, Call):
+        place = place_of(item.value or Name((), item.place))
+        if continuous:
+            return Rate(label, CONTINUOUS, place)
+        scope.complaints.error("D106", f"`{name}` cannot be continuous: only the law of a servo can", place,
+                               help="write a rate in Hz")
         return None
     wanted = replace(RATE, name=name)
     hz = scope.constant(owner, wanted, item)
@@ -304,12 +322,24 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     spot = replace(owner, label=told, called=told, place=place, path=f"{owner.path}.command", local="command",
                    homes=item.homes, command=kind)
     assert kind in COMMAND_UNIT
+    value = replace(item, name="command")
+    model = use_course(scope, spot, inner, value, doc=f"{kind} asked", column=owner.path.removesuffix(".servo"))
+    return None if model is None else Command(kind, model)
+
+
+def use_course(scope: Scope, spot: Owner, inner: Expression, item: Item, *, doc: str, column: str,
+               body: Block | None = None) -> str | None:
+    """A value, or a course in time, entered in the scope under the path of `spot`: its model; None where there is none.
+
+    item    the entry that says it, whose expression is, or holds, `inner`;  body: what of the course is written apart
+    doc     what a value means;  column: of a CSV file, unless one is named
+    """
     name = word_of(inner) if isinstance(inner, Call) else None
     if name is None or name in ("sqrt", "sin", "cos", "min", "max"):
         constant = models.find_own("command")["constant"]
         (value,) = constant.parameters
-        scope.number(spot, replace(value, doc=f"{kind} asked"), replace(item, name="command"), expression=inner)
-        return Command(kind, "constant")
+        scope.number(spot, replace(value, doc=doc), item, expression=inner)
+        return "constant"
     assert isinstance(inner, Call)
     profile = find_model(scope, "command", name, inner.name.place)
     if profile is None:
@@ -317,17 +347,17 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     inner = with_file_named(inner) if profile.from_file else inner
     if refuse_values(scope, inner, [p.name for p in profile.written]):
         return None
-    _, body = open_call(inner, None, scope.complaints)
-    opened = Block({key: replace(part, homes=item.homes, overrides=item.overrides)
-                    for key, part in (body or Block()).items.items()}, (body or Block()).statements)
+    _, named = open_call(inner, None, scope.complaints)
+    inside = {key: replace(part, homes=item.homes, overrides=item.overrides)
+              for key, part in (named or Block()).items.items()}
+    apart = body or Block()
+    opened = Block(inside | dict(apart.items), (*(named or Block()).statements, *apart.statements))
     course = replace(spot, label=f"`{name}`", called=None, place=inner.name.place)
     if profile.from_file:
-        use_file(scope, course, profile, opened, owner.path.removesuffix(".servo"))
-        return Command(kind, profile.name)
-    values = use_model(scope, course, profile.parameters, opened)
-    if values is not None and profile.name == "table":
-        _check_table(scope, opened, values)
-    return Command(kind, profile.name)
+        use_file(scope, course, profile, opened, column)
+        return profile.name
+    use_model(scope, course, profile.parameters, opened)
+    return profile.name
 
 
 def _asked(scope: Scope, command: Call) -> Expression:
@@ -336,31 +366,14 @@ def _asked(scope: Scope, command: Call) -> Expression:
     if isinstance(inner, String):
         raise Problem(error("D151", "a command is about a value or a course in time, and this is text", inner.place,
                             help=f"write `{command.name.text}(trajectory(...))` for a column of a CSV file"))
+    return course_named(scope, inner)
+
+
+def course_named(scope: Scope, inner: Expression) -> Expression:
+    """The name of a course alone, and of nothing else, is that course with nothing written."""
     if isinstance(inner, Name) and inner.text in models.available("command") and not scope.names.knows(inner.text):
         return Call(inner, (), (), None, inner.place)
     return inner
-
-
-def _check_table(scope: Scope, body: Block, values: dict[str, Any]) -> None:
-    """Times rise, and there are as many values."""
-    times, heights = values["times"], values["values"]
-    at, also = body.items["times"], body.items["values"]
-    at_place = place_of(at.value) if at.value is not None else at.place
-    also_place = place_of(also.value) if also.value is not None else also.place
-    if len(times) != len(heights):
-        scope.complaints.error("D154", f"a table of {len(times)} times and {len(heights)} values", at_place,
-                               also=[Label(also_place, "values")], help="each time has its value")
-    elif not times:
-        scope.complaints.error("D155", "a table with no points", at_place, help="a table has one point at least")
-    for n, (before, after) in enumerate(itertools.pairwise(times)):
-        if not after > before:
-            scope.complaints.error(
-                "D156",
-                f"times of a table rise, and number {n + 2}, {after:g} s, follows {before:g} s",
-                at_place,
-                help="sort the points; for a jump, two times close together",
-            )
-            break
 
 
 def check_servo_definition(scope: Scope, name: str) -> None:

@@ -12,6 +12,7 @@ from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, find_model, refuse_values, use_model, word_of
 from ic.meaning.owner import Owner
+from ic.meaning.schedule import Ticks
 from ic.meaning.scope import Scope
 from ic.meaning.servos import Use, moving_kind
 from ic.meaning.values import place_of
@@ -49,10 +50,14 @@ def resolve_substitutions(scope: Scope, block: Block, arm: Arm, uses: list[Use])
     return tuple(use for use, _ in in_order)
 
 
-def check_ticks(scope: Scope, found: tuple[Substitution, ...], divisors: Mapping[str, int], schedule: Schedule) -> None:
-    """The servos of substituted joints tick together."""
+def check_ticks(scope: Scope, found: tuple[Substitution, ...], ticks: Mapping[str, Ticks], schedule: Schedule) -> None:
+    """The servos of substituted joints tick, and together."""
+    for use in found:
+        if ticks[use.joint].continuous and use.place is not None:
+            scope.complaints.error("D106", f"the servo of joint `{use.joint}` is continuous, and its motor is on a bed",
+                                   use.place, help="a bed's servo ticks: write a rate in Hz")
     for use in found[1:]:
-        rates = [schedule.base_hz / divisors[each.joint] for each in (use, found[0])]
+        rates = [schedule.base_hz / ticks[each.joint].divisor for each in (use, found[0])]
         if rates[0] != rates[1] and use.place is not None and found[0].place is not None:
             scope.complaints.error(
                 "D178", f"the servo of joint `{use.joint}` ticks at {rates[0]:g} Hz, and that of joint "
@@ -87,6 +92,13 @@ def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use])
             "D176", f"servo `{use.definition}` ({use.servo.name}) of joint `{item.name}` has no motor that a bed could "
             "take the place of", item.place, also=[Label(use.place, "its servo")],
             help=known_words("servo models that have a motor", sorted(known)))
+        return None
+    only = use.servo.motor_only
+    if only is not None and (word := dict(use.words).get(only[0], only[1][0])) not in only[1]:
+        scope.complaints.error(
+            "D176", f"the servo of joint `{item.name}` has `{only[0]} = {word}`, and a motor on a bed has "
+            f"{' or '.join(f'`{each}`' for each in only[1])} alone", item.place, also=[Label(use.place, "its servo")],
+            help=f"write `{only[0]} = {only[1][0]};`, or leave the joint to its servo")
         return None
     block = item.body or Block()
     check_keys(scope, block, DEFAULTS, Owner(f"`substitute {item.name}`", item.place, ""))

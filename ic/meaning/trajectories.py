@@ -10,16 +10,15 @@ from ic.grammar.syntax import Call, Name, String, Word
 from ic.meaning.csv_files import missing_column
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, use_model
-from ic.meaning.owner import Owner, Settled
+from ic.meaning.owner import Owner
 from ic.meaning.scope import Scope
+from ic.meaning.tables import OF_A_FILE, TIME, keep_column, named_file
 from ic.meaning.values import place_of
 from met.commands.profile import COLUMN, FILE, Profile
 from met.diagnostic import Label, Problem, error
 from met.models import parameter
-from met.plan import Origin
 
 LISTS = ("times", "values")
-TIME = "time"
 FEWEST = 2  # rows: a curve goes from one to the next
 
 
@@ -38,7 +37,7 @@ def use_file(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: s
     values = use_model(scope, owner, others, Block({key: item for key, item in body.items.items()
                                                     if key in [each.name for each in others]}))
     for name in (FILE.name, COLUMN.name, *LISTS):
-        scope.whole[owner.join(name)] = "is read from a file, and is one for the whole sweep"
+        scope.whole[owner.join(name)] = OF_A_FILE
     columns: dict[str, tuple[float, ...]] | None = None
     with scope.complaints.gather():
         columns = _columns(scope, owner, profile, body, joint)
@@ -50,14 +49,7 @@ def use_file(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: s
 
 def _columns(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: str) -> dict[str, tuple[float, ...]]:
     """The two lists. Raises Problem."""
-    item = body.get(FILE.name)
-    if item is None:
-        raise Problem(error("D075", f"{owner.label} has no `file`", owner.place, help='write `file = "NAME.csv"`'))
-    if not isinstance(item.value, String):
-        raise Problem(error("D076", f"`file` of {owner.label} is the name of a file, in quotes",
-                            place_of(item.value) if item.value is not None else item.place,
-                            help=f'write `file = "{item.value.text if isinstance(item.value, Name) else "NAME.csv"}"`'))
-    named = item.value
+    named = named_file(owner, body.get(FILE.name))
     wanted, place = _column_name(owner, body.get(COLUMN.name), joint), named.place
     if body.get(COLUMN.name) is not None:
         place = place_of(body.items[COLUMN.name].value or named)
@@ -73,19 +65,13 @@ def _columns(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: s
             if at is named.place and not why:
                 why = "that of the joint's name is taken, unless `column = \"NAME\"` names another"
             raise missing_column(table, column_name, at, why)
-        text, dimension = scope.unit(owner, declared)
         label = here if column_name == TIME else Label(named.place, f"read here for joint `{joint}`")
-        columns[name] = table.numbers(column, text, dimension, label)
-        if name == LISTS[0]:
-            table.rising(column, columns[name])
-        note = f"column `{column.name}` of {table.file}"
-        scope.parameters[owner.join(name)] = Settled(columns[name], text, Origin("deck", column.place, (), note),
-                                                     declared.doc)
+        columns[name] = keep_column(scope, owner, declared, table, column, label)
     if len(table.rows) < FEWEST:
         raise Problem(error("D196", f"`{table.file}` has {len(table.rows) or 'no'} row"
                             f"{'s' if not table.rows else ''}", table.columns[0].place, also=[here],
                             help=f"a trajectory has {FEWEST} at least; `table` takes a single point"))
-    scope.setting(owner.join(FILE.name), table.file, item=item)
+    scope.setting(owner.join(FILE.name), table.file, item=body.get(FILE.name))
     scope.setting(owner.join(COLUMN.name), wanted, item=body.get(COLUMN.name), note="the joint's name")
     return columns
 

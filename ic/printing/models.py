@@ -98,7 +98,7 @@ def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
     for words in ("commands", "unit", "order", "real_limit"):
         if hasattr(model, words):
             told[words] = getattr(model, words)
-    for words in ("memory", "states", "signals"):
+    for words in models.HELD:
         told[words] = [{"name": p.name, "unit": p.unit, "doc": p.doc} for p in getattr(model, words, ())]
     return told
 
@@ -117,7 +117,8 @@ def how(kind: models.Kind, model: Any) -> str:
 def shown_of(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
     """What there is of a servo, bed or law to be recorded: in words, then name, unit and meaning of each."""
     for words, text in (
-        ("memory", "Held by its computer from tick to tick"),
+        ("outputs", "Given by its law, at its ticks"),
+        ("integrals", "Integrated by its law"),
         ("states", "Integrated with the motion"),
         ("signals", "Shown at every instant"),
     ):
@@ -170,12 +171,16 @@ def default(parameter: Parameter) -> str:
         return "needed"
     if isinstance(value, str):
         return value
+    if value == ():
+        return "none"
     needed = f"; needed under {', '.join(parameter.needed_for)}" if parameter.needed_for else ""
     return vector(value, "1") if isinstance(value, tuple) else f"{number(value)}{needed}"
 
 
 def range_(parameter: Parameter) -> str:
     """The bounds in SI, or the words that are possible."""
+    if parameter.names:
+        return " | ".join((f"a {parameter.names}", *parameter.words))
     if parameter.words:
         return " | ".join(parameter.words)
     whole = ["whole"] if parameter.whole else []
@@ -186,6 +191,8 @@ def range_(parameter: Parameter) -> str:
 
 
 def meaning(parameter: Parameter) -> str:
-    """What it is, and where its number comes from."""
+    """What it is, where its number comes from, and with which word it is there."""
+    only = "" if parameter.only is None else f"; with {parameter.only[0]} = {' or '.join(parameter.only[1])}"
     shape = {"vector": "three numbers; ", "list": "a list; ", "text": "in quotes; "}.get(parameter.shape, "")
-    return f"{shape}{parameter.doc}" + (f" ({parameter.source})" if parameter.source else "")
+    shape = "the same in all cases; " if parameter.decides else shape
+    return f"{shape}{parameter.doc}{only}" + (f" ({parameter.source})" if parameter.source else "")

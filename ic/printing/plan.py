@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from ic.printing.columns import columns, count, number, quantity, size, vector
 from met import models
 from met.distinct import distinct
-from met.plan import Experiment, Formula, Joint, Plan, Structure
+from met.parameter import Parameter
+from met.plan import BASE, Base, Experiment, Formula, Joint, Plan, Structure
+from met.plan_defaults import OF_FREE_BASE
 
 CHOSEN = 88  # columns, of parameters that stand in one cell
 FIXED_SPACE = "\u00a0"  # no line ends at one
@@ -76,6 +78,9 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
     yield from _arm(experiment)
     if verbose:
         yield from _bodies(experiment)
+    if structure.base is not None:
+        yield ""
+        yield from _base(experiment, structure.base)
     yield ""
     yield from _schedule(experiment)
     yield ""
@@ -105,12 +110,15 @@ def _arm(experiment: Experiment) -> Iterator[str]:
     structure = experiment.structure
     values = _Values(experiment)
     servos = {use.joint: use for use in structure.servos}
-    rows: list[tuple[str, ...]] = [("joint", "moves", "at", "rpy", "link", "mass", "servo"), ("base",)]
+    rows: list[tuple[str, ...]] = [("joint", "moves", "at", "rpy", "link", "mass", "servo"), (BASE,)]
+    if any(link.name == BASE for link in structure.links):
+        kind = structure.base.kind if structure.base is not None else "fixed"
+        rows[-1] = (BASE, kind, "", "", "", values.shown(f"links.{BASE}.mass"))
 
     children: dict[str, list[Joint]] = {}
     for joint in structure.joints:
         children.setdefault(joint.parent, []).append(joint)
-    waiting = [(joint, "") for joint in reversed(children.get("base", []))]
+    waiting = [(joint, "") for joint in reversed(children.get(BASE, []))]
     while waiting:
         joint, stem = waiting.pop()
         last = joint is children[joint.parent][-1]
@@ -146,6 +154,42 @@ def _bodies(experiment: Experiment) -> Iterator[str]:
     yield from columns(rows)
 
 
+def _base(experiment: Experiment, base: Base) -> Iterator[str]:
+    """How the base moves: from where, or by which courses."""
+    values = _Values(experiment)
+    if base.kind == "free":
+        yield "Base: moves freely, at the start with"
+        rows = []
+        for name, unit in OF_FREE_BASE:
+            found = values.vector(f"initial.{BASE}.{name}")
+            if found is not None and unit.startswith("rad"):
+                found, unit = tuple(map(math.degrees, found)), unit.replace("rad", "deg")
+            rows.append((name, "varies" if found is None else vector(found, unit)))
+        yield from columns(rows)
+        return
+    yield "Base: moves as it is told; its other components stay 0"
+    yield from columns([
+        (course.component, course.model,
+         ", ".join(_given(experiment, f"{BASE}.{course.component}", models.find("command", course.model).parameters)))
+        for course in base.courses
+    ])  # fmt: skip
+
+
+def _given(experiment: Experiment, prefix: str, parameters: Iterable[Parameter]) -> list[str]:
+    """The parameters of a model in use, each as `name = value`."""
+    values, shown = _Values(experiment), []
+    for parameter in parameters:
+        path = f"{prefix}.{parameter.name}"
+        if parameter.shape == "vector":
+            found = values.vector(path)
+            shown.append(f"{parameter.name} = {'varies' if found is None else vector(found, parameter.unit)}")
+        elif path in experiment.parameters:
+            given = experiment.parameters[path].value
+            text = f"{len(given)} numbers" if isinstance(given, tuple) else values.shown(path)
+            shown.append(f"{parameter.name} = {given if isinstance(given, str) else text}")
+    return shown
+
+
 def passive(structure: Structure) -> list[str]:
     """The joints that move and have no servo."""
     driven = {use.joint for use in structure.servos}
@@ -175,13 +219,14 @@ def _schedule(experiment: Experiment) -> Iterator[str]:
         return what, f"{number(base / divisor)} Hz", "every tick" if divisor == 1 else f"every {divisor} ticks", times
 
     rows = []
-    divisors: dict[tuple[str, int], list[str]] = {}
+    laws: dict[tuple[str, int, bool], list[str]] = {}
     for use in structure.servos:
-        if models.find("servo", use.model).tick is not None:
-            divisors.setdefault((use.definition, use.divisor), []).append(use.joint)
-    for (definition, divisor), joints in divisors.items():
-        where = f"servo {definition} of {', '.join(joints)}"
-        rows.append(row(where, divisor, count(schedule.ticks // divisor + 1, "tick")))
+        if models.find("servo", use.model).control is not None:
+            laws.setdefault((use.definition, use.divisor, use.continuous), []).append(use.joint)
+    for (definition, divisor, continuous), joints in laws.items():
+        what = f"servo {definition} of {', '.join(joints)}"
+        ticks = count(schedule.ticks // divisor + 1, "tick")
+        rows.append((what, "continuous", "", "a part of each step") if continuous else row(what, divisor, ticks))
     steps = f"{count(schedule.ticks // schedule.dynamics, 'step')} of {number(schedule.step * 1e3)} ms"
     rows.append(row("dynamics", schedule.dynamics, f"{steps}, {structure.integrator}"))
     rows.append(row("record", schedule.record, count(schedule.rows, "row")))
@@ -224,22 +269,13 @@ def _substitutions(experiment: Experiment) -> Iterator[str]:
 
 def _environment(experiment: Experiment) -> Iterator[str]:
     structure = experiment.structure
-    values = _Values(experiment)
     products = "with" if structure.velocity_products else "without"
     yield f"Environment: {products} velocity products (Coriolis, centrifugal, gyroscopic)" + (
         "" if structure.environment else "; no gravity, no other loads"
     )
     rows: list[tuple[str, str, str]] = []
     for use in structure.environment:
-        shown: list[str] = []
-        for parameter in models.find("environment", use.model).parameters:
-            path = f"environment.{use.name}.{parameter.name}"
-            if parameter.shape == "vector":
-                found = values.vector(path)
-                shown.append(f"{parameter.name} = {'varies' if found is None else vector(found, parameter.unit)}")
-            elif path in experiment.parameters:
-                given = experiment.parameters[path].value
-                shown.append(f"{parameter.name} = {given if isinstance(given, str) else values.shown(path)}")
+        shown = _given(experiment, f"environment.{use.name}", models.find("environment", use.model).parameters)
         rows.append((use.name, use.model, ", ".join(shown)))
     if all(name == model for name, model, _ in rows):
         yield from columns([(name, shown) for name, _, shown in rows])

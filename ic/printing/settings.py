@@ -26,7 +26,9 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
     for use in structure.servos:
         word(f"servos.{use.joint}", use.definition, use.place)
         word(f"{use.joint}.servo.model", use.model, use.place)
-        if models.find("servo", use.model).tick is not None:
+        if use.continuous:
+            word(f"{use.joint}.servo.rate", "continuous", use.place)
+        elif models.find("servo", use.model).control is not None:
             number(f"{use.joint}.servo.rate", schedule.base_hz / use.divisor, "Hz", f"{use.divisor} base ticks a tick")
     for on_bed in structure.substitutions:
         word(f"{on_bed.joint}.bed.model", on_bed.bed, on_bed.place)

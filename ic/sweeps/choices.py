@@ -25,7 +25,7 @@ from met.trace import Scalar
 MACRO = "macro"
 """What a path of a macro begins with, before a space: `macro PAYLOAD`."""
 
-OF_RUN = ("integrator", "arm", "duration")
+OF_RUN = ("integrator", "arm", "duration", "base")
 OF_JOINT = ("servo", "law", "bed")
 OF_SERVO = ("model", "command", "rate")
 NEVER_NUMBERS = ("shape", "along", "of", "parent", "child", "axes", "interpolation", "growth")

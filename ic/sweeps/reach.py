@@ -33,7 +33,7 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
                                    help=f"it {scope.whole[path]}" + (f": write `vary {path} = [...];`" * decides))
             continue
         first, _, rest = path.partition(".")
-        if path in ("integrator", "arm") or rest in ("servo", "law", "bed", "servo.model", "servo.command"):
+        if path in ("integrator", "arm", "base") or rest in ("servo", "law", "bed", "servo.model", "servo.command"):
             scope.complaints.error("D122", f"`{path}` cannot vary over numbers", place,
                                    help=f"it varies over names: `vary {path} = [...];`")
             continue

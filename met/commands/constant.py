@@ -18,4 +18,5 @@ PROFILE = Profile(
     doc=__doc__,
     parameters=(Parameter(name="value", unit="command", doc="the value"),),
     course=course,
+    jumps="none",
 )

@@ -7,7 +7,7 @@ constant profile. The engine evaluates it at the servo's ticks.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 from met.frozen import frozen
 from met.parameter import Parameter
@@ -17,6 +17,9 @@ FILE = Parameter(name="file", shape="text", doc="CSV file")
 COLUMN = Parameter(name="column", shape="text", default="the joint's", doc="name of its column")
 
 
+Jump = Literal["value", "rate", "none"]
+
+
 @frozen(kw_only=True)
 class Profile:
     """The declaration of a command profile; one a file.
@@ -24,6 +27,8 @@ class Profile:
     parameters  what `course` reads, and what a plan holds
     course      (p, t) -> (value, slope): value in the unit `command`, slope its time derivative; t in s.
                 The slope at a jump is zero, at a kink the slope of what follows.
+    jumps       what of the course may jump within a run: its value; the slope, so that it has kinks; none of the two.
+                What moves a base must not jump. (p) -> that, where a word decides
     from_file   the lists `times` and `values` are columns of a CSV file: a deck writes `file` and `column` for them
     """
 
@@ -31,7 +36,12 @@ class Profile:
     doc: str
     parameters: tuple[Parameter, ...]
     course: Callable[[Any, Real], tuple[Real, Real]]
+    jumps: Jump | Callable[[Any], Jump] = "rate"
     from_file: bool = False
+
+    def jump(self, p: Any) -> Jump:
+        """What may jump, with these parameters."""
+        return self.jumps(p) if callable(self.jumps) else self.jumps
 
     @property
     def written(self) -> tuple[Parameter, ...]:

@@ -26,4 +26,5 @@ PROFILE = Profile(
         Parameter(name="phase", unit="rad", default=0.0, doc="angle at t = 0"),
     ),
     course=course,
+    jumps="none",
 )

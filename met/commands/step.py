@@ -22,4 +22,5 @@ PROFILE = Profile(
         Parameter(name="at", unit="s", default=0.0, at_least=0.0, doc="time of the jump"),
     ),
     course=course,
+    jumps="value",
 )

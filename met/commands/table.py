@@ -20,8 +20,10 @@ PROFILE = Profile(
     name="table",
     doc=__doc__,
     parameters=(
-        Parameter(name="times", unit="s", shape="list", doc="times of the points, rising"),
-        Parameter(name="values", unit="command", shape="list", doc="values at those times, as many"),
+        Parameter(name="times", unit="s", shape="list", rises=True, doc="times of the points, rising"),
+        Parameter(
+            name="values", unit="command", shape="list", as_many_as="times", doc="values at those times, as many"
+        ),
     ),
     course=course,
 )

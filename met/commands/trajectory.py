@@ -41,4 +41,5 @@ PROFILE = Profile(
         Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="when the file's time 0 is"),
     ),
     course=course,
+    jumps=lambda p: "none" if p.interpolation == "cubic" else "rate",
 )  # fmt: skip

@@ -46,4 +46,5 @@ PROFILE = Profile(
         Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which the move begins"),
     ),
     course=course,
+    jumps="none",
 )

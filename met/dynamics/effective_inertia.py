@@ -6,6 +6,7 @@ and all joints in their modes: a six by six from wrench to acceleration.
 
 from __future__ import annotations
 
+from met.dynamics.floating import mobility as base_mobility
 from met.dynamics.recursion import Solved
 from met.dynamics.spatial import (
     AT,
@@ -23,25 +24,22 @@ from met.trace.primitives import divide
 from met.trace.scalar import Scalar
 
 
-def effective_inertia(
-    tree: Tree, solved: Solved, base_mobility: Symmetric = NOTHING
-) -> tuple[tuple[Real, Real], ...]:
+def effective_inertia(tree: Tree, solved: Solved) -> tuple[tuple[Real, Real], ...]:
     """(J_eff, b) at every joint, with tau_load_i = J_eff qdd_i + b and all other joints keeping their modes.
 
     Joint i's own rotor is in neither, the rotors of all other torque-mode joints are in both. It does not depend on
-    joint i's own mode. Not S'IA S (the paper's eq. 7): what is inboard yields too, unless it is held.
+    joint i's own mode. Not S'IA S (the paper's eq. 7): what is inboard yields too, unless it is held. A free base
+    yields; one that is fixed or prescribed does not.
 
     J_eff  kg m^2 (prismatic: kg)      b  N m (prismatic: N)
-
-    base_mobility  the base's answer to wrenches, in the recursion's base frame: nothing for a base that is fixed or
-                   prescribed
     """
     n = len(tree.joints)
+    root = NOTHING if solved.base is None else base_mobility(solved.base)
     mobility = [NOTHING] * n
     result: list[tuple[Real, Real]] = [(0.0, 0.0)] * n
     for i in tree.order:
         joint, k = tree.joints[i], tree.joints[i].axis
-        outer = base_mobility if joint.parent < 0 else mobility[joint.parent]
+        outer = root if joint.parent < 0 else mobility[joint.parent]
         Yp = solved.steps[i].lower_mobility(outer)
         U, D0, D, Dinv, rotor = solved.U[i], solved.D0[i], solved.D[i], solved.Dinv[i], solved.rotor[i]
         B, (angular, linear) = Yp.B, (U[:3], U[3:])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from met.dynamics.kinematics import joint_poses, joint_rates
+from met.dynamics.kinematics import fixed_motion, joint_poses, joint_rates
 from met.dynamics.spatial import (
     HERE,
     ZERO,
@@ -14,6 +14,7 @@ from met.dynamics.spatial import (
     Vector,
     add,
     apply_symmetric,
+    compose,
     cross,
     dot,
     scale,
@@ -24,7 +25,7 @@ from met.dynamics.tree import Tree
 
 
 class Energy(NamedTuple):
-    """Of everything that the joints move; links fixed to the base are not counted.
+    """Of everything that the joints move. Links fixed to the base, its own included, count where it moves freely.
 
     kinetic    J, 1/2 rotor qd^2 included
     potential  J, of uniform gravity, zero at the world's origin
@@ -50,12 +51,16 @@ def energy(
 ) -> Energy:
     """Energy and momentum at a state; gravity in world axes (m/s^2), base as in `kinematics.link_motions`."""
     steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
-    poses = joint_poses(tree, steps, base)
+    bodies = [joint.body for joint in tree.joints]
+    poses = list(joint_poses(tree, steps, base))
+    rates = list(joint_rates(tree, steps, qd, base_velocity))
+    if tree.floating is not None:
+        bodies.append(tree.floating.body)
+        poses.append(compose(base, tree.base))
+        rates.append(fixed_motion(base_velocity, tree.base))
     kinetic: Real = 0.0
     weighed, linear, angular = ZERO, ZERO, ZERO
-    for i, (w, v) in enumerate(joint_rates(tree, steps, qd, base_velocity)):
-        m, h, I = tree.joints[i].body  # noqa: E741
-        R, p = poses[i]
+    for i, ((m, h, I), (R, p), (w, v)) in enumerate(zip(bodies, poses, rates, strict=True)):  # noqa: E741
         momentum = sub(scale(m, v), cross(h, w))
         spin = add(apply_symmetric(I, w), cross(h, v))
         kinetic = kinetic + 0.5 * (dot(w, spin) + dot(v, momentum))
@@ -63,6 +68,6 @@ def energy(
         linear = add(linear, turned)
         angular = add(angular, add(turn_vector(R, spin), cross(p, turned)))
         weighed = add(weighed, add(scale(m, p), turn_vector(R, h)))
-        if rotor is not None:
+        if rotor is not None and i < len(rotor):
             kinetic = kinetic + 0.5 * (rotor[i] * (qd[i] * qd[i]))
     return Energy(kinetic, -dot(gravity, weighed), linear, angular)

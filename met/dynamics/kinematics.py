@@ -8,7 +8,6 @@ from met.dynamics.joints import Step
 from met.dynamics.spatial import (
     HERE,
     ZERO,
-    Matrix,
     Pose,
     Real,
     Vector,
@@ -21,7 +20,6 @@ from met.dynamics.spatial import (
 )
 from met.dynamics.tree import Tree
 from met.frozen import frozen
-from met.trace import sqrt, where
 
 
 @frozen
@@ -71,35 +69,12 @@ def link_motions(
     steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
     poses = joint_poses(tree, steps, base)
     rates = joint_rates(tree, steps, qd, base_velocity)
-    root_pose, root_rates = compose(base, tree.base), _at(base_velocity, tree.base)
+    root_pose, root_rates = compose(base, tree.base), fixed_motion(base_velocity, tree.base)
     result = {}
     for name, frame in tree.frames.items():
         outer, motion = (root_pose, root_rates) if frame.joint < 0 else (poses[frame.joint], rates[frame.joint])
-        result[name] = LinkMotion(compose(outer, frame.pose), *_at(motion, frame.pose))
+        result[name] = LinkMotion(compose(outer, frame.pose), *fixed_motion(motion, frame.pose))
     return result
-
-
-def quaternion(R: Matrix) -> tuple[Real, Real, Real, Real]:
-    """The unit quaternion (w, x, y, z) of a rotation, w >= 0: R turns a vector u as q u q* does.
-
-    Of 4 q q' every entry is a sum of entries of R; the row with the largest diagonal entry, which is at least 1, is
-    divided by its root (Shepperd, "Quaternion from rotation matrix", 1978), so nothing is lost near any rotation.
-    """
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R
-    rows = (
-        (1.0 + xx + yy + zz, zy - yz, xz - zx, yx - xy),
-        (zy - yz, 1.0 + xx - yy - zz, xy + yx, xz + zx),
-        (xz - zx, xy + yx, 1.0 - xx + yy - zz, yz + zy),
-        (yx - xy, xz + zx, yz + zy, 1.0 - xx - yy + zz),
-    )
-    best, size = rows[0], rows[0][0]
-    for k, row in enumerate(rows[1:], 1):
-        more = row[k] > size
-        best = tuple(where(more, new, old) for new, old in zip(row, best, strict=True))
-        size = where(more, row[k], size)
-    scale = where(best[0] < 0.0, -0.5, 0.5) / sqrt(size)
-    w, x, y, z = (scale * part for part in best)
-    return w, x, y, z
 
 
 def joint_poses(tree: Tree, steps: Sequence[Step], base: Pose = HERE) -> tuple[Pose, ...]:
@@ -117,7 +92,7 @@ def joint_rates(
 ) -> tuple[tuple[Vector, Vector], ...]:
     """Angular velocity and velocity of the origin of the recursion's frames, in their axes, by joint."""
     rates = [(ZERO, ZERO)] * len(steps)
-    root = _at(base_velocity, tree.base)
+    root = fixed_motion(base_velocity, tree.base)
     for i in tree.order:
         joint = tree.joints[i]
         w, v = steps[i].lower_acceleration(*(root if joint.parent < 0 else rates[joint.parent]), ZERO)
@@ -126,14 +101,17 @@ def joint_rates(
     return tuple(rates)
 
 
-def jacobian(tree: Tree, q: Sequence[Real], link: str, point: Vector = ZERO) -> tuple[tuple[Vector, Vector], ...]:
+def jacobian(
+    tree: Tree, q: Sequence[Real], link: str, point: Vector = ZERO, base: Pose = HERE
+) -> tuple[tuple[Vector, Vector], ...]:
     """For each joint, the angular velocity of the link and the velocity of a point of it (link frame, m), in world
-    axes, for each unit of that joint's rate. Zeros for joints that do not carry the link."""
+    axes, for each unit of that joint's rate. Zeros for joints that do not carry the link. base: as in `link_motions`.
+    """
     steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
-    poses = joint_poses(tree, steps)
+    poses = joint_poses(tree, steps, base)
     frame = tree.frames[link]
     columns: list[tuple[Vector, Vector]] = [(ZERO, ZERO)] * len(tree.joints)
-    outer = tree.base if frame.joint < 0 else poses[frame.joint]
+    outer = compose(base, tree.base) if frame.joint < 0 else poses[frame.joint]
     there = compose(outer, frame.pose)
     target = add(there.p, turn_vector(there.R, point))
     i = frame.joint
@@ -146,7 +124,7 @@ def jacobian(tree: Tree, q: Sequence[Real], link: str, point: Vector = ZERO) -> 
     return tuple(columns)
 
 
-def _at(motion: tuple[Vector, Vector], inner: Pose) -> tuple[Vector, Vector]:
+def fixed_motion(motion: tuple[Vector, Vector], inner: Pose) -> tuple[Vector, Vector]:
     """The motion of a frame fixed to the moving one at the given pose, in its own axes."""
     w, v = motion
     return turn_vector_back(inner.R, w), turn_vector_back(inner.R, add(v, cross(w, inner.p)))

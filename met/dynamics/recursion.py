@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from met.dynamics.floating import Factors, accelerated, factors
 from met.dynamics.joints import Step
 from met.dynamics.spatial import (
     AT,
@@ -65,11 +66,14 @@ class Solved:
     tau_load    tau - rotor * qdd, what the arm takes: the S component of the joint's reaction
     D           S'IA S + rotor, kg m^2 (kg)
     singular    whether the joint is in torque mode and D is nothing: qdd is then undefined
+    base_acceleration   of the base frame's origin, angular and linear, base axes: given, or solved where it is free
+    base_singular       whether a free base has no inertia in some direction: nothing is then defined
 
     In the recursion's frames and with regrouped inertia (`tree`), for `effective_inertia`, `reactions`:
 
     mode, rotor, steps, w (angular velocity), wd and a (angular acceleration; acceleration of the frame's origin less
-    gravity), U and D0 (column and entry k of IA), Dinv, load (wrench that was applied to the body).
+    gravity), U and D0 (column and entry k of IA), Dinv, load (wrench that was applied to the body), base (IA_0 of a
+    free one, taken apart).
     """
 
     qdd: tuple[Real, ...]
@@ -87,6 +91,9 @@ class Solved:
     D0: tuple[Real, ...]
     Dinv: tuple[Real, ...]
     load: tuple[Wrench, ...]
+    base_acceleration: Wrench
+    base_singular: Truth = False
+    base: Factors | None = None
 
 
 def solve(
@@ -117,7 +124,12 @@ def solve(
                 no effect on the arm, its angular velocity is `base_rate`, rad/s. Gravity is in base axes then
     wrenches    by link's name: moment about the link frame's origin and force on the link, link axes, N m and N
     velocity_products  False leaves out Coriolis, centrifugal and gyroscopic terms: M qdd + g(q) = tau + J'f
+
+    Where the base moves freely (`Tree.floating`) its acceleration is solved, not given, and no velocity product is
+    left out.
     """
+    if tree.floating is not None and (base_acceleration != (ZERO, ZERO) or not velocity_products):
+        raise ValueError("a free base is given no acceleration, and moves with all velocity products")
     joints = tree.joints
     n = len(joints)
     tau = (0.0,) * n if tau is None else tau
@@ -149,7 +161,9 @@ def solve(
                 c[i] = (ZERO, add(slide, scale(2.0, cross(carried, along))))
 
     # Tips to base: articulated inertias and bias wrenches.
-    load = _loads(tree, wrenches)
+    load, base_load = _loads(tree, wrenches)
+    base_IA: Symmetric = NOTHING
+    base_p: Wrench = (ZERO, ZERO)
     IA: list[Symmetric] = [NOTHING] * n
     p: list[Wrench] = [(ZERO, ZERO)] * n
     U: list[Six] = [(0.0,) * 6] * n
@@ -167,7 +181,7 @@ def solve(
         IA[i], p[i] = M, (pA[:3], pA[3:])
         U[i] = M.column(k)
         Dinv[i], e[i], rest[i] = _resolve(modes[i], U[i][k], rotor[i], tau[i] - pA[k], qdd[i])
-        if joint.parent < 0:
+        if joint.parent < 0 and tree.floating is None:
             continue
         Ia = _handed_on(M, k, U[i], Dinv[i], rest[i])
         own = choose(modes[i], tau[i] - rotor[i] * e[i], pA[k] + U[i][k] * e[i])
@@ -175,8 +189,23 @@ def solve(
         extra = _apply(Ia, c[i])
         moment, force = add(tuple(pa[:3]), extra[0]), add(tuple(pa[3:]), extra[1])  # type: ignore[arg-type]
         raised, moment, force = steps[i].raise_articulated(Ia, moment, force, far[i])
+        if joint.parent < 0:
+            base_IA = symmetric_sum(base_IA, raised)
+            base_p = (add(base_p[0], moment), add(base_p[1], force))
+            continue
         IA[joint.parent] = symmetric_sum(IA[joint.parent], raised)
         p[joint.parent] = (add(p[joint.parent][0], moment), add(p[joint.parent][1], force))
+
+    base: Factors | None = None
+    base_singular: Truth = False
+    if tree.floating is not None:
+        base_IA = add_rigid(base_IA, tree.floating.dynamic)
+        limits = (SINGULAR * tree.floating.mass, SINGULAR * tree.floating.reach)
+        base, base_singular = factors(base_IA, limits)
+        gyroscopic, centrifugal = rate_wrench(tree.floating.dynamic, base_w)
+        base_wd, base_a = accelerated(base, sub(base_load[0], add(base_p[0], gyroscopic)),
+                                      sub(base_load[1], add(base_p[1], centrifugal)))
+        base_acceleration = _of_base_frame(tree, gravity, base_rate, base_wd, base_a)
 
     # Base to tips: accelerations, and what was to be solved.
     wd: list[Vector] = [ZERO] * n
@@ -203,7 +232,7 @@ def solve(
         qdd=tuple(s[0] for s in solved), tau=tuple(s[1] for s in solved), tau_load=tuple(s[2] for s in solved),
         D=D, singular=tuple(both(modes[i], D[i] <= SINGULAR * joints[i].reach) for i in range(n)),
         mode=modes, rotor=tuple(rotor), steps=steps, w=tuple(w), wd=tuple(wd), a=tuple(a), U=tuple(U), D0=D0,
-        Dinv=tuple(Dinv), load=load,
+        Dinv=tuple(Dinv), load=load, base_acceleration=base_acceleration, base_singular=base_singular, base=base,
     )
 
 
@@ -289,16 +318,28 @@ def _base(tree: Tree, gravity: Vector, acceleration: tuple[Vector, Vector], rate
     return turn_vector_back(R, rate), turn_vector_back(R, wd), turn_vector_back(R, sub(a, gravity))
 
 
-def _loads(tree: Tree, wrenches: Mapping[str, Wrench] | None) -> tuple[Wrench, ...]:
-    """Sum of the given wrenches on each joint's body, about its frame's origin and in its axes."""
+def _of_base_frame(tree: Tree, gravity: Vector, rate: Vector, wd: Vector, a: Vector) -> Wrench:
+    """The other way round of `_base`: the deck's base frame from the recursion's; rate in the deck's base axes."""
+    R, p = tree.base
+    wd, a = turn_vector(R, wd), add(turn_vector(R, a), gravity)
+    return wd, sub(a, add(cross(wd, p), cross(rate, cross(rate, p))))
+
+
+def _loads(tree: Tree, wrenches: Mapping[str, Wrench] | None) -> tuple[tuple[Wrench, ...], Wrench]:
+    """Sum of the given wrenches on each joint's body, about its frame's origin and in its axes; and on a free base."""
     total: list[Wrench] = [(ZERO, ZERO)] * len(tree.joints)
+    base: Wrench = (ZERO, ZERO)
     for name, (moment, force) in (wrenches or {}).items():
         frame = tree.frames[name]
-        if frame.joint < 0:
+        if frame.joint < 0 and tree.floating is None:
             continue
         R, p = frame.pose
         force = turn_vector(R, force)
         moment = add(turn_vector(R, moment), cross(p, force))
-        before = total[frame.joint]
-        total[frame.joint] = (add(before[0], moment), add(before[1], force))
-    return tuple(total)
+        before = base if frame.joint < 0 else total[frame.joint]
+        after = (add(before[0], moment), add(before[1], force))
+        if frame.joint < 0:
+            base = after
+        else:
+            total[frame.joint] = after
+    return tuple(total), base

@@ -1,9 +1,7 @@
-"""Vectors, rotations and spatial quantities as tuples of Reals, in the few operations that planar steps need.
+"""Spatial quantities as tuples of Reals, in the few operations that planar steps need; vectors are `met.vectors`'.
 
 Everything here is plain arithmetic on `Real = float | Scalar`: no arrays, so that a trace sees every zero and one.
 
-    Vector     (x, y, z)
-    Matrix     three rows; R_AB turns components in B into components in A
     Rigid      mass, h = mass * centre of mass, I about the origin as (xx, xy, xz, yy, yz, zz)
     Symmetric  a symmetric 6x6 in blocks [[A, B], [B', C]]: A, C as (xx, xy, xz, yy, yz, zz), B row by row
 
@@ -15,19 +13,36 @@ frame to its parent frame, "lower" from parent to child, where the child frame i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple, TypeGuard
+from typing import NamedTuple
 
-from met.trace import Real, Scalar, Truth, cos, sin, sqrt, where
+from met.trace import Real, Scalar, Truth, sqrt, where
+from met.vectors import (  # noqa: F401 - the whole room takes them from here
+    IDENTITY,
+    ZERO,
+    Matrix,
+    Turn,
+    Vector,
+    add,
+    constant,
+    cross,
+    dot,
+    product,
+    rotation_about,
+    rotation_quaternion,
+    rotation_rpy,
+    scale,
+    snap_rotation,
+    snapped,
+    sub,
+    transposed,
+    turn_by,
+    turn_vector,
+    turn_vector_back,
+)
 
-Vector = tuple[Real, Real, Real]
-Matrix = tuple[Vector, Vector, Vector]
 Six = tuple[Real, Real, Real, Real, Real, Real]
 Nine = tuple[Real, Real, Real, Real, Real, Real, Real, Real, Real]
-Turn = tuple[Real, Real]
 
-ZERO: Vector = (0.0, 0.0, 0.0)
-IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 NO_TURN: Turn = (1.0, 0.0)
 
 # Place of entry (i, j) of a symmetric 3x3 among its six numbers.
@@ -75,15 +90,6 @@ class Symmetric(NamedTuple):
 NOTHING = Symmetric((0.0,) * 6, (0.0,) * 9, (0.0,) * 6)
 
 
-def constant(x: object) -> TypeGuard[float]:
-    """Whether x is known when the tree is built: a plain Python number.
-
-    A Scalar is not, nor is numpy's float64, which stands for a case's value where the plain run must take exactly
-    the same path as the traced one.
-    """
-    return type(x) in (float, int)
-
-
 def settled(x: Real) -> Real:
     """x as a plain number where a trace has found that it is one."""
     if isinstance(x, Scalar):
@@ -102,11 +108,6 @@ def is_zero(x: Real) -> bool:
     return bool(constant(x) and x == 0.0)
 
 
-def turn_by(angle: Real) -> Turn:
-    """(cos, sin) of an angle; constants of a constant, where the trace's functions give numpy's numbers."""
-    return (float(cos(angle)), float(sin(angle))) if constant(angle) else (cos(angle), sin(angle))
-
-
 def root(x: Real) -> Real:
     """The square root, a constant of a constant."""
     return float(sqrt(x)) if constant(x) else sqrt(x)
@@ -119,67 +120,6 @@ def choose(condition: Truth, a: Real, b: Real) -> Real:
     return where(condition, a, b)
 
 
-def snapped(x: float, scale: float = 1.0) -> float:
-    """x with rounding noise near 0 and +-scale removed, so that right angles fold: cos(pi/2) is 0, not 6e-17."""
-    tolerance = 2e-15 * scale
-    if abs(x) < tolerance:
-        return 0.0
-    if abs(abs(x) - scale) < tolerance:
-        return scale if x > 0.0 else -scale
-    return x
-
-
-def snap_rotation(R: Matrix) -> Matrix:
-    """R with its constant entries freed of rounding noise; others stay as they are."""
-    rows = [tuple(snapped(float(x)) if constant(x) else x for x in row) for row in R]
-    return (rows[0], rows[1], rows[2])  # type: ignore[return-value]
-
-
-# -- three-vectors and rotations -------------------------------------------------------------------------------------
-
-def add(a: Vector, b: Vector) -> Vector:
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
-
-
-def sub(a: Vector, b: Vector) -> Vector:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-def scale(k: Real, a: Vector) -> Vector:
-    return (k * a[0], k * a[1], k * a[2])
-
-
-def dot(a: Sequence[Real], b: Sequence[Real]) -> Real:
-    total = a[0] * b[0]
-    for x, y in zip(a[1:], b[1:], strict=True):
-        total = total + x * y
-    return total
-
-
-def cross(a: Vector, b: Vector) -> Vector:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def turn_vector(R: Matrix, a: Vector) -> Vector:
-    """R a: components in the outer frame of a vector given in the inner one."""
-    return (dot(R[0], a), dot(R[1], a), dot(R[2], a))
-
-
-def transposed(R: Matrix) -> Matrix:
-    return ((R[0][0], R[1][0], R[2][0]), (R[0][1], R[1][1], R[2][1]), (R[0][2], R[1][2], R[2][2]))
-
-
-def turn_vector_back(R: Matrix, a: Vector) -> Vector:
-    """R' a: components in the inner frame of a vector given in the outer one."""
-    return turn_vector(transposed(R), a)
-
-
-def product(P: Matrix, Q: Matrix) -> Matrix:
-    columns = transposed(Q)
-    rows = [(dot(row, columns[0]), dot(row, columns[1]), dot(row, columns[2])) for row in P]
-    return (rows[0], rows[1], rows[2])
-
-
 def compose(outer: Pose, inner: Pose) -> Pose:
     """Pose of C in A from B in A and C in B."""
     return Pose(product(outer.R, inner.R), add(outer.p, turn_vector(outer.R, inner.p)))
@@ -189,42 +129,6 @@ def inverse(pose: Pose) -> Pose:
     """Pose of A in B from B in A."""
     p = turn_vector_back(pose.R, pose.p)
     return Pose(transposed(pose.R), (-p[0], -p[1], -p[2]))
-
-
-def rotation_rpy(roll: Real, pitch: Real, yaw: Real) -> Matrix:
-    """R = Rz(yaw) Ry(pitch) Rx(roll): turns about the fixed x, y, z axes in that order; rad."""
-    (cr, sr), (cp, sp), (cy, sy) = ((_turn(angle)) for angle in (roll, pitch, yaw))
-    return (
-        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-        (-sp, cp * sr, cp * cr),
-    )
-
-
-def rotation_about(axis: Vector, angle: Real) -> Matrix:
-    """Rodrigues' rotation by angle (rad) about a unit axis."""
-    c, s = _turn(angle)
-    x, y, z = axis
-    k = 1.0 - c
-    return (
-        (c + x * x * k, x * y * k - z * s, x * z * k + y * s),
-        (x * y * k + z * s, c + y * y * k, y * z * k - x * s),
-        (x * z * k - y * s, y * z * k + x * s, c + z * z * k),
-    )
-
-
-def rotation_quaternion(w: Real, x: Real, y: Real, z: Real) -> Matrix:
-    """Rotation of a unit quaternion, scalar part first."""
-    return (
-        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
-        (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
-        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
-    )
-
-
-def _turn(angle: Real) -> Turn:
-    c, s = turn_by(angle)
-    return (snapped(c), snapped(s)) if constant(c) and constant(s) else (c, s)
 
 
 # -- rigid inertia ---------------------------------------------------------------------------------------------------

@@ -23,6 +23,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, Literal
 
+from met.dynamics.floating import Floating
 from met.dynamics.joints import Joint, X, Z
 from met.dynamics.spatial import (
     HERE,
@@ -107,6 +108,7 @@ class Tree:
     base     the recursion's base frame in the deck's
     frames   by link's name
     carried  by joint: the link that it carries itself
+    floating the base as a body, where it moves freely; None: its motion is given
     """
 
     joints: tuple[Joint, ...]
@@ -114,11 +116,16 @@ class Tree:
     base: Pose
     frames: dict[str, Frame]
     carried: tuple[str, ...]
+    floating: Floating | None = None
 
     @staticmethod
-    def build(bodies: Sequence[Body], moving: Sequence[str] | None = None) -> Tree:
-        """The tree of these bodies, in any order; `moving` orders the joints that move (as the bodies, if None)."""
-        return _Builder(bodies, moving).tree().each(lambda _, value: value)
+    def build(bodies: Sequence[Body], moving: Sequence[str] | None = None, *, free: bool = False) -> Tree:
+        """The tree of these bodies, in any order; `moving` orders the joints that move (as the bodies, if None).
+
+        free  the base moves freely, with the matter of the links that are fixed to it. Its own link is one: a body
+              fixed to the base where the base is
+        """
+        return _Builder(bodies, moving).tree(free=free).each(lambda _, value: value)
 
     def each(self, function: Callable[[str, Real], Real]) -> Tree:
         """The tree with function(name, value) for every number that a case may vary.
@@ -163,7 +170,7 @@ class _Builder:
         for i in self.order:
             self.first.setdefault(self.parent[i], i)
 
-    def tree(self) -> Tree:
+    def tree(self, *, free: bool) -> Tree:
         own: list[Pose] = [HERE] * len(self.links)
         base = HERE
         joints: list[Joint | None] = [None] * len(self.links)
@@ -189,16 +196,27 @@ class _Builder:
                               offset=offset, twist=twist, angle=angle, zero=zero, slide=slide)
         frames = {}
         rigid: list[Rigid] = [NO_INERTIA] * len(self.links)
+        ground = NO_INERTIA if free else None
         for b, body in enumerate(self.bodies):
             g = self.group[b]
             pose = _cleaned(compose(inverse(base if g < 0 else own[g]), self.within[b]))
             frames[body.name] = Frame(g, pose)
+            if g < 0 and ground is None:
+                continue
+            inertia = rigid_raise(rigid_about_centre(body.mass, body.com, body.inertia), pose)
             if g >= 0:
-                inertia = rigid_about_centre(body.mass, body.com, body.inertia)
-                rigid[g] = rigid_sum(rigid[g], rigid_raise(inertia, pose))
+                rigid[g] = rigid_sum(rigid[g], inertia)
+            elif ground is not None:
+                ground = rigid_sum(ground, inertia)
         carried = tuple(self.bodies[b].name for b in self.links)
         made = [replace(joint, body=rigid[i]) for i, joint in enumerate(joints) if joint is not None]
-        return Tree(_with_reach(_regrouped(made, self.order), self.order), self.order, base, frames, carried)
+        made, dynamic = _regrouped(made, self.order, ground)
+        made, whole = _with_reach(made, self.order, ground)
+        floating = None
+        if ground is not None and dynamic is not None and whole is not None:
+            mass, xx, yy, zz = (_size(x) for x in (whole.mass, whole.I[0], whole.I[3], whole.I[5]))
+            floating = Floating(ground, dynamic, mass, xx + yy + zz)
+        return Tree(tuple(made), self.order, base, frames, carried, floating)
 
     def _own(self, i: int) -> Pose:
         """The recursion's frame of joint i in the frame of the link that it carries."""
@@ -287,8 +305,9 @@ def _direction(x: Real, y: Real) -> Turn:
     return choose(nothing, 1.0, x / length), choose(nothing, 0.0, y / length)
 
 
-def _regrouped(joints: list[Joint], order: Sequence[int]) -> list[Joint]:
-    """The joints with `dynamic`: from tips to base, what the joint's motion does not see goes to the parent."""
+def _regrouped(joints: list[Joint], order: Sequence[int], ground: Rigid | None) -> tuple[list[Joint], Rigid | None]:
+    """The joints with `dynamic`: from tips to base, what the joint's motion does not see goes to the parent; and the
+    base's body with what comes to it (None: it is not asked for)."""
     result = list(joints)
     gathered = [joint.body for joint in joints]
     for i in reversed(order):
@@ -303,7 +322,9 @@ def _regrouped(joints: list[Joint], order: Sequence[int]) -> list[Joint]:
         result[i] = replace(joint, dynamic=kept)
         if joint.parent >= 0:
             gathered[joint.parent] = rigid_sum(gathered[joint.parent], rigid_raise(moved, joint.at(0.0).pose()))
-    return result
+        elif ground is not None:
+            ground = rigid_sum(ground, rigid_raise(moved, joint.at(0.0).pose()))
+    return result, ground
 
 
 def _less(a: Real, b: Real) -> Real:
@@ -313,17 +334,24 @@ def _less(a: Real, b: Real) -> Real:
     return a - b
 
 
-def _with_reach(joints: list[Joint], order: Sequence[int]) -> tuple[Joint, ...]:
-    """The joints with `reach`, where no case varies it."""
+def _with_reach(joints: list[Joint], order: Sequence[int], ground: Rigid | None) -> tuple[list[Joint], Rigid | None]:
+    """The joints with `reach`, where no case varies it; and all bodies at q = 0 as one, about the base."""
     result = list(joints)
     composite = [joint.body for joint in joints]
     for i in reversed(order):
         joint, body = joints[i], composite[i]
         size = body.I[5] if joint.kind == "revolute" else body.mass
-        result[i] = replace(joint, reach=max(float(size), 0.0) if constant(size) else 0.0)
+        result[i] = replace(joint, reach=_size(size))
         if joint.parent >= 0:
             composite[joint.parent] = rigid_sum(composite[joint.parent], rigid_raise(body, joint.at(0.0).pose()))
-    return tuple(result)
+        elif ground is not None:
+            ground = rigid_sum(ground, rigid_raise(body, joint.at(0.0).pose()))
+    return result, ground
+
+
+def _size(x: Real) -> float:
+    """A number that is not below zero, 0.0 where cases vary it."""
+    return max(float(x), 0.0) if constant(x) else 0.0
 
 
 def _frame_about(axis: Vector) -> Matrix:
@@ -395,7 +423,7 @@ def _each(name: str, value: Any, function: Callable[[str, Real], Real]) -> Any:
     if isinstance(value, tuple):
         items = [_each(f"{name}.{number}", item, function) for number, item in enumerate(value)]
         return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
-    if isinstance(value, str) or constant(value):
+    if value is None or isinstance(value, str) or constant(value):
         return value
     value = settled(value)
     return value if constant(value) else function(name, value)

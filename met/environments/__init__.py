@@ -1,6 +1,28 @@
 """Environment models, one a file. To add one: write its file, add it to `ENVIRONMENTS`."""
 
-from met.environments import gravity, joint_damping, wrench
+from met.environments import (
+    attitude_hold,
+    bushing,
+    gravity,
+    gravity_gradient,
+    joint_damping,
+    joint_stop,
+    plume,
+    spring,
+    wrench,
+    wrench_table,
+)
 from met.environments.environment import Environment
 
-ENVIRONMENTS: tuple[Environment, ...] = (gravity.ENVIRONMENT, joint_damping.ENVIRONMENT, wrench.ENVIRONMENT)
+ENVIRONMENTS: tuple[Environment, ...] = (
+    attitude_hold.ENVIRONMENT,
+    bushing.ENVIRONMENT,
+    gravity.ENVIRONMENT,
+    gravity_gradient.ENVIRONMENT,
+    joint_damping.ENVIRONMENT,
+    joint_stop.ENVIRONMENT,
+    plume.ENVIRONMENT,
+    spring.ENVIRONMENT,
+    wrench.ENVIRONMENT,
+    wrench_table.ENVIRONMENT,
+)

@@ -13,8 +13,7 @@ from typing import Any, Protocol
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.trace import Real
-
-Vector = tuple[Real, Real, Real]
+from met.vectors import Matrix, Vector
 
 
 class World(Protocol):
@@ -28,6 +27,12 @@ class World(Protocol):
     position(link, point)  world position of a point given in the link's frame (m)
     velocity(link, point)  its velocity in the world (m/s)
     to_world(link, vector) a vector given in the link's axes, in the world's
+    orientation(link)    rows of the rotation that turns components in link axes into components in world axes
+    rate(link)           angular velocity of the link, world axes (rad/s)
+    mass(link), com(link), inertia(link)  kg; centre of mass in the link's frame (m); xx, yy, zz, xy, xz, yz about the
+                         centre of mass in link axes (kg m^2)
+
+    Where a link is asked for, but for its mass, centre and inertia, `WORLD` of `met.parameter` may be: it is at rest.
     """
 
     time: Real
@@ -42,11 +47,19 @@ class World(Protocol):
     def position(self, link: str, point: Vector = (0.0, 0.0, 0.0)) -> Vector: ...
     def velocity(self, link: str, point: Vector = (0.0, 0.0, 0.0)) -> Vector: ...
     def to_world(self, link: str, vector: Vector) -> Vector: ...
+    def orientation(self, link: str) -> Matrix: ...
+    def rate(self, link: str) -> Vector: ...
+    def mass(self, link: str) -> Real: ...
+    def com(self, link: str) -> Vector: ...
+    def inertia(self, link: str) -> tuple[Real, Real, Real, Real, Real, Real]: ...
 
 
 @frozen
 class Force:
-    """A force and a moment on a link, in the world's axes, the force at a point in the link's frame (m)."""
+    """A force and a moment on a link, in the world's axes, the force at a point in the link's frame (m).
+
+    On `WORLD` of `met.parameter` it does nothing.
+    """
 
     link: str
     force: Vector = (0.0, 0.0, 0.0)
@@ -68,13 +81,20 @@ class Loads:
     forces: tuple[Force, ...] = ()
 
 
+FILE = Parameter(name="file", shape="text", default="none", doc="CSV file whose columns the lists are, in their stead")
+
+
 @frozen(kw_only=True)
 class Environment:
     """The declaration of an environment model; one a file.
 
-    loads  (p, world) -> Loads. A parameter of shape "word" whose name is `joint` or `link` names one of the arm's.
+    loads  (p, world) -> Loads
     idle   (p, duration) -> the parameters because of which it never acts in a run of that length (s), and why, in
            words; None where it may act. Asked where all its numbers are constants. None: it always may
+    pushes the parameter that names the one link that it acts upon: a deck that names one which is part of the ground
+           is warned. "": none does
+    from_file  a deck may write `file` in the stead of the lists: they are then the columns of their names, and the
+           list that rises is the column `time`
     """
 
     name: str
@@ -82,3 +102,10 @@ class Environment:
     parameters: tuple[Parameter, ...] = ()
     loads: Callable[[Any, World], Loads]
     idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None
+    pushes: str = ""
+    from_file: bool = False
+
+    @property
+    def written(self) -> tuple[Parameter, ...]:
+        """The parameters as a deck writes them."""
+        return (*self.parameters, FILE) if self.from_file else self.parameters

@@ -7,11 +7,12 @@ see the instant. Servos faster than the dynamics tick between instants, on the s
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from met.channel import Channel
-from met.parameter import Memory, State
 from met.plan import Experiment
+from met.program import base
+from met.program.evaluation import law
 from met.program.machine import PARAMETER, Actuator, Machine
 from met.program.observe import derived
 from met.program.step import EVENTS, Step
@@ -56,7 +57,7 @@ class Builder:
         held, at_rows = derived(self.machine)
         tick: list[Control] = [Unless0((Every(instant, self.step.finish()),))]
         tick += self.step.beds.before_servos()
-        for divisor in sorted({actuator.use.divisor for actuator in self.machine.working}):
+        for divisor in sorted({actuator.use.divisor for actuator in self.machine.working if actuator.ticks}):
             tick.append(Every(divisor, (Run(Phase(f"servos_{divisor}", self._servos(divisor))),)))
         tick += self.step.begin()
         if held:
@@ -95,13 +96,24 @@ class Builder:
         for joint in self.joints:
             for name in ("q", "qd"):
                 tape.write(f"{joint}.{name}", self.machine.value(f"initial.{joint}.{name}", tape.read))
+        if self.machine.structure.free:
+            base.start(self.machine, tape)
         for actuator in self.machine.working:
-            parts: tuple[Memory | State, ...] = (*actuator.servo.memory, *actuator.servo.states)
-            for part in parts:
-                tape.write(f"{actuator.path}.{part.name}", part.start)
+            self._start_servo(tape, actuator)
         for name, metric, _ in self.machine.metrics:
             for memory in metric.memory:
                 tape.write(f"{METRIC}{name}.{memory.name}", memory.start)
+
+    def _start_servo(self, tape: Tape, actuator: Actuator) -> None:
+        """What a servo holds, and its states, where a run begins."""
+        parts, servo = actuator.parts, actuator.servo
+        starts: dict[str, Real] = {part.name: part.start for part in (*parts.memory, *parts.states)}
+        if servo.begin is not None:
+            p = self.machine.servo_values(actuator, tape.read)
+            found = answer(actuator.owner, servo.begin, p, *self._state_of(tape, self.joints[actuator.index]))
+            starts.update(returned(actuator.owner, "begin", found, (state.name for state in parts.natural)))
+        for name, value in starts.items():
+            tape.write(f"{actuator.path}.{name}", value)
 
     def end(self, tape: Tape) -> None:
         for name in OUTPUTS:
@@ -119,55 +131,61 @@ class Builder:
     def _servos(self, divisor: int) -> Body:
         def body(tape: Tape) -> None:
             for actuator in self.machine.working:
-                if actuator.use.divisor == divisor:
+                if actuator.ticks and actuator.use.divisor == divisor:
                     self._tick(tape, actuator)
 
         return body
 
     def _tick(self, tape: Tape, actuator: Actuator) -> None:
         """One tick of one servo's computer, on the state at this time."""
-        servo, joint = actuator.servo, self.joints[actuator.index]
-        asked = Asked("none", 0.0, 0.0)
-        if actuator.use.command is not None and actuator.profile is not None:
-            p = parameters(
-                f"command `{actuator.profile.name}` of {actuator.owner}",
-                f"{actuator.path}.command",
-                actuator.profile.parameters,
-                lambda path: self.machine.value(path, tape.read),
-            )
-            value, slope = answer(actuator.owner, actuator.profile.course, p, tape.time)
-            asked = Asked(actuator.use.command.kind, value, slope)
-            tape.write(f"{actuator.path}.command", value)
-        if servo.tick is None:
-            return
+        joint = self.joints[actuator.index]
+        asked = self.machine.asked(actuator, tape.read, tape.time)
+        if actuator.profile is not None:
+            tape.write(f"{actuator.path}.command", asked.value)
+        states = {state.name: tape.read(f"{actuator.path}.{state.name}") for state in actuator.parts.natural}
         on_bed = self.step.beds.seen(tape, actuator)
         if on_bed is not None:
             q, qd = on_bed
+        elif actuator in self.machine.between:
+            q, qd = self._carried(tape, actuator)
+            states = {name: self._carried_state(tape, f"{actuator.path}.{name}") for name in states}
         else:
-            q, qd = self._carried(tape, actuator) if actuator in self.machine.between else self._state_of(tape, joint)
-        self.compute(tape, actuator, q, qd, asked)
+            q, qd = self._state_of(tape, joint)
+        self.compute(tape, actuator, q, qd, asked, states)
 
-    def compute(self, tape: Tape, actuator: Actuator, q: Real, qd: Real, asked: Asked) -> None:
-        """What the servo's computer does with what it sees and is asked: new memory."""
-        servo = actuator.servo
-        assert servo.tick is not None
-        held = Values(actuator.owner, {m.name: tape.read(f"{actuator.path}.{m.name}") for m in servo.memory})
-        seen = Seen(q, qd, asked, actuator.use.divisor / self.schedule.base_hz, tape.time)
-        new = answer(actuator.owner, servo.tick, self.machine.servo_values(actuator, tape.read), held, seen)
-        returned(actuator.owner, "tick", new, (memory.name for memory in servo.memory))
-        for name, value in new.items():
+    def compute(
+        self, tape: Tape, actuator: Actuator, q: Real, qd: Real, asked: Asked, states: Mapping[str, Real] | None = None
+    ) -> None:
+        """What the servo's computer does with what it sees and is asked: new outputs, integrals a tick on."""
+        parts, period = actuator.parts, actuator.use.divisor / self.schedule.base_hz
+        held = Values(actuator.owner, {part.name: tape.read(f"{actuator.path}.{part.name}") for part in parts.memory})
+        seen = Seen(q, qd, asked, period, tape.time, Values(actuator.owner, states or {}))
+        found = law(actuator, self.machine.servo_values(actuator, tape.read), held, seen)
+        for name, slope in found.slopes.items():
+            path = f"{actuator.path}.{name}"
+            tape.write(path, tape.read(path) + period * slope)
+        for name, value in found.outputs.items():
             tape.write(f"{actuator.path}.{name}", value)
 
     def _carried(self, tape: Tape, actuator: Actuator) -> tuple[Real, Real]:
         """Joint position and rate between instants: carried forward with the acceleration of the step just done."""
         joint = self.joints[actuator.index]
         q, qd = self._state_of(tape, joint)
-        a = tape.read(f"carry:{joint}")
-        steps = tape.tick - self.schedule.dynamics * floor(tape.tick / float(self.schedule.dynamics))
-        s = steps / self.schedule.base_hz
+        a, s = tape.read(f"carry:{joint}"), self._since(tape)
         rate = qd + s * a
-        rate = where(both(self.step.rubs(tape, actuator), qd * rate < 0.0), 0.0, rate)
+        rate = where(both(self.step.rubs(tape, joint), qd * rate < 0.0), 0.0, rate)
         return q + s * qd + 0.5 * s * s * a, rate
+
+    def _carried_state(self, tape: Tape, state: str) -> Real:
+        """A servo's state between instants, carried forward as it changed over the step just done."""
+        x = tape.read(state)
+        carried = x + self._since(tape) * tape.read(f"carry:{state}")
+        return where(both(self.step.rubs(tape, state), x * carried < 0.0), 0.0, carried)
+
+    def _since(self, tape: Tape) -> Real:
+        """Time since the last instant, s."""
+        steps = tape.tick - self.schedule.dynamics * floor(tape.tick / float(self.schedule.dynamics))
+        return steps / self.schedule.base_hz
 
     @staticmethod
     def _state_of(tape: Tape, joint: str) -> tuple[Real, Real]:

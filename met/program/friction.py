@@ -1,7 +1,8 @@
 """Dry friction that truly sticks: modes decided at rest, a step split where a rate comes to zero.
 
-Each joint with dry friction has s in {0, +1, -1}: stuck, sliding forward, sliding backward, fixed during a (sub)step.
-Stuck is acceleration mode with qdd = 0, so a stuck joint does not creep, ever. docs/physics.md, "Friction sticks".
+Each joint with dry friction, and each rate on the motor's side with some, has s in {0, +1, -1}: stuck, sliding forward,
+sliding backward, fixed during a (sub)step. Stuck is acceleration mode with qdd = 0, so a stuck joint does not creep,
+ever. docs/physics.md, "Friction sticks".
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ SPLITS = 2
 """A step is split at most this often; a crossing after that is clamped to the step's end, and counted."""
 
 
-def passes(joints: int) -> int:
-    """Decision passes at rest, at most, for this many joints with dry friction: two a joint.
+def passes(count: int) -> int:
+    """Decision passes at rest, at most, for this many things with dry friction: two each.
 
     A pass changes modes of all violators at once; chains of release and return longer than that do not settle.
     """
-    return max(3, 2 * joints)
+    return max(3, 2 * count)
 
 
 def decide(s: Real, at_rest: Truth, need: Real, dry: Real, qdd: Real) -> Real:
@@ -36,16 +37,19 @@ def decide(s: Real, at_rest: Truth, need: Real, dry: Real, qdd: Real) -> Real:
 
 
 def crossings(s: Sequence[Real | None], y_new: Motion) -> list[Truth]:
-    """Which sliding joints have come to zero rate, or beyond, at the step's end. s None: no dry friction."""
+    """Which sliding rates have come to zero, or beyond, at the step's end.
+
+    s  one for each of qd and then x; None: no dry friction
+    """
     return [
         False if mode is None else both(mode != 0.0, mode * rate <= 0.0)
-        for mode, rate in zip(s, y_new.qd, strict=True)
+        for mode, rate in zip(s, (*y_new.qd, *y_new.x), strict=True)
     ]
 
 
 @frozen
 class Split:
-    """Where a (sub)step with a crossing stops: the state, crossing joints at rest, and the share of the step done."""
+    """Where a (sub)step with a crossing stops: the state, what crosses at rest, and the share of the step done."""
 
     y: Motion
     share: Real
@@ -54,15 +58,17 @@ class Split:
 def split_at_rest(
     y: Motion, k1: Slope, y_new: Motion, h: Real, s: Sequence[Real | None], *, may_split: Truth
 ) -> Split:
-    """Find the first instant in the step at which a sliding joint comes to rest, and stop there.
+    """Find the first instant in the step at which something that slides comes to rest, and stop there.
 
     Between its ends the step is the parabola through y with slope k1 and through y_new. Where `may_split` is false
-    the step is kept whole and the crossing joints are put to rest at its end.
+    the step is kept whole and what crosses is put to rest at its end. s: as `crossings` has it
     """
     crossed = crossings(s, y_new)
     shares = [
-        where(crossing, first_root(rate, h * slope, end), 2.0)
-        for crossing, rate, slope, end in zip(crossed, y.qd, k1.qdd, y_new.qd, strict=True)
+        2.0 if crossing is False else where(crossing, first_root(rate, h * slope, end), 2.0)
+        for crossing, rate, slope, end in zip(
+            crossed, (*y.qd, *y.x), (*k1.qdd, *k1.xd), (*y_new.qd, *y_new.x), strict=True
+        )
     ]
     first: Real = 1.0
     for share in shares:
@@ -73,11 +79,11 @@ def split_at_rest(
         tuple(where(whole, b, a) for a, b in zip(there, end, strict=True))
         for there, end in ((part.q, y_new.q), (part.qd, y_new.qd), (part.x, y_new.x))
     )
-    qd = tuple(
+    rates = tuple(
         where(both(crossing, either(whole, share <= first)), 0.0, rate)
-        for crossing, share, rate in zip(crossed, shares, qd, strict=True)
+        for crossing, share, rate in zip(crossed, shares, (*qd, *x), strict=True)
     )
-    return Split(Motion(q, qd, x), where(whole, 1.0, first))
+    return Split(Motion(q, rates[: len(qd)], rates[len(qd) :]), where(whole, 1.0, first))
 
 
 def first_root(rate: Real, slope: Real, end: Real) -> Real:

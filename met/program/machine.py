@@ -6,7 +6,8 @@ from the case's memory where a sweep varies it (`PARAMETER` cells, computed once
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -14,16 +15,19 @@ from met import models
 from met.channel import Channel, channels
 from met.commands.profile import Profile
 from met.diagnostic import Problem, error
+from met.dynamics.spatial import Six
 from met.dynamics.tree import Body, Tree
 from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Integrator
 from met.metrics.metric import Metric
-from met.plan import Experiment, Formula, Joint, ServoUse, Structure
-from met.program.values import Values, answer, parameters
-from met.servos.servo import Drive, JointMotion, Servo
+from met.plan import BASE, Experiment, Formula, Joint, ServoUse, Structure
+from met.program.courses import recorded
+from met.program.values import Values, answer, parameters, returned
+from met.servos.servo import Asked, Drive, JointMotion, Parts, Servo
 from met.substitution import Bed, Law
-from met.trace import Graph, Real, Scalar
+from met.trace import Formulas, Graph, Real, Scalar
+from met.vectors import Vector
 
 PARAMETER, TREE = "parameter:", "tree:"
 """Prefixes of the cells that hold a case's own parameters, and what of the tree follows from them."""
@@ -35,21 +39,25 @@ ReadCell = Callable[[str], Real]
 class Actuator:
     """A servo at work on a moving joint: its declaration, use, and number in the order of moving joints.
 
+    parts    what there is of it in this use
     level    of its dry friction, where it is the same at all times and for all cases, N m (N); None where it varies
     gives    whether it may give the joint's acceleration
+    levels   of the dry friction on its states, by name, as `level`
     """
 
     index: int
     use: ServoUse
     servo: Servo
     profile: Profile | None
+    parts: Parts
     level: float | None
     gives: bool
+    levels: Mapping[str, float | None]
 
     @property
-    def dry(self) -> bool:
-        """Whether any case may have dry friction at this joint, so that the joint may stick."""
-        return self.level != 0.0
+    def ticks(self) -> bool:
+        """Whether it has a computer that ticks."""
+        return self.servo.control is not None and not self.parts.continuous
 
     @property
     def path(self) -> str:
@@ -114,15 +122,15 @@ class Machine:
         return tuple(actuator for actuator in self.actuators if actuator is not None)
 
     @cached_property
-    def between(self) -> tuple[Actuator, ...]:
-        """Those that tick between instants: faster than the dynamics, or slower and no multiple of them."""
-        return tuple(actuator for actuator in self.working if actuator.use.divisor % self.structure.schedule.dynamics)
+    def states(self) -> tuple[str, ...]:
+        """Channels of the states that servos integrate, in the order of `Motion.x`."""
+        return tuple(f"{actuator.path}.{state.name}" for actuator in self.working for state in actuator.parts.states)
 
     @cached_property
-    def sticking(self) -> tuple[Actuator, ...]:
-        """The actuators with dry friction; a substituted joint's is the bed's."""
-        on_bed = [actuator.index for actuator, _, _ in self.mounted]
-        return tuple(actuator for actuator in self.working if actuator.dry and actuator.index not in on_bed)
+    def between(self) -> tuple[Actuator, ...]:
+        """Those that tick between instants: faster than the dynamics, or slower and no multiple of them."""
+        step = self.structure.schedule.dynamics
+        return tuple(each for each in self.working if each.ticks and each.use.divisor % step)
 
     @cached_property
     def mounted(self) -> tuple[tuple[Actuator, Bed, Law], ...]:
@@ -134,6 +142,11 @@ class Machine:
         )  # fmt: skip
 
     @cached_property
+    def courses(self) -> Formulas:
+        """Of a prescribed base: how it moves, as formulas of time (`met.program.courses`)."""
+        return recorded(self.experiment)
+
+    @cached_property
     def varying(self) -> tuple[str, ...]:
         """Paths of the parameters that vary with the case."""
         return tuple(sorted(path for path, q in self.experiment.parameters.items() if isinstance(q.value, Formula)))
@@ -143,10 +156,36 @@ class Machine:
         value = self.experiment.parameters[path].value
         return read(PARAMETER + path) if isinstance(value, Formula) else value
 
+    def mass(self, link: str, read: ReadCell) -> Real:
+        """Of a link, kg."""
+        mass: Real = self.value(f"links.{link}.mass", read)
+        return mass
+
+    def com(self, link: str, read: ReadCell) -> Vector:
+        """A link's centre of mass in its frame, m."""
+        x, y, z = (self.value(f"links.{link}.com.{axis}", read) for axis in "xyz")
+        return x, y, z
+
+    def inertia(self, link: str, read: ReadCell) -> tuple[Real, Real, Real, Real, Real, Real]:
+        """xx, yy, zz, xy, xz, yz of a link about its centre of mass in its axes, kg m^2."""
+        entries = (self.value(f"links.{link}.inertia.{entry}", read) for entry in ("xx", "yy", "zz", "xy", "xz", "yz"))
+        return tuple(entries)
+
     def servo_values(self, actuator: Actuator, read: ReadCell) -> Values:
         return parameters(
-            actuator.owner, actuator.path, actuator.servo.parameters, lambda path: self.value(path, read)
+            actuator.owner, actuator.path, actuator.parts.parameters, lambda path: self.value(path, read)
         )
+
+    def asked(self, actuator: Actuator, read: ReadCell, time: Real) -> Asked:
+        """What the joint's command asks at a time; kind "none" where it has none."""
+        if actuator.profile is None:
+            return Asked("none", 0.0, 0.0)
+        p = parameters(
+            f"command `{actuator.profile.name}` of {actuator.owner}", f"{actuator.path}.command",
+            actuator.profile.parameters, lambda path: self.value(path, read),
+        )  # fmt: skip
+        value, slope = answer(actuator.owner, actuator.profile.course, p, time)
+        return Asked(actuator.asked, value, slope)
 
     def tree(self, read: ReadCell) -> Tree:
         """The arm as the dynamics see it: built once where no case varies it, else kept in the case's memory."""
@@ -179,29 +218,36 @@ class Machine:
         def vector(path: str) -> tuple[Real, Real, Real]:
             return tuple(self.value(f"{path}.{axis}", read) for axis in "xyz")
 
+        def inertia(link: str) -> Six:
+            xx, yy, zz, xy, xz, yz = (
+                self.value(f"links.{link}.inertia.{entry}", read) for entry in ("xx", "yy", "zz", "xy", "xz", "yz")
+            )
+            return xx, yy, zz, xy, xz, yz
+
         joints = {joint.child: joint for joint in self.structure.joints}
         bodies = []
         for link in self._link_order():
             joint = joints[link.name]
-            inertia = tuple(
-                self.value(f"links.{link.name}.inertia.{entry}", read) for entry in ("xx", "yy", "zz", "xy", "xz", "yz")
-            )
             bodies.append(
                 Body(
                     name=link.name,
                     joint=joint.name,
                     kind=joint.kind,
-                    parent=-1 if joint.parent == "base" else numbers[joint.parent],
+                    parent=-1 if joint.parent == BASE else numbers[joint.parent],
                     at=vector(f"{joint.name}.at"),
                     rpy=vector(f"{joint.name}.rpy"),
                     axis=(0.0, 0.0, 1.0) if joint.kind == "fixed" else vector(f"{joint.name}.axis"),
                     pivot=vector(f"{joint.name}.pivot") if self._has_pivot(joint) else (0.0, 0.0, 0.0),
-                    mass=self.value(f"links.{link.name}.mass", read),
-                    com=vector(f"links.{link.name}.com"),
-                    inertia=inertia,
+                    mass=self.mass(link.name, read),
+                    com=self.com(link.name, read),
+                    inertia=self.inertia(link.name, read),
                 )
             )
-        return Tree.build(tuple(bodies), tuple(joint.name for joint in self.joints))
+        if any(link.name == BASE for link in self.structure.links):
+            head = f"links.{BASE}"
+            mass = self.value(f"{head}.mass", read)
+            bodies.append(Body(BASE, "", "fixed", -1, mass=mass, com=vector(f"{head}.com"), inertia=inertia(BASE)))
+        return Tree.build(tuple(bodies), tuple(joint.name for joint in self.joints), free=self.structure.free)
 
     def _has_pivot(self, joint: Joint) -> bool:
         return f"{joint.name}.pivot.x" in self.experiment.parameters
@@ -214,21 +260,28 @@ class Machine:
     def _actuator(self, index: int, use: ServoUse) -> Actuator:
         servo = models.find("servo", use.model, use.place)
         profile = models.find("command", use.command.model, use.place) if use.command is not None else None
-        bare = Actuator(index, use, servo, profile, None, False)
-        drive, level = self._probe(bare)
+        bare = Actuator(index, use, servo, profile, models.servo_parts(use), None, False, {})
+        drive, level, levels = self._probe(bare)
         if drive.given is not None and level != 0.0:
             message = f"{bare.owner} gives both an acceleration and dry friction"
             help = "a joint that is told its acceleration has no use for friction"
             raise Problem(error("E219", message, use.place, help=help))
-        return Actuator(index, use, servo, profile, level, drive.given is not None)
+        return replace(bare, level=level, gives=drive.given is not None, levels=levels)
 
-    def _probe(self, actuator: Actuator) -> tuple[Drive, float | None]:
-        """The servo's physics recorded once, to see what it uses; and its level of dry friction, where known now."""
-        graph = Graph()
-        servo = actuator.servo
-        held = Values(actuator.owner, {memory.name: graph.input(memory.name) for memory in servo.memory})
-        states = Values(actuator.owner, {state.name: graph.input(state.name) for state in servo.states})
+    def _probe(self, actuator: Actuator) -> tuple[Drive, float | None, dict[str, float | None]]:
+        """The servo's physics recorded once, to see what it uses; and its levels of dry friction, where known now."""
+        graph, parts = Graph(), actuator.parts
+        named = [*(output.name for output in parts.outputs), *(state.name for state in parts.integrals)]
+        held = Values(actuator.owner, {name: graph.input(name) for name in named})
+        states = Values(actuator.owner, {state.name: graph.input(state.name) for state in parts.natural})
         q, qd, time, begin = (graph.input(name) for name in ("q", "qd", "time", "begin"))
         joint = JointMotion(q, qd, time, begin, actuator.asked)
-        drive = answer(actuator.owner, servo.drive, self.servo_values(actuator, graph.input), held, states, joint)
-        return drive, graph.value(drive.dry.ref) if isinstance(drive.dry, Scalar) else float(drive.dry)
+        p = self.servo_values(actuator, graph.input)
+        drive = answer(actuator.owner, actuator.servo.drive, p, held, states, joint)
+
+        def level(value: Real) -> float | None:
+            return graph.value(value.ref) if isinstance(value, Scalar) else float(value)
+
+        unknown = set(drive.friction) - {state.name for state in parts.natural}
+        returned(actuator.owner, "friction", dict.fromkeys(unknown, 0.0), ())
+        return drive, level(drive.dry), {name: level(value) for name, value in drive.friction.items()}

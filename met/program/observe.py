@@ -12,14 +12,16 @@ from functools import cached_property
 from met.channel import WXYZ, XYZ, Channel
 from met.dynamics.effective_inertia import effective_inertia
 from met.dynamics.energy import Energy, energy
-from met.dynamics.kinematics import LinkMotion, jacobian, link_motions, quaternion
+from met.dynamics.kinematics import LinkMotion, jacobian
 from met.dynamics.recursion import Wrench, reactions
 from met.dynamics.spatial import Vector, choose
 from met.dynamics.tree import Tree
 from met.integrators.integrator import Motion
+from met.program.base import Base, motions
 from met.program.evaluation import Derivative
 from met.program.machine import Machine
 from met.trace import Real
+from met.vectors import quaternion
 
 
 def derived(machine: Machine) -> tuple[list[Channel], list[Channel]]:
@@ -40,12 +42,13 @@ def derived(machine: Machine) -> tuple[list[Channel], list[Channel]]:
 class Observed:
     """The arm at one instant. What no channel needs is not computed.
 
-    y      the state;  found  gives its derivative
+    y      the state, and base, where it stands;  found  gives its derivative
     """
 
-    def __init__(self, machine: Machine, tree: Tree, y: Motion, found: Callable[[], Derivative]) -> None:
+    def __init__(self, machine: Machine, tree: Tree, y: Motion, base: Base, found: Callable[[], Derivative]) -> None:
         self.joints = tuple(joint.name for joint in machine.joints)
-        self.tree, self.y = tree, y
+        n = len(self.joints)
+        self.tree, self.q, self.qd, self.base = tree, y.q[:n], y.qd[:n], base
         self._found = found
         self._jacobians: dict[str, tuple[tuple[Vector, Vector], ...]] = {}
 
@@ -95,7 +98,7 @@ class Observed:
 
     def _jacobian(self, link: str) -> tuple[tuple[Vector, Vector], ...]:
         if link not in self._jacobians:
-            self._jacobians[link] = jacobian(self.tree, self.y.q, link)
+            self._jacobians[link] = jacobian(self.tree, self.q, link, base=self.base.pose)
         return self._jacobians[link]
 
     @cached_property
@@ -112,9 +115,12 @@ class Observed:
 
     @cached_property
     def motions(self) -> dict[str, LinkMotion]:
-        return link_motions(self.tree, self.y.q, self.y.qd)
+        return motions(self.tree, self.q, self.qd, self.base)
 
     @cached_property
     def energy(self) -> Energy:
-        found = self.derivative
-        return energy(self.tree, self.y.q, self.y.qd, rotor=found.solved.rotor, gravity=found.gravity)
+        found, base = self.derivative, self.base
+        return energy(
+            self.tree, self.q, self.qd, rotor=found.solved.rotor, gravity=found.gravity, base=base.pose,
+            base_velocity=(base.w, base.v),
+        )

@@ -15,14 +15,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from met.integrators.integrator import Motion, Slope
-from met.program import cells, friction
+from met.program import base, cells, friction
 from met.program.asking import Question, advanced, asked, inconstant
-from met.program.evaluation import Derivative, derivative, drive_of, state_names
+from met.program.evaluation import Derivative, derivative, driven_by
 from met.program.machine import Actuator, Machine
 from met.program.observe import Observed
+from met.program.sticking import sticking
 from met.program.substituted import Substituted
 from met.program.values import Values
-from met.servos.servo import Drive
 from met.trace import Real, Truth, any_of, both, either, isfinite, not_, sign, where
 from met.trace.program import Call, Control, Every, Phase, Run, Tape, WhileAny
 
@@ -44,23 +44,26 @@ class Step:
         self.beds = Substituted(machine, self.loads, wire=wire, late=late)
         self.schedule = machine.structure.schedule
         self.joints = tuple(joint.name for joint in machine.joints)
-        self.states = state_names(machine)
-        self._asked = asked(machine.integrator, len(self.joints), len(self.states), self.schedule.step)
+        self.coordinates = base.coordinates(machine)
+        self.states = machine.states
+        self.sticking = sticking(machine)
+        self._asked = asked(machine.integrator, len(self.coordinates), len(self.states), self.schedule.step)
         self._derive = Call(Phase("derive", self.derive))
         self._slope = Call(Phase("slope", self.slope))
         self._decide = (
             WhileAny(
-                "undecided", friction.passes(len(machine.sticking)), (self._derive, Run(Phase("decide", self.decide)))
+                "undecided", friction.passes(len(self.sticking)), (self._derive, Run(Phase("decide", self.decide)))
             ),
             WhileAny("undecided", 1, (Run(Phase("left_open", self.left_open)),)),
         )
-        # joints whose torque may hide that a number is none: their acceleration is given
-        self._needs = tuple(a.index for a in machine.working if a.dry or a.gives)
+        # what may hide that a number is none: joints whose acceleration may be given, states that may stick
+        hiding = [self.joints[a.index] for a in machine.working if a.level != 0.0 or a.gives]
+        self._needs = (*hiding, *(each.name for each in self.sticking if each.state))
         self._split = WhileAny("crossing", 1, (Run(Phase("split", self.split)),))
 
     def begin(self) -> tuple[Control, ...]:
         """What happens at an instant once the servos have ticked: modes, then the step's first stage."""
-        decide = self._decide if self.machine.sticking else ()
+        decide = self._decide if self.sticking else ()
         judge = WhileAny("suspect", 1, (Run(Phase("judge", self.judge)),))
         modes, due = Run(Phase("modes", self.modes)), self.schedule.dynamics
         return (Every(due, (modes, *decide)), *self.beds.after_modes(), Every(due, (self._derive, judge)))
@@ -68,7 +71,7 @@ class Step:
     def finish(self) -> tuple[Control, ...]:
         """The rest of the step, at its end."""
         parts = self._stages(again=False)
-        if self.machine.sticking:
+        if self.sticking:
             again = (
                 Run(Phase("modes_again", self.modes_again)),
                 *self._decide,
@@ -85,11 +88,11 @@ class Step:
     def modes(self, tape: Tape) -> None:
         """What begins at an instant: held values for the first stage, friction modes from the rates."""
         for actuator in self.machine.between:
-            for memory in actuator.servo.memory:
+            for memory in actuator.parts.memory:
                 channel = f"{actuator.path}.{memory.name}"
                 tape.write(f"first:{channel}", tape.read(channel))
-            joint = self.joints[actuator.index]
-            tape.write(f"before:{joint}", tape.read(f"{joint}.qd"))
+            for name, cell in self._carried(actuator):
+                tape.write(f"before:{name}", tape.read(cell))
         tape.write("instant", tape.time)
         tape.write("fraction", 0.0)
         tape.write("splits", 0.0)
@@ -101,44 +104,48 @@ class Step:
     def _modes(self, tape: Tape, active: Truth) -> None:
         """s = sign(qd), and whether any joint is at rest so that its mode must be decided."""
         any_at_rest: Truth = False
-        for actuator in self.machine.sticking:
-            joint = self.joints[actuator.index]
-            qd = tape.read(f"{joint}.qd")
-            rubs = self._dry(tape, actuator) > 0.0
+        for each, level in zip(self.sticking, self._levels(tape), strict=True):
+            rate = tape.read(each.cell)
+            rubs = level > 0.0
             if not isinstance(rubs, bool):
-                cells.keep(tape, active, f"rubs:{joint}", where(rubs, 1.0, 0.0))
+                cells.keep(tape, active, f"rubs:{each.name}", where(rubs, 1.0, 0.0))
             # without friction at rest it moves freely; a level that rises later in the step opposes the motion at once
-            cells.keep(tape, active, f"friction:{joint}", where(either(rubs, qd != 0.0), sign(qd), 1.0))
-            any_at_rest = either(any_at_rest, both(rubs, qd == 0.0))
+            cells.keep(tape, active, f"friction:{each.name}", where(either(rubs, rate != 0.0), sign(rate), 1.0))
+            any_at_rest = either(any_at_rest, both(rubs, rate == 0.0))
         tape.write_mask("undecided", both(active, any_at_rest))
 
-    def _dry(self, tape: Tape, actuator: Actuator) -> Real:
-        """The level of dry friction at the state, where a step or substep begins, N m (N)."""
-        fraction = tape.read("fraction")
-        held = self._held(tape, actuator, fraction)
+    def _levels(self, tape: Tape) -> list[Real]:
+        """The levels of dry friction at the state, where a step or substep begins, in the units of what they hold."""
+        fraction, y = tape.read("fraction"), self._state(tape)
         time, begin = self._time(tape, fraction), tape.read("instant")
-        return self._drive(tape, actuator, self._state(tape), held, time, begin).dry
+        found: list[Real] = []
+        for each in self.sticking:
+            if each.level is not None:
+                found.append(each.level)
+                continue
+            held = self._held(tape, each.actuator, fraction)
+            drive = driven_by(self.machine, each.actuator, tape.read, y, held, time, begin).drive
+            found.append(drive.friction[each.state] if each.state else drive.dry)
+        return found
 
-    def rubs(self, tape: Tape, actuator: Actuator) -> Truth:
-        """Whether a joint has dry friction, as `modes` found it; False for a case whose level is zero."""
-        if not actuator.dry:
+    def rubs(self, tape: Tape, name: str) -> Truth:
+        """Whether what has this name has dry friction, as `modes` found it; False for a case whose level is zero."""
+        found = next((each for each in self.sticking if each.name == name), None)
+        if found is None:
             return False
-        return True if actuator.level is not None else tape.read_mask(f"rubs:{self.joints[actuator.index]}")
+        return True if found.level is not None else tape.read_mask(f"rubs:{name}")
 
     def decide(self, tape: Tape) -> None:
         """One decision at rest, on the derivative just taken: who breaks away, who turns back."""
-        active = tape.read_mask("undecided")
-        y, fraction = self._state(tape), tape.read("fraction")
+        active, y = tape.read_mask("undecided"), self._state(tape)
         changed: Truth = False
-        for actuator in self.machine.sticking:
-            joint = self.joints[actuator.index]
-            s = tape.read(f"friction:{joint}")
-            held = self._held(tape, actuator, fraction)
-            dry = self._drive(tape, actuator, y, held, self._time(tape, fraction), tape.read("instant")).dry
-            at_rest = both(self.rubs(tape, actuator), y.qd[actuator.index] == 0.0)
-            s_new = friction.decide(s, at_rest, tape.read(f"need:{joint}"), dry, tape.read(f"{joint}.qdd"))
+        for each, level in zip(self.sticking, self._levels(tape), strict=True):
+            s = tape.read(f"friction:{each.name}")
+            slope = tape.read(f"slope:{each.name}" if each.state else f"{each.name}.qdd")
+            at_rest = both(self.rubs(tape, each.name), each.rate(y) == 0.0)
+            s_new = friction.decide(s, at_rest, tape.read(f"need:{each.name}"), level, slope)
             changed = either(changed, s_new != s)
-            cells.keep(tape, active, f"friction:{joint}", s_new)
+            cells.keep(tape, active, f"friction:{each.name}", s_new)
         tape.write_mask("undecided", both(active, changed))
 
     def left_open(self, tape: Tape) -> None:
@@ -151,32 +158,33 @@ class Step:
         """The derivative at the state, with everything that is recorded of it, and whether all is well with it."""
         y = self._state(tape)
         found = self._derivative(tape, y, tape.read("fraction"))
-        for i, joint in enumerate(self.joints):
-            tape.write(f"{joint}.qdd", found.slope.qdd[i])
-            tape.write(f"{joint}.tau", found.tau[i])
-        for i in self._needs:
-            tape.write(f"need:{self.joints[i]}", found.need[i])
+        for i, name in enumerate(self.coordinates):
+            tape.write(f"{name}.qdd", found.slope.qdd[i])
+            if name in self.joints:
+                tape.write(f"{name}.tau", found.tau[i])
+        for name in self._needs:
+            tape.write(f"need:{name}", found.need[name])
         for name, slope in zip(self.states, found.slope.xd, strict=True):
             tape.write(f"slope:{name}", slope)
-        for actuator in self.machine.working:
-            drive = found.drives[actuator.index]
-            assert drive is not None
-            for name, value in drive.signals.items():
-                tape.write(f"{actuator.path}.{name}", value)
-        singular: Real = 0.0
+        for channel, value in found.shown.items():
+            tape.write(channel, value)
+        singular: Real = where(found.solved.base_singular, float(len(self.joints) + 1), 0.0)
         for i in reversed(range(len(self.joints))):
             singular = where(found.solved.singular[i], float(i + 1), singular)
         tape.write("singular", singular)
         # Infinities that cancel leave not a number, so a plain sum misses none; a sum of numbers that is none only
         # makes `judge` look.
-        total: Real = sum((*found.slope.qdd, *found.slope.xd, *y.q, *y.qd, *(found.need[i] for i in self._needs)), 0.0)
+        parts = (*found.slope.qdd, *found.slope.xd, *y.q, *y.qd, *(found.need[name] for name in self._needs))
+        total: Real = sum((*parts, *base.orientation(self.machine, tape)), 0.0)
         tape.write_mask("suspect", either(not_(isfinite(total)), singular != 0.0))
 
     def slope(self, tape: Tape) -> None:
         """The derivative at a stage on the way, its slopes alone."""
         found = self._derivative(tape, self._state(tape, STAGE), tape.read(f"{STAGE}fraction"))
-        for joint, qdd in zip(self.joints, found.slope.qdd, strict=True):
+        for joint, qdd in zip(self.coordinates, found.slope.qdd, strict=True):
             tape.write(f"{STAGE}{joint}.qdd", qdd)
+        for joint, qd in zip(self.coordinates[len(self.joints):], found.slope.qd[len(self.joints):], strict=True):
+            tape.write(f"{STAGE}{joint}.qd", qd)  # of a turn no rate of the state
         for name, slope in zip(self.states, found.slope.xd, strict=True):
             tape.write(f"{STAGE}slope:{name}", slope)
 
@@ -193,8 +201,13 @@ class Step:
         """
         cause: Real = 0.0
         number: Real = 0.0
+        if base.free(self.machine):
+            told = [f"{name}.{part}" for name in base.free(self.machine) for part in ("qdd", "q", "qd")]
+            of_base = sum((tape.read(name) for name in told), sum(base.orientation(self.machine, tape), 0.0))
+            cause, number = where(isfinite(of_base), cause, NOT_FINITE), float(len(self.joints))
         for i, joint in reversed(list(enumerate(self.joints))):
-            told = [f"{joint}.qdd", f"{joint}.q", f"{joint}.qd"] + [f"need:{joint}"] * (i in self._needs)
+            told = [f"{joint}.qdd", f"{joint}.q", f"{joint}.qd"]
+            told += [f"need:{name}" for name in self._needs if name == joint or name.startswith(f"{joint}.servo.")]
             told += [f"slope:{name}" for name in self.states if name.startswith(f"{joint}.servo.")]
             bad = not_(isfinite(sum((tape.read(name) for name in told), 0.0)))
             cause, number = where(bad, NOT_FINITE, cause), where(bad, float(i), number)
@@ -218,7 +231,8 @@ class Step:
     def observed(self, tape: Tape) -> Observed:
         """The arm at an instant, with the derivative that `derive` took of it."""
         y = self._state(tape)
-        return Observed(self.machine, self.machine.tree(tape.read), y, lambda: self._derivative(tape, y, 0.0))
+        stands = base.base_of(self.machine, tape.read, y, tape.read("instant"))
+        return Observed(self.machine, self.machine.tree(tape.read), y, stands, lambda: self._derivative(tape, y, 0.0))
 
     def _derivative(
         self, tape: Tape, y: Motion, fraction: Real, told: dict[int, Real] | None = None
@@ -237,18 +251,13 @@ class Step:
             told=self.beds.given(tape, fraction) if told is None else told,
         )
 
-    def _drive(
-        self, tape: Tape, actuator: Actuator, y: Motion, held: Values, time: Real, begin: Real
-    ) -> Drive:
-        return drive_of(self.machine, actuator, tape.read, y, held, time, begin)
-
     def _time(self, tape: Tape, fraction: Real) -> Real:
         return tape.read("instant") + fraction * self.schedule.step
 
     def _held(self, tape: Tape, actuator: Actuator, fraction: Real) -> Values:
         """What the servo's computer holds; between the first and last tick of a step for a servo that is faster."""
         numbers: dict[str, Real] = {}
-        for memory in actuator.servo.memory:
+        for memory in actuator.parts.memory:
             channel = f"{actuator.path}.{memory.name}"
             now = tape.read(channel)
             if actuator in self.machine.between:
@@ -275,7 +284,7 @@ class Step:
             question = self._integrate(tape, settled, fraction)
             if not isinstance(question, Question):
                 raise inconstant(self.machine.integrator)
-            cells.store(tape, True, self.joints, self.states, question.there, STAGE)
+            cells.store(tape, True, self.coordinates, self.states, question.there, STAGE)
             tape.write(f"{STAGE}fraction", fraction + question.share * (1.0 - fraction))
 
         return body
@@ -289,12 +298,14 @@ class Step:
             y_new = self._integrate(tape, settled, tape.read("fraction") if again else 0.0)
             if isinstance(y_new, Question):
                 raise inconstant(self.machine.integrator)
-            if self.machine.sticking:
+            if self.sticking:
                 crossed = any_of(friction.crossings(self._sliding(tape), y_new))
-                cells.store(tape, True, self.joints, self.states, y, FROM)
+                cells.store(tape, True, self.coordinates, self.states, y, FROM)
+                base.keep_orientation(self.machine, tape, FROM)
                 tape.write_mask("crossing", both(active, crossed))
                 tape.write_mask("again", False)
-            cells.store(tape, active, self.joints, self.states, y_new)
+            cells.store(tape, active, self.coordinates, self.states, y_new)
+            base.turn(self.machine, tape, active, y_new)
 
         return body
 
@@ -302,15 +313,15 @@ class Step:
         """Runs the integrator with the first `settled` slopes from cells, up to the next question or to its end."""
         y = self._state(tape)
         if settled:
-            for joint in self.joints:
+            for joint in self.coordinates:
                 for part in ("qd", "qdd"):
                     tape.write(f"k{settled}:{joint}.{part}", tape.read(f"{STAGE}{joint}.{part}"))
             for name in self.states:
                 tape.write(f"k{settled}:{name}", tape.read(f"{STAGE}slope:{name}"))
         answers = [
             Slope(
-                tuple(tape.read(f"k{n}:{joint}.qd") for joint in self.joints),
-                tuple(tape.read(f"k{n}:{joint}.qdd") for joint in self.joints),
+                tuple(tape.read(f"k{n}:{joint}.qd") for joint in self.coordinates),
+                tuple(tape.read(f"k{n}:{joint}.qdd") for joint in self.coordinates),
                 tuple(tape.read(f"k{n}:{name}") for name in self.states),
             )
             for n in range(1, settled + 1)
@@ -322,7 +333,7 @@ class Step:
         """The first stage's slope, as `derive` left it; qd are the rates then."""
         return Slope(
             qd,
-            tuple(tape.read(f"{joint}.qdd") for joint in self.joints),
+            tuple(tape.read(f"{joint}.qdd") for joint in self.coordinates),
             tuple(tape.read(f"slope:{name}") for name in self.states),
         )
 
@@ -336,7 +347,7 @@ class Step:
         reached = friction.split_at_rest(
             y,
             self._first_slope(tape, y.qd),
-            self._state(tape),
+            cells.state(tape, self.coordinates, self.states),
             left * self.schedule.step,
             self._sliding(tape),
             may_split=may_split,
@@ -347,33 +358,38 @@ class Step:
         cells.count(tape, both(active, may_split), "splits")
         cells.count(tape, both(active, may_split), "friction.splits")
         cells.count(tape, both(active, not_(may_split)), "friction.clamped")
-        cells.store(tape, active, self.joints, self.states, reached.y)
+        cells.store(tape, active, self.coordinates, self.states, reached.y)
+        base.turn(self.machine, tape, active, reached.y, FROM)
 
     def carry(self, tape: Tape) -> None:
-        """The acceleration of the step just done, for servos that tick before the next; none for a joint at rest."""
+        """The slope of the step just done, for servos that tick before the next; none for what is at rest and rubs."""
         for actuator in self.machine.between:
-            joint = self.joints[actuator.index]
-            qd = tape.read(f"{joint}.qd")
-            a = (qd - tape.read(f"before:{joint}")) / self.schedule.step
-            at_rest = both(self.rubs(tape, actuator), qd == 0.0)
-            tape.write(f"carry:{joint}", where(at_rest, 0.0, a))
+            for name, cell in self._carried(actuator):
+                now = tape.read(cell)
+                slope = (now - tape.read(f"before:{name}")) / self.schedule.step
+                tape.write(f"carry:{name}", where(both(self.rubs(tape, name), now == 0.0), 0.0, slope))
+
+    def _carried(self, actuator: Actuator) -> list[tuple[str, str]]:
+        """What of a servo's joint is carried forward between instants, and the cells: its rate, the servo's states."""
+        joint = self.joints[actuator.index]
+        states = [f"{actuator.path}.{state.name}" for state in actuator.parts.natural]
+        return [(joint, f"{joint}.qd"), *((name, name) for name in states)]
 
     # What the phases share.
 
     def _state(self, tape: Tape, copy: str = "") -> Motion:
-        return cells.state(tape, self.joints, self.states, copy)
+        """The state, or a copy of it: a stage's as it is, another where a (sub)step begins."""
+        y = cells.state(tape, self.coordinates, self.states, copy)
+        return y if copy == STAGE else base.begun(self.machine, y)
 
-    def _friction(self, tape: Tape) -> list[Real | None]:
-        modes: list[Real | None] = [None] * len(self.joints)
-        for actuator in self.machine.sticking:
-            modes[actuator.index] = tape.read(f"friction:{self.joints[actuator.index]}")
-        return modes
+    def _friction(self, tape: Tape) -> dict[str, Real]:
+        return {each.name: tape.read(f"friction:{each.name}") for each in self.sticking}
 
     def _sliding(self, tape: Tape) -> list[Real | None]:
         """Friction modes as crossings count them: zero, so that it never crosses, where a case has no friction."""
-        modes = self._friction(tape)
-        for actuator in self.machine.sticking:
-            mode = modes[actuator.index]
-            assert mode is not None
-            modes[actuator.index] = where(self.rubs(tape, actuator), mode, 0.0)
+        modes: list[Real | None] = [None] * (len(self.coordinates) + len(self.states))
+        for each in self.sticking:
+            mode = tape.read(f"friction:{each.name}")
+            number = each.number + (len(self.coordinates) if each.state else 0)
+            modes[number] = where(self.rubs(tape, each.name), mode, 0.0)
         return modes

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 from met.diagnostic import Problem, error
-from met.dynamics.kinematics import LinkMotion, link_motions
+from met.dynamics.kinematics import LinkMotion
+from met.dynamics.spatial import HERE
 from met.dynamics.tree import Tree
-from met.environments.environment import Vector
-from met.program.machine import Machine
+from met.integrators.integrator import Motion
+from met.parameter import WORLD
+from met.program.base import Base, motions
+from met.program.machine import Machine, ReadCell
 from met.trace import Real
+from met.vectors import ZERO, Matrix, Vector
 
 
 class ArmWorld:
     """A `met.environments.environment.World` at one stage."""
 
     def __init__(
-        self, machine: Machine, tree: Tree, q: tuple[Real, ...], qd: tuple[Real, ...], time: Real, begin: Real
+        self, machine: Machine, read: ReadCell, tree: Tree, y: Motion, base: Base, time: Real, begin: Real
     ) -> None:
         self.time, self.begin = time, begin
         self.step = machine.structure.schedule.step
         self.joints = tuple(joint.name for joint in machine.joints)
         self.links = tuple(link.name for link in machine.structure.links)
         self._sliding = {joint.name: joint.kind == "prismatic" for joint in machine.joints}
-        self._tree, self._q, self._qd = tree, q, qd
+        self._machine, self._read = machine, read
+        n = len(self.joints)
+        self._tree, self._q, self._qd, self._base = tree, y.q[:n], y.qd[:n], base
         self._motions: dict[str, LinkMotion] | None = None
 
     def slides(self, joint: str) -> bool:
@@ -42,13 +48,37 @@ class ArmWorld:
     def to_world(self, link: str, vector: Vector) -> Vector:
         return self.link(link).to_world(vector)
 
+    def orientation(self, link: str) -> Matrix:
+        return self.link(link).pose.R
+
+    def rate(self, link: str) -> Vector:
+        return self.link(link).rate()
+
+    def mass(self, link: str) -> Real:
+        return self._machine.mass(self._own(link), self._read)
+
+    def com(self, link: str) -> Vector:
+        return self._machine.com(self._own(link), self._read)
+
+    def inertia(self, link: str) -> tuple[Real, Real, Real, Real, Real, Real]:
+        return self._machine.inertia(self._own(link), self._read)
+
+    def is_ground(self, link: str) -> bool:
+        """Whether this names the ground. Where the arm has a link of that name, no model's parameter is that word."""
+        return link == WORLD and link not in self.links
+
     def link(self, link: str) -> LinkMotion:
+        if self.is_ground(link):
+            return LinkMotion(HERE, ZERO, ZERO)
         if self._motions is None:
-            self._motions = link_motions(self._tree, self._q, self._qd)
-        if link not in self._motions:
+            self._motions = motions(self._tree, self._q, self._qd, self._base)
+        return self._motions[self._own(link)]
+
+    def _own(self, link: str) -> str:
+        if link not in self.links:
             message = f"an environment model asks for link `{link}`, which the arm does not have"
             raise Problem(error("E218", message, help=f"links: {', '.join(self.links)}"))
-        return self._motions[link]
+        return link
 
     def _number(self, joint: str) -> int:
         if joint not in self.joints:

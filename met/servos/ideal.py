@@ -1,11 +1,12 @@
 """Ideal servo: the joint follows its command whatever the arm, and the torque that this takes is what comes out.
 
-    r(t) = value + slope (t - t_k)                    the command, carried on along its slope from the tick at t_k
+    r(t) = value + slope (t - since)                  the command, carried on along its slope from the tick at `since`
     rate            qdd = slope + w (r - qd)
     position        qdd = 2 w (slope - qd) + w^2 (r - q)
     acceleration    qdd = r
 
-Value and slope are taken at the servo's ticks and held; the law is evaluated at every stage. w is `bandwidth`: an
+Value and slope are taken at the servo's ticks and held, or at every stage where it is continuous; the law below is
+evaluated at every stage. w is `bandwidth`: an
 error dies away as exp(-w t), without overshoot, and at a step of a command the joint goes there so. The second
 derivative of a position command is not known, so a position whose rate changes is followed (its acceleration)/w^2
 behind. tau is from inverse dynamics, the rotor's share included; there is no limit.
@@ -16,17 +17,16 @@ the other joints like any other, but nothing shakes it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from met.parameter import Memory, Parameter
-from met.servos.servo import Drive, JointMotion, Seen, Servo
+from met.servos.servo import Control, Drive, JointMotion, Seen, Servo
 from met.trace import Real
 
 
-def tick(p: Any, held: Any, seen: Seen) -> Mapping[str, Real]:
+def control(p: Any, held: Any, seen: Seen) -> Control:
     """The servo's computer: it hands the command on."""
-    return {"value": seen.asked.value, "slope": seen.asked.slope, "since": seen.time}
+    return Control({"value": seen.asked.value, "slope": seen.asked.slope, "since": seen.time})
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
@@ -62,12 +62,12 @@ SERVO = Servo(
             doc="inertia of the drive, seen at the joint: its share of tau",
         ),
     ),
-    memory=(
-        Memory(name="value", unit="command", doc="what was asked at the last tick"),
-        Memory(name="slope", unit="command/s", doc="its rate of change then"),
-        Memory(name="since", unit="s", doc="time of the last tick"),
+    outputs=(
+        Memory(name="value", unit="command", doc="what was asked"),
+        Memory(name="slope", unit="command/s", doc="its rate of change"),
+        Memory(name="since", unit="s", doc="time at which it was asked"),
     ),
-    tick=tick,
+    control=control,
     drive=drive,
     fastest=fastest,
     follows=True,

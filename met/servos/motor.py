@@ -3,7 +3,33 @@
 from __future__ import annotations
 
 from met.frozen import frozen
+from met.parameter import Parameter
 from met.trace import Real, clip
+
+TABLE_1 = "Hill, Hopping, Price 1989, table 1"
+
+RATIO = Parameter(
+    name="ratio", unit="rad/joint", above=0.0, source=TABLE_1, doc="gear ratio N: motor turns per joint turn"
+)
+SHAFT = (
+    Parameter(name="j_m", unit="kg*m^2", above=0.0, source=TABLE_1, doc="inertia of the motor's shaft J_m"),
+    Parameter(
+        name="f_c", unit="N*m", default=0.0, at_least=0.0, source=TABLE_1, doc="Coulomb friction at the motor"
+    ),
+    Parameter(
+        name="f_v", unit="N*m*s/rad", default=0.0, at_least=0.0, source=TABLE_1, doc="viscous friction at the motor"
+    ),
+)  # fmt: skip
+ARMATURE = (
+    Parameter(name="resistance", unit="ohm", above=0.0, source=TABLE_1, doc="armature resistance R"),
+    Parameter(
+        name="kt", unit="N*m/A", above=0.0, source=TABLE_1, doc="torque constant, and back-EMF constant in V s/rad"
+    ),
+)  # fmt: skip
+TAU_MAX = Parameter(
+    name="tau_max", unit="N*m", above=0.0, source=TABLE_1, doc="largest motor torque, before friction"
+)
+"""What servos with a motor declare."""
 
 
 @frozen

@@ -1,8 +1,11 @@
-"""What a servo is to the engine: a declaration, a tick of its computer, and the physics between ticks.
+"""What a servo is to the engine: a declaration, its control law, and the physics that the law drives.
 
-A servo is split where the real one is. What a computer does runs at the servo's rate and is held between its
-ticks (`tick`, over `Memory`); what nature does is part of the derivative, evaluated at every stage of every step
-(`drive`, over `State`). Both are ordinary functions over numbers that may be traced (docs/models.md).
+A servo is split where the real one is: the law of its computer (`control`), and what nature does (`drive`). Both are
+ordinary functions over numbers that may be traced (docs/models.md). The physics is part of the derivative, evaluated at
+every stage of every step. The law is written once and runs in one of two ways, as the deck says:
+
+    rate = 1 kHz          sampled: at the servo's ticks; outputs are held between them, an integral x' = x + T slope
+    rate = continuous     analog: a part of the derivative; its integrals are integrated with the arm
 
 Everything the servo gives back is on the joint's side of the gearbox, in joint units: rad, rad/s, N m; m, m/s, N
 on a prismatic joint.
@@ -15,7 +18,7 @@ from dataclasses import field
 from typing import Any
 
 from met.frozen import frozen
-from met.parameter import Memory, Parameter, Signal, State
+from met.parameter import Memory, Only, Parameter, Signal, State, there
 from met.servos.motor import Motor
 from met.trace import Real, Truth
 
@@ -36,12 +39,13 @@ class Asked:
 
 @frozen
 class Seen:
-    """What the servo's computer sees at a tick.
+    """What the servo's control law sees, at a tick or a stage.
 
     q, qd   joint position and rate
     asked   the command
-    period  time from this tick to the next, s
-    time    of this tick, s
+    period  time from this tick to the next, s; 0 of a continuous law
+    time    of the tick or stage, s
+    states  the servo's own states by name, which sensors on the motor's side see; `states.motor_rate`
     """
 
     q: Real
@@ -49,6 +53,15 @@ class Seen:
     asked: Asked
     period: float
     time: Real = 0.0
+    states: Any = None
+
+
+@frozen
+class Control:
+    """What the control law gives: its outputs by name, and how fast its integrals change, 1/s of their units."""
+
+    outputs: Mapping[str, Real] = field(default_factory=dict)
+    slopes: Mapping[str, Real] = field(default_factory=dict)
 
 
 @frozen
@@ -78,7 +91,10 @@ class Drive:
     rotor      inertia that moves rigidly with the joint but is not the arm's: N^2 J_m (kg m^2; kg)
     given      None: the joint is in torque mode. A truth: where true, in acceleration mode with qdd = `qdd`
     qdd        the acceleration, where `given`
-    slopes     d(state)/dt for each `State` of the servo, by name
+    slopes     d(state)/dt for each of the servo's `states`, by name; dry friction on a state not included
+    friction   of states that are rates of something with dry friction, by name: the level of that friction, >= 0, as
+               what it takes off the state's slope (a motor's F_c/J_m, rad/s^2). It sticks as the joint's does: a rate
+               that comes to zero stays there while the slope is no larger than the level
     signals    value of each `Signal` of the servo, by name
     """
 
@@ -88,6 +104,7 @@ class Drive:
     given: Truth | None = None
     qdd: Real = 0.0
     slopes: Mapping[str, Real] = field(default_factory=dict)
+    friction: Mapping[str, Real] = field(default_factory=dict)
     signals: Mapping[str, Real] = field(default_factory=dict)
 
 
@@ -95,28 +112,92 @@ class Drive:
 class Servo:
     """The declaration of a servo model; one a file, in met/servos or in a package of your own.
 
-    commands  kinds of command it understands, of "rate", "position", "torque", "acceleration"; empty: it takes none
-    tick      (p, held, seen) -> new memory, by name. p: parameters by name. None: no computer
-    drive     (p, held, states, joint) -> Drive
-    fastest   (p) -> upper bound of the fastest rate constant of the joint's motion under this servo, 1/s, whatever
-              arm it carries; for the plan's stability figure. None: no such bound
-    motor     (p) -> the motor that a bed may take the place of (met/substitution): the servo's computer then sets
-              `voltage`, one of its memories, on the bed. None: there is none to substitute
-    follows   whether the joint goes with its command whatever the arm, so that a position command that begins
-              elsewhere than the joint makes it jump, which is told (D169)
-    at_rest   (p) -> whether its joint must begin at rest: another initial rate is an error. None: it need not
+    commands   kinds of command it understands, of "rate", "position", "torque", "acceleration"; empty: it takes none
+    outputs    what its law gives, held between ticks where it is sampled
+    integrals  what its law integrates
+    control    (p, held, seen) -> Control. held: the integrals, and of a sampled law the outputs of its last tick; p:
+               parameters by name. None: no law
+    clocked    whether the law needs a clock, for it reads outputs of its last tick or the period: never continuous
+    states     what nature integrates for it
+    drive      (p, held, states, joint) -> Drive. held: outputs of the law, and its integrals
+    begin      (p, q, qd) -> states where a run begins, by name, from the joint's position and rate there. None: as
+               declared
+    fastest    (p) -> upper bound of the fastest rate constant of the joint's motion under this servo, 1/s, whatever
+               arm it carries; for the plan's stability figure. None: no such bound
+    motor      (p) -> the motor that a bed may take the place of (met/substitution): the servo's computer then sets
+               `voltage`, one of its outputs, on the bed. None: there is none to substitute
+    motor_only word and value of it under which that is so; None: under all
+    follows    whether the joint goes with its command whatever the arm, so that a position command that begins
+               elsewhere than the joint makes it jump, which is told (D169)
+    at_rest    (p) -> whether its joint must begin at rest: another initial rate is an error. None: it need not
     """
 
     name: str
     doc: str
     parameters: tuple[Parameter, ...] = ()
     commands: tuple[str, ...] = ()
-    memory: tuple[Memory, ...] = ()
+    outputs: tuple[Memory, ...] = ()
+    integrals: tuple[State, ...] = ()
     states: tuple[State, ...] = ()
     signals: tuple[Signal, ...] = ()
-    tick: Callable[[Any, Any, Seen], Mapping[str, Real]] | None = None
+    control: Callable[[Any, Any, Seen], Control] | None = None
+    clocked: bool = False
     drive: Callable[[Any, Any, Any, JointMotion], Drive]
+    begin: Callable[[Any, Real, Real], Mapping[str, Real]] | None = None
     fastest: Callable[[Any], Real] | None = None
     follows: bool = False
     motor: Callable[[Any], Motor] | None = None
+    motor_only: Only | None = None
     at_rest: Callable[[Any], Truth] | None = None
+
+    @property
+    def deciding(self) -> tuple[str, ...]:
+        """Names of the parameters, words, on which parts of it depend (`only`), in order."""
+        parts: tuple[Parameter | Memory | State | Signal, ...] = (
+            *self.parameters, *self.outputs, *self.integrals, *self.states, *self.signals
+        )  # fmt: skip
+        names = {part.only[0] for part in parts if part.only is not None}
+        return tuple(parameter.name for parameter in self.parameters if parameter.name in names)
+
+
+@frozen
+class Parts:
+    """What there is of a servo in one use of it, under that use's words and with its law sampled or continuous.
+
+    natural  states that nature integrates
+    memory   held from tick to tick, and recorded at ticks: outputs and integrals of a sampled law
+    states   integrated with the arm: nature's first, then integrals of a continuous law
+    shown    recorded at instants besides states: outputs of a continuous law, then signals
+    """
+
+    parameters: tuple[Parameter, ...]
+    outputs: tuple[Memory, ...]
+    integrals: tuple[State, ...]
+    natural: tuple[State, ...]
+    signals: tuple[Signal, ...]
+    continuous: bool
+
+    @property
+    def memory(self) -> tuple[Memory | State, ...]:
+        return () if self.continuous else (*self.outputs, *self.integrals)
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        return (*self.natural, *self.integrals) if self.continuous else self.natural
+
+    @property
+    def shown(self) -> tuple[Memory | Signal, ...]:
+        return (*self.outputs, *self.signals) if self.continuous else self.signals
+
+
+def parts(servo: Servo, words: Mapping[str, str], *, continuous: bool = False) -> Parts:
+    """What there is of a servo under these words, by the names of their parameters; of one left out, its default."""
+    words = {each.name: each.default for each in servo.parameters if isinstance(each.default, str)} | dict(words)
+    return Parts(
+        tuple(part for part in servo.parameters if there(part, words)),
+        tuple(part for part in servo.outputs if there(part, words)),
+        tuple(part for part in servo.integrals if there(part, words)),
+        tuple(part for part in servo.states if there(part, words)),
+        tuple(part for part in servo.signals if there(part, words)),
+        continuous,
+    )

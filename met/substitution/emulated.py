@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from met.parameter import Memory, Parameter
-from met.servos.motor import damping, torque
+from met.servos.motor import TABLE_1, damping, torque
 from met.substitution import butterworth, shaft
 from met.substitution.bed import Bed, Draw, Wire
 from met.trace import Real, Truth, absolute, clip, rint, sin, where
@@ -72,7 +72,6 @@ def converted(x: Real, resolution: Real) -> Real:
     return where(resolution > 0.0, step * rint(x / step), x)
 
 
-TABLE_1 = "Hill, Hopping, Price 1989, table 1"
 ASSUMED = "assumed: of the size that such motors have"
 
 BED = Bed(

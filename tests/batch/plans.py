@@ -33,10 +33,11 @@ from met.trace.graph import Formulas, Graph
 
 COMPARE = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal}
 DECK = Origin("deck", Place("two_link.ic", 12, 5, 6, included=(("main.ic", 3),)))
-TABLE_1 = {
+TABLE_1: dict[str, tuple[float | str, str]] = {
     "ratio": (1570.0, "rad/rad"), "kp": (0.02, "V*s/rad"), "ki": (0.125, "V/rad"), "v_max": (20.0, "V"),
     "resistance": (2.05, "ohm"), "kt": (0.061, "N*m/A"), "tau_max": (0.144, "N*m"), "j_m": (6.38e-5, "kg*m^2"),
     "f_c": (0.0205, "N*m"), "f_v": (2.58e-5, "N*m*s/rad"), "k_position": (0.0, "1/s"),
+    "friction": ("coulomb", ""),
 }  # fmt: skip
 
 
@@ -90,7 +91,7 @@ def parameters() -> dict[str, Quantity]:
             put(f"{joint}.rpy.{axis}", 0.0, "rad")
             put(f"{joint}.axis.{axis}", float(axis == "z"), "1")
         for name, (value, unit) in TABLE_1.items():
-            put(f"{joint}.servo.{name}", value, unit, Origin("default") if name == "k_position" else DECK)
+            put(f"{joint}.servo.{name}", value, unit, Origin("default") if name in ("k_position", "friction") else DECK)
         put(f"{joint}.servo.command.value", 0.03, "rad/s")
         put(f"initial.{joint}.q", 0.0, "rad")
         put(f"initial.{joint}.qd", 0.0, "rad/s")

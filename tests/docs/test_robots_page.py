@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 import xarray
 
+import ic
+from ic.find import standard_decks
 from ic.robots.robot import TYPES
 from met import cli
 
@@ -61,3 +63,16 @@ links.bar.com.x = 0.5 m
 
 def test_every_type_of_joint_that_is_read_is_on_the_page() -> None:
     assert all(f"`{kind}`" in PAGE for kind in TYPES)
+
+
+def test_the_arms_that_come_with_met_are_those_and_have_these_joints_and_this_mass() -> None:
+    section = PAGE.partition("## Arms that come with MET")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| `(\w+\.ic)` \| (\d+) \| ([\d.]+) \|", section, re.MULTILINE)
+    assert sorted(deck for deck, _, _ in rows) == standard_decks()
+    for deck, joints, mass in rows:
+        made = ic.compile(deck).experiments[0]
+        assert len(made.structure.moving) == int(joints)
+        held = {joint.child for joint in made.structure.joints if joint.parent == "base" and joint.kind == "fixed"}
+        moved = [link.name for link in made.structure.links if link.name not in {*held, "load"}]
+        weighed = sum(made.parameters[f"links.{name}.mass"].value for name in moved)
+        assert weighed == pytest.approx(float(mass), abs=0.05)

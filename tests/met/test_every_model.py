@@ -39,7 +39,7 @@ def test_a_model_declares_what_its_numbers_are(kind: models.Kind, name: str) -> 
     assert model.name == name
     assert len(model.doc.split(". ")[0].split()) >= 3, "its own words begin with a sentence"
     words = {word: parse_unit("1") for word in ("joint", "effort", "command", "of")}
-    held = [part for group in ("memory", "states", "signals") for part in getattr(model, group, ())]
+    held = [part for group in models.HELD for part in getattr(model, group, ())]
     for part in (*parameters(model), *held):
         assert part.doc, part.name
         parse_unit(part.unit, words)
@@ -52,8 +52,11 @@ def test_a_model_declares_what_its_numbers_are(kind: models.Kind, name: str) -> 
     if kind == "servo":
         assert set(model.commands) <= set(COMMAND_UNIT)
         assert all(set(parameter.needed_for) <= set(model.commands) for parameter in parameters(model))
-        assert (model.tick is None) == (not model.memory), "what a computer holds, it has ticked"
-        assert model.tick is not None or not model.commands, "a command reaches the computer alone"
+        assert (model.control is None) == (not model.outputs), "what a law gives, it has computed"
+        assert model.control is not None or not model.commands, "a command reaches the law alone"
+        known = {parameter.name: parameter.words for parameter in parameters(model)}
+        for part in (*parameters(model), *held):
+            assert part.only is None or set(part.only[1]) <= set(known[part.only[0]]), part.name
 
 
 @pytest.mark.parametrize(("kind", "name"), EVERY)

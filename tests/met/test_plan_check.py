@@ -106,7 +106,7 @@ def coordinate(**new: Any) -> Change:
          "structure.joints[0].parent: link `upper` hangs on itself"),
         (structure("joints", child="base"), "structure.joints[1].child: there is no link `base`"),
         (structure("joints", name="shoulder"), "structure.joints[1].name: `shoulder` is there twice"),
-        (structure("links", name="base"), "structure.links[1].name: `base` is there twice"),
+        (structure("links", name="upper"), "structure.links[1].name: `upper` is there twice"),
         (structure("links", name="a/b"), "structure.links[1].name: 'a/b' is no name: letters, digits and _"),
         (lambda e: e["structure"]["joints"].pop(), "structure.links[1]: no joint holds link `lower`"),
         (lambda e: e["structure"].update(links=[], joints=[]), "structure.links: there is none"),

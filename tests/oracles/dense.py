@@ -12,7 +12,7 @@ or five, and those would be counted against the recursion, which does not lose t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,11 +46,13 @@ class LinkState:
 
 
 class DenseArm:
-    """Bodies (parents before children) on a base at rest."""
+    """Bodies (parents before children) on a base at rest, or on one that moves as `base` says (its J are not read)."""
 
     def __init__(self, bodies: Sequence[Body], gravity: Sequence[float] = (0.0, 0.0, 0.0),
-                 rotor: Sequence[float] | None = None, wrenches: Wrenches | None = None) -> None:
+                 rotor: Sequence[float] | None = None, wrenches: Wrenches | None = None,
+                 base: LinkState | None = None) -> None:
         self.bodies = bodies
+        self.base = base
         self.n = sum(body.kind != "fixed" for body in bodies)
         self.g = np.array(gravity, LONG)
         self.rotor = np.zeros(self.n, LONG) if rotor is None else np.array(rotor, LONG)
@@ -60,6 +62,8 @@ class DenseArm:
         """Every body's state."""
         zero, none = np.zeros(3, LONG), np.zeros((3, self.n), LONG)
         ground = LinkState(np.eye(3, dtype=LONG), zero, zero, zero, zero, zero, none, none)
+        if self.base is not None:
+            ground = replace(self.base, Jw=none, Jv=none)
         result: list[LinkState] = []
         i = 0
         for body in self.bodies:

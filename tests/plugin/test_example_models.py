@@ -49,7 +49,7 @@ class Still:
 
 def test_the_servos_computer_hands_the_rate_on() -> None:
     seen = Seen(q=0.0, qd=0.1, asked=Asked("rate", np.float64(0.4), np.float64(0.0)), period=0.001)
-    assert load("velocity_servo").tick(SERVO, SimpleNamespace(qd_cmd=0.0), seen) == {"qd_cmd": 0.4}
+    assert load("velocity_servo").control(SERVO, SimpleNamespace(), seen).outputs == {"qd_cmd": 0.4}
 
 
 def test_the_torque_goes_to_the_gain_times_the_rate_error_until_the_limit() -> None:

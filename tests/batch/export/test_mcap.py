@@ -14,8 +14,9 @@ from batch.archive.read import ArchiveFile
 from batch.export import export
 from met import run as engine
 from met.diagnostic import Problem
-from met.dynamics.kinematics import link_motions, quaternion
+from met.dynamics.kinematics import link_motions
 from met.program.machine import Machine
+from met.vectors import quaternion
 from tests.batch import plans
 from tests.batch.export.decks import CHAIN, DECK, LINKS, Mcap, made, matrix, said
 

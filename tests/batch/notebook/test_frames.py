@@ -13,8 +13,9 @@ import batch
 from batch.archive.read import ArchiveFile
 from batch.export import poses
 from batch.export.picking import pick
-from met.dynamics.kinematics import link_motions, quaternion
+from met.dynamics.kinematics import link_motions
 from met.program.machine import Machine
+from met.vectors import quaternion
 from tests.batch import plans
 from tests.batch.export import decks
 from tests.batch.notebook.archives import answered, said

@@ -22,7 +22,7 @@ error[D141]: servo `drive` has no `kpp`
 7 |     ratio = 100; kpp = 3; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm; kt = 0.05 N*m/A;
   |                  ^^^
   = help: did you mean `kp`?
-  = help: it has: ratio, kp, ki, v_max, resistance, kt, tau_max, j_m, f_c, f_v, k_position, model, command, rate
+  = help: it has: ratio, kp, ki, v_max, k_position, resistance, kt, tau_max, j_m, f_c, f_v, friction, model, command, rate
 """
 
 
@@ -202,7 +202,7 @@ error[D140]: no servo model `rigid_gearbx`
 6 |     model = rigid_gearbx;
   |             ^^^^^^^^^^^^
   = help: did you mean `rigid_gearbox`?
-  = help: servo models: ideal, locked, passive, rigid_gearbox
+  = help: servo models: cascade, compliant_gearbox, ideal, locked, passive, rigid_gearbox
 """
 
 
@@ -299,7 +299,7 @@ error[D149]: servo `drive` has no command
 def test_a_table_whose_times_do_not_rise(tmp_path: Path) -> None:
     deck = (ARM, changed(SERVO, ("0.1 rad/s", "table(times = [0, 2, 1] s, values = [0, 1, 2] rad/s)")), RUN)
     assert shown(tmp_path, *deck) == """\
-error[D156]: times of a table rise, and number 3, 1 s, follows 2 s
+error[D156]: `times` of `table` must rise, and number 3, 1 s, follows 2 s
  --> deck.ic:9:34
   |
 9 |     command = rate(table(times = [0, 2, 1] s, values = [0, 1, 2] rad/s));
@@ -311,13 +311,13 @@ error[D156]: times of a table rise, and number 3, 1 s, follows 2 s
 def test_a_table_with_a_value_too_many(tmp_path: Path) -> None:
     deck = (ARM, changed(SERVO, ("0.1 rad/s", "table(times = [0, 2] s, values = [0, 1, 2] rad/s)")), RUN)
     assert shown(tmp_path, *deck) == """\
-error[D154]: a table of 2 times and 3 values
- --> deck.ic:9:34
+error[D154]: `values` of `table` has 3 numbers, and `times` 2
+ --> deck.ic:9:53
   |
 9 |     command = rate(table(times = [0, 2] s, values = [0, 1, 2] rad/s));
-  |                                  ^^^^^^^^
- ::: deck.ic:9:53  values
-  = help: each time has its value
+  |                                                     ^^^^^^^^^^^^^^^
+ ::: deck.ic:9:34  `times`
+  = help: they go together, one to one
 """
 
 

@@ -519,7 +519,7 @@ BELONGS = "  = help: `substitute JOINT { ... }`, in a run, puts a joint's motor 
     ("substitute one {}", "error[D045]: no kind of definition `substitute`", "kinds: arm, servo, run, sweep"),
     ("arm b like chain { substitute one {} }", "error[D082]: no `substitute` in an arm", "an arm holds links and joints"),
     ("servo c like drive { substitute one {} }", "error[D141]: no `substitute` in servo `c`",
-     "it has: ratio, kp, ki, v_max, resistance, kt, tau_max, j_m, f_c, f_v, k_position, model, command, rate"),
+     "it has: ratio, kp, ki, v_max, k_position, resistance, kt, tau_max, j_m, f_c, f_v, friction, f_s, rate_s, sigma_0, sigma_1, model, command, rate"),
     ("sweep s of base_run { substitute one {} }", "error[D136]: no `substitute one` in a sweep",
      "a sweep has: vary, zip, from, sample, repeat, exclude when, seed, seeds"),
 ])

@@ -47,8 +47,8 @@ error[D141]: servo `drive` has no `kpp`
 11 |     ratio = 100; kpp = 3; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm; kt = 0.05 N*m/A;
    |                  ^^^
    = help: did you mean `kp`?
-   = help: it has: ratio, kp, ki, v_max, resistance, kt, tau_max, j_m, f_c, f_v, k_position, model, command, rate
-"""
+   = help: it has: ratio, kp, ki, v_max, k_position, resistance, kt, tau_max, j_m, f_c, f_v, friction, model, command, rate
+"""  # noqa: E501
 
 
 def test_two_unknown_keys_are_two_mistakes(tmp_path: Path) -> None:

@@ -300,8 +300,8 @@ def test_explain_of_an_unknown_path_says_what_was_meant(capsys: pytest.CaptureFi
     assert complained(capsys, "explain", "swing.ic", "knee.servo.kq") == (
         "error[D170]: no parameter `knee.servo.kq` in `free`\n"
         " = help: did you mean `knee.servo.kt`, `knee.servo.kp`, `knee.servo.ki`?\n"
-        " = help: `knee.servo` has: ratio, kp, ki, v_max, resistance, kt, tau_max, j_m, f_c, f_v, k_position, "
-        "command.value, rate, model\n"
+        " = help: `knee.servo` has: ratio, kp, ki, v_max, k_position, resistance, kt, tau_max, j_m, f_c, f_v, "
+        "friction, command.value, rate, model\n"
         "\n"
         "1 error\n"
     )

@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from met.dynamics.kinematics import jacobian, link_motions, quaternion
+from met.dynamics.kinematics import jacobian, link_motions
 from met.dynamics.spatial import Pose, rotation_about, rotation_quaternion, rotation_rpy
 from met.dynamics.tree import Tree
 from met.trace import Formulas, Graph
+from met.vectors import quaternion
 from tests.oracles.pinocchio_tree import PinocchioTree
 from tests.oracles.random_tree import random_tree
 

@@ -20,6 +20,7 @@ from met.parameter import Memory, Parameter
 from met.plan import Experiment
 from met.program import build
 from met.servos import Servo
+from met.servos.servo import Control as Law
 from met.servos.servo import Drive
 from met.trace import maximum, sin, where
 from met.trace.program import Control, Every, Unless0, WhileAny
@@ -57,8 +58,8 @@ BRAKE = Servo(
         Parameter(name="push", unit="effort", doc="largest torque"),
         Parameter(name="begin", unit="s", doc="when its computer brakes"),
     ),
-    memory=(Memory(name="braking", unit="1", doc="1 while it brakes"),),
-    tick=lambda p, held, seen: {"braking": where(seen.time >= p.begin, 1.0, 0.0)},
+    outputs=(Memory(name="braking", unit="1", doc="1 while it brakes"),),
+    control=lambda p, held, seen: Law({"braking": where(seen.time >= p.begin, 1.0, 0.0)}),
     drive=lambda p, held, states, joint: Drive(
         torque=p.push * sin(31.0 * joint.time),
         dry=p.level * {"computer": held.braking, "time": maximum(0.0, sin(97.0 * joint.time)), "nobody": 1.0}[p.by],

@@ -1,6 +1,6 @@
 """Velocity servo: a drive whose torque follows the rate error, with a limit and a lag of the first order.
 
-    wanted = clip(gain (qd_cmd - qd), +-limit)      at every stage; qd_cmd is held from tick to tick
+    wanted = clip(gain (qd_cmd - qd), +-limit)      at every stage; qd_cmd is held between ticks
     d(torque)/dt = (wanted - torque)/lag
 
 Not a motor: there is neither back-EMF nor friction.
@@ -8,18 +8,17 @@ Not a motor: there is neither back-EMF nor friction.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from met.parameter import Memory, Parameter, Signal, State
 from met.servos import Servo
-from met.servos.servo import Drive, JointMotion, Seen
+from met.servos.servo import Control, Drive, JointMotion, Seen
 from met.trace import Real, clip, maximum, sqrt
 
 
-def tick(p: Any, held: Any, seen: Seen) -> Mapping[str, Real]:
+def control(p: Any, held: Any, seen: Seen) -> Control:
     """The servo's computer: it hands the command on."""
-    return {"qd_cmd": seen.asked.value}
+    return Control({"qd_cmd": seen.asked.value})
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
@@ -48,10 +47,10 @@ SERVO = Servo(
         Parameter(name="lag", unit="s", default=0.01, above=0.0, doc="time constant of the torque"),
         Parameter(name="rotor", unit="effort*s^2/joint", above=0.0, doc="inertia of the drive, seen at the joint"),
     ),
-    memory=(Memory(name="qd_cmd", unit="joint/s", doc="rate asked at the last tick"),),
+    outputs=(Memory(name="qd_cmd", unit="joint/s", doc="rate asked"),),
     states=(State(name="torque", unit="effort", doc="torque of the drive"),),
     signals=(Signal(name="wanted", unit="effort", doc="torque that the drive goes to"),),
-    tick=tick,
+    control=control,
     drive=drive,
     fastest=fastest,
 )

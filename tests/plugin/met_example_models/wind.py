@@ -24,7 +24,7 @@ ENVIRONMENT = Environment(
     name="wind",
     doc=__doc__,
     parameters=(
-        Parameter(name="link", shape="word", doc="link that the wind blows on"),
+        Parameter(name="link", shape="word", names="link", doc="link that the wind blows on"),
         Parameter(name="velocity", unit="m/s", shape="vector", doc="velocity of the wind, world axes"),
         Parameter(name="point", unit="m", shape="vector", default=(0.0, 0.0, 0.0), doc="where it acts, link frame"),
         Parameter(name="area", unit="m^2", at_least=0.0, doc="drag coefficient times the area that the wind meets"),

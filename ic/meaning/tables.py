@@ -1,0 +1,100 @@
+"""Environment models whose lists are columns of a CSV file: its rows become lists of the plan, as if the deck had them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ic.grammar.syntax import Name, String
+from ic.meaning.complaints import known_words
+from ic.meaning.csv_files import Column, Table, missing_column
+from ic.meaning.merge import Block, Item
+from ic.meaning.models import check_keys, use_model
+from ic.meaning.owner import Owner, Settled
+from ic.meaning.scope import Scope
+from ic.meaning.values import place_of
+from met.diagnostic import Label, Problem, did_you_mean, error
+from met.environments.environment import FILE, Environment
+from met.parameter import Parameter
+from met.plan import Origin
+
+TIME = "time"
+OF_A_FILE = "is read from a file, and is one for the whole sweep"
+
+
+def use_table(scope: Scope, owner: Owner, environment: Environment, body: Block) -> dict[str, Any] | None:
+    """Every parameter of a model whose body names a file, entered in the scope; None where one is missing or wrong."""
+    lists = [each for each in environment.parameters if each.shape == "list"]
+    check_keys(scope, body, [each.name for each in environment.written], owner)
+    for each in lists:
+        item = body.get(each.name)
+        if item is not None:
+            scope.complaints.error("D242", f"`{each.name}` of {owner.label} stands in the file", item.place,
+                                   also=[Label(body.items[FILE.name].place, "which is named here")],
+                                   help="leave one of the two out")
+    own = [each.name for each in environment.parameters if each.shape != "list"]
+    values = use_model(scope, owner, [each for each in environment.parameters if each.shape != "list"],
+                       Block({key: item for key, item in body.items.items() if key in own}))
+    for name in (FILE.name, *(each.name for each in lists)):
+        scope.whole[owner.join(name)] = OF_A_FILE
+    columns: dict[str, tuple[float, ...]] | None = None
+    with scope.complaints.gather():
+        columns = _columns(scope, owner, lists, body.items[FILE.name])
+    if columns is None:
+        for each in lists:
+            scope.checks.fail(owner.join(each.name))
+    return None if values is None or columns is None else {**values, **columns}
+
+
+def named_file(owner: Owner, item: Item | None) -> String:
+    """The name of the file that `file` is. Raises Problem D075, D076."""
+    if item is None:
+        raise Problem(error("D075", f"{owner.label} has no `file`", owner.place, help='write `file = "NAME.csv"`'))
+    if not isinstance(item.value, String):
+        raise Problem(error("D076", f"`file` of {owner.label} is the name of a file, in quotes",
+                            place_of(item.value) if item.value is not None else item.place,
+                            help=f'write `file = "{item.value.text if isinstance(item.value, Name) else "NAME.csv"}"`'))
+    return item.value
+
+
+def keep_column(scope: Scope, owner: Owner, wanted: Parameter, table: Table, column: Column, label: Label
+                ) -> tuple[float, ...]:
+    """A column as the model's list, entered in the scope. Raises Problem D193, D194, D195. label: who wants it."""
+    text, dimension = scope.unit(owner, wanted)
+    numbers = table.numbers(column, text, dimension, label)
+    if column.name == TIME:
+        table.rising(column, numbers)
+    note = f"column `{column.name}` of {table.file}"
+    scope.parameters[owner.join(wanted.name)] = Settled(numbers, text, Origin("deck", column.place, (), note),
+                                                        wanted.doc)
+    return numbers
+
+
+def _columns(scope: Scope, owner: Owner, lists: list[Parameter], item: Item) -> dict[str, tuple[float, ...]]:
+    """The lists. Raises Problem."""
+    named = named_file(owner, item)
+    table = scope.definitions.csv_files.get(named)
+    by_column = {TIME if each.rises else each.name: each for each in lists}
+    label = Label(named.place, "read here")
+    for column in table.columns:
+        if column.name not in by_column:
+            raise Problem(error("D243", f"{owner.label} has no use for column `{column.name}`", column.place,
+                                also=[label], help=[*did_you_mean(column.name, by_column),
+                                                    known_words("its columns", by_column), "or take it out"]))
+    columns = {}
+    for name, wanted in by_column.items():
+        found = table.column(name)
+        if found is not None:
+            columns[wanted.name] = keep_column(scope, owner, wanted, table, found, label)
+        elif isinstance(wanted.default, tuple):
+            text, _ = scope.unit(owner, wanted)
+            columns[wanted.name] = wanted.default
+            scope.parameters[owner.join(wanted.name)] = Settled(wanted.default, text, Origin("default"), wanted.doc)
+        else:
+            why = f"the times of the rows stand in a column `{TIME} [s]`" if name == TIME else ""
+            raise missing_column(table, name, named.place, why)
+    if not table.rows:
+        raise Problem(error("D196", f"`{table.file}` has no rows", table.columns[0].place, also=[label],
+                            help="it has one at least"))
+    scope.setting(owner.join(FILE.name), table.file, item=item)
+    return columns

@@ -1,0 +1,82 @@
+"""Attitude hold: a moment on a link, the base unless another is named, that turns it to an attitude and damps its rate.
+
+    moment = clip(-stiffness e - damping w, +-limit), axis by axis, in the link's axes or the world's
+    e = 2 sin(phi/2) n      the link is turned from the wanted attitude by phi about the axis n
+
+For small angles e is the rotation vector phi n. It is largest at half a turn, where the way back changes over. As of
+thrusters, the moment comes from outside: momentum is not kept. No integral, no dead band, and no propellant.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from met.environments.environment import Environment, Force, Loads, Vector, World
+from met.parameter import Parameter
+from met.trace import clip, where
+from met.vectors import composed, quaternion, quaternion_rpy
+
+
+def loads(p: Any, world: World) -> Loads:
+    R, rate = world.orientation(p.link), world.rate(p.link)
+    w, x, y, z = quaternion_rpy(*p.rpy)
+    w, x, y, z = composed((w, -x, -y, -z), quaternion(R))
+    short = where(w < 0.0, -2.0, 2.0)
+    error = (short * x, short * y, short * z)  # along n, which is the same in the axes of both attitudes
+    if p.axes == "world":
+        return _moment(p, _clipped(p, world.to_world(p.link, error), rate))
+    own = tuple(sum(R[i][j] * rate[i] for i in range(3)) for j in range(3))
+    return _moment(p, world.to_world(p.link, _clipped(p, error, own)))  # type: ignore[arg-type]
+
+
+def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
+    """Why these numbers make it nothing, with the parameters that say so."""
+    if not any((*p.stiffness, *p.damping)):
+        return ("stiffness", "damping"), "it has neither stiffness nor damping"
+    if not any(p.limit):
+        return ("limit",), "its moment is limited to nothing"
+    return None
+
+
+def _clipped(p: Any, error: Vector, rate: Vector) -> Vector:
+    x, y, z = (
+        clip(-stiffness * e - damping * w, -limit, limit)
+        for stiffness, damping, limit, e, w in zip(p.stiffness, p.damping, p.limit, error, rate, strict=True)
+    )
+    return x, y, z
+
+
+def _moment(p: Any, moment: Vector) -> Loads:
+    return Loads(forces=(Force(p.link, moment=moment),))
+
+
+ZERO = (0.0, 0.0, 0.0)
+
+ENVIRONMENT = Environment(
+    name="attitude_hold",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="link", shape="word", default="base", doc="link that is held"),
+        Parameter(name="rpy", unit="rad", shape="vector", default=ZERO, doc="wanted attitude, fixed x-y-z, world axes"),
+        Parameter(
+            name="stiffness", unit="N*m/rad", shape="vector", default=ZERO, at_least=0.0,
+            doc="moment for each radian of error, about x, y and z",
+        ),
+        Parameter(
+            name="damping", unit="N*m*s/rad", shape="vector", default=ZERO, at_least=0.0,
+            doc="moment for each rad/s, about x, y and z",
+        ),
+        Parameter(
+            name="limit", unit="N*m", shape="vector", default=(math.inf, math.inf, math.inf), at_least=0.0,
+            doc="largest moment about x, y and z; none unless written",
+        ),
+        Parameter(
+            name="axes", shape="word", words=("link", "world"), default="link",
+            doc="axes of stiffness, damping and limit: the link's, as those of thrusters, or the world's",
+        ),
+    ),
+    loads=loads,
+    idle=idle,
+    pushes="link",
+)

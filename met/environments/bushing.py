@@ -1,0 +1,121 @@
+"""A bushing: a spring and damper with six freedoms between a frame of a link and a frame of another, or of the ground.
+
+With x the origin of the link's frame in the other's, phi its rotation vector there (axis times angle) and w its
+angular velocity against it, all in the axes of the other frame,
+
+    F = -stiffness x - damping x'                                  on the link, at the origin of its frame
+    M = -(turning phi + phi x (turning phi)/2 + g phi x (phi x (turning phi))) - turning_damping w
+
+where g = (1 - a/tan(a))/(4 a^2), a half of the angle. The other link feels the opposite, on the same line. Each vector
+holds three numbers, along or about the axes of the other frame.
+
+M is what the energy phi' turning phi/2 asks for, at any angle short of half a turn, so that nothing is gained by going
+round; for small angles it is -turning phi. At half a turn the rotation vector changes its sign, and M jumps: what may
+go there wants another model. Not for rubber whose stiffness depends on load or frequency.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from met.environments.environment import Environment, Force, Loads, World
+from met.parameter import WORLD, ZEROS, Parameter
+from met.trace import Real, cos, sin, sqrt, where
+from met.vectors import (
+    Matrix,
+    Vector,
+    add,
+    cross,
+    dot,
+    product,
+    rotation_rpy,
+    rotation_vector,
+    scale,
+    sub,
+    transposed,
+    turn_vector,
+    turn_vector_back,
+)
+
+
+def loads(p: Any, world: World) -> Loads:
+    own = product(world.orientation(p.link), rotation_rpy(*p.rpy))
+    other = product(world.orientation(p.to), rotation_rpy(*p.to_rpy))
+    apart = sub(world.position(p.link, p.at), world.position(p.to, p.to_at))
+    moving = sub(world.velocity(p.link, p.at), add(world.velocity(p.to, p.to_at), cross(world.rate(p.to), apart)))
+    turning = sub(world.rate(p.link), world.rate(p.to))
+
+    x, v, w = (turn_vector_back(other, vector) for vector in (apart, moving, turning))
+    force = turn_vector(other, _minus(_each(p.stiffness, x), _each(p.damping, v)))
+    moment = turn_vector(other, sub(restoring(p.turning, product(transposed(other), own)),
+                                    _each(p.turning_damping, w)))
+    back = scale(-1.0, add(moment, cross(apart, force)))
+    return Loads(forces=(Force(p.link, force, moment, p.at), Force(p.to, scale(-1.0, force), back, p.to_at)))
+
+
+def restoring(stiffness: Vector, R: Matrix) -> Vector:
+    """The moment M of a frame turned by R, without damping, in the axes that it is turned against, N m."""
+    phi = rotation_vector(R)
+    felt = _each(stiffness, phi)
+    once = cross(phi, felt)
+    twice = scale(_bending(dot(phi, phi)), cross(phi, once))
+    return scale(-1.0, add(felt, add(scale(0.5, once), twice)))
+
+
+def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
+    """Why these numbers make it nothing, with the parameters that say so."""
+    if not any((*p.stiffness, *p.damping, *p.turning, *p.turning_damping)):
+        return ("stiffness", "turning", "damping", "turning_damping"), "it has neither stiffness nor damping"
+    if p.link == p.to:
+        return ("to",), f"both its frames are fixed to link `{p.link}`"
+    return None
+
+
+def _bending(square: Real) -> Real:
+    """g of the square of the angle, (1 - a cot a)/(4 a^2) with a half the angle: by its series where that cancels."""
+    small = square < 0.01
+    a = 0.5 * sqrt(where(small, 1.0, square))
+    exact = (1.0 - a * cos(a) / sin(a)) / (4.0 * a * a)
+    # the next term is square^4/47900160, 2e-16 at the most
+    series = 1.0 / 12.0 + square * (1.0 / 720.0 + square * (1.0 / 30240.0 + square * (1.0 / 1209600.0)))
+    return where(small, series, exact)
+
+
+def _each(factors: Vector, vector: Vector) -> Vector:
+    return (factors[0] * vector[0], factors[1] * vector[1], factors[2] * vector[2])
+
+
+def _minus(a: Vector, b: Vector) -> Vector:
+    return (-a[0] - b[0], -a[1] - b[1], -a[2] - b[2])
+
+
+def _three(name: str, unit: str, doc: str) -> Parameter:
+    return Parameter(name=name, unit=unit, shape="vector", default=ZEROS, at_least=0.0, doc=doc)
+
+
+ENVIRONMENT = Environment(
+    name="bushing",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="link", shape="word", names="link", doc="link at one side"),
+        Parameter(name="at", unit="m", shape="vector", default=ZEROS, doc="origin of its frame, link frame"),
+        Parameter(
+            name="rpy", unit="rad", shape="vector", default=ZEROS,
+            doc="turns of its frame about fixed x, y, z of the link's",
+        ),
+        Parameter(
+            name="to", shape="word", names="link", words=(WORLD,), default=WORLD, doc="link at the other side",
+        ),
+        Parameter(name="to_at", unit="m", shape="vector", default=ZEROS, doc="origin of its frame, frame of that link"),
+        Parameter(
+            name="to_rpy", unit="rad", shape="vector", default=ZEROS,
+            doc="turns of its frame about fixed x, y, z of that link's; its axes are those of what follows",
+        ),
+        _three("stiffness", "N/m", "force per displacement along each axis"),
+        _three("damping", "N*s/m", "force per velocity along each axis"),
+        _three("turning", "N*m/rad", "moment per small angle about each axis"),
+        _three("turning_damping", "N*m*s/rad", "moment per angular velocity about each axis"),
+    ),
+    loads=loads,
+    idle=idle,
+)  # fmt: skip

@@ -1,0 +1,63 @@
+"""When a thruster fires: a window, pulses in it, and a list of times at which it is switched; all that is said holds.
+
+What a step of the dynamics sees is constant in it: the share of the step in which the thruster fires.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+from met.environments.environment import World
+from met.environments.window import WINDOW, never, passed
+from met.parameter import Parameter
+from met.trace import Real, floor, maximum, minimum, where
+
+FIRING = (
+    *WINDOW,
+    Parameter(name="period", unit="s", default=1.0, above=0.0, doc="time from pulse to pulse, the first at `from`"),
+    Parameter(
+        name="duty", default=1.0, above=0.0, at_most=1.0,
+        doc="share of the period that a pulse lasts, from its beginning; 1: no pulses, it fires steadily",
+    ),
+    Parameter(
+        name="switches", unit="s", shape="list", rises=True, default=(),
+        doc="times at which it is switched on, off, on and so forth; left out: on from the beginning",
+    ),
+)  # fmt: skip
+
+
+def share(p: Any, world: World) -> Real:
+    """The share of the step in which it fires."""
+    begins = getattr(p, "from")
+    total: Real = 0.0
+    for on, off in _intervals(p.switches):
+        opened = passed(world, begins if on == -math.inf else maximum(on, begins))
+        shut = maximum(opened, passed(world, minimum(off, p.until)))
+        within = world.begin + opened * world.step - begins  # time since the first pulse began
+        phase = within - floor(within / p.period) * p.period
+        pulses = _fired(p, phase + (shut - opened) * world.step) - _fired(p, phase)
+        total = total + where(p.duty >= 1.0, shut - opened, pulses / world.step)
+    return total
+
+
+def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
+    """Why it never fires in a run of this length, with the parameters that say so."""
+    begins = getattr(p, "from")
+    if not any(max(on, begins, 0.0) < min(off, p.until, duration) for on, off in _intervals(p.switches)):
+        return never(begins, p.until, duration) or (("switches",), "it is never on while the run lasts")
+    return None
+
+
+def _intervals(switches: tuple[float, ...]) -> list[tuple[float, float]]:
+    """From on to off; the last without end where it is not switched off again."""
+    if not switches:
+        return [(-math.inf, math.inf)]
+    return list(itertools.zip_longest(switches[::2], switches[1::2], fillvalue=math.inf))
+
+
+def _fired(p: Any, time: Real) -> Real:
+    """For how long it has fired, this time after a pulse began."""
+    whole = floor(time / p.period)
+    return whole * (p.duty * p.period) + minimum(time - whole * p.period, p.duty * p.period)

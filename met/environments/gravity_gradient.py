@@ -1,0 +1,108 @@
+"""How gravity differs over an arm in orbit: forces and moments on every link, beside the free fall of the orbit itself.
+
+The world's origin goes round on a circular orbit of the radius R, in free fall. rpy turns the orbit's axes in the
+world: x away from the centre of attraction, y along the flight, z normal to the orbit; n = sqrt(mu/R^3). Gravity to
+first order in the way from the origin: a part dm of a link at x feels dm T x, with
+
+    T = n^2 (3 r r' - 1),     r the direction away from the centre
+
+so a link of mass m, centre c, and second moments J = integral of y y' dm = tr(I)/2 - I about its centre, feels the
+force m T c there and the moment of T J, which is 3 n^2 r x I r.
+
+`frame = inertial`: the world does not turn, rpy is how the orbit's axes stand at t = 0, and they turn about z by n t.
+`frame = orbital`: the world turns with the orbit, as Hill's axes do, and stands still seen from there: what its turning
+does is added, as apparent forces on every part, so that a free body follows the equations of Clohessy and Wiltshire,
+
+    x'' = 3 n^2 x + 2 n y',     y'' = -2 n x',     z'' = -n^2 z     (in the orbit's axes)
+
+and rates are those against the turning world. There the base of a station that keeps its attitude to the Earth stands.
+
+Not an orbit that is not circular, not the flattening of the Earth, nor the second order (of arms of tens of metres it
+is some 1e-6 of this), and no attraction between links.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from met.environments.environment import Environment, Force, Loads, World
+from met.parameter import ZEROS, Parameter
+from met.trace import Real, cos, sin, sqrt
+from met.vectors import Matrix, Vector, add, cross, product, rotation_rpy, scale, transposed, turn_vector
+
+
+def loads(p: Any, world: World) -> Loads:
+    n = sqrt(p.mu / (p.radius * p.radius * p.radius))
+    axes = transposed(rotation_rpy(*p.rpy))
+    up, along, normal = axes
+    if p.frame == "inertial":
+        c, s = cos(n * world.time), sin(n * world.time)
+        up = add(scale(c, up), scale(s, along))
+    field = _field(n, up, normal, turning=p.frame == "orbital")
+    return Loads(forces=tuple(_on_link(p, world, link, field, scale(n, normal)) for link in world.links))
+
+
+def _on_link(p: Any, world: World, link: str, field: Matrix, turning: Vector) -> Force:
+    """field: the acceleration of a part for each way from the origin, of a part at rest."""
+    mass, com = world.mass(link), world.com(link)
+    second = _second_moments(world, link)
+    acceleration = turn_vector(field, world.position(link, com))
+    spread = product(field, second)
+    if p.frame == "orbital":
+        acceleration = add(acceleration, scale(-2.0, cross(turning, world.velocity(link, com))))
+        coriolis = product(_crossing(scale(-2.0, turning)), _crossing(world.rate(link)))
+        spread = _sum(spread, product(coriolis, second))
+    moment = (spread[2][1] - spread[1][2], spread[0][2] - spread[2][0], spread[1][0] - spread[0][1])
+    return Force(link, force=scale(mass, acceleration), moment=moment, point=com)
+
+
+def _field(n: Real, up: Vector, normal: Vector, turning: bool) -> Matrix:
+    """n^2 (3 r r' - 1), and with what a turning world adds, n^2 (1 - z z')."""
+    square = n * n
+    rows = []
+    for i in range(3):
+        row = [3.0 * up[i] * up[j] for j in range(3)]
+        row = [x - normal[i] * normal[j] for j, x in enumerate(row)] if turning else row
+        row[i] = row[i] if turning else row[i] - 1.0
+        rows.append(scale(square, (row[0], row[1], row[2])))
+    return rows[0], rows[1], rows[2]
+
+
+def _second_moments(world: World, link: str) -> Matrix:
+    """The integral of y y' dm about the centre of mass, world axes, kg m^2."""
+    xx, yy, zz, xy, xz, yz = world.inertia(link)
+    half = 0.5 * (xx + yy + zz)
+    own = ((half - xx, -xy, -xz), (-xy, half - yy, -yz), (-xz, -yz, half - zz))
+    R = world.orientation(link)
+    return product(product(R, own), transposed(R))
+
+
+def _crossing(a: Vector) -> Matrix:
+    """The matrix of a x."""
+    return ((0.0, -a[2], a[1]), (a[2], 0.0, -a[0]), (-a[1], a[0], 0.0))
+
+
+def _sum(A: Matrix, B: Matrix) -> Matrix:
+    return add(A[0], B[0]), add(A[1], B[1]), add(A[2], B[2])
+
+
+ENVIRONMENT = Environment(
+    name="gravity_gradient",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="radius", unit="m", above=0.0, doc="of the orbit, from the centre of attraction"),
+        Parameter(
+            name="mu", unit="m^3/s^2", default=3.986004418e14, above=0.0, doc="gravitational parameter",
+            source="Earth: WGS 84",
+        ),
+        Parameter(
+            name="rpy", unit="rad", shape="vector", default=ZEROS,
+            doc="turns of the orbit's axes about fixed x, y, z of the world's: x up, y along the flight, z the normal",
+        ),
+        Parameter(
+            name="frame", shape="word", words=("inertial", "orbital"),
+            doc="whether the world keeps its directions, or turns with the orbit",
+        ),
+    ),
+    loads=loads,
+)  # fmt: skip

@@ -1,0 +1,67 @@
+"""Stops at the ends of a joint's way: a spring on each side that the joint runs into, and that takes energy from it.
+
+With d how far the joint is beyond a stop, and d' how fast it goes further,
+
+    torque = -stiffness d max(0, 1 + dissipation d')        back from the stop, where d > 0; else none
+
+the law of Hunt and Crossley (1975) with a straight spring. It never pulls. Its force begins at zero where the joint
+comes in, whatever its rate, so an integrator of order 2 keeps its order over contacts; one of order 4 has order 2. A
+spring beside a damper would begin with a jump, and pull when the joint leaves.
+
+A joint that comes in at the rate v, with nothing else that acts on it, goes out at the rate v' with
+
+    a v - ln(1 + a v) = -a v' - ln(1 - a v'),     a the dissipation
+
+whatever stiffness and inertia: v' = v (1 - 2/3 a v) while a v is small, and below 1/a always. Stiffness wants steps
+that are short against sqrt(inertia/stiffness). The stop moves the link against its parent; the servo does not know it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from met.environments.environment import Environment, Loads, World
+from met.parameter import Parameter
+from met.trace import Real, maximum, where
+
+
+def loads(p: Any, world: World) -> Loads:
+    q, qd = world.q(p.joint), world.qd(p.joint)
+    return Loads(torques={p.joint: _push(p, p.lower - q, -qd) - _push(p, q - p.upper, qd)})
+
+
+def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
+    """Why these numbers make it nothing, with the parameters that say so."""
+    if math.isinf(p.lower) and math.isinf(p.upper):
+        return ("lower", "upper"), "it has neither a lower nor an upper end"
+    if p.stiffness == 0.0:
+        return ("stiffness",), "it has no stiffness"
+    return None
+
+
+def _push(p: Any, beyond: Real, deeper: Real) -> Real:
+    """What a stop pushes the joint back with, N m (N): how far the joint is beyond it, and how fast it goes further."""
+    inside = beyond <= 0.0  # also where there is no stop, infinitely far away
+    return where(inside, 0.0, p.stiffness * where(inside, 0.0, beyond) * maximum(0.0, 1.0 + p.dissipation * deeper))
+
+
+ENVIRONMENT = Environment(
+    name="joint_stop",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="joint", shape="word", names="joint", doc="joint that is stopped"),
+        Parameter(
+            name="lower", unit="joint", default=-math.inf, less_than="upper",
+            doc="position of the lower end; none unless written",
+        ),
+        Parameter(name="upper", unit="joint", default=math.inf, doc="position of the upper end; none unless written"),
+        Parameter(name="stiffness", unit="effort/joint", at_least=0.0, doc="torque per way into a stop"),
+        Parameter(
+            name="dissipation", unit="s/joint", default=0.0, at_least=0.0,
+            doc="share by which a stop pushes more for each unit of the rate of going in; 0: it gives all energy back",
+        ),
+    ),
+    loads=loads,
+    idle=idle,
+)  # fmt: skip

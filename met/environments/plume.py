@@ -1,0 +1,163 @@
+"""A thruster's plume on a rectangular plate that is fixed to a link: force and moment of its gas, while it fires.
+
+The gas goes straight from a point in all directions before the nozzle, at one speed, with the dynamic pressure
+
+    q = K cos(theta)^n / r^2,     K = (n + 2) share thrust/(4 pi),     theta the angle from the nozzle's axis     (P1)
+
+and none behind the nozzle's plane. K makes the momentum that the plume carries along the axis `share` times the thrust:
+the integral of 2 q cos(theta) over the half space is 4 pi K/(n + 2). On a surface whose normal N is turned towards the
+nozzle, with u the direction of the gas there and s = -u.N the sine of its incidence, the force on an area A is
+
+    A q s [2 sigma_t (u + s N) - (2 (2 - sigma_n) s + sqrt(pi) sigma_n reemission) N]                              (P2)
+
+free molecular flow so fast that its own thermal motion does not count (Schaaf and Chambre 1961), with accommodation
+coefficients sigma_n, sigma_t for normal and tangential momentum. sigma_n = 1, sigma_t = 0 is Newton's law of dense
+hypersonic flow. The plate is cut into cells^2 equal parts, each with what is at its middle: the error falls with
+1/cells^2 where the plate lies before the nozzle. The plate is a rectangle about the origin of its frame, `at` and `rpy`
+in the link's, width along x and height along y, and its front looks along z.
+
+Nothing stands in the gas's way: no part of the arm shades another, and what is turned back hits nothing. Not for a
+plate so near that the plume does not look as if it came from a point, nor for gas so dense that it piles up before the
+plate. The link's own velocity does not count against the gas's.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from met.environments import firing
+from met.environments.environment import Environment, Force, Loads, World
+from met.parameter import WORLD, ZEROS, Parameter
+from met.trace import Real, absolute, exp, log, maximum, sqrt, where
+from met.vectors import (
+    ZERO,
+    Vector,
+    add,
+    cross,
+    dot,
+    product,
+    rotation_rpy,
+    scale,
+    sub,
+    turn_vector,
+    turn_vector_back,
+)
+
+
+def loads(p: Any, world: World) -> Loads:
+    fires = firing.share(p, world)
+    turn = product(world.orientation(p.link), rotation_rpy(*p.rpy))
+    nozzle = sub(world.position(p.nozzle_link, p.nozzle), world.position(p.link, p.at))
+    axis = world.to_world(p.nozzle_link, scale(1.0 / sqrt(dot(p.axis, p.axis)), p.axis))
+    force, moment = on_plate(p, turn_vector_back(turn, nozzle), turn_vector_back(turn, axis))
+    strength = fires * ((p.exponent + 2.0) * p.share * p.thrust / (4.0 * math.pi))
+    felt = Force(p.link, scale(strength, turn_vector(turn, force)), scale(strength, turn_vector(turn, moment)), p.at)
+    if p.reaction == "off":
+        return Loads(forces=(felt,))
+    return Loads(forces=(felt, Force(p.nozzle_link, scale(-fires * p.thrust, axis), point=p.nozzle)))
+
+
+def on_plate(p: Any, nozzle: Vector, axis: Vector) -> tuple[Vector, Vector]:
+    """Force and moment about the plate's middle, in the plate's axes, of a plume with K = 1 (N, N m for each N).
+
+    nozzle, axis  where the plume comes from, m, and its unit direction, in the plate's frame
+    """
+    cells = int(p.cells)
+    force, moment = ZERO, ZERO
+    for i in range(cells):
+        for j in range(cells):
+            middle = (p.width * ((i + 0.5) / cells - 0.5), p.height * ((j + 0.5) / cells - 0.5), 0.0)
+            part = _on_cell(p, sub(middle, nozzle), axis)
+            force, moment = add(force, part), add(moment, cross(middle, part))
+    area = p.width * p.height / cells**2
+    return scale(area, force), scale(area, moment)
+
+
+def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
+    """Why these numbers make it nothing in a run of this length, with the parameters that say so."""
+    if p.thrust == 0.0:
+        return ("thrust",), "it has no thrust"
+    return firing.idle(p, duration)
+
+
+def _on_cell(p: Any, way: Vector, axis: Vector) -> Vector:
+    """(P2) for each area and K, in the plate's axes, of the gas that comes this way from the nozzle."""
+    squared = maximum(dot(way, way), p.closest * p.closest)
+    r = sqrt(squared)
+    u = scale(1.0 / r, way)
+    cosine = dot(u, axis)
+    behind = cosine <= 0.0
+    q = where(behind, 0.0, exp(p.exponent * log(where(behind, 1.0, cosine)))) / squared
+    side: Real = 1.0  # of the plate's z that the gas comes from
+    s = maximum(0.0, -u[2])
+    if p.sides == "both":
+        side, s = where(u[2] > 0.0, -1.0, 1.0), absolute(u[2])
+    along = 2.0 * p.sigma_t
+    push = 2.0 * (2.0 - p.sigma_n) * s + math.sqrt(math.pi) * p.sigma_n * p.reemission
+    x, y, z = scale(along, add(u, (0.0, 0.0, side * s)))
+    return scale(q * s, (x, y, z - side * push))
+
+
+ENVIRONMENT = Environment(
+    name="plume",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="link", shape="word", names="link", doc="link that the plate is fixed to"),
+        Parameter(name="at", unit="m", shape="vector", default=ZEROS, doc="middle of the plate, link frame"),
+        Parameter(
+            name="rpy", unit="rad", shape="vector", default=ZEROS,
+            doc="turns of the plate's frame about fixed x, y, z of the link's; z is the normal of its front",
+        ),
+        Parameter(name="width", unit="m", above=0.0, doc="side of the plate along its x"),
+        Parameter(name="height", unit="m", above=0.0, doc="side of the plate along its y"),
+        Parameter(
+            name="cells", default=4.0, at_least=1.0, at_most=40.0, whole=True, decides=True,
+            doc="parts that each side is cut into",
+        ),
+        Parameter(
+            name="sides", shape="word", words=("front", "both"), default="front",
+            doc="whether gas that comes from behind the plate pushes it too",
+        ),
+        Parameter(
+            name="sigma_n", default=1.0, at_least=0.0, at_most=1.0,
+            doc="accommodation of normal momentum: 0 thrown back as by a mirror, 1 let go anew", source="assumption",
+        ),
+        Parameter(
+            name="sigma_t", default=1.0, at_least=0.0, at_most=1.0,
+            doc="accommodation of tangential momentum: 0 none is left behind, 1 all", source="assumption",
+        ),
+        Parameter(
+            name="reemission", default=0.0, at_least=0.0,
+            doc="most probable thermal speed at the plate's temperature, sqrt(2 R T), over the gas's speed",
+        ),
+        Parameter(
+            name="nozzle_link", shape="word", names="link", words=(WORLD,), default=WORLD,
+            doc="link that the nozzle is fixed to",
+        ),
+        Parameter(name="nozzle", unit="m", shape="vector", doc="the nozzle, in the frame of that link"),
+        Parameter(
+            name="axis", shape="vector", direction=True, doc="where the plume goes to, in the axes of that link",
+        ),
+        Parameter(name="thrust", unit="N", at_least=0.0, doc="thrust while it fires"),
+        Parameter(
+            name="exponent", at_least=0.0,
+            doc="n of the cosine law: (pi/(2 theta_limit))^2 2/(gamma - 1) fits the law of Simons 1972 near the axis",
+        ),
+        Parameter(
+            name="share", default=1.0, at_least=0.0,
+            doc="momentum of the plume over the thrust; 4 pi q r^2/((n + 2) thrust) of a q measured on the axis at r",
+        ),
+        Parameter(
+            name="closest", unit="m", default=0.01, above=0.0,
+            doc="distance from the nozzle within which the pressure grows no more",
+        ),
+        Parameter(
+            name="reaction", shape="word", words=("off", "on"), default="off",
+            doc="whether the thruster pushes the link that it is on; the ground does not feel it",
+        ),
+        *firing.FIRING,
+    ),
+    loads=loads,
+    idle=idle,
+)  # fmt: skip

@@ -1,0 +1,61 @@
+"""A straight spring and damper between a point of a link and a point of another, or of the ground.
+
+    T = stiffness (d - length) + damping d'
+
+along the line between the points, d their distance: each is pulled towards the other by T, and pushed where T is below
+zero. `acts = pull` is a rope: no force while d <= length, and none that pushes. Where both points are in one place
+there is no line, and no force. Not a spring that bends or has mass.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from met.environments.environment import Environment, Force, Loads, World
+from met.parameter import WORLD, ZEROS, Parameter
+from met.trace import maximum, sqrt, where
+from met.vectors import dot, scale, sub
+
+
+def loads(p: Any, world: World) -> Loads:
+    way = sub(world.position(p.to, p.to_point), world.position(p.link, p.point))
+    apart = sqrt(dot(way, way))
+    along = scale(1.0 / where(apart == 0.0, 1.0, apart), way)
+    growing = dot(along, sub(world.velocity(p.to, p.to_point), world.velocity(p.link, p.point)))
+    tension = p.stiffness * (apart - p.length) + p.damping * growing
+    if p.acts == "pull":
+        tension = where(apart <= p.length, 0.0, maximum(0.0, tension))
+    pull = scale(tension, along)
+    return Loads(forces=(Force(p.link, pull, point=p.point), Force(p.to, scale(-1.0, pull), point=p.to_point)))
+
+
+def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
+    """Why these numbers make it nothing, with the parameters that say so."""
+    if p.stiffness == 0.0 and p.damping == 0.0:
+        return ("stiffness", "damping"), "it has neither stiffness nor damping"
+    if p.link == p.to:
+        return ("to",), f"both its points are fixed to link `{p.link}`"
+    return None
+
+
+ENVIRONMENT = Environment(
+    name="spring",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="link", shape="word", names="link", doc="link at one end"),
+        Parameter(name="point", unit="m", shape="vector", default=ZEROS, doc="its point, link frame"),
+        Parameter(
+            name="to", shape="word", names="link", words=(WORLD,), default=WORLD, doc="link at the other end",
+        ),
+        Parameter(name="to_point", unit="m", shape="vector", default=ZEROS, doc="its point, frame of that link"),
+        Parameter(name="stiffness", unit="N/m", at_least=0.0, doc="force per length that it is longer"),
+        Parameter(name="damping", unit="N*s/m", default=0.0, at_least=0.0, doc="force per rate at which it grows"),
+        Parameter(name="length", unit="m", default=0.0, at_least=0.0, doc="its length without load"),
+        Parameter(
+            name="acts", shape="word", words=("both", "pull"), default="both",
+            doc="whether it pulls and pushes, or pulls alone, as a rope",
+        ),
+    ),
+    loads=loads,
+    idle=idle,
+)  # fmt: skip

@@ -1,0 +1,39 @@
+"""A window in time, as the steps of the dynamics see it: the share of each step that lies in it, constant in the step.
+
+A load that jumped within a step would cost an integrator its order. Times the share, it gives the right impulse, and a
+window that begins and ends with steps is met exactly.
+"""
+
+from __future__ import annotations
+
+import math
+
+from met.environments.environment import World
+from met.parameter import Parameter
+from met.trace import Real, clip, maximum
+
+WINDOW = (
+    Parameter(name="from", unit="s", default=0.0, doc="time at which it begins"),
+    Parameter(name="until", unit="s", default=math.inf, doc="time at which it ends; never unless written"),
+)
+
+
+def share(world: World, begins: Real, ends: Real) -> Real:
+    """The share of the step that lies in begins <= t < ends; 0 where `ends` is the earlier."""
+    return maximum(0.0, passed(world, ends) - passed(world, begins))
+
+
+def passed(world: World, time: Real) -> Real:
+    """The share of the step that lies before this time."""
+    return clip((time - world.begin) / world.step, 0.0, 1.0)
+
+
+def never(begins: float, until: float, duration: float) -> tuple[tuple[str, ...], str] | None:
+    """Why a window of constants holds nothing of a run of this length, with the parameters that say so."""
+    if begins >= until:
+        return ("until", "from"), f"it would begin at {begins:g} s and end at {until:g} s"
+    if begins >= duration:
+        return ("from",), f"it would begin at {begins:g} s, and the run ends at {duration:g} s"
+    if until <= 0.0:
+        return ("until",), f"it would end at {until:g} s, and the run begins at 0 s"
+    return None

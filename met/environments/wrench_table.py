@@ -1,0 +1,71 @@
+"""A force and a moment on a link that change in time: straight lines through the rows of a table, or of a CSV file.
+
+    time [s], force_x [N], moment_z [N*m]
+    0,        0,           0
+    0.5,      12.5,        -3
+
+Before its first row the first holds, after its last the last. A component that is not given is zero. The force acts at
+`point` of the link, which moves along with it; `axes = link`: force and moment turn with the link too. In the deck a
+component is a list of as many numbers as `times` has; in a file, which has the lists' place, it is a column of its
+name, and `time` is one. The table is read at every stage of a step, so rows that are closer together than steps are not
+all seen: of what jumps, `wrench` keeps the impulse.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from met.commands.points import linear
+from met.environments.environment import Environment, Force, Loads, World
+from met.parameter import ZEROS, Parameter
+from met.trace import Real
+from met.vectors import Vector
+
+NAMES = tuple(f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz")
+
+
+def loads(p: Any, world: World) -> Loads:
+    def given(kind: str) -> Vector:
+        x, y, z = (_at(p, getattr(p, f"{kind}_{axis}"), world.time) for axis in "xyz")
+        return world.to_world(p.link, (x, y, z)) if p.axes == "link" else (x, y, z)
+
+    return Loads(forces=(Force(p.link, force=given("force"), moment=given("moment"), point=p.point),))
+
+
+def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
+    """Why these numbers make it nothing, with the parameters that say so."""
+    if not any(number for name in NAMES for number in getattr(p, name)):
+        return NAMES, "it has neither force nor moment"
+    return None
+
+
+def _at(p: Any, values: tuple[float, ...], time: Real) -> Real:
+    if len(values) < 2:
+        return values[0] if values else 0.0
+    return linear(p.times, values, time - p.begin)[0]
+
+
+ENVIRONMENT = Environment(
+    name="wrench_table",
+    doc=__doc__,
+    from_file=True,
+    parameters=(
+        Parameter(name="link", shape="word", names="link", doc="link that it acts on"),
+        Parameter(name="point", unit="m", shape="vector", default=ZEROS, doc="where the force acts, link frame"),
+        Parameter(
+            name="axes", shape="word", words=("world", "link"), default="world",
+            doc="axes of force and moment: the world's, or the link's, which turn with it",
+        ),
+        Parameter(name="begin", unit="s", default=0.0, doc="when the table's time 0 is"),
+        Parameter(name="times", unit="s", shape="list", rises=True, doc="times of the rows"),
+        *(
+            Parameter(
+                name=name, unit="N" if name.startswith("force") else "N*m", shape="list", as_many_as="times",
+                default=(), doc=f"{name[-1]} of the {name[:-2]} at those times",
+            )
+            for name in NAMES
+        ),
+    ),
+    loads=loads,
+    idle=idle,
+)  # fmt: skip

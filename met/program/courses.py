@@ -1,0 +1,56 @@
+"""A base that moves as it is told: pose, velocity and acceleration as formulas of time, recorded once.
+
+A course gives a value and its slope (`Profile.course`). The acceleration is the derivative of the recorded slope, and
+that of the turn the derivative of the angular velocity, so no profile says anything twice. Where a slope has a kink,
+the acceleration is that of the piece which the profile takes there.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from met import models
+from met.dynamics.spatial import Real, Vector, add, rotation_rpy, turn_vector
+from met.plan import COMPONENTS, Experiment, Formula
+from met.program.values import answer, parameters
+from met.trace import Formulas, Graph, Scalar
+from met.trace.derivative import derivative
+
+TIME = "time"
+
+
+def recorded(experiment: Experiment) -> Formulas:
+    """From the time (`TIME`, s) and the parameters that vary, by path: the rows of R_WB, and in world axes the origin,
+    angular velocity, velocity, angular acceleration and acceleration of the origin; three numbers each."""
+    graph = Graph()
+
+    def number(path: str) -> Any:
+        value = experiment.parameters[path].value
+        return graph.input(path) if isinstance(value, Formula) else value
+
+    base = experiment.structure.base
+    values: dict[str, Real] = dict.fromkeys(COMPONENTS, 0.0)
+    rates: dict[str, Real] = dict.fromkeys(COMPONENTS, 0.0)
+    for course in base.courses if base is not None else ():
+        profile = models.find("command", course.model, base.place if base is not None else None)
+        owner = f"course `{profile.name}` of `{course.component}` of the base"
+        p = parameters(owner, f"base.{course.component}", profile.parameters, number)
+        values[course.component], rates[course.component] = answer(owner, profile.course, p, graph.input(TIME))
+    place, moving = ([part[name] for name in COMPONENTS[:3]] for part in (values, rates))
+    angles, turning = ([part[name] for name in COMPONENTS[3:]] for part in (values, rates))
+    w = _rate_of_rpy(angles, turning)
+    vectors = [*rotation_rpy(*angles), place, w, moving, *([_changing(x) for x in vector] for vector in (w, moving))]
+    return Formulas.of(graph, [x for vector in vectors for x in vector])
+
+
+def _rate_of_rpy(angles: list[Real], rates: list[Real]) -> Vector:
+    """Angular velocity in world axes of R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    _, pitch, yaw = angles
+    roll_rate, pitch_rate, yaw_rate = rates
+    about_x = turn_vector(rotation_rpy(0.0, pitch, yaw), (roll_rate, 0.0, 0.0))
+    about_y = turn_vector(rotation_rpy(0.0, 0.0, yaw), (0.0, pitch_rate, 0.0))
+    return add(about_x, add(about_y, (0.0, 0.0, yaw_rate)))
+
+
+def _changing(x: Real) -> Real:
+    return derivative(x, TIME) if isinstance(x, Scalar) else 0.0

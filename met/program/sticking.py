@@ -1,0 +1,46 @@
+"""What has dry friction in a machine: joints, and rates on the motor's side of their servos (docs/physics.md)."""
+
+from __future__ import annotations
+
+from met.frozen import frozen
+from met.integrators.integrator import Motion
+from met.program.machine import Actuator, Machine
+from met.trace import Real
+
+
+@frozen
+class Sticking:
+    """A rate that dry friction may hold at zero: a joint's, or a state of its servo.
+
+    name      of its cells: the joint, or the state's channel
+    cell      that holds the rate
+    actuator  the servo whose physics gives its friction
+    state     name of the state; "" where it is the joint
+    number    of the joint in `Motion.qd`; of the state in `Motion.x`
+    level     of its friction, where it is the same at all times and for all cases; None where it varies
+    """
+
+    name: str
+    cell: str
+    actuator: Actuator
+    state: str
+    number: int
+    level: float | None
+
+    def rate(self, y: Motion) -> Real:
+        return y.x[self.number] if self.state else y.qd[self.number]
+
+
+def sticking(machine: Machine) -> tuple[Sticking, ...]:
+    """Joints first, then states; none of a joint whose motor is on a bed: its friction is the bed's."""
+    on_bed = [actuator.index for actuator, _, _ in machine.mounted]
+    free = [actuator for actuator in machine.working if actuator.index not in on_bed]
+    joints = [
+        Sticking(a.use.joint, f"{a.use.joint}.qd", a, "", a.index, a.level) for a in free if a.level != 0.0
+    ]
+    names = machine.states
+    states = [
+        Sticking(f"{a.path}.{name}", f"{a.path}.{name}", a, name, names.index(f"{a.path}.{name}"), level)
+        for a in free for name, level in a.levels.items() if level != 0.0
+    ]  # fmt: skip
+    return (*joints, *states)

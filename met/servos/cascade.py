@@ -1,0 +1,155 @@
+"""Cascaded servo, as robots have it: a position loop around a rate loop around a current loop, with feed-forward.
+
+    u = feed_forward N r' + k_position (N r - theta) - w      position command r, with its rate r'
+    u = N r - w                                               rate command r
+    i* = Kp u + Ki I,  i_cmd = clip(i*, +-i_max)              at a tick, held to the next; or continuous
+    dI/dt = u, 0 where i* is beyond the limit and u would push it further; I+ = I + T dI/dt at a tick
+    V = clip(k_current e + A, +-v_max),  e = i_cmd - i        the amplifier, always analog
+    dA/dt = ki_current e, 0 where V is at its limit and e would push it further
+    L di/dt = V - R i - Kt w,  tau_m = Kt i                   the armature, with its inductance
+    J_m w' = tau_m - T/N - friction                           gear = elastic: motor and joint are two inertias, as in
+                                                              compliant_gearbox
+    tau = N (tau_m - friction), and N^2 J_m moves with q      gear = rigid: w = N q', theta = N q
+
+A torque command asks i* = r/(N Kt), open loop. theta and w are the motor's: the loops see its encoder and tachometer.
+
+The current loop is fast: ki_current/R or sqrt(ki_current/L) often wants a step of the dynamics below 0.1 ms. Where it
+does not matter, `rigid_gearbox` and `compliant_gearbox` have an armature without inductance, and a voltage.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from met.parameter import Memory, Parameter, Signal, State
+from met.servos import compliant_gearbox, gear
+from met.servos.compliant_gearbox import JOINT_FRICTION, geared
+from met.servos.friction import BRISTLE, LOSS, friction
+from met.servos.friction import PARAMETERS as FRICTION
+from met.servos.motor import ARMATURE, RATIO, SHAFT
+from met.servos.servo import Control, Drive, JointMotion, Seen, Servo
+from met.trace import Real, both, clip, either, maximum, sqrt, where
+
+ELASTIC = ("gear", ("elastic",))
+
+
+def control(p: Any, held: Any, seen: Seen) -> Control:
+    """Position and rate loop: the current to be driven."""
+    if seen.asked.kind == "torque":
+        current = seen.asked.value / (p.ratio * p.kt)
+        return Control({"current_cmd": clip(current, -p.i_max, p.i_max)}, {"integral": 0.0})
+    elastic = p.gear == "elastic"
+    w = seen.states.motor_rate if elastic else p.ratio * seen.qd
+    rate = p.ratio * seen.asked.value
+    if seen.asked.kind == "position":
+        at_motor = seen.q + seen.states.deflection if elastic else seen.q
+        ahead = p.feed_forward * (p.ratio * seen.asked.slope)
+        rate = ahead + p.k_position * (p.ratio * (seen.asked.value - at_motor))
+    error = rate - w
+    wanted = p.kp * error + p.ki * held.integral
+    return Control(
+        {"current_cmd": clip(wanted, -p.i_max, p.i_max)}, {"integral": _within(error, wanted, p.i_max)}
+    )
+
+
+def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
+    """Amplifier, armature, motor and gear, under the current asked."""
+    elastic = p.gear == "elastic"
+    w = states.motor_rate if elastic else p.ratio * joint.qd
+    error = held.current_cmd - states.current
+    wanted = p.k_current * error + states.amplifier
+    voltage = clip(wanted, -p.v_max, p.v_max)
+    electric = {
+        "current": (voltage - p.resistance * states.current - p.kt * w) / p.inductance,
+        "amplifier": p.ki_current * _within(error, wanted, p.v_max),
+    }
+    tau_m = p.kt * states.current
+    shown = {"voltage": voltage, "motor_torque": tau_m}
+    if elastic:
+        moved = geared(p, states, joint, tau_m, shown)
+        return Drive(
+            moved.torque, moved.dry, slopes={**electric, **moved.slopes}, friction=moved.friction, signals=moved.signals
+        )
+    rubs = friction(p, w, states)
+    return Drive(
+        torque=p.ratio * (tau_m - rubs.torque) - p.f_v_joint * joint.qd,
+        dry=p.ratio * rubs.level + p.f_c_joint,
+        rotor=p.ratio * p.ratio * p.j_m,
+        slopes={**electric, **rubs.bending},
+        signals=shown,
+    )
+
+
+def _within(error: Real, wanted: Real, most: Real) -> Real:
+    """The error that an integral takes in: none where what is wanted is beyond the limit, and it would be further."""
+    return where(either(both(wanted > most, error > 0.0), both(wanted < -most, error < 0.0)), 0.0, error)
+
+
+def begin(p: Any, q: Real, qd: Real) -> Mapping[str, Real]:
+    """No current and nothing wound up; the motor turns with the joint."""
+    starts: dict[str, Real] = {"current": 0.0, "amplifier": 0.0}
+    if p.gear == "elastic":
+        return {**starts, **compliant_gearbox.begin(p, q, qd)}
+    return starts | ({"bristle": 0.0} if p.friction == "lugre" else {})
+
+
+def fastest(p: Any) -> Real:
+    """The current loop, no root of L s^2 + (R + k_current) s + ki_current being larger in size; or the gear; 1/s."""
+    resistance = p.resistance + p.k_current
+    electric = maximum(resistance / p.inductance, sqrt(p.ki_current / p.inductance))
+    if p.gear != "elastic":
+        return electric
+    return maximum(electric, sqrt(p.stiffness / (p.ratio * p.ratio * p.j_m)))
+
+
+SERVO = Servo(
+    name="cascade",
+    doc=__doc__,
+    commands=("position", "rate", "torque"),
+    parameters=(
+        RATIO,
+        Parameter(
+            name="k_position", unit="1/s", default=0.0, at_least=0.0, needed_for=("position",),
+            doc="gain from position error to rate asked, used under a position command alone",
+        ),
+        Parameter(name="feed_forward", default=1.0, doc="share of the rate of a position command that is asked ahead"),
+        Parameter(name="kp", unit="A*s/rad", at_least=0.0, doc="gain on the motor's rate error"),
+        Parameter(name="ki", unit="A/rad", at_least=0.0, doc="gain on the rate error's integral"),
+        Parameter(name="i_max", unit="A", default=math.inf, above=0.0, doc="largest current that is asked"),
+        Parameter(name="k_current", unit="V/A", default=0.0, at_least=0.0, doc="gain on the current's error"),
+        Parameter(name="ki_current", unit="V/(A*s)", at_least=0.0, doc="gain on the current error's integral"),
+        Parameter(name="v_max", unit="V", default=math.inf, above=0.0, doc="largest voltage of the amplifier"),
+        *ARMATURE,
+        Parameter(name="inductance", unit="H", above=0.0, doc="armature inductance L"),
+        *SHAFT,
+        *FRICTION,
+        replace(LOSS, only=ELASTIC),
+        Parameter(
+            name="gear", shape="word", words=("elastic", "rigid"), default="elastic",
+            doc="whether the gear winds up, or motor and joint are one inertia",
+        ),
+        *gear.parameters(ELASTIC),
+        *JOINT_FRICTION,
+    ),
+    outputs=(Memory(name="current_cmd", unit="A", doc="current to be driven"),),
+    integrals=(State(name="integral", unit="rad", doc="integral of the motor's rate error"),),
+    states=(
+        State(name="current", unit="A", doc="current in the armature"),
+        State(name="amplifier", unit="V", doc="integral of the current loop, as a voltage"),
+        gear.deflection(ELASTIC),
+        replace(compliant_gearbox.MOTOR_RATE, only=ELASTIC),
+        BRISTLE,
+    ),
+    signals=(
+        Signal(name="voltage", unit="V", doc="voltage on the armature"),
+        Signal(name="motor_torque", unit="N*m", doc="motor torque, before friction"),
+        replace(compliant_gearbox.GEAR_TORQUE, only=ELASTIC),
+    ),
+    control=control,
+    drive=drive,
+    begin=begin,
+    fastest=fastest,
+)

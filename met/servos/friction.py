@@ -1,0 +1,82 @@
+"""Friction on a motor's shaft: its parameters, and its torque; for servos that have a motor.
+
+    coulomb     dry friction of one level, F_c, which sticks
+    stribeck    the level falls from F_s at rest to F_c: F_c + (F_s - F_c) exp(-(w/w_s)^2); it sticks at F_s
+    lugre       bristles that bend by z and slip at the same level g(w); they do not stick, but creep back a little:
+                z' = w - sigma_0 |w| z/g(w),  torque = sigma_0 z + sigma_1 z'
+
+F_v w is added to each. What a gear loses in proportion to the torque T that it transmits is dry friction too: its level
+is loss |T| higher. So a motor that drives needs (1 + loss) T, and one that is driven back holds with (1 - loss) T.
+
+The bristles are stiff: sigma_0 |w|/g is a rate constant, 1/s, that grows with the shaft's rate, and the dynamics' step
+must be shorter than the integrator's limit over it.
+
+C. Canudas de Wit, H. Olsson, K. J. Astrom, P. Lischinsky, A New Model for Control of Systems with Friction, IEEE
+Transactions on Automatic Control 40, 1995, 419-425; B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A Survey of
+Models, Analysis Tools and Compensation Methods for the Control of Machines with Friction, Automatica 30, 1994. Friction
+that depends on the load: P. Hamon, M. Gautier, P. Garrec, Dynamic Identification of Robots with a Dry Friction Model
+Depending on Load and Velocity, IROS 2010.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from met.frozen import frozen
+from met.parameter import Parameter, State
+from met.trace import Real, absolute, exp, where
+
+CURVED = ("friction", ("stribeck", "lugre"))
+LUGRE = ("friction", ("lugre",))
+
+PARAMETERS = (
+    Parameter(
+        name="friction", shape="word", words=("coulomb", "stribeck", "lugre"), default="coulomb",
+        doc="law of the friction at the motor",
+    ),
+    Parameter(name="f_s", unit="N*m", at_least=0.0, only=CURVED, doc="friction that breaks away, F_s"),
+    Parameter(name="rate_s", unit="rad/s", above=0.0, only=CURVED, doc="motor rate at which it has mostly fallen, w_s"),
+    Parameter(name="sigma_0", unit="N*m/rad", above=0.0, only=LUGRE, doc="stiffness of the bristles"),
+    Parameter(
+        name="sigma_1", unit="N*m*s/rad", default=0.0, at_least=0.0, only=LUGRE, doc="damping of the bristles"
+    ),
+)  # fmt: skip
+"""What a servo declares besides f_c and f_v."""
+
+LOSS = Parameter(
+    name="loss", default=0.0, at_least=0.0, below=1.0,
+    doc="share of the gear's torque by which dry friction at the motor is higher",
+)  # fmt: skip
+
+BRISTLE = State(name="bristle", unit="rad", only=LUGRE, doc="by how much the bristles of friction are bent")
+
+
+@frozen
+class Friction:
+    """Friction at a motor rate.
+
+    level    of what sticks, against the motion, N m: for the engine to decide
+    torque   of what does not, against the motion, N m
+    bending  d(bristle)/dt, rad/s; nothing but with `lugre`
+    """
+
+    level: Real
+    torque: Real
+    bending: dict[str, Real]
+
+
+def friction(p: Any, w: Real, states: Any, transmitted: Real | None = None) -> Friction:
+    """Friction at the shaft's rate w (rad/s). transmitted: torque on the shaft of a gear that has a loss, N m."""
+    level = p.f_c
+    if transmitted is not None:
+        level = level + where(p.loss > 0.0, p.loss * absolute(transmitted), 0.0)
+    if p.friction != "coulomb":
+        share = w / p.rate_s
+        level = level + (p.f_s - p.f_c) * exp(-(share * share))
+    viscous = p.f_v * w
+    if p.friction != "lugre":
+        return Friction(level, viscous, {})
+    slips = level > 0.0
+    z = states.bristle
+    bending = where(slips, w - p.sigma_0 * absolute(w) * z / where(slips, level, 1.0), 0.0)
+    return Friction(0.0, viscous + p.sigma_0 * z + p.sigma_1 * bending, {"bristle": bending})

@@ -1,0 +1,48 @@
+"""An elastic gear between a motor and its joint: its parameters, and its torque; for servos that have one.
+
+With d = theta/N - q, the motor's angle over the ratio less the joint's, everything at the joint's side:
+
+    spring   k1 x + k3 x^3,  x = d beyond half of the play on either side, 0 within
+    damping  c d', and where there is play no more than the spring's torque, either way: teeth push and never pull
+
+The spring's share is its potential energy, k1 x^2/2 + k3 x^4/4. The damping takes energy out, whatever its limit.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from met.parameter import Only, Parameter, State
+from met.trace import Real, absolute, clip, where
+
+
+def parameters(only: Only | None = None) -> tuple[Parameter, ...]:
+    """What a servo declares for its gear."""
+    return (
+        Parameter(
+            name="stiffness", unit="effort/joint", above=0.0, only=only, doc="stiffness k1 of the gear, at the joint"
+        ),
+        Parameter(
+            name="hardening", unit="effort/joint^3", default=0.0, at_least=0.0, only=only,
+            doc="k3: torque of the gear with the third power of its winding",
+        ),
+        Parameter(name="backlash", unit="joint", default=0.0, at_least=0.0, only=only, doc="play, from end to end"),
+        Parameter(
+            name="damping", unit="effort*s/joint", default=0.0, at_least=0.0, only=only,
+            doc="damping c of the gear, at the joint",
+        ),
+    )  # fmt: skip
+
+
+def deflection(only: Only | None = None) -> State:
+    """The state that winds the gear up."""
+    return State(name="deflection", unit="joint", only=only, doc="motor's angle over the ratio, less the joint's")
+
+
+def torque(p: Any, d: Real, rate: Real) -> Real:
+    """Torque of the gear on the joint, N m (N), wound up by d (rad; m) which grows at this rate."""
+    half, play = 0.5 * p.backlash, p.backlash > 0.0
+    beyond = where(play, d - clip(d, -half, half), d)
+    spring = p.stiffness * beyond + p.hardening * (beyond * beyond * beyond)
+    most = absolute(spring)
+    return spring + where(play, clip(p.damping * rate, -most, most), p.damping * rate)

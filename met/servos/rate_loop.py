@@ -1,0 +1,52 @@
+"""A PI loop on a motor's rate that sets its voltage: its parameters and its law; figure 3 of the paper.
+
+    e = N qd_cmd - w                                  rate error, at the motor
+    V* = Kp e + Ki I,  V = clip(V*, +-V_max)          at a tick, held to the next; or continuous
+    dI/dt = e, 0 where V* is beyond the limit and e would push it further; I+ = I + T dI/dt at a tick
+
+A position command is followed by asking for qd_cmd = d(q_cmd)/dt + k_position (q_cmd - q). A torque command sets the
+voltage that gives this torque at the rate seen, without friction's share; it is open loop.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from met.parameter import Memory, Parameter, State
+from met.servos.motor import TABLE_1
+from met.servos.servo import Asked, Control
+from met.trace import Real, both, clip, either, where
+
+COMMANDS = ("rate", "position", "torque")
+
+PARAMETERS = (
+    Parameter(name="kp", unit="V*s/rad", at_least=0.0, source=TABLE_1, doc="gain on the motor's rate error"),
+    Parameter(name="ki", unit="V/rad", at_least=0.0, source=TABLE_1, doc="gain on the rate error's integral"),
+    Parameter(name="v_max", unit="V", above=0.0, source=TABLE_1, doc="largest voltage of the drive's amplifier"),
+    Parameter(
+        name="k_position", unit="1/s", default=0.0, at_least=0.0, needed_for=("position",),
+        doc="gain from position error to rate asked, used under a position command alone",
+    ),
+)  # fmt: skip
+
+OUTPUTS = (Memory(name="voltage", unit="V", doc="voltage on the drive motor"),)
+INTEGRALS = (State(name="integral", unit="rad", doc="integral of the motor's rate error"),)
+
+
+def rate_loop(p: Any, integral: Real, asked: Asked, *, q: Real, qd: Real) -> Control:
+    """The motor's voltage. q, qd: its angle and rate over the ratio, as the loop sees them (rad, rad/s; m, m/s)."""
+    if asked.kind == "torque":
+        torque_m = asked.value / p.ratio
+        voltage = p.resistance * torque_m / p.kt + p.kt * p.ratio * qd
+        return Control({"voltage": clip(voltage, -p.v_max, p.v_max)}, {"integral": 0.0})
+
+    error = p.ratio * (_rate_asked(p, q, asked) - qd)
+    wanted = p.kp * error + p.ki * integral
+    winding_up = either(both(wanted > p.v_max, error > 0.0), both(wanted < -p.v_max, error < 0.0))
+    return Control({"voltage": clip(wanted, -p.v_max, p.v_max)}, {"integral": where(winding_up, 0.0, error)})
+
+
+def _rate_asked(p: Any, q: Real, asked: Asked) -> Real:
+    if asked.kind == "position":
+        return asked.slope + p.k_position * (asked.value - q)
+    return asked.value

@@ -1,0 +1,66 @@
+"""The derivative of a recorded number by one of its inputs: forward, node by node, in the graph itself.
+
+It is that of the pieces: of `where` the derivative of what is chosen, so at a kink or a jump that of the side which the
+condition takes there; of `floor`, `rint`, tables and random numbers none. Of sin, cos, exp and their like it is the
+derivative of the polynomial that stands for them, right to some units in the last place of the function's own size.
+
+For what is not recorded: record it, and `Formulas.replay` the derivative over floats or arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from met.trace.graph import OPERANDS, TRUTHS, ZERO, Graph
+from met.trace.scalar import Scalar
+
+ROUNDS = 2.0**51
+"""A sum with a constant of this size or more is whole, or half of it: so functions round (met/trace/elementary.py)."""
+
+
+def derivative(x: Scalar, name: str) -> Scalar:
+    """d x / d `name`, an input of x's graph; its other inputs, cells, tick and time are held."""
+    graph = x.graph
+    slopes: dict[int, int] = {}
+    for i in graph.live([x.ref]):
+        op, *rest = graph.nodes[i]
+        operands = [ref for ref in rest[: OPERANDS[op]] if graph.nodes[ref >> 1][0] not in TRUTHS]
+        moving = any(slopes[ref >> 1] & -2 != ZERO for ref in operands)
+        if op == "input":
+            slopes[i] = graph.constant(float(rest[0] == name))
+        elif moving and op in _RULES and not _rounds(graph, op, rest):
+            numbers = [Scalar(graph, ref) for ref in rest[: OPERANDS[op]]]
+            moves = [Scalar(graph, slopes.get(ref >> 1, ZERO) ^ (ref & 1)) for ref in rest[: OPERANDS[op]]]
+            slopes[i] = _RULES[op](graph, [*rest[OPERANDS[op] :]], Scalar(graph, 2 * i), numbers, moves).ref
+        else:
+            slopes[i] = ZERO
+    return Scalar(graph, slopes[x.ref >> 1] ^ (x.ref & 1))
+
+
+def _rounds(graph: Graph, op: str, operands: list[int]) -> bool:
+    """Whether a node is a sum that rounds to whole numbers, or halves."""
+    added = {"add": operands[:2], "sub": operands[:2], "fma": operands[2:3]}.get(op, [])
+    return any(abs(value) >= ROUNDS for ref in added if (value := graph.value(ref)) is not None)
+
+
+Rule = Callable[[Graph, list[int], Scalar, list[Scalar], list[Scalar]], Scalar]
+"""(graph, what stands behind the operands, the node, its operands, their derivatives) -> its derivative."""
+
+
+def _flip(graph: Graph, sign: Scalar, move: Scalar, bit: int) -> Scalar:
+    return Scalar(graph, graph.flip(move.ref, sign.ref, bit))
+
+
+_RULES: dict[str, Rule] = {
+    "add": lambda g, _, y, x, dx: dx[0] + dx[1],
+    "sub": lambda g, _, y, x, dx: dx[0] - dx[1],
+    "mul": lambda g, _, y, x, dx: dx[0] * x[1] + x[0] * dx[1],
+    "fma": lambda g, _, y, x, dx: dx[0] * x[1] + x[0] * dx[1] + dx[2],
+    "div": lambda g, _, y, x, dx: (dx[0] - y * dx[1]) / x[1],
+    "sqrt": lambda g, _, y, x, dx: dx[0] / (2.0 * y),
+    "abs": lambda g, _, y, x, dx: _flip(g, x[0], dx[0], 63),
+    "flip": lambda g, rest, y, x, dx: _flip(g, x[1], dx[0], rest[0]),
+    "where": lambda g, _, y, x, dx: Scalar(g, g.where(x[0].ref, dx[1].ref, dx[2].ref)),
+    "significand": lambda g, _, y, x, dx: dx[0] * (y / x[0]),
+}
+"""What is not here has no derivative, or none but at jumps."""

@@ -1,0 +1,65 @@
+"""Parts of a servo that are there only under a word, and laws that are continuous: what a deck may write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told
+
+CURVED = changed(SERVO, ("j_m", "friction = stribeck;  f_c = 0.01 N*m;  f_s = 0.02 N*m;  rate_s = 3 rad/s;  j_m"))
+
+
+def test_a_parameter_of_another_word_is_told_with_the_words_that_have_it(tmp_path: Path) -> None:
+    coulomb = changed(CURVED, ("friction = stribeck", "friction = coulomb"))
+    assert told(check(tmp_path, ARM, coulomb, RUN)).split("\n\n")[0] == """\
+error[D141]: servo `drive` has no `f_s` with `friction = coulomb`
+ --> deck.ic:8:60
+  |
+8 |     tau_max = 1 N*m; friction = coulomb;  f_c = 0.01 N*m;  f_s = 0.02 N*m;  rate_s = 3 rad/s;  j_m = 1e-4 kg*m^2;
+  |                                                            ^^^
+ ::: deck.ic:8:33  chosen here
+  = help: it is there with `friction = stribeck;` or `friction = lugre;`"""
+    assert codes(tmp_path, ARM, changed(CURVED, ("friction = stribeck;", "")), RUN) == ["D141", "D141"]
+
+
+def test_a_word_that_was_written_over_another_leaves_what_that_one_had(tmp_path: Path) -> None:
+    plain = CURVED + "servo plain like drive { friction = coulomb; }\n"
+    made = experiment(tmp_path, ARM, plain, changed(RUN, ("hinge = drive", "hinge = plain")))
+    (use,) = made.structure.servos
+    assert use.words == (("friction", "coulomb"),)
+    assert "hinge.servo.f_s" not in made.parameters and made.parameters["hinge.servo.friction"].value == "coulomb"
+
+
+def test_what_a_word_needs_is_asked_for(tmp_path: Path) -> None:
+    assert codes(tmp_path, ARM, changed(CURVED, ("rate_s = 3 rad/s;", "")), RUN) == ["D075"]
+
+
+def test_a_word_may_be_chosen_by_a_sweep(tmp_path: Path) -> None:
+    sweep = "sweep laws of hold { vary drive.friction = [coulomb, stribeck]; }\n"
+    compiled = check(tmp_path, ARM, CURVED, RUN, sweep, select=["laws"])
+    assert compiled.plan is not None, told(compiled)
+    assert [e.structure.servos[0].words[0][1] for e in compiled.plan.experiments] == ["coulomb", "stribeck"]
+
+
+def test_states_of_a_word_can_be_recorded_under_it_alone(tmp_path: Path) -> None:
+    record = changed(RUN, ("[q]", "[q, servo.bristle]"))
+    lugre = changed(CURVED, ("stribeck;", "lugre;  sigma_0 = 1 N*m/rad;"))
+    assert codes(tmp_path, ARM, lugre, record) == []
+    assert "no" in told(check(tmp_path, ARM, CURVED, record))
+
+
+@pytest.mark.parametrize(("place", "continuous"), [("servos", True), ("own", True), ("neither", False)])
+def test_a_law_is_continuous_where_the_servo_or_the_run_says_so(place: str, continuous: bool, tmp_path: Path) -> None:
+    servo = changed(SERVO, ("command", "rate = continuous; command")) if place == "own" else SERVO
+    run = changed(RUN, ("servos = 1 kHz", "servos = continuous")) if place == "servos" else RUN
+    (use,) = experiment(tmp_path, ARM, servo, run).structure.servos
+    assert (use.continuous, use.divisor) == (continuous, 1)
+
+
+def test_a_motor_on_a_bed_has_a_servo_that_ticks_and_coulombs_friction(tmp_path: Path) -> None:
+    bed = changed(RUN, ("record = [q];", "record = [q]; substitute hinge { }"))
+    assert codes(tmp_path, ARM, SERVO, bed) == []
+    assert codes(tmp_path, ARM, changed(SERVO, ("command", "rate = continuous; command")), bed) == ["D106"]
+    assert codes(tmp_path, ARM, CURVED, bed) == ["D176"]
