@@ -450,7 +450,7 @@ def _bounds(parameter: Parameter) -> list[tuple[Callable[[np.ndarray], np.ndarra
         (parameter.at_most, "at most", np.less_equal),
     )
     tests: list[tuple[Callable[[np.ndarray], np.ndarray], str]] = [
-        (partial(_is_finite, parameter.default == math.inf), "it is not finite")
+        (partial(_is_finite, parameter.default), "it is not finite")
     ]
     if parameter.whole:
         tests.append((_is_whole, "it should be a whole number"))
@@ -465,9 +465,10 @@ def _within(holds: np.ufunc, limit: float, values: np.ndarray) -> np.ndarray:
     return np.asarray(holds(values[:, 0], limit))
 
 
-def _is_finite(or_never: bool, values: np.ndarray) -> np.ndarray:
-    """or_never: infinite is possible too, as a model's own default that stands for never."""
-    return np.asarray(np.isfinite(values[:, 0]) | (or_never & (values[:, 0] == math.inf)))
+def _is_finite(default: object, values: np.ndarray) -> np.ndarray:
+    """Infinite is possible too as a model's own default, or a part of it, that stands for never or none."""
+    numbers = [x for x in (default if isinstance(default, tuple) else (default,)) if isinstance(x, float)]
+    return np.asarray(np.isfinite(values[:, 0]) | np.isin(values[:, 0], [x for x in numbers if math.isinf(x)]))
 
 
 def _is_whole(values: np.ndarray) -> np.ndarray:

@@ -396,8 +396,12 @@ def check_servo_definition(scope: Scope, name: str) -> None:
                 inner = _asked(scope, command.value)
                 if not isinstance(inner, Call):
                     scope.names.evaluate(inner)
+            words = {p.name: p for p in servo.parameters if p.shape == "word"}
             for key, item in block.items.items():
                 if key in NOT_PARAMETERS or item.value is None:
+                    continue
+                if key in words:
+                    scope.word(owner, words[key], item)
                     continue
                 try:
                     scope.written(item)

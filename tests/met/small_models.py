@@ -10,15 +10,16 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, get_args
 
 from met import models
 from met.frozen import frozen
-from met.parameter import Parameter, under
+from met.parameter import Parameter, there, under
 from met.plan import JointKind
+from met.servos.servo import Parts, parts
 from met.units import PURE, Dimension, parse_unit
 
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
@@ -27,6 +28,11 @@ EVERY = [(kind, name) for kind in KINDS for name in models.find_own(kind)]
 JOINTS: dict[str, JointKind] = {"hinge": "revolute", "slide": "prismatic"}
 """The joints of the deck's arm, and their kinds."""
 
+LINKS = ("bar", "tip")
+
+FILES = {"command": "moves.csv", "environment": "loads.csv"}
+"""The file that a model reads, by its kind."""
+
 CASES = "vary initial.hinge.q = linspace(-1, 1, 7) rad;"
 TIMES = (0.0, 0.1, 0.2)
 
@@ -34,6 +40,7 @@ DECK = """\
 arm small {{
     link bar {{ mass = 2 kg; shape = rod(length = 1 m, along = x); }}
     link tip {{ mass = 1 kg; shape = sphere(radius = 0.1 m); com = [0.2, 0.1, 0] m; }}
+    {base}
     joint hinge revolute  {{ parent = base; child = bar; axis = y; }}
     joint slide prismatic {{ parent = bar;  child = tip; axis = x; at = [1, 0, 0] m; }}
 }}
@@ -52,10 +59,13 @@ run it {{
 sweep cases of it {{ {cases} }}
 """
 PLAIN = {
-    "more": "", "servos": "", "gravity": "gravity = [0, 0, -9.81] m/s^2;", "environment": "",
+    "base": "", "more": "", "servos": "", "gravity": "gravity = [0, 0, -9.81] m/s^2;", "environment": "",
     "integrator": "modified_euler", "metric": "final { of = slide.q; }", "run": "", "cases": CASES,
 }  # fmt: skip
 """The parts of the deck, where no model writes them."""
+
+FREE = {"base": "link base { mass = 5 kg; inertia = [3, 4, 5] kg*m^2; }", "run": "base = free;"}
+"""The parts of a deck whose base moves freely."""
 
 Value = float | str | tuple[float, ...]
 
@@ -64,7 +74,8 @@ Value = float | str | tuple[float, ...]
 class Small:
     """What the smallest deck that uses a model says of it.
 
-    values   by parameter, in SI: what must be written, and what makes the model act
+    values   by parameter, in SI: what must be written, and what makes the model act. Of what is there under some words
+             alone, what is written under these; which joint the model is about is not said (`Use.joint`)
     command  kind of command, of a servo or in which a profile stands; none: the servo's first, or a rate
     of       what of a joint a metric watches
     beside   further text for parts of the deck (`PLAIN`), as a model needs that acts on what another one does
@@ -79,14 +90,45 @@ class Small:
 SMALLEST: dict[tuple[str, str], Small] = {
     ("servo", "rigid_gearbox"): Small({
         "ratio": 100.0, "kp": 0.1, "ki": 1.0, "v_max": 24.0, "resistance": 1.0, "kt": 0.05, "tau_max": 1.0,
-        "j_m": 1e-4, "f_c": 0.005, "k_position": 5.0,
+        "j_m": 1e-4, "f_c": 0.005, "k_position": 5.0, "f_s": 0.008, "rate_s": 2.0, "sigma_0": 0.01, "sigma_1": 1e-4,
     }),
+    ("servo", "compliant_gearbox"): Small({
+        "ratio": 100.0, "kp": 0.1, "ki": 1.0, "v_max": 24.0, "resistance": 1.0, "kt": 0.05, "tau_max": 1.0,
+        "j_m": 1e-4, "f_c": 0.005, "k_position": 5.0, "f_s": 0.008, "rate_s": 2.0, "sigma_0": 0.01, "sigma_1": 1e-4,
+        "loss": 0.05, "stiffness": 900.0, "hardening": 4e3, "backlash": 1e-3, "damping": 5.0, "f_c_joint": 0.1,
+        "f_v_joint": 0.2,
+    }),
+    ("servo", "cascade"): Small({
+        "ratio": 100.0, "k_position": 5.0, "feed_forward": 0.9, "kp": 0.1, "ki": 0.5, "i_max": 20.0, "k_current": 1.0,
+        "ki_current": 20.0, "v_max": 24.0, "resistance": 1.0, "kt": 0.05, "inductance": 0.05, "j_m": 1e-4,
+        "f_c": 0.005, "f_s": 0.008, "rate_s": 2.0, "sigma_0": 0.01, "sigma_1": 1e-4, "loss": 0.05,
+        "stiffness": 900.0, "hardening": 4e3, "backlash": 1e-3, "damping": 5.0, "f_c_joint": 0.1, "f_v_joint": 0.2,
+    }, command="rate"),
     ("servo", "ideal"): Small({"bandwidth": 30.0}),
     ("servo", "passive"): Small({"friction": 1.0}),
     ("servo", "locked"): Small({"release": 0.1}),
+    ("environment", "attitude_hold"): Small({
+        "rpy": (0.1, -0.2, 0.3), "stiffness": (3.0, 4.0, 5.0), "damping": (0.1, 0.2, 0.3), "limit": (0.4, 0.5, 0.6),
+    }, beside=FREE),
+    ("environment", "bushing"): Small({
+        "link": "tip", "to": "bar", "to_at": (1.0, 0.0, 0.0), "stiffness": (90.0, 50.0, 10.0),
+        "damping": (1.0, 2.0, 3.0), "turning": (5.0, 6.0, 7.0), "turning_damping": (0.1, 0.2, 0.3),
+    }),
     ("environment", "gravity"): Small({"g": (0.0, 0.0, -9.81)}, beside={"gravity": ""}),
+    ("environment", "gravity_gradient"): Small({"radius": 6.778e6, "frame": "orbital"}),
     ("environment", "joint_damping"): Small({"damping": 1.0}),
+    ("environment", "joint_stop"): Small({
+        "lower": -1e-3, "upper": 5e-3, "stiffness": 900.0, "dissipation": 0.5,
+    }),
+    ("environment", "plume"): Small({
+        "link": "tip", "width": 0.2, "height": 0.1, "cells": 2.0, "nozzle": (1.0, 0.0, 2.0), "axis": (0.0, 0.0, -1.0),
+        "thrust": 50.0, "exponent": 5.0, "duty": 0.5, "period": 0.03, "switches": (0.01, 0.1, 0.15),
+    }),
+    ("environment", "spring"): Small({"link": "tip", "stiffness": 90.0, "damping": 2.0, "length": 1.0}),
     ("environment", "wrench"): Small({"link": "tip", "force": (1.0, 2.0, 3.0), "until": 0.1}),
+    ("environment", "wrench_table"): Small({
+        "link": "tip", "times": (0.0, 0.1, 0.15), "force_z": (0.0, 9.0, 2.0), "moment_x": (1.0, -1.0, 0.5),
+    }),
     ("command", "constant"): Small({"value": 0.5}),
     ("command", "step"): Small({"to": 0.5, "at": 0.1}),
     ("command", "ramp"): Small({"to": 0.5, "over": 0.1}),
@@ -94,7 +136,7 @@ SMALLEST: dict[tuple[str, str], Small] = {
     ("command", "table"): Small({"times": (0.0, 0.1), "values": (0.0, 0.5)}),
     ("command", "chirp"): Small({"amplitude": 0.5, "f0": 1.0, "f1": 9.0, "over": 0.2}),
     ("command", "trapezoid"): Small({"to": 0.5, "max_rate": 9.0, "max_acceleration": 300.0}),
-    ("command", "trajectory"): Small({"file": "moves.csv"}),
+    ("command", "trajectory"): Small({"file": FILES["command"]}),
     ("metric", "final"): Small(of="q"),
     ("metric", "max"): Small(),
     ("metric", "min"): Small(of="qdd"),
@@ -114,6 +156,8 @@ class Use:
     command  kind of the joint's command; "" where the model has to do with none
     carrier  of a command, bed or law: the servo that it stands in; "" for the first that takes it
     words    words that it writes, by parameter, in the stead of the smallest deck's
+    analog   whether the law of the servo is continuous, its own or that in which it stands
+    file     whether the lists that a deck could write are columns of a file, in their stead
     """
 
     kind: models.Kind
@@ -122,6 +166,8 @@ class Use:
     command: str = ""
     carrier: str = ""
     words: Mapping[str, str] = field(default_factory=dict)
+    analog: bool = False
+    file: bool = False
 
     @property
     def model(self) -> Any:
@@ -152,19 +198,40 @@ class Use:
     def values(self) -> dict[str, Value]:
         """What the smallest deck writes, in SI, by parameter; of those that are there."""
         known = [parameter.name for parameter in self.parameters()]
-        return {name: value for name, value in {**self.small.values, **self.words}.items() if name in known}
+        about = {parameter.name: self.joint for parameter in self.parameters() if parameter.names == "joint"}
+        file = {"file": FILES[self.kind]} if self.file else {}
+        said = {**self.small.values, **about, **file, **self.words}
+        return {name: value for name, value in said.items() if name in known}
+
+    @property
+    def chosen(self) -> dict[str, str]:
+        """Every word of the model here, written or not."""
+        said = {**self.small.values, **self.words}
+        return {p.name: str(said.get(p.name, p.default)) for p in models.written(self.model) if p.words}
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """The parameters that a deck may write here, with the bounds that hold here.
+        """The parameters that a deck may write here, with the bounds that hold here."""
+        return self._here(models.written(self.model), lists=not self.file)
 
-        All that the model has: the one place to leave out what is there under some words (`words`) or commands alone.
-        """
-        return tuple(under(parameter, self.command) for parameter in models.written(self.model))
+    def absent(self) -> tuple[Parameter, ...]:
+        """Those that are there under other words alone."""
+        return tuple(parameter for parameter in models.written(self.model) if not there(parameter, self.chosen))
 
     def in_plan(self) -> tuple[Parameter, ...]:
-        """The parameters that a plan holds of it, which the model's functions read; likewise."""
+        """The parameters that a plan holds of it, which the model's functions read."""
         declared = getattr(self.model, "parameters", ())
-        return tuple(under(parameter, self.command) for parameter in declared if parameter.shape != "text")
+        return self._here([parameter for parameter in declared if parameter.shape != "text"])
+
+    def _here(self, declared: Iterable[Parameter], *, lists: bool = True) -> tuple[Parameter, ...]:
+        return tuple(
+            under(parameter, self.command) for parameter in declared
+            if there(parameter, self.chosen) and (lists or parameter.shape != "list")
+        )  # fmt: skip
+
+    @property
+    def parts(self) -> Parts:
+        """What there is of the servo."""
+        return parts(self.model, self.chosen, continuous=self.analog)
 
     def parameter(self, name: str) -> Parameter:
         return next(parameter for parameter in self.parameters() if parameter.name == name)
@@ -214,7 +281,8 @@ class Use:
         call = f"({', '.join(f'{name} = {text}' for name, text in entries.items())})" if entries else ""
         if self.kind == "servo":
             asked = f"command = {self.command}({value_of(self.command, self.joint)});" if self.command else ""
-            definition = f"servo used {{ model = {self.name}; {block[2:-2]} {asked} }}"
+            rate = "rate = continuous;" if self.analog else ""
+            definition = f"servo used {{ model = {self.name}; {block[2:-2]} {asked} {rate} }}"
             return {"more": definition, "servos": f"{self.joint} = used;"}
         if self.kind in ("command", "bed", "law"):
             asked = f"{self.name}{call}" if self.kind == "command" else value_of(self.command, self.joint)
@@ -233,10 +301,11 @@ class Use:
     def put(self, folder: Path) -> Use:
         """Writes the file that a course from a file reads, beside the deck; gives itself."""
         if getattr(self.model, "from_file", False):
-            unit = in_words(ASKED[self.command], WORDS[JOINTS[self.joint]])
-            rows = "".join(f"{t}, {x}\n" for t, x in zip(TIMES, (0.0, 0.5, 0.2), strict=True))
-            text = f"time [s], {self.joint} [{unit}]\n{rows}"
-            (folder / str(self.small.values["file"])).write_text(text, encoding="utf-8")
+            columns = [(self.joint, in_words(ASKED[self.command], WORDS[JOINTS[self.joint]]))] if self.command else [
+                (parameter.name, parameter.unit) for parameter in self.model.parameters if parameter.as_many_as]
+            heads = "".join(f", {name} [{unit}]" for name, unit in columns)
+            rows = "".join(f"{t}{f', {x}' * len(columns)}\n" for t, x in zip(TIMES, (0.0, 0.5, 0.2), strict=True))
+            (folder / FILES[self.kind]).write_text(f"time [s]{heads}\n{rows}", encoding="utf-8")
         return self
 
 
@@ -285,17 +354,42 @@ def commands(kind: str, model: Any) -> tuple[str, ...]:
 
 
 def uses(kind: models.Kind, name: str, joint: str = "hinge") -> Iterator[Use]:
-    """Every way to use a model: under each kind of command, and each choice of its words. The smallest deck's first."""
+    """Every way to use a model, the smallest deck's first.
+
+    Under each kind of command: each choice of its words; then each other link of the arm that one of them may name;
+    then with its lists in a file, where it takes one for them; then with its law continuous, where it may be.
+    """
     model, small = models.find(kind, name), SMALLEST[kind, name]
     kinds = sorted(commands(kind, model), key=lambda command: command != small.command)
-    chosen = [
-        [(parameter.name, word) for word in sorted(parameter.words, key=lambda w: w != parameter.default)]
-        for parameter in models.written(model) if parameter.words
-    ]  # fmt: skip
+
+    def first(parameter: Parameter) -> Value | None:
+        return small.values.get(parameter.name, parameter.default)  # type: ignore[return-value]
+
+    written = models.written(model)
+    chosen = [[(p.name, word) for word in sorted(p.words, key=lambda word, p=p: word != first(p))]
+              for p in written if p.words and not p.names]  # fmt: skip
+    links = [(p.name, link) for p in written if p.names == "link" for link in (*LINKS, *p.words) if link != first(p)]
     for command in kinds:
+        plain = Use(kind, name, joint, command)
         for n, words in enumerate(itertools.product(*chosen)):
             # the defaults are left unwritten, but in a way of their own where they are written too
-            yield Use(kind, name, joint, command, words={} if n == 0 else dict(words))
+            yield plain if n == 0 else replace(plain, words=dict(words))
+        for part, link in links:
+            yield replace(plain, words={part: link})
+        if kind == "environment" and model.from_file:
+            yield replace(plain, file=True)
+        if kind == "servo" and model.control is not None and not model.clocked:
+            yield replace(plain, analog=True)
+
+
+def first_uses(kind: models.Kind, name: str, joint: str = "hinge") -> Iterator[tuple[Use, list[Parameter]]]:
+    """The uses, under each kind of command, in which parameters are there that were in none before; and these."""
+    seen: set[tuple[str, str]] = set()
+    for use in uses(kind, name, joint):
+        new = [parameter for parameter in use.parameters() if (use.command, parameter.name) not in seen]
+        seen |= {(use.command, parameter.name) for parameter in new}
+        if new and not use.file:
+            yield use, new
 
 
 def smallest(kind: models.Kind, name: str, joint: str = "hinge") -> Use:
@@ -305,4 +399,5 @@ def smallest(kind: models.Kind, name: str, joint: str = "hinge") -> Use:
 
 def finite(value: Any) -> bool:
     """Whether a deck can write a default."""
-    return isinstance(value, str) or all(map(math.isfinite, value if isinstance(value, tuple) else (value,)))
+    numbers = value if isinstance(value, tuple) else (value,)
+    return isinstance(value, str) or (bool(numbers) and all(map(math.isfinite, numbers)))

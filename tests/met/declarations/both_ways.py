@@ -22,6 +22,7 @@ from met.environments.environment import World
 from met.integrators.integrator import Motion, Slope
 from met.parameter import Parameter
 from met.plan import Experiment
+from met.program.base import ORIENTATION, base_of, coordinates
 from met.program.machine import Machine
 from met.program.world import ArmWorld
 from met.servos.servo import Asked, JointMotion, Seen, Servo
@@ -162,8 +163,8 @@ def calls(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any
     return {name: call for name, call in known.items() if getattr(model, name) is not None}
 
 
-NOT_TRACED = {("environment", "idle")}
-"""Functions that are asked only where all numbers are constants."""
+NOT_TRACED = {("environment", "idle"), ("command", "jumps")}
+"""Functions that are asked only where all numbers are constants, or about words alone."""
 
 
 def functions(kind: str, model: Any) -> set[str]:
@@ -173,13 +174,14 @@ def functions(kind: str, model: Any) -> set[str]:
 
 
 def parameters(numbers: Numbers, use: Use, experiment: Experiment, of: str = "") -> SimpleNamespace:
-    """The plan's parameters of the model: numbers drawn within their ranges, words and lists as the deck has them."""
+    """The plan's parameters of the model: numbers drawn within their ranges; words, lists and what decides the program
+    as the deck has them."""
     values: dict[str, Any] = {}
     for parameter in use.in_plan():
         path = f"{use.head}.{parameter.name}"
         paths = [f"{path}.{axis}" for axis in "xyz"] if parameter.shape == "vector" else [path]
         found = [experiment.parameters[each].value for each in paths]
-        if parameter.shape in ("number", "vector"):
+        if parameter.shape in ("number", "vector") and not parameter.decides:
             found = [numbers.number(f"{of}{each}", lambda near=near, p=parameter: numbers.within(p, near))
                      for each, near in zip(paths, found, strict=True)]  # fmt: skip
         values[parameter.name] = tuple(found) if parameter.shape == "vector" else found[0]
@@ -217,21 +219,29 @@ def _servo(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], An
 
 
 def servo_calls(servo: Servo, use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]]:
-    """The functions of a servo, which has the parameters of the one in use."""
-    command = use.command or "none"
+    """The functions of a servo, which has the parameters of the one in use, and its parts."""
+    command, parts = use.command or "none", use.parts
+    known = {"period": 0.0} if use.analog else {}
 
     def p(n: Numbers) -> SimpleNamespace:
         return parameters(n, use, experiment)
 
+    def states(n: Numbers) -> SimpleNamespace:
+        return held(n, parts.natural, "states.")
+
+    def control(n: Numbers) -> Any:
+        assert servo.control is not None
+        of_law = parts.integrals if use.analog else (*parts.outputs, *parts.integrals)
+        asked = filled(n, Asked, "asked", kind=command)
+        return servo.control(p(n), held(n, of_law), filled(n, Seen, "seen", asked=asked, states=states(n), **known))
+
     return {
-        "tick": lambda n: servo.tick(
-            p(n), held(n, servo.memory),
-            filled(n, Seen, "seen", asked=filled(n, Asked, "asked", kind=command)),
-        ),
+        "control": control,
         "drive": lambda n: servo.drive(
-            p(n), held(n, servo.memory), held(n, servo.states, "states."),
+            p(n), held(n, (*parts.outputs, *parts.integrals)), states(n),
             filled(n, JointMotion, "joint", command=command),
         ),
+        "begin": lambda n: servo.begin(p(n), n.number("q", n.any), n.number("qd", n.any)),
         "fastest": lambda n: servo.fastest(p(n)),
         "motor": lambda n: servo.motor(p(n)),
         "at_rest": lambda n: servo.at_rest(p(n)),
@@ -260,12 +270,12 @@ class Answers:
         self._asked.append(asked)
         if n == len(self._given):  # the first time, with floats
             self._given.append(find())
-        given = self._given[n]
-        if isinstance(given, bool):
-            return given
-        parts = given if isinstance(given, tuple) else (given,)
-        found = tuple(self._numbers.number(f"answer {n}.{i}", lambda x=x: x) for i, x in enumerate(parts))
-        return found if isinstance(given, tuple) else found[0]
+        return self._as_numbers(self._given[n], f"answer {n}")
+
+    def _as_numbers(self, given: Any, name: str) -> Any:
+        if isinstance(given, tuple):
+            return tuple(self._as_numbers(part, f"{name}.{i}") for i, part in enumerate(given))
+        return given if isinstance(given, bool) else self._numbers.number(name, lambda: given)
 
 
 def _environment(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]]:
@@ -277,10 +287,14 @@ def _environment(use: Use, experiment: Experiment) -> dict[str, Callable[[Number
         if numbers.graph is None:
             given.clear()
         rng = np.random.default_rng(numbers.rng.integers(2**32))
-        q, qd = (tuple(map(np.float64, rng.normal(size=len(machine.joints)))) for _ in range(2))
+        q, qd = (tuple(map(np.float64, rng.normal(size=len(coordinates(machine))))) for _ in range(2))
+        orientation = rng.normal(size=4)
+        cells = dict(zip(ORIENTATION, orientation / np.linalg.norm(orientation), strict=True))
         begin = rng.uniform(0.0, 0.2)
         time = begin + rng.uniform() * experiment.structure.schedule.step
-        world = Answers(ArmWorld(machine, tree, q, qd, time, begin), numbers, given)
+        y = Motion(q, qd, ())
+        base = base_of(machine, cells.__getitem__, y, time)
+        world = Answers(ArmWorld(machine, cells.__getitem__, tree, y, base, time, begin), numbers, given)
         found = use.model.loads(parameters(numbers, use, experiment), world)
         return {"loads": found, "asked": world._asked}
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
@@ -14,14 +14,14 @@ from met.parameter import Parameter
 from met.plan import Experiment
 from tests.ic.small_decks import check, experiment, told
 from tests.met.declarations.values import errors, inner, paths
-from tests.met.small_models import EVERY, Use, finite, uses
+from tests.met.small_models import EVERY, Use, finite, first_uses, uses
 
 WITH_PARAMETERS = [(kind, name) for kind, name in EVERY if models.written(models.find(kind, name))]
 
 
-def defaulted(use: Use) -> Iterator[Parameter]:
-    """The parameters that the declaration says what they are where a deck does not write them."""
-    for parameter in use.parameters():
+def defaulted(use: Use, parameters: Iterable[Parameter]) -> Iterator[Parameter]:
+    """Of these, the parameters that the declaration says what they are where a deck does not write them."""
+    for parameter in parameters:
         if parameter.default is not None and not parameter.of_servo and not use.needed(parameter):
             yield parameter
 
@@ -36,7 +36,8 @@ def found_at(deck: Experiment, use: Use, parameter: Parameter) -> tuple[object, 
 @pytest.mark.parametrize(("kind", "name"), WITH_PARAMETERS)
 def test_what_a_deck_leaves_out_has_its_default(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for use in uses(kind, name):
-        left_out = [parameter for parameter in defaulted(use) if parameter.name not in use.words]
+        left_out = [parameter for parameter in defaulted(use, use.parameters())
+                    if parameter.name not in use.words and not (use.file and parameter.shape == "text")]
         deck = experiment(tmp_path, use.put(tmp_path).deck(without=[p.name for p in left_out]), select=["it"])
         for parameter in left_out:
             if parameter.shape == "text" or parameter.name == models.FAULTS:
@@ -52,11 +53,11 @@ def test_what_a_deck_leaves_out_has_its_default(kind: models.Kind, name: str, tm
 
 @pytest.mark.parametrize(("kind", "name"), WITH_PARAMETERS)
 def test_writing_the_defaults_changes_neither_plan_nor_bits(kind: models.Kind, name: str, tmp_path: Path) -> None:
-    for n, use in enumerate(uses(kind, name)):
+    for n, (use, new) in enumerate(first_uses(kind, name)):
         # what stands for never cannot be written, nor what is called after a joint
-        said = {p.name: use.text(p, p.default) for p in defaulted(use) if finite(p.default) and p.shape != "text"
+        said = {p.name: use.text(p, p.default) for p in defaulted(use, new) if finite(p.default) and p.shape != "text"
                 and p.name not in use.words}  # fmt: skip
-        if not said or use.words:
+        if not said:
             continue
         use.put(tmp_path)
         silent, spoken = (experiment(tmp_path, use.deck(written, without=said.keys() - written.keys()), select=["it"])
@@ -79,10 +80,8 @@ def test_writing_the_defaults_changes_neither_plan_nor_bits(kind: models.Kind, n
 
 @pytest.mark.parametrize(("kind", "name"), WITH_PARAMETERS)
 def test_what_must_be_written_is_missed_by_its_name(kind: models.Kind, name: str, tmp_path: Path) -> None:
-    for use in uses(kind, name):
-        if use.words:
-            continue
-        for parameter in use.parameters():
+    for use, new in first_uses(kind, name):
+        for parameter in new:
             found = check(tmp_path, use.put(tmp_path).deck(without=[parameter.name]), select=["it"])
             if not use.needed(parameter):
                 assert not errors(found), (parameter.name, told(found))
@@ -101,9 +100,9 @@ def test_what_must_be_written_may_come_from_a_sweep_or_the_command_line(
     kind: models.Kind, name: str, tmp_path: Path
 ) -> None:
     taken: dict[str, bool] = {}
-    for use in uses(kind, name):
-        for parameter in use.parameters():
-            if use.words or not use.needed(parameter) or parameter.shape != "number":
+    for use, new in first_uses(kind, name):
+        for parameter in new:
+            if not use.needed(parameter) or parameter.shape != "number":
                 continue
             value = use.values.get(parameter.name, inner(parameter))
             path, text = paths(use, parameter)[0], use.text(parameter, value)

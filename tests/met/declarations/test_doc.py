@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 
@@ -29,6 +30,8 @@ def cells(parameter: Parameter) -> list[str]:
         text = "the servo's" + (f" {parameter.of_servo}" if parameter.of_servo != parameter.name else "")
     elif default is None:
         text = "needed"
+    elif default == ():
+        text = "none"
     elif isinstance(default, tuple):
         text = f"[{', '.join(f'{x:g}' for x in default)}]"
     else:
@@ -38,12 +41,21 @@ def cells(parameter: Parameter) -> list[str]:
     signs = {"above": ">", "at_least": ">=", "below": "<", "at_most": "<="}
     bounds += [f"{sign} {getattr(parameter, name):g}" for name, sign in signs.items()
                if getattr(parameter, name) is not None]  # fmt: skip
-    range_ = " | ".join(parameter.words) if parameter.words else ", ".join(bounds)
+    words = ((f"a {parameter.names}",) if parameter.names else ()) + parameter.words
+    range_ = " | ".join(words) if words else ", ".join(bounds)
     if parameter.above_where_needed is not None:
         range_ += f"; > {parameter.above_where_needed:g} where needed"
     shape = {"vector": "three numbers; ", "list": "a list; ", "text": "in quotes; "}.get(parameter.shape, "")
+    shape = "the same in all cases; " if parameter.decides else shape
+    only = f"; with {parameter.only[0]} = {' or '.join(parameter.only[1])}" if parameter.only else ""
     source = f" ({parameter.source})" if parameter.source else ""
-    return [cell for cell in (parameter.name, unit, text, range_, f"{shape}{parameter.doc}{source}") if cell]
+    return [cell for cell in (parameter.name, unit, text, range_, f"{shape}{parameter.doc}{only}{source}") if cell]
+
+
+def as_json(value: object) -> object:
+    if isinstance(value, tuple):
+        return [as_json(part) for part in value]
+    return repr(value) if value in (math.inf, -math.inf) else value
 
 
 @pytest.mark.parametrize(("kind", "name"), EVERY)
@@ -71,8 +83,7 @@ def test_a_program_is_told_all_that_is_declared_of_a_parameter(
         # all that a declaration has: a field that it gets is told too
         assert each.keys() == vars(parameter).keys(), parameter.name
         for field, value in vars(parameter).items():
-            wanted = list(value) if isinstance(value, tuple) else "inf" if value == float("inf") else value
-            assert each[field] == wanted, (parameter.name, field)
+            assert each[field] == as_json(value), (parameter.name, field)
 
 
 @pytest.mark.parametrize(("kind", "name"), EVERY)

@@ -22,7 +22,7 @@ from met.parameter import Parameter
 from met.plan import Experiment
 from met.plan_codec import Damaged
 from tests.ic.small_decks import check, experiment, told
-from tests.met.declarations.values import NUMBERS, bounds, errors, inner, paths, shaped
+from tests.met.declarations.values import NUMBERS, bounds, constant, errors, inner, paths, several, shaped
 from tests.met.small_models import EVERY, SMALLEST, Small, Use, smallest, uses
 
 UNSTABLE = {"D104"}
@@ -80,8 +80,8 @@ def test_a_number_just_outside_is_refused_where_the_deck_writes_it(
 @pytest.mark.parametrize(("kind", "name"), EVERY)
 def test_so_it_is_in_a_case_of_a_sweep(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for use, parameter in ranged(kind, name):
-        if parameter.shape == "list":
-            continue  # which does not vary
+        if constant(parameter):
+            continue  # which no case varies
         for _, outside, words in bounds(parameter):
             path, unit = paths(use, parameter)[-1], use.unit(parameter)
             cases = f"vary {path} = [{inner(parameter)!r}, {outside!r}] {unit};"
@@ -92,7 +92,7 @@ def test_so_it_is_in_a_case_of_a_sweep(kind: models.Kind, name: str, tmp_path: P
 @pytest.mark.parametrize(("kind", "name"), EVERY)
 def test_so_it_is_on_the_command_line(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for use, parameter in ranged(kind, name):
-        if parameter.shape == "list":
+        if constant(parameter):
             continue
         for _, outside, words in bounds(parameter):
             text = f"{outside!r} {use.unit(parameter)}".rstrip()
@@ -107,7 +107,7 @@ def test_what_comes_out_as_no_number_or_infinite_is_refused(
 ) -> None:
     """No deck can write either; a formula can make one in a case."""
     for use, parameter in ranged(kind, name):
-        if parameter.shape == "list":
+        if constant(parameter):
             continue
         number = expression.format(repr(inner(parameter)))
         text = f"({number}) {use.unit(parameter)}".rstrip()
@@ -132,7 +132,7 @@ def test_so_it_is_in_a_plan_by_hand(kind: models.Kind, name: str, tmp_path: Path
     for use, parameter in ranged(kind, name):
         deck, path = experiment(tmp_path, use.put(tmp_path).deck(), select=["it"]), paths(use, parameter)[-1]
         wrong = [(outside, words) for _, outside, words in bounds(parameter)]
-        wrong += [(x, "") for x in (math.nan, math.inf, -math.inf) if x != parameter.default]
+        wrong += [(x, "") for x in (math.nan, math.inf, -math.inf) if x not in several(parameter.default)]
         for number, words in wrong:
             value = shaped(parameter, use, number) if parameter.shape == "list" else number
             with pytest.raises(Damaged) as raised:

@@ -34,7 +34,7 @@ def test_a_models_functions_give_the_same_recorded_as_with_floats(
         for function, call in calls.items():
             for seed in range(DRAWS):
                 told = both_ways.differences(call, seed)
-                assert not told, (function, use.command, dict(use.words), seed, told)
+                assert not told, (function, use.command, use.analog, dict(use.words), seed, told)
 
 
 def test_a_model_that_computes_otherwise_when_it_is_recorded_is_found(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -19,8 +19,8 @@ from met.diagnostic import Diagnostic
 from met.parameter import Parameter
 from met.units import PURE, UNITS, parse_unit, same
 from tests.ic.small_decks import check, experiment, told
-from tests.met.declarations.values import NUMBERS, holds, inner, paths, shaped
-from tests.met.small_models import EVERY, JOINTS, Use, Value, commands
+from tests.met.declarations.values import NUMBERS, holds, inner, paths, several, shaped
+from tests.met.small_models import EVERY, JOINTS, Use, Value, first_uses, smallest
 
 ODD = "K"
 """A unit of a dimension that no parameter has."""
@@ -31,26 +31,23 @@ WITH_NUMBERS = [
 ]  # fmt: skip
 
 
-def every_use(kind: models.Kind, name: str, joint: str) -> Iterator[Use]:
-    """The uses that may give the model's units a meaning of their own."""
-    kinds = commands(kind, models.find(kind, name))
-    yield from (Use(kind, name, joint, command) for command in (kinds if kind == "command" else kinds[:1]))
+def every_use(kind: models.Kind, name: str, joint: str) -> Iterator[tuple[Use, list[Parameter]]]:
+    """The uses that may give the model's units a meaning of their own, with the parameters that are new in each."""
+    for use, new in first_uses(kind, name, joint):
+        if kind == "command" or use.command == smallest(kind, name).command:
+            yield use, new
 
 
-def numbers_of(use: Use) -> dict[str, tuple[Parameter, Value]]:
+def numbers_of(use: Use, parameters: Iterable[Parameter]) -> dict[str, tuple[Parameter, Value]]:
     """Each parameter that has numbers, with a value in SI that suits the deck: the smallest deck's, the default, ..."""
     found = {}
-    for parameter in use.parameters():
+    for parameter in parameters:
         if parameter.shape not in NUMBERS:
             continue
         tries = (use.values.get(parameter.name), parameter.default, 1e-3, inner(parameter))
-        value = next(v for v in tries if _writable(v) and all(holds(parameter, x) for x in _several(v)))
+        value = next(v for v in tries if _writable(v) and all(holds(parameter, x) for x in several(v)))
         found[parameter.name] = (parameter, value if isinstance(value, tuple) else shaped(parameter, use, value))
     return found
-
-
-def _several(value: Value | None) -> tuple[float, ...]:
-    return value if isinstance(value, tuple) else (value,)  # type: ignore[return-value]
 
 
 def _writable(value: Value | None) -> bool:
@@ -69,7 +66,7 @@ def others(unit: str) -> list[str]:
 
 
 def written(value: Value, unit: str, scale: float = 1.0) -> str:
-    numbers = [repr(x / scale) for x in _several(value)]
+    numbers = [repr(x / scale) for x in several(value)]
     return f"[{', '.join(numbers)}] {unit}" if isinstance(value, tuple) else f"{numbers[0]} {unit}"
 
 
@@ -96,8 +93,8 @@ def refused(folder: Path, use: Use, texts: Mapping[str, str], code: str) -> dict
 def test_a_number_in_another_unit_is_the_same_number_in_si(
     kind: models.Kind, name: str, joint: str, tmp_path: Path
 ) -> None:
-    for use in every_use(kind, name, joint):
-        numbers = numbers_of(use)
+    for use, new in every_use(kind, name, joint):
+        numbers = numbers_of(use, new)
         choices = {each: others(use.unit(parameter)) for each, (parameter, _) in numbers.items()}
         for turn in range(max(map(len, choices.values()), default=0)):
             units = {each: known[turn % len(known)] for each, known in choices.items() if known}
@@ -108,7 +105,7 @@ def test_a_number_in_another_unit_is_the_same_number_in_si(
                 values = [found[path].value for path in paths(use, parameter)]
                 got = values[0] if isinstance(values[0], tuple) else values
                 # a division here, and a multiplication by a product of some factors there
-                assert got == pytest.approx(list(_several(value)), rel=1e-15, abs=0), (each, unit, texts[each])
+                assert got == pytest.approx(list(several(value)), rel=1e-15, abs=0), (each, unit, texts[each])
 
 
 @pytest.mark.parametrize("joint", JOINTS)
@@ -116,8 +113,8 @@ def test_a_number_in_another_unit_is_the_same_number_in_si(
 def test_a_bare_number_is_refused_where_there_is_a_dimension(
     kind: models.Kind, name: str, joint: str, tmp_path: Path
 ) -> None:
-    for use in every_use(kind, name, joint):
-        numbers = {each: (p, v) for each, (p, v) in numbers_of(use).items() if use.dimension(p) != PURE}
+    for use, new in every_use(kind, name, joint):
+        numbers = {each: (p, v) for each, (p, v) in numbers_of(use, new).items() if use.dimension(p) != PURE}
         said = refused(tmp_path, use, {each: written(v, "").strip() for each, (_, v) in numbers.items()}, "D060")
         for each, (parameter, _) in numbers.items():
             named = re.search(r" is in (\S+), and th", said[each].message)
@@ -129,8 +126,8 @@ def test_a_bare_number_is_refused_where_there_is_a_dimension(
 def test_a_number_of_another_dimension_is_refused(
     kind: models.Kind, name: str, joint: str, tmp_path: Path
 ) -> None:
-    for use in every_use(kind, name, joint):
-        numbers = numbers_of(use)
+    for use, new in every_use(kind, name, joint):
+        numbers = numbers_of(use, new)
         said = refused(tmp_path, use, {each: written(v, ODD) for each, (_, v) in numbers.items()}, "D061")
         for each, (parameter, _) in numbers.items():
             named = re.search(rf" is (?:a pure number|in (\S+)), and this is in {ODD}$", said[each].message)
@@ -142,8 +139,8 @@ def test_a_number_of_another_dimension_is_refused(
 def test_the_unit_of_the_other_kind_of_joint_is_refused(
     kind: models.Kind, name: str, joint: str, other: str, tmp_path: Path
 ) -> None:
-    for use, elsewhere in zip(every_use(kind, name, joint), every_use(kind, name, other), strict=True):
-        numbers = {each: (p, v) for each, (p, v) in numbers_of(use).items()
+    for (use, new), (elsewhere, _) in zip(every_use(kind, name, joint), every_use(kind, name, other), strict=True):
+        numbers = {each: (p, v) for each, (p, v) in numbers_of(use, new).items()
                    if not same(use.dimension(p), elsewhere.dimension(p))}  # fmt: skip
         texts = {each: written(v, elsewhere.unit(p)).strip() for each, (p, v) in numbers.items()}
         refused(tmp_path, use, texts, "D061")

@@ -10,11 +10,8 @@ import pytest
 from met import models
 from met.parameter import Parameter
 from tests.ic.small_decks import check, told
-from tests.met.declarations.values import errors
-from tests.met.small_models import EVERY, Use, smallest, uses
-
-NAMED = ("link", "joint")
-"""Parameters of an environment model by which it names a part of the arm."""
+from tests.met.declarations.values import errors, inner
+from tests.met.small_models import EVERY, LINKS, Use, smallest, uses
 
 WITH_WORDS = [
     (kind, name) for kind, name in EVERY
@@ -38,8 +35,9 @@ def test_every_word_that_is_declared_is_taken(kind: models.Kind, name: str, tmp_
                 word = held[f"{use.head}.{parameter.name}"].value
                 assert word == use.values.get(parameter.name, parameter.default)
                 found.add((parameter.name, word))
-    declared = {(p.name, word) for p in smallest(kind, name).in_plan() for word in p.words}
-    assert declared <= found
+    words = {parameter.name: parameter.words for parameter in models.find(kind, name).parameters}
+    names = {p.name: LINKS for p in models.find(kind, name).parameters if p.names == "link"}
+    assert {(each, word) for known in (words, names) for each in known for word in known[each]} <= found
 
 
 @pytest.mark.parametrize(("kind", "name"), WITH_WORDS)
@@ -48,9 +46,9 @@ def test_any_other_word_is_refused_with_those_there_are(kind: models.Kind, name:
     for parameter in words_of(use):
         compiled = check(tmp_path, use.put(tmp_path).deck({parameter.name: "wrongly"}), select=["it"])
         (refused,) = errors(compiled)
-        if parameter.name in NAMED and not parameter.words:
+        if parameter.names:
             assert refused.code == "D159", told(compiled)
-            assert refused.message == f"no {parameter.name} `wrongly` in arm `small`"
+            assert refused.message == f"no {parameter.names} `wrongly` in arm `small`"
         else:
             assert refused.code == "D076", told(compiled)
             assert refused.message == f"`{parameter.name}` of {use.label} cannot be `wrongly`"
@@ -77,3 +75,19 @@ def test_a_word_does_not_vary_as_a_number_does(kind: models.Kind, name: str, tmp
         compiled = check(tmp_path, use.put(tmp_path).deck(cases=f"vary {path} = [1, 2];"), select=["cases"])
         (refused,) = errors(compiled)
         assert f"`{path}`" in refused.message and "word" in refused.message + " ".join(refused.help), told(compiled)
+
+
+@pytest.mark.parametrize(("kind", "name"), WITH_WORDS)
+def test_what_is_not_there_under_a_word_is_refused_with_the_words_under_which_it_is(
+    kind: models.Kind, name: str, tmp_path: Path
+) -> None:
+    for use in uses(kind, name):
+        for parameter in use.absent():
+            text = use.text(parameter, use.small.values.get(parameter.name, inner(parameter)))
+            compiled = check(tmp_path, use.put(tmp_path).deck({parameter.name: text}), select=["it"])
+            (refused,) = errors(compiled)
+            assert parameter.only is not None
+            word, where = parameter.only
+            assert refused.code == "D141", told(compiled)
+            assert refused.message == f"{use.label} has no `{parameter.name}` with `{word} = {use.chosen[word]}`"
+            assert refused.help == (f"it is there with {' or '.join(f'`{word} = {each};`' for each in where)}",)

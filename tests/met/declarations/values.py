@@ -56,8 +56,19 @@ def shaped(parameter: Parameter, use: Use, number: float) -> Value:
     """A value of the parameter's shape with this number in it, the last one of several."""
     if parameter.shape == "number":
         return number
-    count = 3 if parameter.shape == "vector" else len(use.values.get(parameter.name, (0.0,)))
+    of = parameter.as_many_as or parameter.name
+    count = 3 if parameter.shape == "vector" else len(use.values.get(of, (0.0,)))
     return (inner(parameter),) * (count - 1) + (number,)
+
+
+def constant(parameter: Parameter) -> bool:
+    """Whether it has numbers that no case varies, nor the command line."""
+    return parameter.shape == "list" or parameter.decides
+
+
+def several(value: Value | None) -> tuple[float | str | None, ...]:
+    """The numbers of a value, one or more."""
+    return value if isinstance(value, tuple) else (value,)
 
 
 def paths(use: Use, parameter: Parameter) -> list[str]:
