@@ -3,6 +3,8 @@
     <joint>.q .qd .qdd              position, rate, acceleration (rad ...; m ... on a prismatic joint)
     <joint>.tau                     torque on the joint from its servo, rotor's share included (N m; N)
     <joint>.servo.<name>            a servo's memory, state or signal, by its declaration
+    <joint>.servo.sensor.<of>       what the servo's law sees of a quantity through a sensor
+    <joint>.servo.sensor.<of>.<name>                            the sensor's states
     <joint>.servo.command           what the servo was asked at its last tick, in the command's unit
     <joint>.bed.<name>              of a joint whose motor is on a bed: the bed's memory, by its declaration
     <joint>.bed.drive_voltage .load_current                     what the bed's amplifiers hold (V, A)
@@ -190,6 +192,12 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
             for part in held:
                 unit = joint_unit(part.unit, joint, kind)
                 add(f"{joint.name}.servo.{part.name}", unit, part.doc, divisor, joint.name)
+        for sensor in use.sensors:
+            unit = joint_unit(models.quantities(use)[sensor.of], joint, kind)
+            path = f"{joint.name}.servo.sensor.{sensor.of}"
+            add(path, unit, f"what the servo sees as {sensor.of}", use.divisor, joint.name)
+            for state in models.sensor_parts(sensor, "states"):
+                add(f"{path}.{state.name}", watched_unit(state.unit, unit), state.doc, dynamics, joint.name)
         if joint.name in on_beds:
             bed, law = (models.find(kind, getattr(on_beds[joint.name], kind)) for kind in ("bed", "law"))
             for name, unit, doc in of_bed(bed):

@@ -260,7 +260,8 @@ class _Loop:
         tape.cells.update({f"{joint}:Lambda.{joint}": np.float64(load), f"{joint}:b_0": np.float64(0.0)})
         self.beds.advance(tape)
         self.beds.read(tape)
-        self.builder.compute(tape, actuator, *(self.beds.seen(tape, actuator) or (0.0, 0.0)), self._asked())
+        q, qd = self.beds.seen(tape, actuator) or (0.0, 0.0)
+        self.builder.compute(tape, actuator, self.builder.seen(actuator, q, qd, self._asked(), tape.time))
         self.beds.act(tape)
         return {name: float(tape.cells[name]) for name in cells}
 

@@ -20,13 +20,13 @@ from met import units
 from met.diagnostic import Place, Problem, did_you_mean, error
 from met.entry_points import offered
 from met.frozen import frozen
-from met.parameter import Parameter
-from met.plan import ServoUse, Structure
+from met.parameter import Parameter, there
+from met.plan import SensorUse, ServoUse, Structure
 
 if TYPE_CHECKING:
     from met.servos.servo import Parts
 
-Kind = Literal["servo", "environment", "command", "metric", "integrator", "bed", "law"]
+Kind = Literal["servo", "sensor", "environment", "command", "metric", "integrator", "bed", "law"]
 
 
 OF_ONES_OWN = ("a model of your own is known once its package is installed, `pip install -e FOLDER`; `met new` writes "
@@ -60,6 +60,12 @@ def _servos() -> tuple[Iterable[Any], type]:
     from met.servos import SERVOS, Servo
 
     return SERVOS, Servo
+
+
+def _sensors() -> tuple[Iterable[Any], type]:
+    from met.sensors import SENSORS, Sensor
+
+    return SENSORS, Sensor
 
 
 def _environments() -> tuple[Iterable[Any], type]:
@@ -100,6 +106,7 @@ def _laws() -> tuple[Iterable[Any], type]:
 
 GROUPS: dict[Kind, Group] = {
     "servo": Group("met.servos", _servos),
+    "sensor": Group("met.sensors", _sensors),
     "environment": Group("met.environments", _environments),
     "command": Group("met.profiles", _commands),
     "metric": Group("met.metrics", _metrics),
@@ -182,6 +189,7 @@ def packages(structures: Iterable[Structure]) -> tuple[str, ...]:
     used: dict[Kind, set[str]] = {kind: set() for kind in GROUPS}
     for each in structures:
         used["servo"] |= {servo.model for servo in each.servos}
+        used["sensor"] |= {sensor.model for servo in each.servos for sensor in servo.sensors}
         used["command"] |= {servo.command.model for servo in each.servos if servo.command is not None}
         used["environment"] |= {use.model for use in each.environment}
         used["metric"] |= {use.model for use in each.metrics}
@@ -213,6 +221,18 @@ def written(model: Any) -> tuple[Parameter, ...]:
 def has_motor(servo: Any) -> bool:
     """Whether a bed may take the place of this servo's motor: it has one, and its computer sets the voltage."""
     return servo.motor is not None and any(output.name == "voltage" for output in servo.outputs)
+
+
+def quantities(use: ServoUse) -> dict[str, str]:
+    """What a sensor of this servo may be of, with declared units: the joint's motion, states of the servo."""
+    return {"q": "joint", "qd": "joint/s", **{state.name: state.unit for state in servo_parts(use).natural}}
+
+
+def sensor_parts(use: SensorUse, group: str) -> tuple[Any, ...]:
+    """Those of a sensor's `parameters`, `states` or `memory` that are there under this use's words."""
+    sensor = find("sensor", use.model, use.place)
+    defaults = {each.name: each.default for each in sensor.parameters if isinstance(each.default, str)}
+    return tuple(part for part in getattr(sensor, group) if there(part, defaults | dict(use.words)))
 
 
 def servo_parts(use: ServoUse) -> Parts:

@@ -15,6 +15,7 @@ Parameters are named by paths, the ones a deck uses inside a run:
     <joint>.pivot.x|y|z                    m, joint frame: a point of a revolute joint's axis; not there: the origin
     <joint>.servo.<parameter>              as the servo declares
     <joint>.servo.command.<parameter>      as the command declares
+    <joint>.servo.sensor.<of>.<parameter>  as the sensor declares through which the servo's law sees a quantity
     <joint>.bed.<parameter>                as the bed declares that the joint's motor is on
     <joint>.law.<parameter>                as the law declares that drives the bed's load
     initial.<joint>.q|qd                   rad, rad/s (m, m/s)
@@ -133,6 +134,16 @@ class Command:
 
 
 @frozen
+class SensorUse:
+    """A sensor through which a control law sees a quantity: `q`, `qd`, or a state of its servo. words: as a servo's."""
+
+    of: str
+    model: str
+    words: tuple[tuple[str, str], ...] = ()
+    place: Place | None = None
+
+
+@frozen
 class ServoUse:
     """A servo on a joint: the definition's name in the deck, the model, the command.
 
@@ -140,6 +151,7 @@ class ServoUse:
                 dynamics
     words       those of its parameters on which parts of the model depend (`Servo.deciding`): name and word
     continuous  whether its control law is a part of the derivative
+    sensors     through which its law sees; what none of them is of, it sees as it is
     """
 
     joint: str
@@ -150,6 +162,7 @@ class ServoUse:
     place: Place | None = None
     words: tuple[tuple[str, str], ...] = ()
     continuous: bool = False
+    sensors: tuple[SensorUse, ...] = ()
 
 
 @frozen

@@ -21,7 +21,17 @@ from met import plan_rest as rest
 from met.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.outputs import tolerable
 from met.parameter import Parameter
-from met.plan import BASE, COMPONENTS, Coordinate, Experiment, Formula, Quantity, Requirement, Structure
+from met.plan import (
+    BASE,
+    COMPONENTS,
+    Coordinate,
+    Experiment,
+    Formula,
+    Quantity,
+    Requirement,
+    ServoUse,
+    Structure,
+)
 from met.plan_codec import Damaged
 from met.plan_defaults import INERTIA, declared, heads_of_models, of_environment
 from met.trace.graph import TRUTHS, Formulas
@@ -155,7 +165,8 @@ def _check_base(structure: Structure, where: str) -> None:
     known = list(COMPONENTS)
     for index, course in enumerate(base.courses):
         if course.component not in known:
-            raise Damaged(f"{where}.base.courses[{index}].component", f"it should be one of {', '.join(known)}")
+            listed = ", ".join(COMPONENTS)
+            raise Damaged(f"{where}.base.courses[{index}].component", f"it should be one of {listed}, in this order")
         known = known[known.index(course.component) + 1 :]
         models.find("command", course.model, base.place)
     if not structure.velocity_products and base.turns:
@@ -196,6 +207,7 @@ def _check_uses(structure: Structure, where: str) -> None:
             raise Damaged(f"{path}.words", f"no part of a {use.model} depends on a word `{unknown[0]}`")
         if use.continuous and (servo.control is None or servo.clocked):
             raise Damaged(f"{path}.continuous", f"a {use.model} has no continuous law")
+        _check_sensors(use, path)
         if use.continuous and use.divisor != structure.schedule.dynamics:
             raise Damaged(f"{path}.divisor", "of a continuous law it should be that of the dynamics")
     names: list[str] = []
@@ -211,6 +223,20 @@ def _check_uses(structure: Structure, where: str) -> None:
             raise Damaged(f"{where}.metrics[{index}].of", f"there is no channel `{metric.of}`")
     models.find("integrator", structure.integrator)
     _check_substitutions(structure, where)
+
+
+def _check_sensors(use: ServoUse, path: str) -> None:
+    """Sensors of quantities that there are, once each, which the law can see."""
+    if use.sensors and models.find("servo", use.model, use.place).control is None:
+        raise Damaged(f"{path}.sensors", f"a {use.model} has no law that would see them")
+    seen: set[str] = set()
+    for index, sensor in enumerate(use.sensors):
+        where = f"{path}.sensors[{index}]"
+        if sensor.of not in models.quantities(use) or sensor.of in seen:
+            raise Damaged(f"{where}.of", f"there is no `{sensor.of}` to be sensed, or it has a sensor already")
+        seen.add(sensor.of)
+        if use.continuous and models.find("sensor", sensor.model, sensor.place).clocked:
+            raise Damaged(f"{where}.model", f"a {sensor.model} reads at ticks, and the law is continuous")
 
 
 def _moves(kinds: Mapping[str, str], joint: str, path: str) -> None:
@@ -248,6 +274,8 @@ def _check_substitutions(structure: Structure, where: str) -> None:
             raise Damaged(f"{path}.law", f"it should be {first.law}, that of the first substituted joint")
         if servo.continuous:
             raise Damaged(f"{path}.joint", f"the servo of joint `{use.joint}` is continuous: a bed's has a rate")
+        if servo.sensors:
+            raise Damaged(f"{path}.joint", f"the servo of joint `{use.joint}` has sensors: on a bed they are the bed's")
         if servo.divisor != servos[first.joint].divisor:
             message = f"the servo of joint `{use.joint}` should tick with that of `{first.joint}`, the first on a bed"
             raise Damaged(f"{path}.joint", message)
@@ -387,12 +415,19 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
         if use.command is not None and use.command.model in TABLES:
             _check_table(experiment, f"{use.joint}.servo.command", TABLES[use.command.model], where)
         for name, word in use.words:
-            if parameters[f"{use.joint}.servo.{name}"].value != word:
-                raise Damaged(f"{where}.{use.joint}.servo.{name}", f"it should be {word}, as the structure says")
+            _is_word(parameters, f"{use.joint}.servo.{name}", word, where)
+        for sensor in use.sensors:
+            for name, word in sensor.words:
+                _is_word(parameters, f"{use.joint}.servo.sensor.{sensor.of}.{name}", word, where)
     for course in structure.base.courses if structure.base is not None else ():
         if course.model in TABLES:
             _check_table(experiment, f"base.{course.component}", TABLES[course.model], where)
     _check_bodies(experiment, where)
+
+
+def _is_word(parameters: Mapping[str, Quantity], path: str, word: str, where: str) -> None:
+    if path in parameters and parameters[path].value != word:
+        raise Damaged(f"{where}.{path}", f"it should be {word}, as the structure says")
 
 
 def _check_pivots(experiment: Experiment, where: str) -> set[str]:

@@ -86,6 +86,11 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
         for parameter in models.servo_parts(use).parameters:
             held = parameter if use.command is None else under(parameter, use.command.kind)
             yield from _numbers(f"{use.joint}.servo", held, joint_unit(parameter.unit, joint))
+        for sensor in use.sensors:
+            of = joint_unit(models.quantities(use)[sensor.of], joint)
+            head = f"{use.joint}.servo.sensor.{sensor.of}"
+            for parameter in models.sensor_parts(sensor, "parameters"):
+                yield from _numbers(head, parameter, watched_unit(parameter.unit, of))
         if use.command is not None:
             for parameter in models.find("command", use.command.model, use.place).parameters:
                 unit = joint_unit(parameter.unit, joint, use.command.kind)

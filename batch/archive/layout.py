@@ -56,6 +56,7 @@ FRAME = (
     "joint frame: the parent link's frame moved by `at`, turned by `rpy` (fixed x-y-z); a joint moves about or along "
     "its axis in it; the link's frame is the joint frame at q = 0; the world is the base"
 )
+WHERE_IT_MOVES = FRAME.removesuffix("the world is the base") + "the base is a link, which moves in the world"
 
 EVENTS = {
     "splits": "steps split where a joint came to rest",
@@ -324,7 +325,7 @@ def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, 
         "duration_s": schedule.duration,
         "structure_key": keys.structure_key(structure, keys.inputs(experiment)),
         "cases_in_table": experiment.cases.count,
-        "frame": FRAME,
+        "frame": FRAME if structure.base is None else WHERE_IT_MOVES,
         "coordinates": " ".join(coordinates),
     }
 

@@ -10,7 +10,7 @@ from ic.grammar.syntax import Call, Expression
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
-from ic.meaning.models import check_keys, word_of
+from ic.meaning.models import check_keys, refuse_values, word_of
 from ic.meaning.owner import Owner
 from ic.meaning.scope import Scope
 from ic.meaning.servos import course_named, use_course
@@ -42,10 +42,12 @@ def resolve_base(scope: Scope, item: Item | None, arm: Arm) -> tuple[Base | None
     if item is None:
         scope.setting(BASE, "fixed")
         return None, arm
-    if kind not in KINDS:
-        place = place_of(item.value) if item.value is not None else item.place
-        told = f"no base `{kind}`" if kind is not None else "a base is fixed, prescribed or free"
-        scope.complaints.error("D250", told, place, help=[*(did_you_mean(kind, KINDS) if kind else ()), USAGE])
+    if kind not in KINDS or item.appended:
+        wrong = item.appended[0] if item.appended else item.value
+        place = place_of(wrong) if wrong is not None else item.place
+        told = "a base is fixed, prescribed or free" if kind is None or item.appended else f"no base `{kind}`"
+        meant = did_you_mean(kind, KINDS) if kind is not None and kind not in KINDS else ()
+        scope.complaints.error("D250", told, place, help=[*meant, USAGE])
         return None, arm
     scope.setting(BASE, kind, item=item)
     body = item.body or Block()
@@ -56,7 +58,7 @@ def resolve_base(scope: Scope, item: Item | None, arm: Arm) -> tuple[Base | None
                 help = f"its state at the start stands in `initial`: {', '.join(INITIAL)}"
             scope.complaints.error("D250", f"a {kind} base takes no block", item.place, help=help)
         return (Base("free", (), item.place), _standing(scope, item, arm)) if kind == "free" else (None, arm)
-    courses = _courses(scope, item, body)
+    courses = () if refuse_values(scope, item.value, COMPONENTS) else _courses(scope, item, body)
     return Base("prescribed", courses, item.place), _standing(scope, item, arm)
 
 
@@ -87,8 +89,9 @@ def initial_base(scope: Scope, body: Block, base: Base | None) -> None:
         item = body.get(f"{BASE}.{name}")
         wanted = Parameter(name=name, unit=unit, shape="vector", default=NOTHING, doc=DOCS[name])
         if base is not None and base.kind == "free":
-            owner = Owner("the base", item.place if item else base.place or Place("", 1, 1), f"initial.{BASE}")
-            scope.vector(owner, wanted, item)
+            place = item.place if item is not None else base.place
+            assert place is not None  # a base that moves comes from a deck
+            scope.vector(Owner("the base", place, f"initial.{BASE}"), wanted, item)
         elif item is not None:
             told = "a fixed base stays at the world's origin"
             help = "write `base = free;`, or put the arm elsewhere: `at` and `rpy` of the joints on the base"
@@ -153,7 +156,8 @@ def _course(scope: Scope, item: Item) -> str | None:
     told = f"`{item.name}` of the base"
     spot = Owner(told, item.place, f"{BASE}.{item.name}", homes=item.homes, joint=component(item.name).kind,
                  command="position", called=told)
-    model = use_course(scope, spot, inner, item, doc=f"{item.name} of the base", column=item.name, body=item.body)
+    model = use_course(scope, spot, inner, item, doc=f"{item.name} of the base", column=item.name, kind="component",
+                       body=item.body)
     if model is not None:
         scope.setting(f"{BASE}.{item.name}.model", model, item=item)
         path = f"{BASE}.{item.name}"

@@ -29,7 +29,7 @@ from ic.meaning.schedule import (
 )
 from ic.meaning.scope import Scope
 from ic.meaning.servos import RATE, Use, check_rest, check_start, fixed_rate, resolve_servos
-from ic.meaning.substitution import check_ticks, resolve_substitutions
+from ic.meaning.substitution import check_brakes, check_ticks, resolve_substitutions
 from ic.meaning.tables import use_table
 from ic.meaning.tolerances import resolve_tolerances
 from ic.meaning.values import Value, Values, place_of
@@ -98,6 +98,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     if schedule is None or integrator is None:
         return None
     check_ticks(scope, substitutions, ticks, schedule)
+    check_brakes(scope, substitutions, environment)
     _keep_settings(scope, block, arm, integrator, rates, schedule)
     fastest = {}
     on_beds = [each.joint for each in substitutions]
@@ -113,7 +114,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         if h_lambda is not None:
             stability[use.joint] = h_lambda
     servos = tuple(ServoUse(use.joint, use.definition, use.servo.name, use.command, ticks[use.joint].divisor, use.place,
-                            use.words, ticks[use.joint].continuous) for use in uses)  # fmt: skip
+                            use.words, ticks[use.joint].continuous, use.sensors) for use in uses)  # fmt: skip
     structure = Structure(
         arm.name, arm.links, arm.joints, servos, environment, (), products, integrator.name, schedule, (),
         substitutions, base,
@@ -428,6 +429,11 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
         if continuous and use.servo.clocked:
             scope.complaints.error("D106", f"the law of `{use.servo.name}` needs a clock: it cannot be continuous",
                                    rate.place, also=[Label(use.place, "used here")], help="write a rate in Hz")
+        for sensor in use.sensors if continuous else ():
+            if models.find("sensor", sensor.model).clocked and sensor.place is not None:
+                scope.complaints.error("D106", f"a `{sensor.model}` reads at ticks, and the law of joint `{use.joint}` "
+                                       "is continuous", sensor.place, also=[Label(rate.place, "continuous")],
+                                       help="write a rate in Hz, or `low_pass` for a sensor that is analog")
         if continuous:
             rate = dynamics
         ticks[use.joint] = Ticks(divisor(scope.complaints, rate, base, everyone, written=written), continuous)

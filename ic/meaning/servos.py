@@ -25,6 +25,7 @@ from ic.meaning.models import (
 from ic.meaning.owner import Owner, Settled
 from ic.meaning.schedule import CONTINUOUS, Rate
 from ic.meaning.scope import Scope
+from ic.meaning.sensors import use_sensor, without_sensors
 from ic.meaning.trajectories import use_file, with_file_named
 from ic.meaning.unit_words import in_deck
 from ic.meaning.values import measure_of, place_of
@@ -34,7 +35,7 @@ from met.channel import COMMAND_UNIT
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import Command
+from met.plan import Command, SensorUse, ServoUse
 from met.trace import Scalar, where
 
 SLOWEST, FASTEST = 1e-3, 1e9
@@ -54,7 +55,8 @@ BESIDE = "write `model = {};`, and its parameters beside it"
 class Use:
     """A servo on a joint. rate None: the run's `rates.servos`. parameters None: some failed, which was told.
 
-    words  those on which parts of the model depend
+    words    those on which parts of the model depend
+    sensors  through which its law sees
     """
 
     joint: str
@@ -65,6 +67,7 @@ class Use:
     parameters: dict[str, Any] | None
     place: Place
     words: tuple[tuple[str, str], ...] = ()
+    sensors: tuple[SensorUse, ...] = ()
 
     @property
     def has_law(self) -> bool:
@@ -136,6 +139,7 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
     servo = find_bare_model(scope, "servo", model, BESIDE)
     if servo is None:
         return None
+    sensed, block = list(block.of_kind("sensor")), without_sensors(block)
     parameters = use_model(scope, owner, servo.parameters, block, NOT_PARAMETERS)
     command = _command(scope, owner, servo, block.get("command"), place)
     if command is not None:
@@ -150,7 +154,9 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
     scope.setting(f"{item.name}.servo.model", servo.name, item=model)
     scope.whole[f"{item.name}.servo.model"] = f"decides the program: vary `{item.name}.servo` over definitions"
     words = tuple((each.name, word_written(each, block)) for each in servo.parameters if each.name in servo.deciding)
-    return Use(item.name, name, servo, command, rate, parameters, item.place, words)
+    bare = ServoUse(item.name, name, servo.name, command, 1, words=words)
+    sensors = tuple(use for each in sensed if (use := use_sensor(scope, owner, bare, each)) is not None)
+    return Use(item.name, name, servo, command, rate, parameters, item.place, words, sensors)
 
 
 def moving_kind(scope: Scope, item: Item, arm: Arm, so: str) -> str | None:
@@ -328,11 +334,11 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
 
 
 def use_course(scope: Scope, spot: Owner, inner: Expression, item: Item, *, doc: str, column: str,
-               body: Block | None = None) -> str | None:
+               kind: str = "joint", body: Block | None = None) -> str | None:
     """A value, or a course in time, entered in the scope under the path of `spot`: its model; None where there is none.
 
     item    the entry that says it, whose expression is, or holds, `inner`;  body: what of the course is written apart
-    doc     what a value means;  column: of a CSV file, unless one is named
+    doc     what a value means;  column: of a CSV file, unless one is named: the name of the joint, or what `kind` says
     """
     name = word_of(inner) if isinstance(inner, Call) else None
     if name is None or name in ("sqrt", "sin", "cos", "min", "max"):
@@ -354,7 +360,7 @@ def use_course(scope: Scope, spot: Owner, inner: Expression, item: Item, *, doc:
     opened = Block(inside | dict(apart.items), (*(named or Block()).statements, *apart.statements))
     course = replace(spot, label=f"`{name}`", called=None, place=inner.name.place)
     if profile.from_file:
-        use_file(scope, course, profile, opened, column)
+        use_file(scope, course, profile, opened, column, kind)
         return profile.name
     use_model(scope, course, profile.parameters, opened)
     return profile.name
@@ -388,6 +394,10 @@ def check_servo_definition(scope: Scope, name: str) -> None:
         if model is None:
             return
         servo = find_bare_model(scope, "servo", model, BESIDE)
+        for sensor in block.of_kind("sensor"):
+            if sensor.value is not None:
+                find_model(scope, "sensor", word_of(sensor.value), place_of(sensor.value))
+        block = without_sensors(block)
         if servo is not None:
             check_keys(scope, block, [*(p.name for p in servo.parameters), *NOT_PARAMETERS], owner)
             command = block.get("command")

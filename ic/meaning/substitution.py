@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -19,7 +19,7 @@ from ic.meaning.values import place_of
 from met import models
 from met.diagnostic import Label, Place
 from met.parameter import Parameter
-from met.plan import Origin, Schedule, Substitution
+from met.plan import EnvironmentUse, Origin, Schedule, Substitution
 
 DEFAULTS: dict[models.Kind, str] = {"bed": "emulated", "law": "velocity_tracking"}
 USAGE = "write `substitute JOINT { bed = BED(...);  law = LAW(...); }`"
@@ -67,6 +67,18 @@ def check_ticks(scope: Scope, found: tuple[Substitution, ...], ticks: Mapping[st
                       "or substitute them in two runs"])
 
 
+def check_brakes(scope: Scope, found: tuple[Substitution, ...], environment: Iterable[EnvironmentUse]) -> None:
+    """No model puts dry friction on a joint whose motor is on a bed: there friction is the bed's."""
+    for use in environment:
+        rubs = models.find("environment", use.model).rubs
+        joint = scope.parameters.get(f"environment.{use.name}.{rubs}") if rubs else None
+        for each in found:
+            if joint is not None and joint.value == each.joint and use.place is not None and each.place is not None:
+                message = f"`{use.name}` puts friction on joint `{each.joint}`, whose motor is on a bed"
+                scope.complaints.error("D244", message, use.place, also=[Label(each.place, "on a bed")],
+                                       help="leave it out: on a bed, friction is the bed's")
+
+
 def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use]) -> tuple[Substitution, Place] | None:
     """The joint's bed and law, and the place that names the law; None where something failed, which was told."""
     if item.name in arm.lost:
@@ -99,6 +111,12 @@ def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use])
             "D176", f"the servo of joint `{item.name}` has `{only[0]} = {word}`, and a motor on a bed has "
             f"{' or '.join(f'`{each}`' for each in only[1])} alone", item.place, also=[Label(use.place, "its servo")],
             help=f"write `{only[0]} = {only[1][0]};`, or leave the joint to its servo")
+        return None
+    if use.sensors:
+        scope.complaints.error(
+            "D246", f"the servo of joint `{item.name}` has a sensor, and its motor is on a bed, which has its own",
+            item.place, also=[Label(each.place, "the sensor") for each in use.sensors if each.place],
+            help="leave the sensor out in this run: `remove QUANTITY;`, or a servo `like` it without")
         return None
     block = item.body or Block()
     check_keys(scope, block, DEFAULTS, Owner(f"`substitute {item.name}`", item.place, ""))

@@ -30,27 +30,34 @@ def with_file_named(call: Call) -> Call:
     return replace(call, positional=(), named=((Word(FILE.name, named.place), named), *call.named))
 
 
-def use_file(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: str) -> dict[str, Any] | None:
-    """Every parameter of a profile that reads a file, entered in the scope; None where one is missing or wrong."""
+def use_file(
+    scope: Scope, owner: Owner, profile: Profile, body: Block, name: str, kind: str = "joint"
+) -> dict[str, Any] | None:
+    """Every parameter of a profile that reads a file, entered in the scope; None where one is missing or wrong.
+
+    name  of the column, unless another is named: that of the joint, or of what `kind` says
+    """
     others = [each for each in profile.parameters if each.name not in LISTS]
     check_keys(scope, body, [each.name for each in profile.written], owner)
     values = use_model(scope, owner, others, Block({key: item for key, item in body.items.items()
                                                     if key in [each.name for each in others]}))
-    for name in (FILE.name, COLUMN.name, *LISTS):
-        scope.whole[owner.join(name)] = OF_A_FILE
+    for each in (FILE.name, COLUMN.name, *LISTS):
+        scope.whole[owner.join(each)] = OF_A_FILE
     columns: dict[str, tuple[float, ...]] | None = None
     with scope.complaints.gather():
-        columns = _columns(scope, owner, profile, body, joint)
+        columns = _columns(scope, owner, profile, body, name, kind)
     if columns is None:
-        for name in LISTS:
-            scope.checks.fail(owner.join(name))
+        for each in LISTS:
+            scope.checks.fail(owner.join(each))
     return None if values is None or columns is None else {**values, **columns}
 
 
-def _columns(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: str) -> dict[str, tuple[float, ...]]:
+def _columns(
+    scope: Scope, owner: Owner, profile: Profile, body: Block, own: str, kind: str
+) -> dict[str, tuple[float, ...]]:
     """The two lists. Raises Problem."""
     named = named_file(owner, body.get(FILE.name))
-    wanted, place = _column_name(owner, body.get(COLUMN.name), joint), named.place
+    wanted, place = _column_name(owner, body.get(COLUMN.name), own), named.place
     if body.get(COLUMN.name) is not None:
         place = place_of(body.items[COLUMN.name].value or named)
     table = scope.definitions.csv_files.get(named)
@@ -63,16 +70,16 @@ def _columns(scope: Scope, owner: Owner, profile: Profile, body: Block, joint: s
         if column is None:
             why = "the times of the rows stand in a column `time [s]`" if column_name == TIME else ""
             if at is named.place and not why:
-                why = "that of the joint's name is taken, unless `column = \"NAME\"` names another"
+                why = f"that of the {kind}'s name is taken, unless `column = \"NAME\"` names another"
             raise missing_column(table, column_name, at, why)
-        label = here if column_name == TIME else Label(named.place, f"read here for joint `{joint}`")
+        label = here if column_name == TIME else Label(named.place, f"read here for {kind} `{own}`")
         columns[name] = keep_column(scope, owner, declared, table, column, label)
     if len(table.rows) < FEWEST:
         raise Problem(error("D196", f"`{table.file}` has {len(table.rows) or 'no'} row"
                             f"{'s' if not table.rows else ''}", table.columns[0].place, also=[here],
                             help=f"a trajectory has {FEWEST} at least; `table` takes a single point"))
     scope.setting(owner.join(FILE.name), table.file, item=body.get(FILE.name))
-    scope.setting(owner.join(COLUMN.name), wanted, item=body.get(COLUMN.name), note="the joint's name")
+    scope.setting(owner.join(COLUMN.name), wanted, item=body.get(COLUMN.name), note=f"the {kind}'s name")
     return columns
 
 

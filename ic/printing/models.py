@@ -17,6 +17,7 @@ from met.parameter import Parameter
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
 HOW = {
     "servo": "servo NAME { model = MODEL; ... }",
+    "sensor": "sensor QUANTITY = MODEL { ... }, in a servo: of q, qd or a state of the servo",
     "command": "command = rate(MODEL(...)), position(...), torque(...) or acceleration(...), in a servo",
     "environment": "environment { NAME = MODEL { ... } }, in a run",
     "metric": "metric NAME = MODEL { of = CHANNEL; ... }, in a run",

@@ -20,6 +20,10 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
         made[path] = Quantity(value, unit, Origin("derived" if note else "deck", note=note))
 
     word("arm", structure.arm)
+    if structure.base is not None:
+        word("base", structure.base.kind, structure.base.place)
+        for course in structure.base.courses:
+            word(f"base.{course.component}.model", course.model, structure.base.place)
     for joint in structure.joints:
         word(f"{joint.name}.parent", joint.parent, joint.place)
         word(f"{joint.name}.child", joint.child, joint.place)

@@ -35,7 +35,7 @@ STATEMENTS = ("vary", "zip", "sample", "repeat", "exclude", "when", "require", "
 PARTS = ("link", "joint", "metric", "substitute")
 """Words that begin an entry and are followed by a name."""
 
-WORDS = ("on", "off", "base", "faults")
+WORDS = ("on", "off", "base", "faults", "free", "prescribed")
 NAME = r"[A-Za-z_][A-Za-z0-9_]*"
 PATH = rf"{NAME}(?:\s*\.\s*{NAME})*"
 NUMBER = r"(?<![A-Za-z0-9_.])(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"

@@ -2,6 +2,7 @@
 
 from met.environments import (
     attitude_hold,
+    brake,
     bushing,
     gravity,
     gravity_gradient,
@@ -16,6 +17,7 @@ from met.environments.environment import Environment
 
 ENVIRONMENTS: tuple[Environment, ...] = (
     attitude_hold.ENVIRONMENT,
+    brake.ENVIRONMENT,
     bushing.ENVIRONMENT,
     gravity.ENVIRONMENT,
     gravity_gradient.ENVIRONMENT,

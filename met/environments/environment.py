@@ -74,11 +74,14 @@ class Loads:
     gravity  acceleration of free fall, world axes (m/s^2)
     torques  torque on joints by name (N m; N)
     forces   wrenches on links
+    dry      dry friction on joints by name, its level, N m (N): it opposes motion, and holds at rest. Of a model that
+             declares the joint (`Environment.rubs`) alone
     """
 
     gravity: Vector = (0.0, 0.0, 0.0)
     torques: Mapping[str, Real] = field(default_factory=dict)
     forces: tuple[Force, ...] = ()
+    dry: Mapping[str, Real] = field(default_factory=dict)
 
 
 FILE = Parameter(name="file", shape="text", default="none", doc="CSV file whose columns the lists are, in their stead")
@@ -93,6 +96,7 @@ class Environment:
            words; None where it may act. Asked where all its numbers are constants. None: it always may
     pushes the parameter that names the one link that it acts upon: a deck that names one which is part of the ground
            is warned. "": none does
+    rubs   the parameter that names the one joint on which it puts dry friction. "": none does
     from_file  a deck may write `file` in the stead of the lists: they are then the columns of their names, and the
            list that rises is the column `time`
     """
@@ -103,6 +107,7 @@ class Environment:
     loads: Callable[[Any, World], Loads]
     idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None
     pushes: str = ""
+    rubs: str = ""
     from_file: bool = False
 
     @property

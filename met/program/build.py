@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 
 from met.channel import Channel
 from met.plan import Experiment
-from met.program import base
+from met.program import base, sensing
 from met.program.evaluation import law
 from met.program.machine import PARAMETER, Actuator, Machine
 from met.program.observe import derived
@@ -114,6 +114,9 @@ class Builder:
             starts.update(returned(actuator.owner, "begin", found, (state.name for state in parts.natural)))
         for name, value in starts.items():
             tape.write(f"{actuator.path}.{name}", value)
+        states = Values(actuator.owner, {state.name: starts[state.name] for state in parts.natural})
+        q, qd = self._state_of(tape, self.joints[actuator.index])
+        sensing.start(self.machine, tape, actuator, Seen(q, qd, Asked("none", 0.0, 0.0), 0.0, 0.0, states))
 
     def end(self, tape: Tape) -> None:
         for name in OUTPUTS:
@@ -142,24 +145,30 @@ class Builder:
         asked = self.machine.asked(actuator, tape.read, tape.time)
         if actuator.profile is not None:
             tape.write(f"{actuator.path}.command", asked.value)
-        states = {state.name: tape.read(f"{actuator.path}.{state.name}") for state in actuator.parts.natural}
-        on_bed = self.step.beds.seen(tape, actuator)
+        on_bed, between = self.step.beds.seen(tape, actuator), actuator in self.machine.between
+
+        def state(channel: str) -> Real:
+            return self._carried_state(tape, channel) if between else tape.read(channel)
+
         if on_bed is not None:
             q, qd = on_bed
-        elif actuator in self.machine.between:
-            q, qd = self._carried(tape, actuator)
-            states = {name: self._carried_state(tape, f"{actuator.path}.{name}") for name in states}
         else:
-            q, qd = self._state_of(tape, joint)
-        self.compute(tape, actuator, q, qd, asked, states)
+            q, qd = self._carried(tape, actuator) if between else self._state_of(tape, joint)
+        states = {each.name: state(f"{actuator.path}.{each.name}") for each in actuator.parts.natural}
+        seen = self.seen(actuator, q, qd, asked, tape.time, states)
+        self.compute(tape, actuator, sensing.ticked(self.machine, tape, actuator, seen, state))
 
-    def compute(
-        self, tape: Tape, actuator: Actuator, q: Real, qd: Real, asked: Asked, states: Mapping[str, Real] | None = None
-    ) -> None:
+    def seen(
+        self, actuator: Actuator, q: Real, qd: Real, asked: Asked, time: Real, states: Mapping[str, Real] | None = None
+    ) -> Seen:
+        """How things are with a servo's joint at a tick."""
+        period = actuator.use.divisor / self.schedule.base_hz
+        return Seen(q, qd, asked, period, time, Values(actuator.owner, states or {}))
+
+    def compute(self, tape: Tape, actuator: Actuator, seen: Seen) -> None:
         """What the servo's computer does with what it sees and is asked: new outputs, integrals a tick on."""
-        parts, period = actuator.parts, actuator.use.divisor / self.schedule.base_hz
+        parts, period = actuator.parts, seen.period
         held = Values(actuator.owner, {part.name: tape.read(f"{actuator.path}.{part.name}") for part in parts.memory})
-        seen = Seen(q, qd, asked, period, tape.time, Values(actuator.owner, states or {}))
         found = law(actuator, self.machine.servo_values(actuator, tape.read), held, seen)
         for name, slope in found.slopes.items():
             path = f"{actuator.path}.{name}"

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 
 from met.dynamics.recursion import Solved, solve
 from met.dynamics.tree import Tree
+from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
+from met.program import sensing
 from met.program.base import Base, base_of, slopes_of_base
 from met.program.machine import Actuator, Machine, ReadCell
 from met.program.values import Values, answer, parameters, returned
 from met.program.world import ArmWorld
-from met.servos.servo import Control, Drive, JointMotion, Seen
+from met.servos.servo import Asked, Control, Drive, JointMotion, Seen
 from met.trace import Real, Truth, not_, where
 from met.vectors import Vector
 
@@ -69,7 +72,7 @@ def derivative(
     drives = tuple(None if each is None else each.drive for each in driven)
     tree, base, n = machine.tree(read), base_of(machine, read, y, time), len(machine.joints)
     with part("environment"):
-        gravity, torques, wrenches = _environment(machine, tree, read, y, base, time, begin)
+        loads = _environment(machine, tree, read, y, base, time, begin)
 
     told = told or {}
     given: list[Real] = []
@@ -89,10 +92,10 @@ def derivative(
             in_torque_mode = s != 0.0
         mode.append(in_torque_mode)
         given.append(drive.qdd if drive is not None else 0.0)
-        dry.append(0.0 if drive is None or s is None else s * drive.dry)
+        dry.append(0.0 if s is None else s * level_of(machine, i, drive, loads))
 
     smooth = [
-        torques[i] + (0.0 if drive is None or i in told else drive.torque) for i, drive in enumerate(drives)
+        loads.torques[i] + (0.0 if drive is None or i in told else drive.torque) for i, drive in enumerate(drives)
     ]
     with part("dynamics"):
         solved = solve(
@@ -103,10 +106,10 @@ def derivative(
             qdd=tuple(given),
             mode=tuple(mode),
             rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
-            gravity=base.to_base(gravity),
+            gravity=base.to_base(loads.gravity),
             base_acceleration=(base.wd, base.a),
             base_rate=base.w,
-            wrenches=wrenches,
+            wrenches=loads.wrenches,
             velocity_products=machine.structure.velocity_products,
         )
     slopes, state_needs = _slopes(machine, driven, friction)
@@ -114,18 +117,18 @@ def derivative(
     qd, qdd = slopes_of_base(base, solved.base_acceleration, y) if machine.structure.free else ((), ())
     return Derivative(
         slope=Slope((*y.qd[:n], *qd), (*solved.qdd, *qdd), slopes),
-        tau=tuple(a - b for a, b in zip(solved.tau, torques, strict=True)),
+        tau=tuple(a - b for a, b in zip(solved.tau, loads.torques, strict=True)),
         need=needs | state_needs,
         solved=solved,
         shown={path: value for each in driven if each is not None for path, value in each.shown.items()},
-        gravity=gravity,
+        gravity=loads.gravity,
         base=base,
     )
 
 
 @frozen
 class Driven:
-    """A servo at a stage: its physics, the slopes of its states and law, and what it shows, by channel."""
+    """A servo at a stage: its physics, the slopes of its states, law and sensors, and what it shows, by channel."""
 
     drive: Drive
     slopes: Mapping[str, Real]
@@ -140,24 +143,28 @@ def driven_by(
     A continuous law is asked here, for this stage; `held` is then not read.
     """
     servo, parts, owner = actuator.servo, actuator.parts, actuator.owner
-    own = {state.name: y.x[machine.states.index(f"{actuator.path}.{state.name}")] for state in parts.states}
-    natural = Values(owner, {state.name: own[state.name] for state in parts.natural})
+    own = {name: y.x[machine.states.index(name)] for name in actuator.states}
+    natural = Values(owner, {state.name: own[f"{actuator.path}.{state.name}"] for state in parts.natural})
     p = machine.servo_values(actuator, read)
     q, qd = y.q[actuator.index], y.qd[actuator.index]
     slopes: dict[str, Real] = {}
     shown: dict[str, Real] = {}
+    seen = Seen(q, qd, Asked("none", 0.0, 0.0), 0.0, time, natural)
+    of_sensors = sensing.slopes(machine, actuator, read, seen, own)
     if parts.continuous:
-        asked = machine.asked(actuator, read, time)
-        integrals = {state.name: own[state.name] for state in parts.integrals}
-        found = law(actuator, p, Values(owner, integrals), Seen(q, qd, asked, 0.0, time, natural))
+        seen = sensing.through(machine, actuator, read, replace(seen, asked=machine.asked(actuator, read, time)), own)
+        integrals = {state.name: own[f"{actuator.path}.{state.name}"] for state in parts.integrals}
+        found = law(actuator, p, Values(owner, integrals), seen)
         held = Values(owner, {**found.outputs, **integrals})
         slopes.update(found.slopes)
-        shown.update({"command": asked.value} if actuator.profile is not None else {}, **found.outputs)
+        shown.update({"command": seen.asked.value} if actuator.profile is not None else {}, **found.outputs)
+        shown.update({f"sensor.{each.use.of}": sensing.truth(seen, each.use.of) for each in actuator.sensors})
     motion = JointMotion(q, qd, time, begin, actuator.asked)
     drive = answer(owner, servo.drive, p, held, natural, motion)
     slopes.update(returned(owner, "slopes", drive.slopes, (state.name for state in parts.natural)))
     shown.update(returned(owner, "signals", drive.signals, (signal.name for signal in parts.signals)))
-    return Driven(drive, slopes, {f"{actuator.path}.{name}": value for name, value in shown.items()})
+    by_channel = {f"{actuator.path}.{name}": slope for name, slope in slopes.items()}
+    return Driven(drive, by_channel | of_sensors, {f"{actuator.path}.{name}": x for name, x in shown.items()})
 
 
 def law(actuator: Actuator, p: Values, held: Values, seen: Seen) -> Control:
@@ -179,24 +186,60 @@ def _slopes(
     for actuator in machine.working:
         each = driven[actuator.index]
         assert each is not None
-        for state in actuator.parts.states:
-            channel, slope = f"{actuator.path}.{state.name}", each.slopes[state.name]
+        for channel in actuator.states:
+            slope = each.slopes[channel]
             if channel in friction:
                 s, needs[channel] = friction[channel], slope
-                slope = where(s == 0.0, 0.0, slope - s * each.drive.friction[state.name])
+                level = each.drive.friction[channel.removeprefix(f"{actuator.path}.")]
+                slope = where(s == 0.0, 0.0, slope - s * level)
             slopes.append(slope)
     return tuple(slopes), needs
 
 
+@frozen
+class _Loads:
+    """The sum of all loads.
+
+    gravity   world axes, m/s^2;  torques: one a moving joint, N m (N)
+    wrenches  by link: moment about its frame's origin, and force, link axes
+    dry       dry friction on joints, by name, N m (N)
+    """
+
+    gravity: Vector
+    torques: list[Real]
+    wrenches: dict[str, tuple[Vector, Vector]]
+    dry: dict[str, Real]
+
+
+def level_of(machine: Machine, joint: int, drive: Drive | None, loads: _Loads) -> Real:
+    """The level of dry friction at a joint: its servo's, and brakes'."""
+    name = machine.joints[joint].name
+    if drive is None:
+        return loads.dry[name]
+    return drive.dry + loads.dry[name] if name in loads.dry else drive.dry
+
+
+def brakes(
+    machine: Machine, read: ReadCell, y: Motion, time: Real, begin: Real
+) -> dict[str, Real]:
+    """Dry friction that environment models put on joints at state y, by name, N m (N)."""
+    if not machine.braked:
+        return {}
+    tree, base = machine.tree(read), base_of(machine, read, y, time)
+    return _environment(machine, tree, read, y, base, time, begin, [m for m in machine.environment if m[1].rubs]).dry
+
+
 def _environment(
-    machine: Machine, tree: Tree, read: ReadCell, y: Motion, base: Base, time: Real, begin: Real
-) -> tuple[Vector, list[Real], dict[str, tuple[Vector, Vector]]]:
-    """Sum of all loads: gravity (world), torque a joint, wrench a link (moment about its origin, force; link axes)."""
+    machine: Machine, tree: Tree, read: ReadCell, y: Motion, base: Base, time: Real, begin: Real,
+    models: Sequence[tuple[str, Environment]] | None = None,
+) -> _Loads:  # fmt: skip
+    """Sum of the loads of these models; of all, where None."""
     world = ArmWorld(machine, read, tree, y, base, time, begin)
     gravity: list[Real] = [0.0, 0.0, 0.0]
     torques: list[Real] = [0.0 for _ in machine.joints]
     wrenches: dict[str, tuple[Vector, Vector]] = {}
-    for name, model in machine.environment:
+    dry: dict[str, Real] = {}
+    for name, model in machine.environment if models is None else models:
         prefix = f"environment.{name}"
         owner = f"environment model `{model.name}` (as `{name}`)"
         p = parameters(owner, prefix, model.parameters, lambda path: machine.value(path, read))
@@ -205,6 +248,9 @@ def _environment(
         for joint, torque in loads.torques.items():
             number = world._number(joint)
             torques[number] = torques[number] + torque
+        returned(owner, "dry", loads.dry, [getattr(p, model.rubs)] if model.rubs else [])
+        for joint, level in loads.dry.items():
+            dry[joint] = dry[joint] + level if joint in dry else level
         for force in loads.forces:
             if world.is_ground(force.link):
                 continue
@@ -214,4 +260,4 @@ def _environment(
                 moment = tuple(a + b for a, b in zip(before[0], moment, strict=True))  # type: ignore[assignment]
                 total = tuple(a + b for a, b in zip(before[1], total, strict=True))  # type: ignore[assignment]
             wrenches[force.link] = (moment, total)
-    return (gravity[0], gravity[1], gravity[2]), torques, wrenches
+    return _Loads((gravity[0], gravity[1], gravity[2]), torques, wrenches, dry)

@@ -21,9 +21,11 @@ from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Integrator
 from met.metrics.metric import Metric
-from met.plan import BASE, Experiment, Formula, Joint, ServoUse, Structure
+from met.parameter import Memory, Parameter, State
+from met.plan import BASE, Experiment, Formula, Joint, SensorUse, ServoUse, Structure
 from met.program.courses import recorded
 from met.program.values import Values, answer, parameters, returned
+from met.sensors.sensor import Sensor
 from met.servos.servo import Asked, Drive, JointMotion, Parts, Servo
 from met.substitution import Bed, Law
 from met.trace import Formulas, Graph, Real, Scalar
@@ -36,6 +38,23 @@ ReadCell = Callable[[str], Real]
 
 
 @frozen
+class Fitted:
+    """A sensor in use: its declaration, what there is of it here, and what its cells' names begin with."""
+
+    use: SensorUse
+    sensor: Sensor
+    parameters: tuple[Parameter, ...]
+    states: tuple[State, ...]
+    memory: tuple[Memory, ...]
+    path: str
+
+    @property
+    def owner(self) -> str:
+        """Name for messages."""
+        return f"sensor `{self.path}` (model {self.sensor.name})"
+
+
+@frozen
 class Actuator:
     """A servo at work on a moving joint: its declaration, use, and number in the order of moving joints.
 
@@ -43,6 +62,7 @@ class Actuator:
     level    of its dry friction, where it is the same at all times and for all cases, N m (N); None where it varies
     gives    whether it may give the joint's acceleration
     levels   of the dry friction on its states, by name, as `level`
+    sensors  through which its law sees
     """
 
     index: int
@@ -53,6 +73,7 @@ class Actuator:
     level: float | None
     gives: bool
     levels: Mapping[str, float | None]
+    sensors: tuple[Fitted, ...] = ()
 
     @property
     def ticks(self) -> bool:
@@ -62,6 +83,12 @@ class Actuator:
     @property
     def path(self) -> str:
         return f"{self.use.joint}.servo"
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Channels of its states: the servo's, then its sensors'."""
+        own = [f"{self.path}.{state.name}" for state in self.parts.states]
+        return (*own, *(f"{each.path}.{state.name}" for each in self.sensors for state in each.states))
 
     @property
     def asked(self) -> str:
@@ -102,6 +129,14 @@ class Machine:
         return tuple((use.name, models.find("environment", use.model)) for use in self.structure.environment)
 
     @cached_property
+    def braked(self) -> frozenset[str]:
+        """Joints on which environment models put dry friction."""
+        return frozenset(
+            str(self.experiment.parameters[f"environment.{name}.{model.rubs}"].value)
+            for name, model in self.environment if model.rubs
+        )  # fmt: skip
+
+    @cached_property
     def metrics(self) -> tuple[tuple[str, Metric, Channel], ...]:
         return tuple(
             (use.name, models.find("metric", use.model), self.channels[use.of]) for use in self.structure.metrics
@@ -123,8 +158,8 @@ class Machine:
 
     @cached_property
     def states(self) -> tuple[str, ...]:
-        """Channels of the states that servos integrate, in the order of `Motion.x`."""
-        return tuple(f"{actuator.path}.{state.name}" for actuator in self.working for state in actuator.parts.states)
+        """Channels of the states of servos and their sensors, in the order of `Motion.x`."""
+        return tuple(name for actuator in self.working for name in actuator.states)
 
     @cached_property
     def between(self) -> tuple[Actuator, ...]:
@@ -260,13 +295,21 @@ class Machine:
     def _actuator(self, index: int, use: ServoUse) -> Actuator:
         servo = models.find("servo", use.model, use.place)
         profile = models.find("command", use.command.model, use.place) if use.command is not None else None
-        bare = Actuator(index, use, servo, profile, models.servo_parts(use), None, False, {})
+        sensors = tuple(self._fitted(use, each) for each in use.sensors)
+        bare = Actuator(index, use, servo, profile, models.servo_parts(use), None, False, {}, sensors)
         drive, level, levels = self._probe(bare)
-        if drive.given is not None and level != 0.0:
+        if drive.given is not None and (level != 0.0 or use.joint in self.braked):
             message = f"{bare.owner} gives both an acceleration and dry friction"
+            if level == 0.0:
+                message = f"{bare.owner} gives an acceleration, and a brake is on the joint"
             help = "a joint that is told its acceleration has no use for friction"
             raise Problem(error("E219", message, use.place, help=help))
         return replace(bare, level=level, gives=drive.given is not None, levels=levels)
+
+    def _fitted(self, use: ServoUse, sensor: SensorUse) -> Fitted:
+        declared, states, memory = (models.sensor_parts(sensor, group) for group in ("parameters", "states", "memory"))
+        model = models.find("sensor", sensor.model, sensor.place)
+        return Fitted(sensor, model, declared, states, memory, f"{use.joint}.servo.sensor.{sensor.of}")
 
     def _probe(self, actuator: Actuator) -> tuple[Drive, float | None, dict[str, float | None]]:
         """The servo's physics recorded once, to see what it uses; and its levels of dry friction, where known now."""

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from met.integrators.integrator import Motion, Slope
 from met.program import base, cells, friction
 from met.program.asking import Question, advanced, asked, inconstant
-from met.program.evaluation import Derivative, derivative, driven_by
+from met.program.evaluation import Derivative, brakes, derivative, driven_by
 from met.program.machine import Actuator, Machine
 from met.program.observe import Observed
 from met.program.sticking import sticking
@@ -56,9 +56,9 @@ class Step:
             ),
             WhileAny("undecided", 1, (Run(Phase("left_open", self.left_open)),)),
         )
-        # what may hide that a number is none: joints whose acceleration may be given, states that may stick
-        hiding = [self.joints[a.index] for a in machine.working if a.level != 0.0 or a.gives]
-        self._needs = (*hiding, *(each.name for each in self.sticking if each.state))
+        # what may hide that a number is none: joints whose acceleration may be given, and all that may stick
+        gives = [a.use.joint for a in machine.working if a.gives or a.level != 0.0]
+        self._needs = tuple(dict.fromkeys((*gives, *(each.name for each in self.sticking))))
         self._split = WhileAny("crossing", 1, (Run(Phase("split", self.split)),))
 
     def begin(self) -> tuple[Control, ...]:
@@ -118,14 +118,17 @@ class Step:
         """The levels of dry friction at the state, where a step or substep begins, in the units of what they hold."""
         fraction, y = tape.read("fraction"), self._state(tape)
         time, begin = self._time(tape, fraction), tape.read("instant")
+        on_joints = brakes(self.machine, tape.read, y, time, begin)
         found: list[Real] = []
         for each in self.sticking:
-            if each.level is not None:
-                found.append(each.level)
-                continue
-            held = self._held(tape, each.actuator, fraction)
-            drive = driven_by(self.machine, each.actuator, tape.read, y, held, time, begin).drive
-            found.append(drive.friction[each.state] if each.state else drive.dry)
+            own: list[Real] = [] if each.level is None else [each.level]
+            if each.level is None and each.actuator is not None:
+                held = self._held(tape, each.actuator, fraction)
+                drive = driven_by(self.machine, each.actuator, tape.read, y, held, time, begin).drive
+                own.append(drive.friction[each.state] if each.state else drive.dry)
+            if each.name in on_joints:
+                own.append(on_joints[each.name])
+            found.append(own[0] if len(own) == 1 else own[0] + own[1])
         return found
 
     def rubs(self, tape: Tape, name: str) -> Truth:
@@ -372,8 +375,7 @@ class Step:
     def _carried(self, actuator: Actuator) -> list[tuple[str, str]]:
         """What of a servo's joint is carried forward between instants, and the cells: its rate, the servo's states."""
         joint = self.joints[actuator.index]
-        states = [f"{actuator.path}.{state.name}" for state in actuator.parts.natural]
-        return [(joint, f"{joint}.qd"), *((name, name) for name in states)]
+        return [(joint, f"{joint}.qd"), *((name, name) for name in actuator.states)]
 
     # What the phases share.
 

@@ -14,7 +14,7 @@ class Sticking:
 
     name      of its cells: the joint, or the state's channel
     cell      that holds the rate
-    actuator  the servo whose physics gives its friction
+    actuator  the servo whose physics gives its friction; None of a joint without one
     state     name of the state; "" where it is the joint
     number    of the joint in `Motion.qd`; of the state in `Motion.x`
     level     of its friction, where it is the same at all times and for all cases; None where it varies
@@ -22,7 +22,7 @@ class Sticking:
 
     name: str
     cell: str
-    actuator: Actuator
+    actuator: Actuator | None
     state: str
     number: int
     level: float | None
@@ -35,9 +35,12 @@ def sticking(machine: Machine) -> tuple[Sticking, ...]:
     """Joints first, then states; none of a joint whose motor is on a bed: its friction is the bed's."""
     on_bed = [actuator.index for actuator, _, _ in machine.mounted]
     free = [actuator for actuator in machine.working if actuator.index not in on_bed]
-    joints = [
-        Sticking(a.use.joint, f"{a.use.joint}.qd", a, "", a.index, a.level) for a in free if a.level != 0.0
-    ]
+    joints = []
+    for i, (joint, actuator) in enumerate(zip(machine.joints, machine.actuators, strict=True)):
+        own = 0.0 if actuator is None else actuator.level
+        level = None if joint.name in machine.braked else own
+        if i not in on_bed and level != 0.0:
+            joints.append(Sticking(joint.name, f"{joint.name}.qd", actuator, "", i, level))
     names = machine.states
     states = [
         Sticking(f"{a.path}.{name}", f"{a.path}.{name}", a, name, names.index(f"{a.path}.{name}"), level)

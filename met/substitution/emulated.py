@@ -18,10 +18,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from met.parameter import Memory, Parameter
+from met.sensors.digital import converted
 from met.servos.motor import TABLE_1, damping, torque
 from met.substitution import butterworth, shaft
 from met.substitution.bed import Bed, Draw, Wire
-from met.trace import Real, Truth, absolute, clip, rint, sin, where
+from met.trace import Real, Truth, absolute, clip, sin
 
 SUBSTEP = 250e-6
 """Longest substep, s. Against one of 50 us a run moves by 0.005 % of its rate, all faults on."""
@@ -64,12 +65,6 @@ def taken(p: Any, wire: Wire) -> tuple[Wire, Truth]:
     current = converted(wire.current, p.converter_current)
     held = Wire(converted(wire.voltage, p.converter_voltage), clip(current, -p.i_max, p.i_max))
     return held, absolute(current) > p.i_max
-
-
-def converted(x: Real, resolution: Real) -> Real:
-    """x to the nearest of a converter's steps; x itself where the resolution is 0."""
-    step = where(resolution > 0.0, resolution, 1.0)
-    return where(resolution > 0.0, step * rint(x / step), x)
 
 
 ASSUMED = "assumed: of the size that such motors have"

@@ -71,8 +71,8 @@ def test_the_standard_decks_can_be_included_together(tmp_path: Path) -> None:
     compiled = ic.check(together, select="all")
     assert compiled.plan is not None, compiled.diagnostics
     arms = {each.structure.arm for each in compiled.plan.experiments}
-    assert arms == {"ets_vii", "manutec_r3", "manutec_r3_library", "manutec_r3_one_axis", "panda", "puma_560",
-                    "shuttle_arm", "stanford_arm", "station_arm", "two_link"}
+    assert arms == {"ets_vii", "free_flyer", "manutec_r3", "manutec_r3_library", "manutec_r3_one_axis", "panda",
+                    "puma_560", "shuttle_arm", "stanford_arm", "station_arm", "two_link"}
 
 
 def test_of_decks_included_together_none_is_the_default_but_the_decks_own(tmp_path: Path) -> None:

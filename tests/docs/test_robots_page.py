@@ -72,7 +72,7 @@ def test_the_arms_that_come_with_met_are_those_and_have_these_joints_and_this_ma
     for deck, joints, mass in rows:
         made = ic.compile(deck).experiments[0]
         assert len(made.structure.moving) == int(joints)
-        held = {joint.child for joint in made.structure.joints if joint.parent == "base" and joint.kind == "fixed"}
+        held = {"base", *(j.child for j in made.structure.joints if j.parent == "base" and j.kind == "fixed")}
         moved = [link.name for link in made.structure.links if link.name not in {*held, "load"}]
         weighed = sum(made.parameters[f"links.{name}.mass"].value for name in moved)
         assert weighed == pytest.approx(float(mass), abs=0.05)

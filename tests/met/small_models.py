@@ -17,7 +17,7 @@ from typing import Any, get_args
 
 from met import models
 from met.frozen import frozen
-from met.parameter import Parameter, there, under
+from met.parameter import Memory, Parameter, State, there, under
 from met.plan import JointKind
 from met.servos.servo import Parts, parts
 from met.units import PURE, Dimension, parse_unit
@@ -76,8 +76,8 @@ class Small:
 
     values   by parameter, in SI: what must be written, and what makes the model act. Of what is there under some words
              alone, what is written under these; which joint the model is about is not said (`Use.joint`)
-    command  kind of command, of a servo or in which a profile stands; none: the servo's first, or a rate
-    of       what of a joint a metric watches
+    command  kind of command, of a servo or that in which the model stands; none: the servo's first, or a rate
+    of       what of a joint a metric watches, or a sensor is of
     beside   further text for parts of the deck (`PLAIN`), as a model needs that acts on what another one does
     """
 
@@ -107,9 +107,13 @@ SMALLEST: dict[tuple[str, str], Small] = {
     ("servo", "ideal"): Small({"bandwidth": 30.0}),
     ("servo", "passive"): Small({"friction": 1.0}),
     ("servo", "locked"): Small({"release": 0.1}),
+    ("sensor", "tachometer"): Small({"cutoff": 20.0, "noise": 0.01, "resolution": 1e-3, "delay": 1.0}),
+    ("sensor", "encoder"): Small({"step": 1e-3, "delay": 1.0}, command="position", of="q"),
+    ("sensor", "low_pass"): Small({"cutoff": 20.0}),
     ("environment", "attitude_hold"): Small({
         "rpy": (0.1, -0.2, 0.3), "stiffness": (3.0, 4.0, 5.0), "damping": (0.1, 0.2, 0.3), "limit": (0.4, 0.5, 0.6),
     }, beside=FREE),
+    ("environment", "brake"): Small({"torque": 1.0, "from": 0.1}),
     ("environment", "bushing"): Small({
         "link": "tip", "to": "bar", "to_at": (1.0, 0.0, 0.0), "stiffness": (90.0, 50.0, 10.0),
         "damping": (1.0, 2.0, 3.0), "turning": (5.0, 6.0, 7.0), "turning_damping": (0.1, 0.2, 0.3),
@@ -154,7 +158,7 @@ class Use:
 
     joint    the joint that it is on, or whose channel a metric watches
     command  kind of the joint's command; "" where the model has to do with none
-    carrier  of a command, bed or law: the servo that it stands in; "" for the first that takes it
+    carrier  of a command, sensor, bed or law: the servo that it stands in; "" for the first that takes it
     words    words that it writes, by parameter, in the stead of the smallest deck's
     analog   whether the law of the servo is continuous, its own or that in which it stands
     file     whether the lists that a deck could write are columns of a file, in their stead
@@ -181,7 +185,8 @@ class Use:
     def head(self) -> str:
         """What the paths of its parameters begin with."""
         return {
-            "servo": f"{self.joint}.servo", "command": f"{self.joint}.servo.command", "environment": "environment.used",
+            "servo": f"{self.joint}.servo", "sensor": f"{self.joint}.servo.sensor.{self.small.of}",
+            "command": f"{self.joint}.servo.command", "environment": "environment.used",
             "metric": "metrics.m", "bed": f"{self.joint}.bed", "law": f"{self.joint}.law", "integrator": "integrator",
         }[self.kind]  # fmt: skip
 
@@ -189,7 +194,8 @@ class Use:
     def label(self) -> str:
         """What messages call it."""
         return {
-            "servo": "servo `used`", "command": f"`{self.name}`", "environment": "environment `used`",
+            "servo": "servo `used`", "sensor": f"sensor `{self.small.of}` of servo `used`",
+            "command": f"`{self.name}`", "environment": "environment `used`",
             "metric": "metric `m`", "bed": f"bed `{self.name}` of joint `{self.joint}`",
             "law": f"law `{self.name}` of joint `{self.joint}`", "integrator": "",
         }[self.kind]  # fmt: skip
@@ -232,6 +238,10 @@ class Use:
     def parts(self) -> Parts:
         """What there is of the servo."""
         return parts(self.model, self.chosen, continuous=self.analog)
+
+    def held(self, group: str) -> tuple[Memory | State, ...]:
+        """What there is of a group of what the model holds: `memory`, `states`."""
+        return tuple(part for part in getattr(self.model, group) if there(part, self.chosen))
 
     def parameter(self, name: str) -> Parameter:
         return next(parameter for parameter in self.parameters() if parameter.name == name)
@@ -284,6 +294,12 @@ class Use:
             rate = "rate = continuous;" if self.analog else ""
             definition = f"servo used {{ model = {self.name}; {block[2:-2]} {asked} {rate} }}"
             return {"more": definition, "servos": f"{self.joint} = used;"}
+        if self.kind == "sensor":
+            servo = replace(self, kind="servo", name=self.carrier or carrier(self.kind, self.command), words={})
+            taken = servo._parts({name: servo.text(servo.parameter(name), value)
+                                  for name, value in servo.values.items()})  # fmt: skip
+            sensor = f"sensor {self.small.of} = {self.name} {block};"
+            return {**taken, "more": f"{taken['more'].removesuffix('}')} {sensor} }}"}
         if self.kind in ("command", "bed", "law"):
             asked = f"{self.name}{call}" if self.kind == "command" else value_of(self.command, self.joint)
             servo = replace(self, kind="servo", name=self.carrier or carrier(self.kind, self.command), words={})
@@ -340,8 +356,9 @@ def value_of(command: str, joint: str) -> str:
 
 def carrier(kind: str, command: str) -> str:
     """The first servo that takes this command; for a bed or law, that has a motor besides."""
+    on_bed = kind in ("bed", "law")
     return next(name for name, servo in models.find_own("servo").items()
-                if command in servo.commands and (kind == "command" or models.has_motor(servo)))  # fmt: skip
+                if command in servo.commands and (models.has_motor(servo) or not on_bed))  # fmt: skip
 
 
 def commands(kind: str, model: Any) -> tuple[str, ...]:
@@ -350,6 +367,8 @@ def commands(kind: str, model: Any) -> tuple[str, ...]:
         return model.commands or ("",)
     if kind == "command":
         return tuple(ASKED)
+    if kind == "sensor":
+        return (SMALLEST[kind, model.name].command or "rate",)
     return ("rate",) if kind in ("bed", "law") else ("",)
 
 
@@ -378,7 +397,7 @@ def uses(kind: models.Kind, name: str, joint: str = "hinge") -> Iterator[Use]:
             yield replace(plain, words={part: link})
         if kind == "environment" and model.from_file:
             yield replace(plain, file=True)
-        if kind == "servo" and model.control is not None and not model.clocked:
+        if not getattr(model, "clocked", True) and not (kind == "servo" and model.control is None):
             yield replace(plain, analog=True)
 
 

@@ -81,3 +81,8 @@ def test_a_free_base_that_was_not_recorded_is_told(tmp_path: Path) -> None:
     with batch.open(archive) as data, pytest.raises(Problem) as caught:
         data.met.frames()
     assert caught.value.diagnostics[0].help == told.help[:1]
+
+
+def test_an_archive_says_that_its_base_moves(tmp_path: Path) -> None:
+    with batch.open(made(tmp_path, SHORT)) as data:
+        assert data.attrs["frame"].endswith("; the base is a link, which moves in the world")

@@ -130,6 +130,26 @@ error[D250]: this base is prescribed, and nothing says how it moves
 
 1 error
 """),
+    ("base = free; base += fixed;", "", """\
+error[D250]: a base is fixed, prescribed or free
+ --> deck.ic:8:26
+  |
+8 |     base = free; base += fixed;
+  |                          ^^^^^
+  = help: write `base = fixed;`, `base = free;` or `base = prescribed { x = sine(amplitude = 1 cm, frequency = 2 Hz); }`
+
+1 error
+"""),
+    ("base = prescribed(1 m, y = 2 m);", "", """\
+error[D153]: `prescribed` takes its values by name
+ --> deck.ic:8:23
+  |
+8 |     base = prescribed(1 m, y = 2 m);
+  |                       ^^^
+  = help: write `prescribed(x = ..., y = ..., z = ..., roll = ..., pitch = ..., yaw = ...)`
+
+1 error
+"""),
     ("base = prescribed { jaw = 10 deg; }", "", """\
 error[D141]: a prescribed base has no `jaw`
  --> deck.ic:8:25

@@ -110,3 +110,19 @@ def test_check_says_what_a_plan_file_holds(capsys: pytest.CaptureFixture[str]) -
     assert "error[E302]" in capsys.readouterr().err
     assert cli.main(["check", "none.json"]) == 2
     assert "error[E301]" in capsys.readouterr().err
+
+
+def test_the_base_is_explained_of_a_deck_and_of_a_plan(capsys: pytest.CaptureFixture[str]) -> None:
+    text = Path("a.ic").read_text(encoding="utf-8")
+    base = "base = prescribed { x = sine(amplitude = 1 cm, frequency = 2 Hz); }"
+    Path("b.ic").write_text(changed(text, ("arm = swing;", f"arm = swing; {base}")), encoding="utf-8")
+    assert cli.main(["plan", "b.ic", "-q", "-o", "b.json"]) == 0
+    capsys.readouterr()
+    for file in ("b.ic", "b.json"):
+        assert explained(capsys, file, "base")["base"][0] == "prescribed"
+        found = explained(capsys, file, "base.x")
+        assert {path: value for path, (value, _, _) in found.items()} == {
+            "base.x.amplitude": 0.01, "base.x.frequency": 2.0, "base.x.offset": 0.0, "base.x.phase": 0.0,
+            "base.x.model": "sine",
+        }
+    assert explained(capsys, "a.ic", "base")["base"][0] == "fixed"

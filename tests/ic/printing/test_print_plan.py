@@ -12,8 +12,10 @@ from ic.find import find, standard_decks
 from ic.printing.cases import prefixes
 from ic.printing.columns import columns, number, size
 from ic.printing.dump import ORDER, stage_names
+from ic.printing.plan import print_plan
 from met import cli, plan_file
 from met.diagnostic import Problem
+from tests.met.program import free_flyers
 
 DECK = """\
 #define BAR(NAME, MASS) link NAME { mass = MASS; shape = rod(length = 1 m, along = x); }
@@ -556,3 +558,20 @@ def test_doc_says_what_denavit_hartenberg_numbers_are(capsys: pytest.CaptureFixt
     assert [each["name"] for each in json.loads(printed(capsys, "doc", "dh", "--format", "json"))] == [
         "a", "alpha", "d", "theta",
     ]  # fmt: skip
+
+
+def test_a_base_that_moves_is_told(tmp_path: Path) -> None:
+    (tmp_path / "deck.ic").write_text(free_flyers.ARM + free_flyers.RUN, encoding="utf-8")
+    said = "\n".join(print_plan(ic.compile(tmp_path / "deck.ic")))
+    assert """
+  joint        moves             at             rpy              link   mass   servo
+  base         free                                                     40 kg
+  └─ shoulder  revolute about z  [0.5, 0, 0] m  [20, 30, 0] deg  upper  10 kg  passive
+     └─ elbow  revolute about y  [1, 0, 0] m                     lower  5 kg   passive
+
+Base: moves freely, at the start with
+  position  [1, 2, 3] m
+  rpy       [10, 20, 30] deg
+  velocity  [0.1, -0.2, 0.3] m/s
+  rate      [40, 20, -60] deg/s
+""" in said

@@ -234,3 +234,34 @@ def test_what_is_recorded_gives_what_plain_floats_give_lane_by_lane(
         np.testing.assert_allclose([value, slope], wanted, atol=1e-12)
     else:
         np.testing.assert_array_equal([value, slope], wanted)
+
+
+# what jumps
+
+
+JUMPS = [
+    ("constant", {"value": 0.4}, "none"),
+    ("sine", {"amplitude": 1.0, "frequency": 2.0, "phase": 0.3}, "none"),
+    ("trapezoid", {"to": 1.0, "max_rate": 2.0, "max_acceleration": 9.0}, "none"),
+    ("trajectory", {"times": (0.1, 0.4, 0.9), "values": (0.0, 1.0, 0.5), "interpolation": "cubic"}, "none"),
+    ("trajectory", {"times": (0.1, 0.4, 0.9), "values": (0.0, 1.0, 0.5)}, "rate"),
+    ("table", {"times": (0.1, 0.4, 0.9), "values": (0.0, 1.0, 0.5)}, "rate"),
+    ("ramp", {"to": 1.0, "over": 0.5}, "rate"),
+    ("chirp", {"amplitude": 1.0, "f0": 1.0, "f1": 3.0, "over": 0.6}, "rate"),
+    ("step", {"to": 1.0, "at": 0.5}, "value"),
+]
+
+
+def test_every_profile_is_here() -> None:
+    assert {name for name, *_ in JUMPS} == set(models.find_own("command"))
+
+
+@pytest.mark.parametrize(("name", "given", "jump"), JUMPS)
+def test_a_profile_jumps_as_it_says(name: str, given: dict[str, Any], jump: str) -> None:
+    assert profile(name).jump(filled(name, **given)) == jump
+    at = np.linspace(0.0, 1.0, 100_001)
+    value, slope = values(name, at, **given)
+    # a step of 10 us: what does not jump changes by its slope times that, and slopes here change by 200/s at most
+    steps = np.max(np.abs(np.diff(value))), np.max(np.abs(np.diff(slope)))
+    assert (steps[0] > 0.1) == (jump == "value")
+    assert (steps[1] > 0.1) == (jump == "rate")

@@ -25,6 +25,7 @@ from met.plan import Experiment
 from met.program.base import ORIENTATION, base_of, coordinates
 from met.program.machine import Machine
 from met.program.world import ArmWorld
+from met.sensors.sensor import Sensed
 from met.servos.servo import Asked, JointMotion, Seen, Servo
 from met.substitution.balance import Balanced
 from met.substitution.bed import Wire
@@ -156,7 +157,7 @@ def calls(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any
     """Every function that the model declares, by name, as a call on numbers alone."""
     model = use.model
     kinds = {
-        "servo": _servo, "environment": _environment, "command": _command, "metric": _metric,
+        "servo": _servo, "sensor": _sensor, "environment": _environment, "command": _command, "metric": _metric,
         "integrator": _integrator, "bed": _bed, "law": _law,
     }  # fmt: skip
     known = kinds[use.kind](use, experiment)
@@ -246,6 +247,29 @@ def servo_calls(servo: Servo, use: Use, experiment: Experiment) -> dict[str, Cal
         "motor": lambda n: servo.motor(p(n)),
         "at_rest": lambda n: servo.at_rest(p(n)),
     }  # fmt: skip
+
+
+def _sensor(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]]:
+    sensor = use.model
+
+    def p(n: Numbers) -> SimpleNamespace:
+        return parameters(n, use, experiment)
+
+    def states(n: Numbers) -> SimpleNamespace:
+        return held(n, use.held("states"), "states.")
+
+    def value(n: Numbers) -> Any:
+        return n.number("value", n.any)
+
+    def sensed(n: Numbers) -> Sensed:
+        period = 0.0 if use.analog else n.known("period", lambda: n.rng.uniform(1e-4, 2e-3))
+        return Sensed(value(n), period, lambda: n.number("draw", n.rng.normal))
+
+    return {
+        "follow": lambda n: sensor.follow(p(n), states(n), value(n)),
+        "begin": lambda n: sensor.begin(p(n), value(n)),
+        "read": lambda n: sensor.read(p(n), held(n, use.held("memory")), states(n), sensed(n)),
+    }
 
 
 class Answers:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from met.diagnostic import Problem
+from met.integrators.integrator import Motion
 from met.parameter import WORLD
+from met.program.base import Base
 from met.program.machine import Machine
 from met.program.world import ArmWorld
 from tests.ic.small_decks import changed, experiment
@@ -21,7 +23,7 @@ Q, QD = (0.3, -0.7, 0.2, 1.1), (0.5, -0.4, 0.3, -1.0)
 
 def world(tmp_path: Path, text: str = TREE) -> ArmWorld:
     machine = Machine(experiment(tmp_path, text, RUN))
-    return ArmWorld(machine, lambda _: 0.0, machine.tree(lambda _: 0.0), Q, QD, time=0.0, begin=0.0)
+    return ArmWorld(machine, lambda _: 0.0, machine.tree(lambda _: 0.0), Motion(Q, QD), Base(), time=0.0, begin=0.0)
 
 
 def test_orientation_and_rate_are_those_of_pinocchio(tmp_path: Path) -> None:

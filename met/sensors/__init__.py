@@ -1,0 +1,6 @@
+"""Sensor models, one a file. To add one: write its file, add it to `SENSORS`."""
+
+from met.sensors import encoder, low_pass, tachometer
+from met.sensors.sensor import Sensor
+
+SENSORS: tuple[Sensor, ...] = (tachometer.SENSOR, encoder.SENSOR, low_pass.SENSOR)

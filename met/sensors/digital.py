@@ -1,0 +1,48 @@
+"""What becomes of a number on its way into a computer: noise, steps of a converter, and ticks of delay."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from met.parameter import Memory, Parameter
+from met.sensors.sensor import Reading, Sensed
+from met.trace import Real, rint, where
+
+MOST = 3
+"""Ticks of delay that there is room for."""
+
+NOISE = Parameter(name="noise", unit="of", default=0.0, at_least=0.0, doc="noise at each tick, rms")
+RESOLUTION = Parameter(
+    name="resolution", unit="of", default=0.0, at_least=0.0, doc="step of the converter, to the nearest; 0: it has none"
+)
+DELAY = Parameter(
+    name="delay", default=0.0, at_least=0.0, at_most=float(MOST), whole=True,
+    doc="ticks from reading to what the law sees",
+)  # fmt: skip
+PAST = tuple(Memory(name=f"past_{n}", unit="of", doc=f"reading {n} ticks before the last") for n in range(MOST))
+
+
+def noisy(p: Any, value: Real, sensed: Sensed) -> Real:
+    """The value with the noise of this tick."""
+    return value + where(p.noise > 0.0, p.noise * sensed.draw(), 0.0)
+
+
+def converted(x: Real, resolution: Real) -> Real:
+    """x to the nearest of a converter's steps; x itself where the resolution is 0."""
+    step = where(resolution > 0.0, resolution, 1.0)
+    return where(resolution > 0.0, step * rint(x / step), x)
+
+
+def delayed(p: Any, held: Any, value: Real) -> Reading:
+    """The reading of `delay` ticks ago, and the queue a tick on."""
+    queue = [value, *(getattr(held, memory.name) for memory in PAST)]
+    seen = value
+    for ago in range(1, MOST + 1):
+        seen = where(p.delay == float(ago), queue[ago], seen)
+    return Reading(seen, {memory.name: queue[n] for n, memory in enumerate(PAST)})
+
+
+def filled(value: Real) -> Mapping[str, Real]:
+    """The queue where a run begins."""
+    return {memory.name: value for memory in PAST}
