@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
 from functools import partial
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, Literal
@@ -323,4 +324,13 @@ def _print(lines: Iterable[str]) -> None:
 def _print_json(told: object) -> None:
     import json
 
-    click.echo(json.dumps(told, indent=1))
+    click.echo(json.dumps(_spelled(told), indent=1, allow_nan=False))
+
+
+def _spelled(told: object) -> object:
+    """The same with the words of plan files for numbers that JSON has none for: "inf", "nan"."""
+    if isinstance(told, Mapping):
+        return {key: _spelled(part) for key, part in told.items()}
+    if isinstance(told, list | tuple):
+        return [_spelled(part) for part in told]
+    return repr(told) if isinstance(told, float) and not math.isfinite(told) else told

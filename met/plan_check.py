@@ -459,19 +459,21 @@ def _check_quantity(quantity: Quantity, unit: str, parameter: Parameter | None, 
             raise Damaged(f"{where}.value", "it should be a list of numbers")
         if not all(math.isfinite(number) for number in value):
             raise Damaged(f"{where}.value", "one of its numbers is not finite")
+        if parameter is not None:
+            _check_bounds(value, parameter, where, "one of its numbers: ")
     elif isinstance(value, str | tuple):
         raise Damaged(f"{where}.value", "it should be a number")
     elif isinstance(value, float):
         if parameter is None and not math.isfinite(value):
             raise Damaged(f"{where}.value", "it is not finite")
         if parameter is not None:
-            _check_bounds(value, parameter, where)
+            _check_bounds((value,), parameter, where)
 
 
-def _check_bounds(value: float, parameter: Parameter, where: str) -> None:
+def _check_bounds(values: tuple[float, ...], parameter: Parameter, where: str, head: str = "") -> None:
     for holds, message in _bounds(parameter):
-        if not holds(np.array([[value]]))[0]:
-            raise Damaged(f"{where}.value", message)
+        if not holds(np.array(values).reshape(-1, 1)).all():
+            raise Damaged(f"{where}.value", head + message)
 
 
 def _bounds(parameter: Parameter) -> list[tuple[Callable[[np.ndarray], np.ndarray], str]]:
@@ -482,8 +484,12 @@ def _bounds(parameter: Parameter) -> list[tuple[Callable[[np.ndarray], np.ndarra
         (parameter.below, "below", np.less),
         (parameter.at_most, "at most", np.less_equal),
     )
-    whole = [(_is_whole, "it should be a whole number")] if parameter.whole else []
-    return whole + [
+    tests: list[tuple[Callable[[np.ndarray], np.ndarray], str]] = [
+        (partial(_is_finite, parameter.default), "it is not finite")
+    ]
+    if parameter.whole:
+        tests.append((_is_whole, "it should be a whole number"))
+    return tests + [
         (partial(_within, holds, limit), f"it should be {words} {limit:g}")
         for limit, words, holds in written
         if limit is not None
@@ -492,6 +498,12 @@ def _bounds(parameter: Parameter) -> list[tuple[Callable[[np.ndarray], np.ndarra
 
 def _within(holds: np.ufunc, limit: float, values: np.ndarray) -> np.ndarray:
     return np.asarray(holds(values[:, 0], limit))
+
+
+def _is_finite(default: object, values: np.ndarray) -> np.ndarray:
+    """Infinite is possible too as a model's own default, or a part of it, that stands for never or none."""
+    numbers = [x for x in (default if isinstance(default, tuple) else (default,)) if isinstance(x, float)]
+    return np.asarray(np.isfinite(values[:, 0]) | np.isin(values[:, 0], [x for x in numbers if math.isinf(x)]))
 
 
 def _is_whole(values: np.ndarray) -> np.ndarray:

@@ -109,11 +109,15 @@ def use_model(scope: Scope, owner: Owner, parameters: Iterable[Parameter], body:
     """
     parameters = tuple(parameters)
     words = {p.name: word_written(p, body) for p in parameters if p.shape == "word"}
+    wrong = [p.name for p in parameters if p.words and not p.names and words[p.name] not in p.words]
     known = [p.name for p in parameters if there(p, words) or body.get(p.name) is not None]
     check_keys(scope, body, [*known, *extra], owner)
     values: dict[str, Any] = {}
     for wanted in parameters:
         item = body.get(wanted.name)
+        if wanted.only is not None and wanted.only[0] in wrong:
+            scope.checks.fail(owner.join(wanted.name))  # no word at all is told of where words are read
+            continue
         if wanted.only is not None and not there(wanted, words):
             _check_unused(scope, owner, wanted, wanted.only, body, words)
             continue

@@ -16,6 +16,7 @@ from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
 from met.diagnostic import Label, Place, did_you_mean
 from met.parameter import WORLD, Parameter
+from met.plan import BASE
 
 
 def check_relations(scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: Block,
@@ -57,6 +58,8 @@ def check_names(scope: Scope, owner: Owner, parameters: Iterable[Parameter], bod
                                    help="give the link another name")
         elif word not in (*names, *lost):
             others = [f"or {' or '.join(f'`{each}`' for each in wanted.words)}"] if wanted.words else []
+            if word == BASE:
+                others.append("the base is a link where it moves: `base = free;` in the run")
             scope.complaints.error("D159", f"no {wanted.names} `{word}` in arm `{arm}`", place,
                                    help=[*did_you_mean(word, names),
                                          known_words(f"{wanted.names}s", known[wanted.names]), *others])

@@ -155,8 +155,10 @@ def fastest_rate(
         return None
     from types import SimpleNamespace
 
-    with scope.complaints.gather():
-        found: Real = bound(SimpleNamespace(**parameters))
+    # as in the engine, a division by a product that is too small for a double is infinite, and no exception
+    numbers = {name: np.float64(x) if isinstance(x, float) else x for name, x in parameters.items()}
+    with scope.complaints.gather(), np.errstate(all="ignore"):
+        found: Real = bound(SimpleNamespace(**numbers))
         return found
     return None
 

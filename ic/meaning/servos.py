@@ -176,11 +176,13 @@ def moving_kind(scope: Scope, item: Item, arm: Arm, so: str) -> str | None:
 
 
 def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, block: Block, used: Place) -> None:
-    """What this kind of command needs is written."""
+    """What this kind of command needs is written, or given by a sweep or on the command line."""
     item = block.get("command")
     place = place_of(item.value) if item is not None and item.value is not None else used
     for parameter in servo.parameters:
-        if command.kind in parameter.needed_for and block.get(parameter.name) is None:
+        settled = scope.parameters.get(owner.join(parameter.name))
+        given = block.get(parameter.name) is not None or (settled is not None and settled.origin.kind != "default")
+        if command.kind in parameter.needed_for and not given:
             message = f"{owner.label} needs `{parameter.name}` under a {command.kind} command"
             scope.complaints.error(
                 "D160",
@@ -404,8 +406,12 @@ def check_servo_definition(scope: Scope, name: str) -> None:
                 inner = _asked(scope, command.value)
                 if not isinstance(inner, Call):
                     scope.names.evaluate(inner)
+            words = {p.name: p for p in servo.parameters if p.shape == "word"}
             for key, item in block.items.items():
                 if key in NOT_PARAMETERS or item.value is None:
+                    continue
+                if key in words:
+                    scope.word(owner, words[key], item)
                     continue
                 try:
                     scope.written(item)

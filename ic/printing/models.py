@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterable, Iterator
+from dataclasses import fields
 from typing import Any, get_args
 
 from ic.printing.columns import columns, number, vector
@@ -28,8 +29,7 @@ HOW = {
 OTHERS = ("channels", "designs", "dh", "distributions", "functions", "shapes", "substitute", "sweep", "units")
 """What else `met doc` has a page on (ic/printing/subjects.py)."""
 
-FIELDS = ("name", "unit", "doc", "default", "above", "at_least", "below", "at_most", "shape", "words", "names",
-          "source", "only")
+FIELDS = tuple(field.name for field in fields(Parameter))
 """What a program is told of a parameter."""
 
 WORDS = {
@@ -174,7 +174,8 @@ def default(parameter: Parameter) -> str:
         return value
     if value == ():
         return "none"
-    return vector(value, "1") if isinstance(value, tuple) else number(value)
+    needed = f"; needed under {', '.join(parameter.needed_for)}" if parameter.needed_for else ""
+    return vector(value, "1") if isinstance(value, tuple) else f"{number(value)}{needed}"
 
 
 def range_(parameter: Parameter) -> str:
@@ -185,7 +186,9 @@ def range_(parameter: Parameter) -> str:
         return " | ".join(parameter.words)
     whole = ["whole"] if parameter.whole else []
     bounds = (("> ", parameter.above), (">= ", parameter.at_least), ("< ", parameter.below), ("<= ", parameter.at_most))
-    return ", ".join(whole + [f"{sign}{number(bound)}" for sign, bound in bounds if bound is not None])
+    told = ", ".join(whole + [f"{sign}{number(bound)}" for sign, bound in bounds if bound is not None])
+    needed = parameter.above_where_needed
+    return told if needed is None else f"{told}; > {number(needed)} where needed".removeprefix("; ")
 
 
 def meaning(parameter: Parameter) -> str:

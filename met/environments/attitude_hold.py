@@ -57,7 +57,7 @@ ENVIRONMENT = Environment(
     name="attitude_hold",
     doc=__doc__,
     parameters=(
-        Parameter(name="link", shape="word", default="base", doc="link that is held"),
+        Parameter(name="link", shape="word", names="link", default="base", doc="link that is held"),
         Parameter(name="rpy", unit="rad", shape="vector", default=ZERO, doc="wanted attitude, fixed x-y-z, world axes"),
         Parameter(
             name="stiffness", unit="N*m/rad", shape="vector", default=ZERO, at_least=0.0,

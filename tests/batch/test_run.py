@@ -197,7 +197,7 @@ class TestRefusedBeforeAnythingRuns:
         usage = namedtuple("usage", "total used free")
         monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(10**9, 10**9 - 5000, 5000))
         assert self.run("a.h5") == (
-            "error[E306]: cannot write a.h5: it needs about 78.9 KiB until it is whole, and the disk has 4.9 KiB left\n"
+            "error[E306]: cannot write a.h5: it needs about 79.5 KiB until it is whole, and the disk has 4.9 KiB left\n"
             " = help: `--histories none` keeps metrics only; `--float32`, fewer signals in `record`, or a slower "
             "`rates.record`, take less\n"
             "\n1 error\n"
@@ -370,7 +370,7 @@ class TestWhatIsSaid:
         assert without_times(said) == (
             "nominal: 1 case, 2 s in 50 steps of 40 ms, modified_euler\n"
             "  histories: q, qd, tau, shoulder.servo.voltage; 51 rows, 2.8 KiB a case\n"
-            "writing two_link.h5, about 56.2 KiB\n"
+            "writing two_link.h5, about 56.8 KiB\n"
             "\n"
             "the case reached its end, TIME of computing\n"
             "  settle      5 s  settling_time of shoulder.qd\n"

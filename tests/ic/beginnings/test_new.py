@@ -21,19 +21,35 @@ from ic.beginnings.models import MODELS
 from ic.formatting.formatter import formatted
 from met import cli, models
 from tests.met import test_every_model as every
+from tests.met.declarations import both_ways, test_defaults, test_ranges, test_traced, test_units
+from tests.met.small_models import JOINTS, SMALLEST, Small
 
 ROOT = Path(__file__).parents[3]
 USES = {
-    "servo": {
-        "more": "servo mine { model = begun; gain = 20 N*m*s/rad; limit = 5 N*m; rotor = 0.2 kg*m^2; }",
-        "servos": "hinge = mine { command = rate(0.5 rad/s); };",
-    },
-    "environment": {"environment": "drag = begun { link = tip; damping = 3 N*s/m; };"},
-    "command": {"servos": every.DRIVEN.format("rate(begun(to = 0.5 rad/s, over = 0.1 s))")},
-    "metric": {"metric": "begun { of = slide.qd; }"},
-    "integrator": {"integrator": "begun"},
+    "servo": Small({"gain": 20.0, "limit": 5.0, "rotor": 0.2}),
+    "environment": Small({"link": "tip", "damping": 3.0}),
+    "command": Small({"to": 0.5, "over": 0.1}),
+    "metric": Small(),
+    "integrator": Small(),
 }
-"""The model `begun` of each kind in the small deck that every model of MET's own must run from."""
+"""What the small deck that every model of MET's own must run from says of the model `begun` of each kind."""
+
+
+OF_DECLARATIONS = (
+    test_traced.test_a_models_functions_give_the_same_recorded_as_with_floats,
+    test_ranges.test_a_number_at_its_bound_is_taken_as_it_is,
+    test_ranges.test_a_number_just_outside_is_refused_where_the_deck_writes_it,
+    test_ranges.test_so_it_is_in_a_case_of_a_sweep,
+    test_ranges.test_so_it_is_in_a_plan_by_hand,
+    test_defaults.test_what_a_deck_leaves_out_has_its_default,
+    test_defaults.test_writing_the_defaults_changes_neither_plan_nor_bits,
+    test_defaults.test_what_must_be_written_is_missed_by_its_name,
+)
+OF_UNITS = (
+    test_units.test_a_number_in_another_unit_is_the_same_number_in_si,
+    test_units.test_a_bare_number_is_refused_where_there_is_a_dimension,
+    test_units.test_a_number_of_another_dimension_is_refused,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -114,9 +130,15 @@ def test_a_model_does_what_every_model_must(
     kind: models.Kind, begin: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begin(kind)
-    monkeypatch.setitem(every.SMALLEST, (kind, "begun"), USES[kind])
+    monkeypatch.setitem(SMALLEST, (kind, "begun"), USES[kind])
     every.test_a_model_declares_what_its_numbers_are(kind, "begun")
     every.test_it_runs_from_a_small_deck_and_its_bits_depend_on_the_case_alone(kind, "begun", tmp_path)
+    both_ways.use_sines_of_ones_own(monkeypatch)
+    for test in OF_DECLARATIONS:
+        test(kind, "begun", tmp_path)
+    for joint in JOINTS:
+        for test in OF_UNITS:
+            test(kind, "begun", joint, tmp_path)
 
 
 @pytest.mark.parametrize("kind", MODELS)
@@ -218,4 +240,4 @@ def test_the_kinds_of_the_command_are_those_that_can_be_begun() -> None:
     from ic.cli_new import new
 
     assert new.params[0].type.choices == ("deck", *MODELS)  # type: ignore[attr-defined]
-    assert set(files.MODELS) | {"bed", "law"} == set(models.GROUPS)
+    assert set(files.MODELS) | {"bed", "law", "sensor"} == set(models.GROUPS)

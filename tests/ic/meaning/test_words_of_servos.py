@@ -72,3 +72,48 @@ def test_the_gains_of_a_continuous_law_count_for_its_stability(tmp_path: Path) -
     compiled = check(tmp_path, ARM, SERVO, changed(slow, ("servos = 100 Hz", "servos = continuous")))
     assert [each.code for each in compiled.diagnostics] == ["D105"]
     assert "h * lambda = 0.75" in compiled.diagnostics[0].message
+
+
+@pytest.mark.parametrize("used", [True, False], ids=["used", "by no run"])
+def test_a_wrong_word_is_told_once_and_nothing_of_what_depends_on_it(used: bool, tmp_path: Path) -> None:
+    wrong = changed(CURVED, ("friction = stribeck", "friction = stribek"))
+    servos = wrong if used else wrong.replace("servo drive", "servo other") + SERVO
+    assert told(check(tmp_path, ARM, servos, RUN)) == f"""\
+error[D076]: `friction` of servo `{"drive" if used else "other"}` cannot be `stribek`
+ --> deck.ic:8:33
+  |
+8 |     tau_max = 1 N*m; friction = stribek;  f_c = 0.01 N*m;  f_s = 0.02 N*m;  rate_s = 3 rad/s;  j_m = 1e-4 kg*m^2;
+  |                                 ^^^^^^^
+  = help: did you mean `stribeck`?
+  = help: one of: coulomb, stribeck, lugre
+
+1 error
+"""
+
+
+def test_a_word_in_quotes_is_told_once(tmp_path: Path) -> None:
+    assert told(check(tmp_path, ARM, changed(CURVED, ("= stribeck", '= "stribeck"')), RUN)) == """\
+error[D076]: `friction` of servo `drive` is a word, without quotes
+ --> deck.ic:8:33
+  |
+8 |     tau_max = 1 N*m; friction = "stribeck";  f_c = 0.01 N*m;  f_s = 0.02 N*m;  rate_s = 3 rad/s;  j_m = 1e-4 kg*m^2;
+  |                                 ^^^^^^^^^^
+  = help: one of: coulomb, stribeck, lugre
+
+1 error
+"""
+
+
+def test_a_ratio_whose_square_is_nothing_is_infinitely_fast(tmp_path: Path) -> None:
+    elastic = "compliant_gearbox; stiffness = 9 N*m/rad; damping = 1 N*m*s/rad"
+    geared = changed(SERVO, ("rigid_gearbox", elastic), ("100", "1e-200"))
+    assert told(check(tmp_path, ARM, geared, RUN)) == """\
+error[D104]: servo `drive` is unstable with modified_euler at this rate of the dynamics
+  --> deck.ic:14:24
+   |
+14 |     rates { dynamics = 1 kHz; servos = 1 kHz; record = 100 Hz; }
+   |                        ^^^^^ h * lambda = inf; the slowest rate that fits is none
+   = help: h * lambda must stay below 2; lambda is the servo's fastest rate constant, on any arm
+
+1 error
+"""

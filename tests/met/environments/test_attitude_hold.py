@@ -12,7 +12,7 @@ import pytest
 from met import run as engine
 from met.dynamics.spatial import rotation_about, rotation_rpy
 from met.environments.attitude_hold import ENVIRONMENT, loads
-from tests.ic.small_decks import changed, check, experiment, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, experiment, told
 
 DECK = """\
 arm top { link base { mass = 3 kg; inertia = [2, 3, 4] kg*m^2; } }
@@ -125,4 +125,19 @@ warning[D256]: environment `h` changes nothing: link `base` moves as it is told
   = help: write `base = free;` in the run, or name a link that a joint moves
 
 1 warning
+"""
+
+
+def test_one_on_a_base_that_is_no_link_is_told_where_it_stands(tmp_path: Path) -> None:
+    held = changed(RUN, ("duration", "environment { h = attitude_hold { stiffness = [1, 1, 1] N*m/rad; } }  duration"))
+    assert told(check(tmp_path, ARM, SERVO, held)) == """\
+error[D159]: no link `base` in arm `swing`
+  --> deck.ic:15:19
+   |
+15 |     environment { h = attitude_hold { stiffness = [1, 1, 1] N*m/rad; } }  duration = 1 s;
+   |                   ^
+   = help: links: bar
+   = help: the base is a link where it moves: `base = free;` in the run
+
+1 error
 """
