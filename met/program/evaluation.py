@@ -9,8 +9,10 @@ from met.dynamics.recursion import Solved, solve
 from met.dynamics.tree import Tree
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
-from met.program.base import Base, base_of, slopes_of_base
+from met.program.base import Base, base_of, free_base
+from met.program.bodies import slopes
 from met.program.machine import Actuator, Machine, ReadCell
+from met.program.payloads import laden, shared, slopes_of_payloads
 from met.program.values import Values, answer, parameters, returned
 from met.program.world import ArmWorld
 from met.servos.servo import Control, Drive, JointMotion, Seen
@@ -67,9 +69,10 @@ def derivative(
             for i, actuator in enumerate(machine.actuators)
         )
     drives = tuple(None if each is None else each.drive for each in driven)
-    tree, base, n = machine.tree(read), base_of(machine, read, y, time), len(machine.joints)
+    tree, base, n = laden(machine, read), base_of(machine, read, y, time), len(machine.joints)
     with part("environment"):
-        gravity, torques, wrenches = _environment(machine, tree, read, y, base, time, begin)
+        gravity, torques, loads = _environment(machine, tree, read, y, base, time, begin)
+        wrenches, on_payloads = shared(machine, read, loads)
 
     told = told or {}
     given: list[Real] = []
@@ -109,11 +112,16 @@ def derivative(
             wrenches=wrenches,
             velocity_products=machine.structure.velocity_products,
         )
-    slopes, state_needs = _slopes(machine, driven, friction)
+    of_states, state_needs = _slopes(machine, driven, friction)
     needs = {joint.name: a - b for joint, a, b in zip(machine.joints, smooth, solved.tau_load, strict=True)}
-    qd, qdd = slopes_of_base(base, solved.base_acceleration, y) if machine.structure.free else ((), ())
+    qd, qdd = (*y.qd[:n],), solved.qdd
+    body = free_base(machine)
+    if body is not None:
+        of_base = slopes(body, y, pose=base.pose, turned=base.turned, solved=solved.base_acceleration)
+        qd, qdd = (*qd, *of_base[0]), (*qdd, *of_base[1])
+    of_payloads = slopes_of_payloads(machine, read, y, on_payloads, gravity)
     return Derivative(
-        slope=Slope((*y.qd[:n], *qd), (*solved.qdd, *qdd), slopes),
+        slope=Slope((*qd, *of_payloads[0]), (*qdd, *of_payloads[1]), of_states),
         tau=tuple(a - b for a, b in zip(solved.tau, torques, strict=True)),
         need=needs | state_needs,
         solved=solved,
@@ -191,7 +199,8 @@ def _slopes(
 def _environment(
     machine: Machine, tree: Tree, read: ReadCell, y: Motion, base: Base, time: Real, begin: Real
 ) -> tuple[Vector, list[Real], dict[str, tuple[Vector, Vector]]]:
-    """Sum of all loads: gravity (world), torque a joint, wrench a link (moment about its origin, force; link axes)."""
+    """Sum of all loads: gravity (world), torque a joint, wrench a link or payload (moment about its origin, force; its
+    axes)."""
     world = ArmWorld(machine, read, tree, y, base, time, begin)
     gravity: list[Real] = [0.0, 0.0, 0.0]
     torques: list[Real] = [0.0 for _ in machine.joints]
