@@ -84,6 +84,7 @@ def arm_of(plan: Plan, case: Case, prefix: str) -> Arm:
         world = world_poses(experiment, values, q, base)
         parents = {joint.child: joint.parent for joint in experiment.structure.joints}
         parents |= {BASE: ""} if BASE in world else {}
+        parents |= {payload.name: payload.link for payload in experiment.structure.payloads if not payload.flies}
         within = {name: compose(inverse(world.get(parents[name], HERE)), pose) for name, pose in world.items()}
         poses = {name: moved(pose, len(case.time)) for name, pose in within.items()}
         links = [link.name for link in experiment.structure.links]

@@ -138,8 +138,9 @@ def _check_order(scope: Scope, item: Item, times: list[Real | None], place: Plac
         return
     head = f"payloads.{item.name}"
     scope.checks.hold((grapple, release), _not_in_order, code="D264", path=f"{head}.release",
-                      message=f"payload `{item.name}` is released before it is grappled", place=place,
-                      needs=(f"{head}.grapple", f"{head}.release"), help="`release` comes after `grapple`")
+                      message=f"payload `{item.name}` is not released after it is grappled", place=place,
+                      needs=(f"{head}.grapple", f"{head}.release"),
+                      help="write a later `release`, or an earlier `grapple`")
 
 
 def _check_solid(scope: Scope, owner: Owner, payload: Payload, item: Item) -> None:
@@ -150,12 +151,12 @@ def _check_solid(scope: Scope, owner: Owner, payload: Payload, item: Item) -> No
         return
     body = item.body or Block()
     given = next((part for name in ("inertia", "shape", "mass") if (part := body.get(name)) is not None), item)
-    helps = ["give it a shape with three dimensions: a box, a cylinder or a sphere",
-             "or an `inertia` whose principal moments are all above 0"]
+    helps = ("what flies has mass, and resists a turn about every axis: a box, a cylinder or a sphere does",
+             "or leave `grapple` and `release` out: then it is a part of its link")
     scope.checks.hold(
         tuple(each.value for each in settled if each is not None),  # type: ignore[misc]  # numbers, by the test above
-        _not_solid, code="D265", place=value_at(given), help=tuple(helps), needs=(*paths, f"{owner.path}.shape"),
-        message=f"payload `{payload.name}` flies, and has no inertia about some axis")
+        _not_solid, code="D265", place=value_at(given), help=helps, needs=(*paths, f"{owner.path}.shape"),
+        message=f"payload `{payload.name}` is no body that could fly")
 
 
 def _not_in_order(pairs: np.ndarray) -> tuple[np.ndarray, list[str]]:

@@ -165,6 +165,8 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
             adds = f"`metric {item.name} = ...` would add a metric"
             if not {"bed", "law"}.isdisjoint(item.body.items):
                 adds = f"`substitute {item.name} {{ ... }}` would put this joint's motor on a bed"
+            if not {"on", "mass", "grapple", "release"}.isdisjoint(item.body.items):
+                adds = f"`payload {item.name} {{ ... }}` would add a payload"
             scope.complaints.error(
                 "D109", f"nothing named `{item.name}` in run `{definition.name}` to change", item.place,
                 help=belongs(item.name) or [*did_you_mean(item.name, (*metrics, *KEYS)), adds])
