@@ -224,6 +224,33 @@ def test_a_gradient_of_gravity_pulls_at_payloads_too(tmp_path: Path) -> None:
     np.testing.assert_allclose(run.signals["payloads.box.position"][0, :900], place, rtol=0, atol=1e-8)
 
 
+PLUME = """\
+arm tower { link mast { mass = 10 kg; shape = sphere(radius = 0.3 m); }
+            joint turn revolute { parent = base; child = mast; axis = z; } }
+run it {
+    arm = tower;
+    payload box { mass = 1000 kg; inertia = [90, 90, 90] kg*m^2; on = mast; grapple = 1 s; position = [3, 0, 0] m;
+                  attitude = [0, -90, 0] deg; }
+    environment {
+        jet = plume { link = box; width = 2 cm; height = 2 cm; nozzle_link = mast; nozzle = [1, 0, 0] m;
+                      axis = [1, 0, 0]; thrust = 50 N; exponent = 8; sigma_n = 1; sigma_t = 0; }
+    }
+    rates { dynamics = 100 Hz; record = 10 Hz; }
+    duration = 2 s;
+    record = [q, qd, payloads.box.velocity, payloads.box.carried, tau_load];
+}
+"""
+
+
+def test_the_gas_of_a_thruster_pushes_a_payload_in_flight(tmp_path: Path) -> None:
+    # straight on: 2 q A with q = (n + 2) thrust/(4 pi r^2), the plate a hundredth of the distance wide
+    run = engine.run(experiment(tmp_path, PLUME))
+    force = 2.0 * 4e-4 * 10.0 * 50.0 / (4.0 * math.pi * 2.0**2)
+    assert run.signals["payloads.box.velocity"][0, 9, 0] == pytest.approx(0.9 * force / 1000.0, rel=2e-4)
+    assert run.signals["payloads.box.carried"][0, 9:11].tolist() == [0.0, 1.0]
+    assert run.signals["qd"][0, :10].tolist() == [[0.0]] * 10
+
+
 SERVOS = """\
 servo rub { model = passive; friction = 50 N*m; }
 servo hold { model = locked; release = 1.5 s; }
