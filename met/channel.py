@@ -19,7 +19,10 @@ Derived, that is computed from the state only where a record or a metric asks fo
     <joint>.reaction.moment|force   what the link takes from its parent: about its frame's origin, in its axes
     links.<link>.position, .orientation, .velocity, .rate       of the link's frame, in world axes
     links.<link>.jacobian.angular|linear.<joint>                rate and velocity for each unit of the joint's rate
-    energy.kinetic|potential, momentum.linear|angular           of all that the joints move
+    energy.kinetic|potential, momentum.linear|angular           of all that the joints move, and of payloads
+    payloads.<payload>.position, .orientation, .velocity, .rate of the payload's frame, in world axes
+    payloads.<payload>.distance     from the point `at` of its link to its frame
+    payloads.<payload>.carried      1 while its link carries it, 0 while it flies
 
 A vector is one channel a component: `links.tip.position.x`, `links.tip.orientation.w`.
 """
@@ -76,6 +79,14 @@ OF_LINK = (
     ("orientation", "1", "unit quaternion of the link's frame", WXYZ, "from link axes to world axes, w >= 0"),
     ("velocity", "m/s", "velocity of the link frame's origin", XYZ, WORLD_AXES),
     ("rate", "rad/s", "angular velocity of the link", XYZ, WORLD_AXES),
+)
+OF_PAYLOAD = (
+    ("position", "m", "origin of the payload's frame", XYZ, WORLD_AXES),
+    ("orientation", "1", "unit quaternion of the payload's frame", WXYZ, "from payload axes to world axes, w >= 0"),
+    ("velocity", "m/s", "velocity of the payload frame's origin", XYZ, WORLD_AXES),
+    ("rate", "rad/s", "angular velocity of the payload", XYZ, WORLD_AXES),
+    ("distance", "m", "from its point of the link to the payload's frame", (), ""),
+    ("carried", "1", "1 while the link carries it, 0 while it flies", (), ""),
 )
 JACOBIAN = (
     ("jacobian.angular", "angular", "rate of the link by the joint's rate"),
@@ -217,6 +228,9 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
             for joint in carrying:
                 path = f"links.{link.name}.{name}.{joint.name}"
                 derive(path, joint_unit(unit, joint), doc, XYZ, WORLD_AXES, joint.name)
+    for payload in structure.payloads:
+        for name, unit, doc, several, frame in OF_PAYLOAD:
+            derive(f"payloads.{payload.name}.{name}", unit, doc, several, frame)
     for name, unit, doc, components, frame in OF_ARM:
         derive(name, unit, doc, components, frame)
     return found
@@ -255,8 +269,8 @@ def channel_paths(name: str, joints: tuple[str, ...], components: tuple[str, ...
 
 
 def joint_of(name: str) -> str:
-    """The joint that a variable of one thing belongs to, by its name; none for a link's and the arm's."""
-    if name.startswith(("links.", *(own for own, *_ in OF_ARM))):
+    """The joint that a variable of one thing belongs to, by its name; none for a link's, a payload's and the arm's."""
+    if name.startswith(("links.", "payloads.", *(own for own, *_ in OF_ARM))):
         return ""
     return name.partition(".")[0]
 

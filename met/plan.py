@@ -23,6 +23,12 @@ Parameters are named by paths, the ones a deck uses inside a run:
     base.<component>.<parameter>           of a prescribed base, as the profile declares that gives this component
     environment.<name>.<parameter>         as the environment model declares; uniform gravity is `gravity`, `g`
     metrics.<name>.<parameter>             as the metric declares
+    payloads.<name>.mass .com.x .inertia.xx ...             of a payload, as of a link, in its own frame
+    payloads.<name>.at|rpy.x|y|z           its frame in its link's, m, rad (fixed x-y-z): where it is held from the
+                                           start; of one that is grappled `at` alone, the point that it should come to
+    payloads.<name>.grapple|release        s; each only where it is grappled, released
+    payloads.<name>.position|attitude|velocity|rate.x|y|z   where it flies first, as `initial.base.` has it (attitude:
+                                           rpy); only where it is grappled
 
 A vector parameter of a model is three numbers, `.x .y .z`.
 """
@@ -46,6 +52,9 @@ BASE = "base"
 
 COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
 """Of the pose of a prescribed base: m, and rad about fixed x, y, z."""
+
+INSTANT = 1e-6
+"""Share of a step of the dynamics by which a written time may lie after the instant that it means: rounding."""
 
 REPEAT, SEED = "noise:repeat", "noise:seed"
 """Inputs of a program besides coordinates: no path of a deck's has a colon."""
@@ -189,6 +198,28 @@ class EnvironmentUse:
 
 
 @frozen
+class Payload:
+    """A rigid body that a link carries; its numbers are parameters.
+
+    link      that carries it, the base too
+    grappled  whether it flies freely first, until the link grapples it
+    released  whether it flies freely in the end
+    """
+
+    name: str
+    link: str
+    grappled: bool = False
+    released: bool = False
+    place: Place | None = None
+    shape: tuple[str, tuple[tuple[str, float], ...]] | None = None
+
+    @property
+    def flies(self) -> bool:
+        """Whether it moves freely for a time: it is otherwise a part of its link."""
+        return self.grappled or self.released
+
+
+@frozen
 class MetricUse:
     """A metric under a name of the deck's, watching one channel (`Channel.path`)."""
 
@@ -295,6 +326,7 @@ class Structure:
     record: tuple[Recorded, ...]
     substitutions: tuple[Substitution, ...] = ()
     base: Base | None = None
+    payloads: tuple[Payload, ...] = ()
 
     @property
     def free(self) -> bool:

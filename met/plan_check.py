@@ -20,7 +20,7 @@ from met import plan_relations as relations
 from met import plan_rest as rest
 from met.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.outputs import tolerable
-from met.parameter import Parameter
+from met.parameter import WORLD, Parameter
 from met.plan import (
     BASE,
     COMPONENTS,
@@ -64,6 +64,7 @@ def check(experiments: Iterable[Experiment]) -> None:
         names.append(experiment.name)
         _check_arm(experiment.structure, f"{where}.structure")
         _check_base(experiment.structure, f"{where}.structure")
+        _check_payloads(experiment.structure, f"{where}.structure.payloads")
         _check_schedule(experiment.structure, f"{where}.structure")
         _check_uses(experiment.structure, f"{where}.structure")
         _check_record(experiment.structure, f"{where}.structure.record")
@@ -171,6 +172,19 @@ def _check_base(structure: Structure, where: str) -> None:
         models.find("command", course.model, base.place)
     if not structure.velocity_products and base.turns:
         raise Damaged(f"{where}.velocity_products", "a base that turns needs them")
+
+
+def _check_payloads(structure: Structure, where: str) -> None:
+    """Payloads have names of their own, and links that carry them; their flight keeps the velocity products."""
+    names = [BASE, WORLD, *(link.name for link in structure.links)]
+    links = (BASE, *(link.name for link in structure.links))
+    for index, payload in enumerate(structure.payloads):
+        _name(payload.name, f"{where}[{index}].name", names)
+        names.append(payload.name)
+        if payload.link not in links:
+            raise Damaged(f"{where}[{index}].link", f"there is no link `{payload.link}`")
+    if not structure.velocity_products and any(payload.flies for payload in structure.payloads):
+        raise Damaged(f"{where.rpartition('.')[0]}.velocity_products", "a payload that flies needs them")
 
 
 def _check_schedule(structure: Structure, where: str) -> None:
@@ -540,6 +554,19 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
         tests.append((f"{head}.mass", [f"{head}.mass"], _is_mass, "it should be at least 0"))
         inertia = [f"{head}.inertia.{entry}" for entry in INERTIA]
         tests.append((f"{head}.inertia", inertia, _is_inertia, "a principal moment is below 0: no body has that"))
+    for payload in structure.payloads:
+        head = f"payloads.{payload.name}"
+        inertia = [f"{head}.inertia.{entry}" for entry in INERTIA]
+        if payload.flies:
+            tests.append((f"{head}.mass", [f"{head}.mass"], _is_some, "what flies has mass"))
+            message = "a principal moment is not above 0: what flies turns about all axes"
+            tests.append((f"{head}.inertia", inertia, _is_solid, message))
+        else:
+            tests.append((f"{head}.mass", [f"{head}.mass"], _is_mass, "it should be at least 0"))
+            tests.append((f"{head}.inertia", inertia, _is_inertia, "a principal moment is below 0: no body has that"))
+        if payload.grappled and payload.released:
+            times = [f"{head}.grapple", f"{head}.release"]
+            tests.append((times[1], times, _in_order, "it is not after `grapple`"))
     for joint in structure.moving:
         axis = [f"{joint.name}.axis.{letter}" for letter in "xyz"]
         tests.append((f"{joint.name}.axis", axis, _is_axis, "its length should be 1"))
@@ -594,6 +621,19 @@ def _is_some(values: np.ndarray) -> np.ndarray:
 def _is_axis(values: np.ndarray) -> np.ndarray:
     with np.errstate(all="ignore"):
         return np.abs(np.sqrt((values * values).sum(axis=1)) - 1.0) <= ROUNDING
+
+
+def _in_order(values: np.ndarray) -> np.ndarray:
+    return np.asarray(values[:, 0] < values[:, 1])
+
+
+def _is_solid(values: np.ndarray) -> np.ndarray:
+    """Positive definite beyond rounding, by the pivots of the matrix scaled to its largest entry."""
+    with np.errstate(all="ignore"):
+        xx, yy, zz, xy, xz, yz = values.T / np.abs(values).max(axis=1)
+        second, side = yy - xy * xy / xx, yz - xy * xz / xx
+        third = zz - xz * xz / xx - side * side / second
+        return np.logical_and.reduce([pivot > ROUNDING for pivot in (xx, second, third)])
 
 
 def _is_inertia(values: np.ndarray) -> np.ndarray:

@@ -15,6 +15,9 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 OF_FREE_BASE = (("position", "m"), ("rpy", "rad"), ("velocity", "m/s"), ("rate", "rad/s"))
 """Of the initial state of a free base: vectors, world axes."""
 
+OF_FLIGHT = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("rate", "rad/s"))
+"""Of a payload that flies first: vectors, world axes."""
+
 
 def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity | None]]:
     """Paths that the experiment lacks, each with its model's default or the servo's value, None where neither is."""
@@ -71,6 +74,7 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
             yield f"links.{link.name}.com.{axis}", "m", None, None
         for entry in INERTIA:
             yield f"links.{link.name}.inertia.{entry}", "kg*m^2", None, None
+    yield from _of_payloads(structure)
     kinds = {joint.name: joint for joint in structure.joints}
     for joint in structure.joints:
         vectors = [("at", "m"), ("rpy", "rad"), *([] if joint.kind == "fixed" else [("axis", "1")])]
@@ -114,6 +118,20 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
         of = watched[metric.of].unit if metric.of in watched else "1"
         for parameter in models.find("metric", metric.model, metric.place).parameters:
             yield from _numbers(f"metrics.{metric.name}", parameter, watched_unit(parameter.unit, of))
+
+
+def _of_payloads(structure: Structure) -> Iterator[Declared]:
+    for payload in structure.payloads:
+        head = f"payloads.{payload.name}"
+        yield f"{head}.mass", "kg", None, None
+        for entry in INERTIA:
+            yield f"{head}.inertia.{entry}", "kg*m^2", None, None
+        held = () if payload.grappled else (("rpy", "rad"),)
+        for name, unit in (("com", "m"), ("at", "m"), *held, *(OF_FLIGHT if payload.grappled else ())):
+            for axis in "xyz":
+                yield f"{head}.{name}.{axis}", unit, None, None
+        for name in ("grapple",) * payload.grappled + ("release",) * payload.released:
+            yield f"{head}.{name}", "s", None, None
 
 
 def _of_base(structure: Structure) -> Iterator[Declared]:

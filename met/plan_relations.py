@@ -41,8 +41,9 @@ def check_uses(experiment: Experiment, uses: Iterable[tuple[str, tuple[Parameter
 
 def named(structure: Structure, parameter: Parameter) -> tuple[str, ...]:
     """What a word that names something of the arm may be."""
-    of_arm = structure.links if parameter.names == "link" else structure.moving
-    return (*(each.name for each in of_arm), *parameter.words)
+    bodies = (*(link.name for link in structure.links), *(payload.name for payload in structure.payloads))
+    of_arm = bodies if parameter.names == "link" else tuple(joint.name for joint in structure.moving)
+    return (*of_arm, *parameter.words)
 
 
 def tests(experiment: Experiment, uses: Iterable[tuple[str, tuple[Parameter, ...]]]

@@ -230,8 +230,10 @@ def _cause(experiment: Experiment, failure: float, number: float, tick: float) -
     if failure == 0.0:
         return ""
     moving = experiment.structure.moving
-    if int(number) == len(moving):
+    if int(number) == len(moving) and experiment.structure.free:
         return _cause_of_base(experiment, failure, tick)
+    if int(number) >= len(moving):
+        return _cause_of_payload(experiment, int(number) - len(moving) - experiment.structure.free, tick)
     joint = moving[int(number)]
     prismatic = joint.kind == "prismatic"
     unit = "kg" if prismatic else "kg m^2"
@@ -253,6 +255,17 @@ def _cause(experiment: Experiment, failure: float, number: float, tick: float) -
         f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: a step too long for "
         f"the servo or the arm (see the stability figures of `met plan`; try a faster rate for the dynamics), or a "
         f"model that divides by zero."
+    )
+
+
+def _cause_of_payload(experiment: Experiment, number: int, tick: float) -> str:
+    """Why a case failed by one of the payloads that fly, in words."""
+    payload = [each for each in experiment.structure.payloads if each.flies][number]
+    where = f" ({payload.place.file}:{payload.place.line})" if payload.place else ""
+    return (
+        f"t = {tick / experiment.structure.schedule.base_hz:g} s: payload {payload.name}: position, rate or "
+        f"acceleration is no longer a finite number{where}. Usual reasons: a step too long for what acts on it (try a "
+        f"faster rate for the dynamics), or a model that divides by zero."
     )
 
 

@@ -37,8 +37,10 @@ class Arm:
     prefix    before the names of its frames and topics; "" where it is alone
     values    its parameters by path, in SI; the numbers among them
     first     the same of the case in which shapes are as the plan has them
-    parents   of each link: the link, or "base", that carries it; "" of the base, where it is a link
-    poses     of each link in its parent, by row; of the base in the world
+    parents   of each link: the link, or "base", that carries it; "" of the base, where it is a link, and of payloads
+              that fly for a time
+    poses     of each link in its parent, by row; of the base in the world. And of each payload, but of those that fly
+              for a time only where their position and orientation were recorded
     place     of each link's origin from the base's at the first row, world axes, m
     travel    of each joint that slides: the stretch of q, 0 in it, that this case uses, m
     """
@@ -84,6 +86,12 @@ def arm_of(plan: Plan, case: Case, prefix: str) -> Arm:
         world = world_poses(experiment, values, q, base)
         parents = {joint.child: joint.parent for joint in experiment.structure.joints}
         parents |= {BASE: ""} if BASE in world else {}
+        told = {variable.name for variable in group.role("signal")}
+        for payload in experiment.structure.payloads:
+            parents[payload.name] = "" if payload.flies else payload.link
+            names = [f"payloads.{payload.name}.{part}" for part in ("position", "orientation")]
+            if payload.flies and told.issuperset(names):
+                world[payload.name] = free_pose(*(case.signal(name).astype(np.float64) for name in names))
         within = {name: compose(inverse(world.get(parents[name], HERE)), pose) for name, pose in world.items()}
         poses = {name: moved(pose, len(case.time)) for name, pose in within.items()}
         links = [link.name for link in experiment.structure.links]

@@ -19,7 +19,7 @@ from batch.export.poses import Arm
 from batch.export.wire import plain
 from batch.plotting.sheet import COLOURS
 from met.dynamics.spatial import IDENTITY, Pose, compose, rotation_rpy
-from met.plan import BASE, Joint, Link
+from met.plan import BASE, Joint, Link, Payload
 
 Vector = tuple[float, float, float]
 
@@ -69,10 +69,13 @@ def scene(arm: Arm, root: str, ghost: bool, size: float) -> Any:
         ground = _entity(out, root, f"{arm.prefix}{BASE}")
         _draw(ground, [(ORIGIN, _at(arm, joint)) for joint in carried.get(BASE, ())], grey)
         _draw(ground, _rails(arm, carried.get(BASE, ())), grey)
-    for number, link in enumerate(structure.links):
+    payloads = [payload for payload in structure.payloads if payload.name in arm.poses]
+    bodies: list[Link | Payload] = [*structure.links, *payloads]
+    for number, link in enumerate(bodies):
         entity = _entity(out, arm.prefix + link.name, arm.prefix + link.name)
         colour = _colour(LINKS[number % len(LINKS)], opacity)
-        told = {"link": link.name, "mass": f"{arm.values.get(f'links.{link.name}.mass', math.nan):g} kg"}
+        what = "payload" if isinstance(link, Payload) else "link"
+        told = {what: link.name, "mass": f"{arm.values.get(f'{head(link)}.mass', math.nan):g} kg"}
         if drawn(link):
             kind, numbers = shape_of(arm, link)
             _solid(entity, kind, numbers, _middle(arm, link, kind, numbers), colour)
@@ -87,12 +90,17 @@ def scene(arm: Arm, root: str, ghost: bool, size: float) -> Any:
     return out
 
 
-def drawn(link: Link) -> bool:
+def head(link: Link | Payload) -> str:
+    """What the paths of a link's or payload's parameters begin with."""
+    return f"payloads.{link.name}" if isinstance(link, Payload) else f"links.{link.name}"
+
+
+def drawn(link: Link | Payload) -> bool:
     """Whether a link has a shape that is drawn."""
     return link.shape is not None and set(SIZES.get(link.shape[0], ("none",))) <= set(dict(link.shape[1]))
 
 
-def shape_of(arm: Arm, link: Link) -> tuple[str, dict[str, float]]:
+def shape_of(arm: Arm, link: Link | Payload) -> tuple[str, dict[str, float]]:
     """A link's shape in this case: kind and sizes, in m; `along` as 0, 1 or 2.
 
     The plan has the sizes of its first case. Where a sweep varies a size by its path, this case has its own; and where
@@ -103,14 +111,14 @@ def shape_of(arm: Arm, link: Link) -> tuple[str, dict[str, float]]:
     sizes = dict(numbers)
     along = "xyz"[int(sizes.get("along", 0.0))]
     length = f"size_{along}" if kind == "box" else "length"
-    centre = f"links.{link.name}.com.{along}"
+    centre = f"{head(link)}.com.{along}"
     before, now = arm.first.get(centre, math.nan), arm.values.get(centre, math.nan)
     if length in sizes and now > 0.0 and math.isclose(2.0 * before, sizes[length], rel_tol=1e-9):
         sizes[length] = 2.0 * now
     group = arm.case.group
     varied = {v.path: float(group.at(v.name, [arm.case.position])[0]) for v in group.role("coordinate")}
     for name in sizes:
-        path = f"links.{link.name}.shape.{name}".replace("size_", "size.")
+        path = f"{head(link)}.shape.{name}".replace("size_", "size.")
         sizes[name] = varied.get(path, sizes[name])
     return kind, sizes
 
@@ -126,11 +134,11 @@ def _entity(scene: Any, frame: str, name: str) -> Any:
     return entity
 
 
-def _middle(arm: Arm, link: Link, kind: str, numbers: Mapping[str, float]) -> Vector:
+def _middle(arm: Arm, link: Link | Payload, kind: str, numbers: Mapping[str, float]) -> Vector:
     """Where the middle of a link's shape is in the link's frame."""
-    inertia = arm.experiment.parameters.get(f"links.{link.name}.inertia.xx")
+    inertia = arm.experiment.parameters.get(f"{head(link)}.inertia.xx")
     if inertia is not None and inertia.origin.kind != "deck":
-        return _numbers(arm, f"links.{link.name}.com", "xyz")
+        return _numbers(arm, f"{head(link)}.com", "xyz")
     axis = _axis(numbers)
     lengths = {"sphere": 0.0, "box": numbers.get(f"size_{'xyz'[axis.index(1.0)]}", 0.0)}
     return _scaled(axis, lengths.get(kind, numbers.get("length", 0.0)) / 2.0)
@@ -153,9 +161,9 @@ def _solid(entity: Any, kind: str, numbers: Mapping[str, float], middle: Vector,
         _cylinder(entity, middle, _axis(numbers), numbers.get("radius", ROD * length), length, colour)
 
 
-def _bare(entity: Any, arm: Arm, link: Link, carried: Sequence[Joint], colour: Any, size: float) -> None:
+def _bare(entity: Any, arm: Arm, link: Link | Payload, carried: Sequence[Joint], colour: Any, size: float) -> None:
     """A link that has no shape: lines to its joints, or to its centre of mass."""
-    com = _numbers(arm, f"links.{link.name}.com", "xyz")
+    com = _numbers(arm, f"{head(link)}.com", "xyz")
     ends = [_at(arm, joint) for joint in carried] or [com]
     _draw(entity, [(ORIGIN, end) for end in ends], colour)
     if not carried:

@@ -7,36 +7,31 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ic.grammar.syntax import Call, Expression, Name, Unary
-from ic.meaning.bodies import check_body, check_moved
+from ic.meaning.bodies import check_moved
 from ic.meaning.complaints import belongs, known_words
 from ic.meaning.dh import use_dh
 from ic.meaning.foreign import refused
+from ic.meaning.matter import MATTER_KEYS, use_matter
 from ic.meaning.merge import Block, Item
-from ic.meaning.models import check_keys, refuse_values, word_of
+from ic.meaning.models import check_keys, value_at, word_of
 from ic.meaning.owner import Owner
 from ic.meaning.relations import no_direction
 from ic.meaning.resolve import RESERVED, Definition
 from ic.meaning.scope import Scope
-from ic.meaning.shapes import SHAPES, Solid
-from ic.meaning.values import place_of
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import BASE, Joint, Link
-from met.trace import Real, Scalar, sqrt
+from met.trace import Scalar, sqrt
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 JOINT_KINDS = ("revolute", "prismatic", "fixed")
 
-MASS = Parameter(name="mass", unit="kg", at_least=0.0, doc="mass of the link")
-COM = Parameter(name="com", unit="m", shape="vector", doc="centre of mass, link frame")
-INERTIA = Parameter(name="inertia", unit="kg*m^2", shape="list", doc="inertia about the centre of mass, link axes")
 AT = Parameter(name="at", unit="m", shape="vector", doc="origin of the joint frame, parent link's frame")
 RPY = Parameter(name="rpy", unit="rad", shape="vector", doc="turn of the joint frame, fixed x-y-z")
 AXIS = Parameter(name="axis", unit="1", shape="vector", doc="axis of motion, joint frame")
 
-LINK_KEYS = ("mass", "com", "inertia", "shape")
+LINK_KEYS = MATTER_KEYS
 JOINT_KEYS = ("parent", "child", "at", "rpy", "axis", "dh")
 NO_STOPS = "a joint has no stops in this version; a metric with `require` tells where it goes beyond"
 NOT_OF_A_JOINT = dict.fromkeys(("limit", "limits", "range", "stops"), NO_STOPS)
@@ -111,87 +106,8 @@ def _link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
         scope.complaints.error("D085", f"link `{item.name}` needs a block", item.place,
                                help=f"write `link {item.name} {{ mass = ...; shape = ...; }}`")
         return None
-    body = item.body
-    check_keys(scope, body, LINK_KEYS, owner)
-    mass = scope.number(owner, MASS, body.get("mass"))
-    solid = _shape(scope, owner, body.get("shape"))
-    _com(scope, owner, body.get("com"), solid)
-    inertia = _inertia(scope, owner, body.get("inertia"), solid, mass)
-    if inertia is not None:
-        check_body(scope, owner, item.name, body.get("inertia"), inertia, mass)
-    shape = None
-    if solid is not None:
-        shape = (solid.kind, tuple((name, scope.checks.first(value)) for name, value in solid.numbers))
-    return Link(item.name, item.place, shape)
-
-
-def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
-    if item is None:
-        return None
-    name = word_of(item.value)
-    if name is None or name not in SHAPES:
-        helps = did_you_mean(name, SHAPES) if name else ()
-        scope.complaints.error("D088", f"no shape `{name}`" if name else "a shape is needed here",
-                               _value_at(item),
-                               help=[*helps, "shapes: rod(length, along), box(size, along), cylinder(radius, length, "
-                                     "along), sphere(radius)"])
-        scope.checks.fail(f"{owner.path}.shape")
-        return None
-    kind = SHAPES[name]
-    if refuse_values(scope, item.value, [p.name for p in kind.parameters]):
-        scope.checks.fail(f"{owner.path}.shape")
-        return None
-    inner = Owner(f"the {name} of {owner.label}", item.place, f"{owner.path}.shape", homes=owner.homes)
-    body = item.body or Block()
-    check_keys(scope, body, [p.name for p in kind.parameters], inner)
-    numbers: dict[str, Real] = {}
-    along, good = "x", True
-    for wanted in kind.parameters:
-        given = body.get(wanted.name)
-        if wanted.shape == "word":
-            word = scope.word(inner, wanted, given)
-            along, good = word or along, good and word is not None
-        elif wanted.shape == "vector":
-            vector = scope.vector(inner, wanted, given, record=False)
-            good = good and vector is not None
-            numbers |= {f"{wanted.name}_{axis}": x for axis, x in zip("xyz", vector or (), strict=False)}
-        else:
-            number = scope.number(inner, wanted, given, record=False)
-            good = good and number is not None
-            if number is not None:
-                numbers[wanted.name] = number
-    return kind.solid(numbers, "xyz".index(along)) if good else None
-
-
-def _com(scope: Scope, owner: Owner, item: Item | None, solid: Solid | None) -> None:
-    if item is not None or solid is None:
-        default = Parameter(name="com", unit="m", shape="vector", doc=COM.doc, default=(0.0, 0.0, 0.0))
-        scope.vector(owner, default, item)
-        return
-    scope.whole[owner.join("com")] = "is made of 3 numbers; vary one of them, such as `" + owner.join("com.x`")
-    for axis, value in zip("xyz", solid.com, strict=True):
-        scope.derived(owner, f"com.{axis}", value, "m", f"middle of the {solid.kind}")
-
-
-def _inertia(scope: Scope, owner: Owner, item: Item | None, solid: Solid | None,
-             mass: Real | None) -> tuple[Real, ...] | None:
-    if item is not None:
-        return scope.vector(owner, INERTIA, item, names=MOMENTS, short=3)
-    if solid is None:
-        if isinstance(mass, float) and mass == 0.0:
-            return tuple(scope.derived(owner, f"inertia.{name}", 0.0, "kg*m^2", "without mass") for name in MOMENTS)
-        if not scope.checks.failed(f"{owner.path}.shape"):
-            scope.complaints.error(
-                "D089", f"{owner.label} has no inertia", owner.place,
-                help=["write a shape, such as `shape = rod(length = 1 m, along = x);`",
-                      "or `inertia = [xx, yy, zz] kg*m^2;`, about the centre of mass"])
-        return None
-    if mass is None:
-        scope.checks.fail(owner.join("inertia"))
-        return None
-    scope.whole[owner.join("inertia")] = "is made of 6 numbers; vary one of them, such as `" + owner.join("inertia.xx`")
-    return tuple(scope.derived(owner, f"inertia.{name}", value, "kg*m^2", f"uniform {solid.kind} of the link's mass")
-                 for name, value in zip(MOMENTS, solid.inertia(mass), strict=True))
+    check_keys(scope, item.body, LINK_KEYS, owner)
+    return Link(item.name, item.place, use_matter(scope, owner, "link", item.name, item.body))
 
 
 # Joints
@@ -246,21 +162,17 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping
     if name in known:
         return name
     if name == BASE:
-        scope.complaints.error("D093", "the base cannot be a child", _value_at(item),
+        scope.complaints.error("D093", "the base cannot be a child", value_at(item),
                                help="turn the joint round: `parent = base;`")
     elif name is None:
-        scope.complaints.error("D094", f"a link's name is needed for {key}", _value_at(item),
+        scope.complaints.error("D094", f"a link's name is needed for {key}", value_at(item),
                                help=known_words("links", known))
     else:
         ground = name in scope.definitions.robot_files.roots
         near = (f"`{name}` is the root of its robot: write `base`",) if ground else did_you_mean(name, known)
-        scope.complaints.error("D094", f"no link `{name}` in this arm", _value_at(item),
+        scope.complaints.error("D094", f"no link `{name}` in this arm", value_at(item),
                                help=[*near, known_words("links", known)])
     return None
-
-
-def _value_at(item: Item) -> Place:
-    return place_of(item.value) if item.value is not None else item.place
 
 
 def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
@@ -283,7 +195,7 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
     if written is None:
         return
     scope.checks.hold(written, no_direction, code="D097", message=f"the axis of {owner.label} has no direction",
-                      place=_value_at(item), needs=(owner.join("axis"),),
+                      place=value_at(item), needs=(owner.join("axis"),),
                       help="write numbers of ordinary size, not all of them zero")
     x, y, z = written
     length = sqrt(x * x + y * y + z * z)

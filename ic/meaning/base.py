@@ -103,7 +103,7 @@ def initial_base(scope: Scope, body: Block, base: Base | None) -> None:
 
 def remark_ground(scope: Scope, item: Item, arm: Arm, base: Base | None, key: str, link: str) -> None:
     """Tells of an environment model that acts upon a link which does not yield to it."""
-    if link not in ground(arm.links, arm.joints):
+    if link != BASE and link not in ground(arm.links, arm.joints):
         return
     given = (item.body or Block()).get(key)
     place = place_of(given.value) if given is not None and given.value is not None else item.place

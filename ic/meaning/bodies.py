@@ -19,14 +19,15 @@ from met.plan import Joint, Link
 from met.trace import Real
 
 
-def check_body(scope: Scope, owner: Owner, name: str, item: Item | None, inertia: tuple[Real, ...],
+def check_body(scope: Scope, owner: Owner, kind: str, name: str, item: Item | None, inertia: tuple[Real, ...],
                mass: Real | None) -> None:
-    """The inertia is a body's, in every case. item: the inertia as written, None where it follows from a shape."""
-    helps = ["inertia is about the centre of mass, in link axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2",
+    """The inertia is a body's, in every case. item: the inertia as written, None where it follows from a shape; kind:
+    what it is in words."""
+    helps = [f"inertia is about the centre of mass, in {kind} axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2",
              "products have the sign of -sum(m x y)"]
     weightless = isinstance(mass, float) and mass == 0.0
     if weightless:
-        helps = ["leave `inertia` out, or write the link's mass"]
+        helps = [f"leave `inertia` out, or write the {kind}'s mass"]
     place = owner.place
     if item is not None:
         place = item.place if item.value is None else place_of(item.value)
@@ -35,10 +36,10 @@ def check_body(scope: Scope, owner: Owner, name: str, item: Item | None, inertia
             helps.append(f"in the arm's block: `{name} {{ {entry} }}`")
     scope.checks.hold(
         (*inertia, 1.0 if mass is None else mass),
-        lambda values: _not_a_body(values, item is not None),
+        lambda values: _not_a_body(values, kind, item is not None),
         code="D087",
         needs=(f"{owner.path}.mass", f"{owner.path}.shape"),
-        message=f"the inertia of link `{name}` is no body's",
+        message=f"the inertia of {kind} `{name}` is no body's",
         place=place,
         help=tuple(helps),
     )
@@ -49,7 +50,7 @@ def written_elsewhere(scope: Scope, place: Place) -> bool:
     return any(source.name == place.file for source in scope.definitions.robot_files.sources)
 
 
-def _not_a_body(values: np.ndarray, strict: bool) -> tuple[np.ndarray, list[str]]:
+def _not_a_body(values: np.ndarray, kind: str, strict: bool) -> tuple[np.ndarray, list[str]]:
     """Which rows [n, 7], moments and mass, are no rigid body's, and why, in words.
 
     The tolerance, 1e-9 of the largest moment, is for rounding alone: published tables have ten digits at most.
@@ -70,7 +71,7 @@ def _not_a_body(values: np.ndarray, strict: bool) -> tuple[np.ndarray, list[str]
         if not finite[row]:
             causes.append("it is not finite")
         elif weightless[row]:
-            causes.append("the link has no mass, and so no inertia")
+            causes.append(f"the {kind} has no mass, and so no inertia")
         elif negative[row]:
             causes.append(f"{shown}; none may be {'zero or negative' if strict else 'negative'}")
         else:

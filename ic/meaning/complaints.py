@@ -86,7 +86,9 @@ class Complaints:
 
 def belongs(word: str) -> list[str]:
     """Where a word of the language stands that stands elsewhere only."""
-    return ["`substitute JOINT { ... }`, in a run, puts a joint's motor on a bed"] if word == "substitute" else []
+    told = {"substitute": "`substitute JOINT { ... }`, in a run, puts a joint's motor on a bed",
+            "payload": "`payload NAME { ... }`, in a run, is a body that a link carries or grapples"}
+    return [told[word]] if word in told else []
 
 
 def an(word: str) -> str:

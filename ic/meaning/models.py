@@ -27,6 +27,11 @@ def word_of(expression: Expression | None) -> str | None:
     return None
 
 
+def value_at(item: Item) -> Place:
+    """Where an entry's value is; the entry itself, where it has none."""
+    return place_of(item.value) if item.value is not None else item.place
+
+
 def word_written(wanted: Parameter, body: Block) -> str:
     """The word that a body writes for a parameter, else its default."""
     item = body.get(wanted.name)

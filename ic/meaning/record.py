@@ -86,7 +86,7 @@ def _nearest(name: Name, known: dict[str, tuple[Recorded, ...]], structure: Stru
         return [why]
     whole = [each for each in known if each.rpartition(".")[0] not in known]
     first = name.path[0].text
-    head = ".".join(word.text for word in name.path[:2]) if first == "links" else first
+    head = ".".join(word.text for word in name.path[:2]) if first in ("links", "payloads") else first
     own = [each for each in whole if each.startswith(head + ".")]
     if own:
         rests = [each.removeprefix(f"{head}.") for each in known if each.startswith(f"{head}.")]
@@ -97,10 +97,13 @@ def _nearest(name: Name, known: dict[str, tuple[Recorded, ...]], structure: Stru
     arm = [each for each in whole if each in FAMILIES and not known[each][0].joints]
     links = [each for each in whole if each.startswith("links.")]
     some = [each for each in links if each.split(".")[1] == links[0].split(".")[1]]
+    payloads = [f"payloads.{payload.name}" for payload in structure.payloads[:1]]
+    of_payload = [each for each in whole for payload in payloads if each.startswith(f"{payload}.")]
     return [
         *did_you_mean(name.text, known),
         known_words("channels of all joints", joints),
         known_words("channels of the arm, and of a link", [*arm, *some]),
+        *([known_words("channels of a payload", of_payload)] if of_payload else []),
     ]
 
 

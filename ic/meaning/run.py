@@ -15,6 +15,7 @@ from ic.meaning.failures import check_failures
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import find_bare_model, find_model, refuse_values, use_model, word_of
 from ic.meaning.owner import Owner
+from ic.meaning.payloads import check_payloads, resolve_payloads
 from ic.meaning.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
 from ic.meaning.relations import check_names
 from ic.meaning.resolve import Definition
@@ -38,12 +39,13 @@ from met import models, units
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import BASE, Base, EnvironmentUse, Requirement, Schedule, ServoUse, Structure, Tolerance
+from met.plan import BASE, Base, EnvironmentUse, Payload, Requirement, Schedule, ServoUse, Structure, Tolerance
 from met.trace import Real, Scalar
 from met.units import PURE
 
 KEYS = ("arm", "base", "servos", "initial", "environment", "rates", "integrator", "duration", "record", "tolerances",
         "seed")
+KINDS = ("metric", "payload", "substitute")
 BLOCKS = ("servos", "initial", "environment", "rates", "tolerances")
 RATES = ("dynamics", "servos", "record", "base")
 DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
@@ -89,7 +91,8 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     base, arm = resolve_base(scope, block.get("base"), arm)
     uses, scope.lost = resolve_servos(scope, _body(scope, block.get("servos")), arm)
     substitutions = resolve_substitutions(scope, block, arm, uses)
-    environment, products = _environment(scope, _body(scope, block.get("environment")), arm, base, duration)
+    payloads = resolve_payloads(scope, block, arm)
+    environment, products = _environment(scope, _body(scope, block.get("environment")), arm, base, payloads, duration)
     _initial(scope, _body(scope, block.get("initial")), arm)
     initial_base(scope, _body(scope, block.get("initial")), base)
     for use in uses:
@@ -120,9 +123,10 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
                             use.words, ticks[use.joint].continuous, use.sensors) for use in uses)  # fmt: skip
     structure = Structure(
         arm.name, arm.links, arm.joints, servos, environment, (), products, integrator.name, schedule, (),
-        substitutions, base,
+        substitutions, base, payloads,
     )  # fmt: skip
     check_base(scope, base, structure, _body(scope, block.get("environment")), block.get("base"))
+    check_payloads(scope, block, structure)
     metrics = resolve_metrics(scope, block, structure)
     record = resolve_record(scope, run, block.get("record"), structure)
     structure = replace(structure, metrics=metrics, record=record)
@@ -149,22 +153,24 @@ def _keep_settings(scope: Scope, block: Block, arm: Arm, integrator: Any, rates:
 
 
 def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
-    metrics = [item.name for kind in ("metric", "substitute") for item in block.of_kind(kind)]
+    metrics = [item.name for kind in KINDS for item in block.of_kind(kind)]
     for item in block.items.values():
-        if item.kind in ("metric", "substitute") or (not item.kind and item.name in KEYS):
+        if item.kind in KINDS or (not item.kind and item.name in KEYS):
             continue
         if item.kind in KEYS:
             scope.complaints.error("D108", f"`{item.name}` after `{item.kind}`, which takes no name", item.place,
                                    help=f"write `{item.kind} {'= ...;' if item.body is None else '{ ... }'}`")
         elif item.kind:
             scope.complaints.error("D108", f"no `{item.kind}` in a run", item.place,
-                                   help=[*did_you_mean(item.kind, ("metric", "substitute", *KEYS)),
-                                         known_words("a run has", (*KEYS, "metric NAME", "substitute JOINT", "require"))
-                                         ])
+                                   help=[*did_you_mean(item.kind, (*KINDS, *KEYS)),
+                                         known_words("a run has", (*KEYS, "metric NAME", "payload NAME",
+                                                                   "substitute JOINT", "require"))])
         elif item.body is not None:
             adds = f"`metric {item.name} = ...` would add a metric"
             if not {"bed", "law"}.isdisjoint(item.body.items):
                 adds = f"`substitute {item.name} {{ ... }}` would put this joint's motor on a bed"
+            if not {"on", "mass", "grapple", "release"}.isdisjoint(item.body.items):
+                adds = f"`payload {item.name} {{ ... }}` would add a payload"
             scope.complaints.error(
                 "D109", f"nothing named `{item.name}` in run `{definition.name}` to change", item.place,
                 help=belongs(item.name) or [*did_you_mean(item.name, (*metrics, *KEYS)), adds])
@@ -236,7 +242,7 @@ def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
 
 
 def _environment(
-    scope: Scope, body: Block, arm: Arm, base: Base | None, duration: float | None
+    scope: Scope, body: Block, arm: Arm, base: Base | None, payloads: tuple[Payload, ...], duration: float | None
 ) -> tuple[tuple[EnvironmentUse, ...], bool]:
     uses = []
     products = True
@@ -249,7 +255,7 @@ def _environment(
             owner = Owner("the environment", item.place, "environment")
             products = scope.word(owner, ON_OFF, item) != "off"
         else:
-            use = _environment_use(scope, item, arm, base, duration)
+            use = _environment_use(scope, item, arm, base, payloads, duration)
             if use is not None:
                 uses.append(use)
     for statement in body.statements:
@@ -259,7 +265,7 @@ def _environment(
 
 
 def _environment_use(
-    scope: Scope, item: Item, arm: Arm, base: Base | None, duration: float | None
+    scope: Scope, item: Item, arm: Arm, base: Base | None, payloads: tuple[Payload, ...], duration: float | None
 ) -> EnvironmentUse | None:
     owner = Owner(f"environment `{item.name}`", item.place, f"environment.{item.name}", homes=item.homes)
     name = word_of(item.value)
@@ -286,7 +292,8 @@ def _environment_use(
     if environment is None or refuse_values(scope, item.value, [p.name for p in environment.written]):
         return None
     body = item.body or Block()
-    known = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
+    bodies = [*(link.name for link in arm.links), *(payload.name for payload in payloads)]
+    known = {"joint": [joint.name for joint in arm.moving], "link": bodies}
     named = check_names(scope, owner, environment.parameters, body, arm=arm.name, known=known, lost=arm.lost)
     about = next((named[p.name] for p in environment.parameters if p.names == "joint" and p.name in named), None)
     if about is not None:  # what the unit words `joint` and `effort` mean
@@ -303,7 +310,9 @@ def _environment_use(
     if values is not None and duration is not None:
         _remark_idle(scope, environment, item, values, duration)
     if values is not None and environment.pushes and (base is None or base.kind != "free"):
-        remark_ground(scope, item, arm, base, environment.pushes, values[environment.pushes])
+        carriers = {payload.name: payload.link for payload in payloads if not payload.flies}
+        pushed = values[environment.pushes]
+        remark_ground(scope, item, arm, base, environment.pushes, carriers.get(pushed, pushed))
     return EnvironmentUse(item.name, environment.name, None, item.place)
 
 

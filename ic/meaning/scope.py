@@ -67,7 +67,7 @@ class Scope:
     def hangs(self, path: str) -> bool:
         """Whether nothing can be said of this path, because what it leads to has failed, which was told."""
         first, _, rest = path.partition(".")
-        thing = rest.partition(".")[0] if first == "links" else first
+        thing = rest.partition(".")[0] if first in ("links", "payloads") else first
         if self.checks.touches(path) or thing in self.gone:
             return True
         return bool(self.lost) and (first in self.lost or first in self.definitions.of_kind("servo"))

@@ -26,7 +26,7 @@ SAID = {
     "default": "the default",
     "derived": "computed",
 }
-HEADS = ("links", "metrics", "environment", "initial")
+HEADS = ("links", "metrics", "environment", "initial", "payloads")
 IN_PLAN = "as the plan has it"
 NO_MORE: Mapping[str, Sequence[str]] = MappingProxyType({})
 MOST_NEAR = 12

@@ -81,6 +81,9 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
     if structure.base is not None:
         yield ""
         yield from _base(experiment, structure.base)
+    if structure.payloads:
+        yield ""
+        yield from _payloads(experiment)
     yield ""
     yield from _schedule(experiment)
     yield ""
@@ -173,6 +176,19 @@ def _base(experiment: Experiment, base: Base) -> Iterator[str]:
          ", ".join(_given(experiment, f"{BASE}.{course.component}", models.find("command", course.model).parameters)))
         for course in base.courses
     ])  # fmt: skip
+
+
+def _payloads(experiment: Experiment) -> Iterator[str]:
+    """What links carry, and when they grapple and release it."""
+    values = _Values(experiment)
+    yield "Payloads"
+    rows: list[tuple[str, ...]] = [("payload", "mass", "link", "grappled", "released")]
+    for payload in experiment.structure.payloads:
+        head = f"payloads.{payload.name}"
+        grappled = values.shown(f"{head}.grapple") if payload.grappled else "held from the start"
+        released = values.shown(f"{head}.release") if payload.released else "never"
+        rows.append((payload.name, values.shown(f"{head}.mass"), payload.link, grappled, released))
+    yield from columns(rows)
 
 
 def _given(experiment: Experiment, prefix: str, parameters: Iterable[Parameter]) -> list[str]:

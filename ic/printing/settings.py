@@ -37,6 +37,8 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
     for on_bed in structure.substitutions:
         word(f"{on_bed.joint}.bed.model", on_bed.bed, on_bed.place)
         word(f"{on_bed.joint}.law.model", on_bed.law, on_bed.place)
+    for payload in structure.payloads:
+        word(f"payloads.{payload.name}.on", payload.link, payload.place)
     for environment in structure.environment:
         word(f"environment.{environment.name}.model", environment.model, environment.place)
     word("environment.velocity_products", "on" if structure.velocity_products else "off")

@@ -36,11 +36,12 @@ def channels() -> list[dict[str, str]]:
         *(row(JOINT, *each) for each in channel.OF_JOINT),
         *(row(LINK, *each) for each in channel.OF_LINK),
         *(row(LINK, name, unit, doc, channel.XYZ, channel.WORLD_AXES) for name, unit, doc in channel.JACOBIAN),
+        *(row(PAYLOAD, *each) for each in channel.OF_PAYLOAD),
         *(row("", *each) for each in channel.OF_ARM),
     ]
 
 
-JOINT, LINK = "JOINT.", "links.LINK."
+JOINT, LINK, PAYLOAD = "JOINT.", "links.LINK.", "payloads.PAYLOAD."
 MORE_WORDS = {word: f"{channel.TURNING[word]}, or {channel.SLIDING[word]} of a prismatic joint"
               for word in ("inertia", "angular", "linear")}
 

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from ic.meaning import arm, dh, run
+from ic.meaning import arm, dh, payloads, run
 from ic.meaning.resolve import KINDS as DEFINITIONS
 from ic.meaning.shapes import SHAPES
 from ic.meaning.substitution import DEFAULTS
@@ -32,7 +32,7 @@ NAMES = ("met.tmLanguage.json", "met.tmLanguage")
 STATEMENTS = ("vary", "zip", "sample", "repeat", "exclude", "when", "require", "remove", "macro", "from")
 """Words that begin an entry, or stand in one, and name nothing."""
 
-PARTS = ("link", "joint", "metric", "substitute")
+PARTS = ("link", "joint", "metric", "payload", "substitute")
 """Words that begin an entry and are followed by a name."""
 
 WORDS = ("on", "off", "base", "faults", "free", "prescribed")
@@ -170,7 +170,8 @@ def _keys() -> set[str]:
     shaped = {parameter.name for shape in SHAPES.values() for parameter in shape.parameters}
     numbered = {number.name for number in dh.NUMBERS}
     written = {"model", "command", "rate", "of", "velocity_products", "q", "qd"}
-    return declared | shaped | numbered | written | {*arm.LINK_KEYS, *arm.JOINT_KEYS, *run.KEYS, *run.RATES, *DEFAULTS}
+    keys = {*arm.LINK_KEYS, *arm.JOINT_KEYS, *payloads.KEYS, *run.KEYS, *run.RATES, *DEFAULTS}
+    return declared | shaped | numbered | written | keys
 
 
 def texts() -> dict[str, bytes]:

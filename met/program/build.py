@@ -1,8 +1,9 @@
 """From an experiment to its program: which phase runs when (docs/physics.md, "An instant").
 
-At an instant t_k, in this order: the step that ends there is finished; servos tick (their commands first); friction
-modes are decided; derivatives are taken, which is the first stage of the step that begins; metrics and the recorder
-see the instant. Servos faster than the dynamics tick between instants, on the state carried forward.
+At an instant t_k, in this order: the step that ends there is finished; payloads are grappled and released; servos tick
+(their commands first); friction modes are decided; derivatives are taken, which is the first stage of the step that
+begins; metrics and the recorder see the instant. Servos faster than the dynamics tick between instants, on the state
+carried forward.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Callable, Mapping
 
 from met.channel import Channel
 from met.plan import Experiment
-from met.program import base, failing, sensing
+from met.program import base, failing, payloads, sensing
 from met.program.evaluation import law
 from met.program.machine import PARAMETER, Actuator, Machine
 from met.program.observe import derived
@@ -55,7 +56,7 @@ class Builder:
         instant = self.schedule.dynamics
         columns = [channel for recorded in self.machine.structure.record for channel in recorded.channels]
         held, at_rows = derived(self.machine)
-        tick: list[Control] = [Unless0((Every(instant, self.step.finish()),))]
+        tick: list[Control] = [Unless0((Every(instant, self.step.finish()),)), *self.step.grapple.events()]
         tick += self.step.beds.before_servos()
         for divisor in sorted({actuator.use.divisor for actuator in self.machine.working if actuator.ticks}):
             tick.append(Every(divisor, (Run(Phase(f"servos_{divisor}", self._servos(divisor))),)))
@@ -96,8 +97,8 @@ class Builder:
         for joint in self.joints:
             for name in ("q", "qd"):
                 tape.write(f"{joint}.{name}", self.machine.value(f"initial.{joint}.{name}", tape.read))
-        if self.machine.structure.free:
-            base.start(self.machine, tape)
+        base.start(self.machine, tape)
+        payloads.start(self.machine, tape)
         for actuator in self.machine.working:
             self._start_servo(tape, actuator)
         for name, metric, _ in self.machine.metrics:

@@ -12,8 +12,10 @@ from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
 from met.program import failing, sensing
-from met.program.base import Base, base_of, slopes_of_base
+from met.program.base import Base, base_of, free_base
+from met.program.bodies import slopes
 from met.program.machine import Actuator, Machine, ReadCell
+from met.program.payloads import laden, shared, slopes_of_payloads
 from met.program.values import Values, answer, parameters, returned
 from met.program.world import ArmWorld
 from met.servos.servo import Asked, Control, Drive, JointMotion, Seen
@@ -70,9 +72,10 @@ def derivative(
             for i, actuator in enumerate(machine.actuators)
         )
     drives = tuple(None if each is None else each.drive for each in driven)
-    tree, base, n = machine.tree(read), base_of(machine, read, y, time), len(machine.joints)
+    tree, base, n = laden(machine, read), base_of(machine, read, y, time), len(machine.joints)
     with part("environment"):
         loads = _environment(machine, tree, read, y, base, time, begin)
+        wrenches, on_payloads = shared(machine, read, loads.wrenches)
 
     told = told or {}
     given: list[Real] = []
@@ -109,14 +112,19 @@ def derivative(
             gravity=base.to_base(loads.gravity),
             base_acceleration=(base.wd, base.a),
             base_rate=base.w,
-            wrenches=loads.wrenches,
+            wrenches=wrenches,
             velocity_products=machine.structure.velocity_products,
         )
-    slopes, state_needs = _slopes(machine, driven, friction)
+    of_states, state_needs = _slopes(machine, driven, friction)
     needs = {joint.name: a - b for joint, a, b in zip(machine.joints, smooth, solved.tau_load, strict=True)}
-    qd, qdd = slopes_of_base(base, solved.base_acceleration, y) if machine.structure.free else ((), ())
+    qd, qdd = (*y.qd[:n],), solved.qdd
+    body = free_base(machine)
+    if body is not None:
+        of_base = slopes(body, y, pose=base.pose, turned=base.turned, solved=solved.base_acceleration)
+        qd, qdd = (*qd, *of_base[0]), (*qdd, *of_base[1])
+    of_payloads = slopes_of_payloads(machine, read, y, on_payloads, loads.gravity)
     return Derivative(
-        slope=Slope((*y.qd[:n], *qd), (*solved.qdd, *qdd), slopes),
+        slope=Slope((*qd, *of_payloads[0]), (*qdd, *of_payloads[1]), of_states),
         tau=tuple(a - b for a, b in zip(solved.tau, loads.torques, strict=True)),
         need=needs | state_needs,
         solved=solved,
@@ -231,7 +239,7 @@ def brakes(
     """Dry friction that environment models put on joints at state y, by name, N m (N)."""
     if not machine.braked:
         return {}
-    tree, base = machine.tree(read), base_of(machine, read, y, time)
+    tree, base = laden(machine, read), base_of(machine, read, y, time)
     return _environment(machine, tree, read, y, base, time, begin, [m for m in machine.environment if m[1].rubs]).dry
 
 
@@ -239,7 +247,7 @@ def _environment(
     machine: Machine, tree: Tree, read: ReadCell, y: Motion, base: Base, time: Real, begin: Real,
     models: Sequence[tuple[str, Environment]] | None = None,
 ) -> _Loads:  # fmt: skip
-    """Sum of the loads of these models; of all, where None."""
+    """Sum of the loads of these models; of all, where None. Wrenches are on links and payloads."""
     world = ArmWorld(machine, read, tree, y, base, time, begin)
     gravity: list[Real] = [0.0, 0.0, 0.0]
     torques: list[Real] = [0.0 for _ in machine.joints]

@@ -22,7 +22,7 @@ from met.frozen import frozen
 from met.integrators.integrator import Integrator
 from met.metrics.metric import Metric
 from met.parameter import Memory, Parameter, State
-from met.plan import BASE, Experiment, Formula, Joint, SensorUse, ServoUse, Structure
+from met.plan import BASE, Experiment, Formula, Joint, Payload, SensorUse, ServoUse, Structure
 from met.program.courses import recorded
 from met.program.values import Values, answer, parameters, returned
 from met.sensors.sensor import Sensor
@@ -187,6 +187,11 @@ class Machine:
         )  # fmt: skip
 
     @cached_property
+    def flying(self) -> tuple[Payload, ...]:
+        """The payloads that move freely for a time."""
+        return tuple(payload for payload in self.structure.payloads if payload.flies)
+
+    @cached_property
     def courses(self) -> Formulas:
         """Of a prescribed base: how it moves, as formulas of time (`met.program.courses`)."""
         return recorded(self.experiment)
@@ -202,19 +207,30 @@ class Machine:
         return read(PARAMETER + path) if isinstance(value, Formula) else value
 
     def mass(self, link: str, read: ReadCell) -> Real:
-        """Of a link, kg."""
-        mass: Real = self.value(f"links.{link}.mass", read)
+        """Of a link or payload, kg."""
+        mass: Real = self.value(f"{self._head(link)}.mass", read)
         return mass
 
     def com(self, link: str, read: ReadCell) -> Vector:
-        """A link's centre of mass in its frame, m."""
-        x, y, z = (self.value(f"links.{link}.com.{axis}", read) for axis in "xyz")
+        """Centre of mass of a link or payload in its frame, m."""
+        return self.vector(f"{self._head(link)}.com", read)
+
+    def inertia(self, link: str, read: ReadCell) -> Six:
+        """xx, yy, zz, xy, xz, yz of a link or payload about its centre of mass in its axes, kg m^2."""
+        head = self._head(link)
+        xx, yy, zz, xy, xz, yz = (
+            self.value(f"{head}.inertia.{entry}", read) for entry in ("xx", "yy", "zz", "xy", "xz", "yz")
+        )
+        return xx, yy, zz, xy, xz, yz
+
+    def vector(self, path: str, read: ReadCell) -> Vector:
+        """A parameter of three numbers."""
+        x, y, z = (self.value(f"{path}.{axis}", read) for axis in "xyz")
         return x, y, z
 
-    def inertia(self, link: str, read: ReadCell) -> tuple[Real, Real, Real, Real, Real, Real]:
-        """xx, yy, zz, xy, xz, yz of a link about its centre of mass in its axes, kg m^2."""
-        entries = (self.value(f"links.{link}.inertia.{entry}", read) for entry in ("xx", "yy", "zz", "xy", "xz", "yz"))
-        return tuple(entries)
+    def _head(self, link: str) -> str:
+        """What the paths of a link's or payload's parameters begin with."""
+        return f"payloads.{link}" if any(each.name == link for each in self.structure.payloads) else f"links.{link}"
 
     def servo_values(self, actuator: Actuator, read: ReadCell) -> Values:
         return parameters(
@@ -253,22 +269,12 @@ class Machine:
         joints = {joint.name for joint in self.structure.joints}
         for path in self.varying:
             head, *rest = path.split(".")
-            if head == "links" or (head in joints and rest[0] in ("at", "rpy", "axis", "pivot")):
+            if head in ("links", "payloads") or (head in joints and rest[0] in ("at", "rpy", "axis", "pivot")):
                 return None
         return self._tree(lambda _: 0.0)
 
     def _tree(self, read: ReadCell) -> Tree:
         numbers = {link.name: index for index, link in enumerate(self._link_order())}
-
-        def vector(path: str) -> tuple[Real, Real, Real]:
-            return tuple(self.value(f"{path}.{axis}", read) for axis in "xyz")
-
-        def inertia(link: str) -> Six:
-            xx, yy, zz, xy, xz, yz = (
-                self.value(f"links.{link}.inertia.{entry}", read) for entry in ("xx", "yy", "zz", "xy", "xz", "yz")
-            )
-            return xx, yy, zz, xy, xz, yz
-
         joints = {joint.child: joint for joint in self.structure.joints}
         bodies = []
         for link in self._link_order():
@@ -279,20 +285,29 @@ class Machine:
                     joint=joint.name,
                     kind=joint.kind,
                     parent=-1 if joint.parent == BASE else numbers[joint.parent],
-                    at=vector(f"{joint.name}.at"),
-                    rpy=vector(f"{joint.name}.rpy"),
-                    axis=(0.0, 0.0, 1.0) if joint.kind == "fixed" else vector(f"{joint.name}.axis"),
-                    pivot=vector(f"{joint.name}.pivot") if self._has_pivot(joint) else (0.0, 0.0, 0.0),
+                    at=self.vector(f"{joint.name}.at", read),
+                    rpy=self.vector(f"{joint.name}.rpy", read),
+                    axis=(0.0, 0.0, 1.0) if joint.kind == "fixed" else self.vector(f"{joint.name}.axis", read),
+                    pivot=self.vector(f"{joint.name}.pivot", read) if self._has_pivot(joint) else (0.0, 0.0, 0.0),
                     mass=self.mass(link.name, read),
                     com=self.com(link.name, read),
                     inertia=self.inertia(link.name, read),
                 )
             )
         if any(link.name == BASE for link in self.structure.links):
-            head = f"links.{BASE}"
-            mass = self.value(f"{head}.mass", read)
-            bodies.append(Body(BASE, "", "fixed", -1, mass=mass, com=vector(f"{head}.com"), inertia=inertia(BASE)))
+            bodies.append(self._fixed(BASE, -1, read))
+        elif any(payload.link == BASE for payload in self.structure.payloads):
+            bodies.append(Body(BASE, "", "fixed", -1))
+        for payload in self.structure.payloads:
+            if not payload.flies:
+                at, rpy = (self.vector(f"payloads.{payload.name}.{name}", read) for name in ("at", "rpy"))
+                bodies.append(replace(self._fixed(payload.name, numbers.get(payload.link, -1), read), at=at, rpy=rpy))
         return Tree.build(tuple(bodies), tuple(joint.name for joint in self.joints), free=self.structure.free)
+
+    def _fixed(self, name: str, parent: int, read: ReadCell) -> Body:
+        """A link or payload that no joint carries, rigid with its parent."""
+        mass, com, inertia = self.mass(name, read), self.com(name, read), self.inertia(name, read)
+        return Body(name, "", "fixed", parent, mass=mass, com=com, inertia=inertia)
 
     def _has_pivot(self, joint: Joint) -> bool:
         return f"{joint.name}.pivot.x" in self.experiment.parameters

@@ -13,14 +13,15 @@ from met.channel import WXYZ, XYZ, Channel
 from met.dynamics.effective_inertia import effective_inertia
 from met.dynamics.energy import Energy, energy
 from met.dynamics.kinematics import LinkMotion, jacobian
+from met.dynamics.payload import energy_of
 from met.dynamics.recursion import Wrench, reactions
-from met.dynamics.spatial import Vector, choose
-from met.dynamics.tree import Tree
+from met.dynamics.spatial import Vector, add, choose, dot
 from met.integrators.integrator import Motion
+from met.program import payloads
 from met.program.base import Base, motions
 from met.program.evaluation import Derivative
-from met.program.machine import Machine
-from met.trace import Real
+from met.program.machine import Machine, ReadCell
+from met.trace import Real, sqrt
 from met.vectors import quaternion
 
 
@@ -45,10 +46,13 @@ class Observed:
     y      the state, and base, where it stands;  found  gives its derivative
     """
 
-    def __init__(self, machine: Machine, tree: Tree, y: Motion, base: Base, found: Callable[[], Derivative]) -> None:
+    def __init__(
+        self, machine: Machine, read: ReadCell, y: Motion, base: Base, found: Callable[[], Derivative]
+    ) -> None:
+        self.machine, self.read, self.y = machine, read, y
         self.joints = tuple(joint.name for joint in machine.joints)
         n = len(self.joints)
-        self.tree, self.q, self.qd, self.base = tree, y.q[:n], y.qd[:n], base
+        self.tree, self.q, self.qd, self.base = machine.tree(read), y.q[:n], y.qd[:n], base
         self._found = found
         self._jacobians: dict[str, tuple[tuple[Vector, Vector], ...]] = {}
 
@@ -57,6 +61,8 @@ class Observed:
         parts = channel.path.split(".")
         if parts[0] == "links":
             return self._of_link(channel, parts[1:])
+        if parts[0] == "payloads":
+            return self._of_payload(parts[1:])
         return self._of_joint(channel.joint, parts[1:]) if channel.joint else self._of_arm(parts)
 
     def _of_joint(self, joint: str, parts: list[str]) -> Real:
@@ -80,11 +86,17 @@ class Observed:
         if kind == "jacobian":
             angular, linear = self._jacobian(link)[self.joints.index(channel.joint)]
             return (angular if rest[0] == "angular" else linear)[XYZ.index(rest[-1])]
-        motion = self.motions[link]
-        if kind == "orientation":
-            return quaternion(motion.pose.R)[WXYZ.index(rest[0])]
-        vectors = {"position": motion.position, "velocity": motion.velocity, "rate": motion.rate}
-        return vectors[kind]()[XYZ.index(rest[0])]
+        return _of_frame(self.motions[link], kind, rest[0])
+
+    def _of_payload(self, parts: list[str]) -> Real:
+        name, kind, *rest = parts
+        payload, motion = next(each for each in self.machine.structure.payloads if each.name == name), self.seen[name]
+        if kind == "carried":
+            return choose(payloads.carried(payload, self.read), 1.0, 0.0) if payload.flies else 1.0
+        if kind == "distance":
+            way = payloads.way(self.machine, payload, self.read, motion, self.motions[payload.link])
+            return sqrt(dot(way, way))
+        return _of_frame(motion, kind, rest[0])
 
     def _of_arm(self, parts: list[str]) -> Real:
         match parts:
@@ -111,16 +123,42 @@ class Observed:
 
     @cached_property
     def reactions(self) -> tuple[Wrench, ...]:
-        return reactions(self.tree, self.derivative.solved)
+        return reactions(payloads.laden(self.machine, self.read), self.derivative.solved)
 
     @cached_property
     def motions(self) -> dict[str, LinkMotion]:
         return motions(self.tree, self.q, self.qd, self.base)
 
     @cached_property
+    def seen(self) -> dict[str, LinkMotion]:
+        """Every payload in the world, by name."""
+        return {
+            each.name: payloads.seen(self.machine, each, self.read, self.y, self.motions)
+            if each.flies else self.motions[each.name]
+            for each in self.machine.structure.payloads
+        }  # fmt: skip
+
+    @cached_property
     def energy(self) -> Energy:
+        """Of the arm, and of each payload that flies for a time, whoever carries it."""
         found, base = self.derivative, self.base
-        return energy(
+        total = energy(
             self.tree, self.q, self.qd, rotor=found.solved.rotor, gravity=found.gravity, base=base.pose,
             base_velocity=(base.w, base.v),
         )
+        for payload in self.machine.flying:
+            body = payloads.body_of(self.machine, payload, self.read)
+            own = energy_of(body, self.seen[payload.name], found.gravity)
+            total = Energy(
+                total.kinetic + own.kinetic, total.potential + own.potential, add(total.linear, own.linear),
+                add(total.angular, own.angular),
+            )
+        return total
+
+
+def _of_frame(motion: LinkMotion, kind: str, part: str) -> Real:
+    """A component of where a frame is in the world, or of how it moves."""
+    if kind == "orientation":
+        return quaternion(motion.pose.R)[WXYZ.index(part)]
+    vectors = {"position": motion.position, "velocity": motion.velocity, "rate": motion.rate}
+    return vectors[kind]()[XYZ.index(part)]

@@ -15,9 +15,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from met.integrators.integrator import Motion, Slope
-from met.program import base, cells, friction
+from met.program import base, bodies, cells, friction
 from met.program.asking import Question, advanced, asked, inconstant
 from met.program.evaluation import Derivative, brakes, derivative, driven_by
+from met.program.grapple import Grapple
 from met.program.machine import Actuator, Machine
 from met.program.observe import Observed
 from met.program.sticking import sticking
@@ -44,9 +45,10 @@ class Step:
         self.beds = Substituted(machine, self.loads, wire=wire, late=late)
         self.schedule = machine.structure.schedule
         self.joints = tuple(joint.name for joint in machine.joints)
-        self.coordinates = base.coordinates(machine)
+        self.coordinates = bodies.coordinates(machine)
         self.states = machine.states
         self.sticking = sticking(machine)
+        self.grapple = Grapple(machine, self._state, lambda tape, actuator: self._held(tape, actuator, 1.0))
         self._asked = asked(machine.integrator, len(self.coordinates), len(self.states), self.schedule.step)
         self._derive = Call(Phase("derive", self.derive))
         self._slope = Call(Phase("slope", self.slope))
@@ -178,7 +180,7 @@ class Step:
         # Infinities that cancel leave not a number, so a plain sum misses none; a sum of numbers that is none only
         # makes `judge` look.
         parts = (*found.slope.qdd, *found.slope.xd, *y.q, *y.qd, *(found.need[name] for name in self._needs))
-        total: Real = sum((*parts, *base.orientation(self.machine, tape)), 0.0)
+        total: Real = sum((*parts, *bodies.orientation(self.machine, tape)), 0.0)
         tape.write_mask("suspect", either(not_(isfinite(total)), singular != 0.0))
 
     def slope(self, tape: Tape) -> None:
@@ -204,10 +206,12 @@ class Step:
         """
         cause: Real = 0.0
         number: Real = 0.0
-        if base.free(self.machine):
-            told = [f"{name}.{part}" for name in base.free(self.machine) for part in ("qdd", "q", "qd")]
-            of_base = sum((tape.read(name) for name in told), sum(base.orientation(self.machine, tape), 0.0))
-            cause, number = where(isfinite(of_base), cause, NOT_FINITE), float(len(self.joints))
+        for i, body in reversed(list(enumerate(bodies.bodies(self.machine), len(self.joints)))):
+            told = [f"{name}.{part}" for name in body.coordinates for part in ("qdd", "q", "qd")]
+            turned = sum([tape.read(name) for name in body.orientation], 0.0)
+            good = isfinite(sum((tape.read(name) for name in told), turned))
+            number = float(i) if isinstance(cause, float) else where(good, number, float(i))
+            cause = where(good, cause, NOT_FINITE)
         for i, joint in reversed(list(enumerate(self.joints))):
             told = [f"{joint}.qdd", f"{joint}.q", f"{joint}.qd"]
             told += [f"need:{name}" for name in self._needs if name == joint or name.startswith(f"{joint}.servo.")]
@@ -235,7 +239,7 @@ class Step:
         """The arm at an instant, with the derivative that `derive` took of it."""
         y = self._state(tape)
         stands = base.base_of(self.machine, tape.read, y, tape.read("instant"))
-        return Observed(self.machine, self.machine.tree(tape.read), y, stands, lambda: self._derivative(tape, y, 0.0))
+        return Observed(self.machine, tape.read, y, stands, lambda: self._derivative(tape, y, 0.0))
 
     def _derivative(
         self, tape: Tape, y: Motion, fraction: Real, told: dict[int, Real] | None = None
@@ -304,11 +308,11 @@ class Step:
             if self.sticking:
                 crossed = any_of(friction.crossings(self._sliding(tape), y_new))
                 cells.store(tape, True, self.coordinates, self.states, y, FROM)
-                base.keep_orientation(self.machine, tape, FROM)
+                bodies.keep_orientation(self.machine, tape, FROM)
                 tape.write_mask("crossing", both(active, crossed))
                 tape.write_mask("again", False)
             cells.store(tape, active, self.coordinates, self.states, y_new)
-            base.turn(self.machine, tape, active, y_new)
+            bodies.turn(self.machine, tape, active, y_new)
 
         return body
 
@@ -362,7 +366,7 @@ class Step:
         cells.count(tape, both(active, may_split), "friction.splits")
         cells.count(tape, both(active, not_(may_split)), "friction.clamped")
         cells.store(tape, active, self.coordinates, self.states, reached.y)
-        base.turn(self.machine, tape, active, reached.y, FROM)
+        bodies.turn(self.machine, tape, active, reached.y, FROM)
 
     def carry(self, tape: Tape) -> None:
         """The slope of the step just done, for servos that tick before the next; none for what is at rest and rubs."""
@@ -382,7 +386,7 @@ class Step:
     def _state(self, tape: Tape, copy: str = "") -> Motion:
         """The state, or a copy of it: a stage's as it is, another where a (sub)step begins."""
         y = cells.state(tape, self.coordinates, self.states, copy)
-        return y if copy == STAGE else base.begun(self.machine, y)
+        return y if copy == STAGE else bodies.begun(self.machine, y)
 
     def _friction(self, tape: Tape) -> dict[str, Real]:
         return {each.name: tape.read(f"friction:{each.name}") for each in self.sticking}

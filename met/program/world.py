@@ -10,6 +10,7 @@ from met.integrators.integrator import Motion
 from met.parameter import WORLD
 from met.program.base import Base, motions
 from met.program.machine import Machine, ReadCell
+from met.program.payloads import seen
 from met.trace import Real
 from met.vectors import ZERO, Matrix, Vector
 
@@ -23,11 +24,13 @@ class ArmWorld:
         self.time, self.begin = time, begin
         self.step = machine.structure.schedule.step
         self.joints = tuple(joint.name for joint in machine.joints)
-        self.links = tuple(link.name for link in machine.structure.links)
+        self.links = (*(each.name for each in machine.structure.links), *(p.name for p in machine.structure.payloads))
         self._sliding = {joint.name: joint.kind == "prismatic" for joint in machine.joints}
         self._machine, self._read = machine, read
         n = len(self.joints)
-        self._tree, self._q, self._qd, self._base = tree, y.q[:n], y.qd[:n], base
+        self._tree, self._y, self._base = tree, y, base
+        self._q, self._qd = y.q[:n], y.qd[:n]
+        self._flying = {payload.name: payload for payload in machine.flying}
         self._motions: dict[str, LinkMotion] | None = None
 
     def slides(self, joint: str) -> bool:
@@ -72,6 +75,8 @@ class ArmWorld:
             return LinkMotion(HERE, ZERO, ZERO)
         if self._motions is None:
             self._motions = motions(self._tree, self._q, self._qd, self._base)
+        if link in self._flying:
+            return seen(self._machine, self._flying[link], self._read, self._y, self._motions)
         return self._motions[self._own(link)]
 
     def _own(self, link: str) -> str:

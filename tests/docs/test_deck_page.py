@@ -17,7 +17,7 @@ import xarray
 import batch
 import ic
 from ic.grammar.syntax import Name
-from ic.meaning import arm, run
+from ic.meaning import arm, payloads, run
 from ic.meaning.complaints import Complaints
 from ic.meaning.resolve import Definitions
 from ic.meaning.scope import Scope
@@ -208,7 +208,8 @@ def test_every_function_shape_key_and_model_is_on_the_page() -> None:
     assert {word for row in table("key of a joint") for word in ticked(row[0])} == set(arm.JOINT_KEYS)
     entries = {entry.split()[0] for row in table("entry of a run") for entry in ticked(row[0])}
     assert {word for row in table("key of `substitute`") for word in ticked(row[0])} == set(DEFAULTS)
-    assert entries == {*run.KEYS, "metric", "require", "substitute"}
+    assert {word for row in table("key of a payload") for word in ticked(row[0])} == set(payloads.KEYS)
+    assert entries == {*run.KEYS, *run.KINDS, "require"}
     words = ticked(re.sub(r"```.*?```", "", PAGE, flags=re.DOTALL))
     assert set(run.RATES) <= words
     for kind in ("servo", "environment", "metric", "integrator"):

@@ -22,7 +22,8 @@ from met.environments.environment import World
 from met.integrators.integrator import Motion, Slope
 from met.parameter import Parameter
 from met.plan import Experiment
-from met.program.base import ORIENTATION, base_of, coordinates
+from met.program.base import base_of, free_base
+from met.program.bodies import coordinates
 from met.program.machine import Machine
 from met.program.world import ArmWorld
 from met.sensors.sensor import Sensed
@@ -315,7 +316,9 @@ def _environment(use: Use, experiment: Experiment) -> dict[str, Callable[[Number
         rng = np.random.default_rng(numbers.rng.integers(2**32))
         q, qd = (tuple(map(np.float64, rng.normal(size=len(coordinates(machine))))) for _ in range(2))
         orientation = rng.normal(size=4)
-        cells = dict(zip(ORIENTATION, orientation / np.linalg.norm(orientation), strict=True))
+        body = free_base(machine)
+        names = () if body is None else body.orientation
+        cells = dict(zip(names, orientation / np.linalg.norm(orientation), strict=False))
         begin = rng.uniform(0.0, 0.2)
         time = begin + rng.uniform() * experiment.structure.schedule.step
         y = Motion(q, qd, ())

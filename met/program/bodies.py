@@ -1,0 +1,189 @@
+"""Bodies that move freely: their coordinates, and their orientation from step to step (docs/physics.md, section 1).
+
+A free base is one, and each payload that flies for a time. Each has six coordinates, integrated with those of the
+joints: its origin in world axes, and a turn theta since the (sub)step began, whose orientation is kept as a unit
+quaternion q_0. Its rates are the origin's velocity in world axes and the angular velocity w in its own axes. At a stage
+
+    q = q_0 o exp(theta),     d(theta)/dt = w + theta x w / 2 + b theta x (theta x w),
+    b = (1 - phi/2 cot(phi/2))/phi^2,   phi = |theta|
+
+which is exact (Hairer, Lubich and Wanner, Geometric Numerical Integration, 2006, IV.7), so every integrator keeps its
+order on the rotations; a step ends by taking theta into the quaternion, which is made a unit one again. At its
+beginning theta is 0, and its slope w: so semi-implicit Euler turns the body with the new rate.
+"""
+
+from __future__ import annotations
+
+from met.dynamics.spatial import (
+    Pose,
+    Real,
+    Vector,
+    add,
+    cross,
+    is_zero,
+    rotation_quaternion,
+    scale,
+    turn_vector,
+    turn_vector_back,
+)
+from met.frozen import frozen
+from met.integrators.integrator import Motion
+from met.plan import BASE
+from met.program import cells
+from met.program.machine import Machine, ReadCell
+from met.trace import Truth, cos, sin, sqrt, where
+from met.trace.program import Tape
+from met.vectors import Quaternion, composed
+
+PAYLOAD = "payload:"
+"""What the cells of a payload begin with."""
+
+SIX = 6
+
+
+@frozen
+class FreeBody:
+    """A body that moves freely.
+
+    name   before its coordinates, `base:x`, whose cells are named as a joint's are: `base:x.q`, `base:x.qd`
+    first  number of its first coordinate among all (`coordinates`)
+    """
+
+    name: str
+    first: int
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        return tuple(f"{self.name}:{part}" for part in ("x", "y", "z", "turn_x", "turn_y", "turn_z"))
+
+    @property
+    def orientation(self) -> tuple[str, ...]:
+        """The cells of its quaternion."""
+        return tuple(f"{self.name}:orientation.{part}" for part in "wxyz")
+
+    def q(self, y: Motion) -> tuple[Real, ...]:
+        return y.q[self.first : self.first + SIX]
+
+    def qd(self, y: Motion) -> tuple[Real, ...]:
+        return y.qd[self.first : self.first + SIX]
+
+
+@frozen
+class Flight:
+    """A body that moves freely, at a stage.
+
+    pose    R_WB and p_WB, m
+    w, v    angular velocity, and velocity of the origin, its own axes, rad/s, m/s
+    turned  d(theta)/dt, rad/s
+    """
+
+    pose: Pose
+    w: Vector
+    v: Vector
+    turned: Vector
+
+
+def bodies(machine: Machine) -> tuple[FreeBody, ...]:
+    """The base, where it is free, then the payloads that fly for a time."""
+    names = ([BASE] if machine.structure.free else []) + [PAYLOAD + each.name for each in machine.flying]
+    joints = len(machine.joints)
+    return tuple(FreeBody(name, joints + SIX * number) for number, name in enumerate(names))
+
+
+def coordinates(machine: Machine) -> tuple[str, ...]:
+    """All that is integrated as positions with rates: the joints' names, then those of the bodies' coordinates."""
+    of_bodies = (name for body in bodies(machine) for name in body.coordinates)
+    return (*(joint.name for joint in machine.joints), *of_bodies)
+
+
+def flight(body: FreeBody, read: ReadCell, y: Motion) -> Flight:
+    """Where a body is and how it moves, at a state that has its coordinates, theta included."""
+    q, qd = body.q(y), body.qd(y)
+    theta, v, w = q[3:], qd[:3], qd[3:]
+    there = _read(body, read, "")
+    if not all(is_zero(part) for part in theta):
+        there = _turned(there, theta)
+    R = rotation_quaternion(*there)
+    return Flight(Pose(R, q[:3]), w, turn_vector_back(R, v), _slope(theta, w))  # type: ignore[arg-type]
+
+
+def slopes(
+    body: FreeBody, y: Motion, *, pose: Pose, turned: Vector, solved: tuple[Vector, Vector]
+) -> tuple[tuple[Real, ...], tuple[Real, ...]]:
+    """Slopes of a body's coordinates and of its rates, from its flight and its acceleration (angular, linear; its own
+    axes)."""
+    wd, a = solved
+    return (*body.qd(y)[:3], *turned), (*turn_vector(pose.R, a), *wd)
+
+
+def place(body: FreeBody, tape: Tape, active: Truth, turn: Quaternion, position: Vector, v: Vector, w: Vector) -> None:
+    """Makes this a body's state, where active: velocity in world axes, angular velocity in its own."""
+    _write(body, tape, active, turn)
+    for name, q, qd in zip(body.coordinates, (*position, 0.0, 0.0, 0.0), (*v, *w), strict=True):
+        cells.keep(tape, active, f"{name}.q", q)
+        cells.keep(tape, active, f"{name}.qd", qd)
+
+
+def begun(machine: Machine, y: Motion) -> Motion:
+    """A state at which a (sub)step begins, or is seen: theta is 0 there."""
+    q = list(y.q)
+    for body in bodies(machine):
+        q[body.first + 3 : body.first + SIX] = (0.0, 0.0, 0.0)
+    return Motion(tuple(q), y.qd, y.x)
+
+
+def orientation(machine: Machine, tape: Tape) -> tuple[Real, ...]:
+    """The quaternions of all bodies, at the beginning of the (sub)step."""
+    return tuple(part for body in bodies(machine) for part in _read(body, tape.read, ""))
+
+
+def keep_orientation(machine: Machine, tape: Tape, copy: str) -> None:
+    """Keeps a copy of the orientations at which the (sub)step began."""
+    for body in bodies(machine):
+        for name in body.orientation:
+            tape.write(f"{copy}{name}", tape.read(name))
+
+
+def turn(machine: Machine, tape: Tape, active: Truth, y: Motion, copy: str = "") -> None:
+    """Takes the turns of a (sub)step that ends at y into the orientations, of which `copy` was their beginning."""
+    for body in bodies(machine):
+        _write(body, tape, active, _turned(_read(body, tape.read, copy), body.q(y)[3:]))
+
+
+def _slope(theta: tuple[Real, ...], w: tuple[Real, ...]) -> Vector:
+    """d(theta)/dt: head of this file."""
+    if all(is_zero(part) for part in theta):
+        return w  # type: ignore[return-value]
+    size, half, s = _half_turn(theta)
+    b = where(size == 0.0, 1.0 / 12.0, (1.0 - half * cos(half) / s) / where(size == 0.0, 1.0, size))
+    once = cross(theta, w)  # type: ignore[arg-type]
+    return add(w, add(scale(0.5, once), scale(b, cross(theta, once))))  # type: ignore[arg-type]
+
+
+def _turned(q: Quaternion, theta: tuple[Real, ...]) -> Quaternion:
+    """q o exp(theta), of length 1."""
+    size, half, s = _half_turn(theta)
+    along = where(size == 0.0, 0.5, 0.5 * s / half)
+    x, y, z = (along * part for part in theta)
+    product = composed(q, (where(size == 0.0, 1.0, cos(half)), x, y, z))
+    shrink = 1.0 / sqrt(sum((part * part for part in product[1:]), product[0] * product[0]))
+    w, x, y, z = (shrink * part for part in product)
+    return w, x, y, z
+
+
+def _half_turn(theta: tuple[Real, ...]) -> tuple[Real, Real, Real]:
+    """phi^2, phi/2 (1 where phi is 0, so that it may divide) and its sine."""
+    x, y, z = theta
+    size = x * x + y * y + z * z
+    half = where(size == 0.0, 1.0, 0.5 * sqrt(size))
+    return size, half, sin(half)
+
+
+def _read(body: FreeBody, read: ReadCell, copy: str) -> Quaternion:
+    w, x, y, z = (read(f"{copy}{name}") for name in body.orientation)
+    return w, x, y, z
+
+
+def _write(body: FreeBody, tape: Tape, active: Truth, q: Quaternion) -> None:
+    for name, part in zip(body.orientation, q, strict=True):
+        cells.keep(tape, active, name, part)

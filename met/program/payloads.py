@@ -1,0 +1,195 @@
+"""Payloads that fly for a time: where they are, what they are to the arm, and what happens as they are grappled.
+
+In a case's memory, for a payload `box` (`payload:box:...`):
+
+    x.q ... turn_z.qd, orientation.w ...    its state while it flies (`bodies`); at rest while a link carries it
+    stage                                   FLYING, CARRIED or RELEASED
+    held.0 ... 11                           its pose in the link's frame, rows of R then p, while a link carries it
+    body.0 ... 9                            its inertia in the recursion's frame (`in_tree`); zeros while it flies
+
+So the derivative adds ten numbers to the arm's, whatever happened when, and cases of a block may differ in that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from met.dynamics.kinematics import LinkMotion, fixed_motion
+from met.dynamics.payload import free_acceleration, in_tree, loaded, raised
+from met.dynamics.recursion import Wrench
+from met.dynamics.spatial import (
+    NO_INERTIA,
+    Pose,
+    Real,
+    Rigid,
+    choose,
+    compose,
+    rigid_about_centre,
+    rotation_quaternion,
+    rotation_rpy,
+    turn_vector_back,
+)
+from met.dynamics.tree import Tree
+from met.integrators.integrator import Motion
+from met.plan import Payload
+from met.program import cells
+from met.program.bodies import PAYLOAD, FreeBody, bodies, flight, place, slopes
+from met.program.machine import Machine, ReadCell
+from met.trace import Truth
+from met.trace.program import Tape
+from met.vectors import ZERO, Vector, quaternion_rpy
+
+FLYING, CARRIED, RELEASED = 0.0, 1.0, 2.0
+"""What has become of a payload: it flies and waits to be grappled; a link carries it; it flies for good."""
+
+NOTHING: Wrench = (ZERO, ZERO)
+
+
+def body_of(machine: Machine, payload: Payload, read: ReadCell) -> Rigid:
+    """A payload's inertia in its own frame."""
+    name = payload.name
+    return rigid_about_centre(machine.mass(name, read), machine.com(name, read), machine.inertia(name, read))
+
+
+def free_body(machine: Machine, payload: Payload) -> FreeBody:
+    """Its coordinates."""
+    return next(each for each in bodies(machine) if each.name == PAYLOAD + payload.name)
+
+
+def cell(payload: Payload, name: str) -> str:
+    return f"{PAYLOAD}{payload.name}:{name}"
+
+
+def carried(payload: Payload, read: ReadCell) -> Truth:
+    """Whether a link carries it."""
+    return read(cell(payload, "stage")) == CARRIED
+
+
+def held(payload: Payload, read: ReadCell) -> Pose:
+    """Its pose in the link's frame, while the link carries it."""
+    x = [read(cell(payload, f"held.{i}")) for i in range(12)]
+    return Pose(((x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8])), (x[9], x[10], x[11]))
+
+
+def laden(machine: Machine, read: ReadCell) -> Tree:
+    """The arm with the payloads that its links carry."""
+    tree = machine.tree(read)
+    for payload in machine.flying:
+        x = [read(cell(payload, f"body.{i}")) for i in range(10)]
+        body = Rigid(x[0], (x[1], x[2], x[3]), (x[4], x[5], x[6], x[7], x[8], x[9]))
+        tree = loaded(tree, payload.link, body)
+    return tree
+
+
+def seen(machine: Machine, payload: Payload, read: ReadCell, y: Motion, links: Mapping[str, LinkMotion]) -> LinkMotion:
+    """A payload in the world, wherever it is; links: the arm's, in the world."""
+    own, link = flown(machine, payload, read, y), with_link(payload, read, links)
+    on = carried(payload, read)
+
+    def either(a: Vector, b: Vector) -> Vector:
+        return choose(on, a[0], b[0]), choose(on, a[1], b[1]), choose(on, a[2], b[2])
+
+    x, y_, z = (either(a, b) for a, b in zip(link.pose.R, own.pose.R, strict=True))
+    return LinkMotion(Pose((x, y_, z), either(link.pose.p, own.pose.p)), either(link.w, own.w), either(link.v, own.v))
+
+
+def flown(machine: Machine, payload: Payload, read: ReadCell, y: Motion) -> LinkMotion:
+    """A payload that flies, in the world."""
+    found = flight(free_body(machine, payload), read, y)
+    return LinkMotion(found.pose, found.w, found.v)
+
+
+def with_link(payload: Payload, read: ReadCell, links: Mapping[str, LinkMotion]) -> LinkMotion:
+    """A payload that its link carries, in the world."""
+    link, pose = links[payload.link], held(payload, read)
+    return LinkMotion(compose(link.pose, pose), *fixed_motion((link.w, link.v), pose))
+
+
+def shared(machine: Machine, read: ReadCell, wrenches: Mapping[str, Wrench]) -> tuple[dict[str, Wrench], ...]:
+    """Wrenches on links, those on payloads among them that a link carries; and those on payloads that fly.
+
+    wrenches  on links and payloads by name, about their frames' origins and in their axes
+    """
+    names = {payload.name: payload for payload in machine.flying}
+    links = {name: wrench for name, wrench in wrenches.items() if name not in names}
+    own = {name: wrench for name, wrench in wrenches.items() if name in names}
+    for name, wrench in own.items():
+        payload = names[name]
+        on = carried(payload, read)
+        before = links.get(payload.link, NOTHING)
+        felt = raised(wrench, held(payload, read))
+        links[payload.link] = tuple(  # type: ignore[assignment]
+            tuple(a + choose(on, b, 0.0) for a, b in zip(*parts, strict=True))
+            for parts in zip(before, felt, strict=True)
+        )
+    return links, own
+
+
+def slopes_of_payloads(
+    machine: Machine, read: ReadCell, y: Motion, wrenches: Mapping[str, Wrench], gravity: Vector
+) -> tuple[tuple[Real, ...], tuple[Real, ...]]:
+    """Slopes of the payloads' coordinates and rates; none while a link carries them. gravity: world axes, m/s^2."""
+    qd: list[Real] = []
+    qdd: list[Real] = []
+    for payload in machine.flying:
+        body = free_body(machine, payload)
+        found = flight(body, read, y)
+        falling = turn_vector_back(found.pose.R, gravity)
+        wrench = wrenches.get(payload.name, NOTHING)
+        solved = free_acceleration(body_of(machine, payload, read), found.w, wrench, falling)
+        on = carried(payload, read)
+        for kept, free in zip((qd, qdd), slopes(body, y, pose=found.pose, turned=found.turned, solved=solved),
+                              strict=True):  # fmt: skip
+            kept += [choose(on, 0.0, slope) for slope in free]
+    return tuple(qd), tuple(qdd)
+
+
+# What becomes of them
+
+
+def start(machine: Machine, tape: Tape) -> None:
+    """Where payloads are when a run begins."""
+    for payload in machine.flying:
+        head = f"payloads.{payload.name}"
+
+        def given(name: str, head: str = head) -> Vector:
+            return machine.vector(f"{head}.{name}", tape.read)
+
+        body = free_body(machine, payload)
+        if payload.grappled:
+            turn = quaternion_rpy(*given("attitude"))
+            w = turn_vector_back(rotation_quaternion(*turn), given("rate"))
+            place(body, tape, True, turn, given("position"), given("velocity"), w)
+            tape.write(cell(payload, "stage"), FLYING)
+        else:
+            place(body, tape, True, (1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO)
+            hold(machine, tape, True, payload, Pose(rotation_rpy(*given("rpy")), given("at")))
+
+
+def hold(machine: Machine, tape: Tape, active: Truth, payload: Payload, pose: Pose) -> None:
+    """Makes a payload a part of its link, at this pose in its frame, where active."""
+    for i, x in enumerate((*pose.R[0], *pose.R[1], *pose.R[2], *pose.p)):
+        cells.keep(tape, active, cell(payload, f"held.{i}"), x)
+    body = in_tree(machine.tree(tape.read), payload.link, body_of(machine, payload, tape.read), pose)
+    _keep_body(tape, active, payload, body)
+    cells.keep(tape, active, cell(payload, "stage"), CARRIED)
+
+
+def let_go(tape: Tape, active: Truth, payload: Payload) -> None:
+    """Takes a payload off its link, where active."""
+    _keep_body(tape, active, payload, NO_INERTIA)
+    cells.keep(tape, active, cell(payload, "stage"), RELEASED)
+
+
+def way(machine: Machine, payload: Payload, read: ReadCell, motion: LinkMotion, link: LinkMotion) -> Vector:
+    """From the point of the link that the payload's frame is to come to, to where it is; world axes, m."""
+    x, y, z = motion.pose.p
+    a, b, c = link.position(machine.vector(f"payloads.{payload.name}.at", read))
+    return x - a, y - b, z - c
+
+
+def _keep_body(tape: Tape, active: Truth, payload: Payload, body: Rigid) -> None:
+    for i, x in enumerate((body.mass, *body.h, *body.I)):
+        cells.keep(tape, active, cell(payload, f"body.{i}"), x)
+
+
