@@ -21,6 +21,9 @@ Parameters are named by paths, the ones a deck uses inside a run:
     initial.base.position|velocity.x|y|z   of a free base, world axes, m, m/s; .rpy (rad, fixed x-y-z), .rate (rad/s)
     base.<component>.<parameter>           of a prescribed base, as the profile declares that gives this component
     environment.<name>.<parameter>         as the environment model declares; uniform gravity is `gravity`, `g`
+    guides.<name>.<parameter>              as the guide declares
+    guides.<name>.<joint>.<parameter>      of each joint that the guide moves, as the guide declares
+    guides.<name>.<component>.<parameter>  of its path, as the profile declares that gives this component
     metrics.<name>.<parameter>             as the metric declares
 
 A vector parameter of a model is three numbers, `.x .y .z`.
@@ -44,7 +47,7 @@ BASE = "base"
 """The link that the arm stands on. It has no joint, and matter only where a deck gives it some."""
 
 COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
-"""Of the pose of a prescribed base: m, and rad about fixed x, y, z."""
+"""Of the pose of a prescribed base, and of a guide's path: m, and rad about fixed x, y, z."""
 
 REPEAT, SEED = "noise:repeat", "noise:seed"
 """Inputs of a program besides coordinates: no path of a deck's has a colon."""
@@ -102,7 +105,7 @@ class Joint:
 
 @frozen
 class Course:
-    """One of `COMPONENTS` of a prescribed base, and the model of its course in time."""
+    """One of `COMPONENTS` of a prescribed base or a guide's path, and the model of its course in time."""
 
     component: str
     model: str
@@ -126,10 +129,14 @@ class Base:
 
 @frozen
 class Command:
-    """What a servo is told: "rate", "position", "torque" or "acceleration", and the model of its course in time."""
+    """What a servo is told: "rate", "position", "torque" or "acceleration", and the model of its course in time.
+
+    guide  the guide that tells it, by its name in the deck; then there is no model, ""
+    """
 
     kind: str
     model: str
+    guide: str = ""
 
 
 @frozen
@@ -150,6 +157,23 @@ class ServoUse:
     place: Place | None = None
     words: tuple[tuple[str, str], ...] = ()
     continuous: bool = False
+
+
+@frozen
+class GuideUse:
+    """A guide under a name of the deck's, which commands several joints.
+
+    joints   that it moves, in the arm's order
+    divisor  base ticks a tick of its computer, a multiple of the dynamics' step; of one without, that step
+    courses  of its path's components; those left out stay 0
+    """
+
+    name: str
+    model: str
+    joints: tuple[str, ...]
+    divisor: int
+    courses: tuple[Course, ...] = ()
+    place: Place | None = None
 
 
 @frozen
@@ -282,6 +306,7 @@ class Structure:
     record: tuple[Recorded, ...]
     substitutions: tuple[Substitution, ...] = ()
     base: Base | None = None
+    guides: tuple[GuideUse, ...] = ()
 
     @property
     def free(self) -> bool:

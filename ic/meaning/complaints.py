@@ -86,6 +86,8 @@ class Complaints:
 
 def belongs(word: str) -> list[str]:
     """Where a word of the language stands that stands elsewhere only."""
+    if word == "guide":
+        return ["`guide NAME = MODEL { ... }`, in a run, commands several joints together"]
     return ["`substitute JOINT { ... }`, in a run, puts a joint's motor on a bed"] if word == "substitute" else []
 
 

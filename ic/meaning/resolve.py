@@ -19,7 +19,8 @@ from met.frozen import frozen
 from met.render import shown_place
 
 KINDS = ("arm", "servo", "run", "sweep")
-RESERVED = ("links", "initial", "environment", "metrics", "rates")  # what paths of a run begin with, besides joints
+RESERVED = ("links", "initial", "environment", "guides", "metrics", "rates")
+"""What paths of a run begin with, besides joints."""
 
 
 @frozen

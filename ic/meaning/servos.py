@@ -315,6 +315,8 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
         scope.complaints.error("D152", f"the model `{servo.name}` takes no command `{kind}`", call.name.place,
                                help=[*did_you_mean(kind, servo.commands), f"it takes {known}"])
         return None
+    if (guide := word_of(call.positional[0])) in scope.guides and isinstance(call.positional[0], Name):
+        return Command(kind, "", guide or "")
     inner = _asked(scope, call)
     told = f"the command of {owner.label}"
     spot = replace(owner, label=told, called=told, place=place, path=f"{owner.path}.command", local="command",
@@ -374,6 +376,12 @@ def course_named(scope: Scope, inner: Expression) -> Expression:
     return inner
 
 
+def _is_guide(scope: Scope, inner: Expression) -> bool:
+    """Whether this names a guide of one of the deck's runs."""
+    runs = [scope.definitions.block(run) for run in scope.definitions.of_kind("run").values()]
+    return any(run is not None and run.get(f"guide {word_of(inner)}") is not None for run in runs)
+
+
 def check_servo_definition(scope: Scope, name: str) -> None:
     """What can be told of a definition that no run uses: its model and its keys."""
     definition = scope.definitions.of_kind("servo")[name]
@@ -392,7 +400,7 @@ def check_servo_definition(scope: Scope, name: str) -> None:
             if (command is not None and isinstance(command.value, Call) and len(command.value.positional) == 1
                     and command.value.name.text in COMMAND_UNIT):
                 inner = _asked(scope, command.value)
-                if not isinstance(inner, Call):
+                if not isinstance(inner, Call) and not _is_guide(scope, inner):
                     scope.names.evaluate(inner)
             for key, item in block.items.items():
                 if key in NOT_PARAMETERS or item.value is None:

@@ -125,7 +125,7 @@ def _arm(experiment: Experiment) -> Iterator[str]:
         use = servos.get(joint.name)
         servo = "" if joint.kind == "fixed" else "passive"
         if use is not None:
-            asked = f": {use.command.kind}, {use.command.model}" if use.command else ""
+            asked = f": {use.command.kind}, {use.command.model or use.command.guide}" if use.command else ""
             servo = f"{use.definition} ({use.model}){asked}"
         at = values.vector(f"{joint.name}.at")
         place = "varies" if at is None else vector(at, "m") if any(at) else ""

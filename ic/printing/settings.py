@@ -33,6 +33,11 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
     for on_bed in structure.substitutions:
         word(f"{on_bed.joint}.bed.model", on_bed.bed, on_bed.place)
         word(f"{on_bed.joint}.law.model", on_bed.law, on_bed.place)
+    for guide in structure.guides:
+        word(f"guides.{guide.name}.model", guide.model, guide.place)
+        if models.find("guide", guide.model).steer is not None:
+            ticks = f"{guide.divisor} base ticks a tick"
+            number(f"guides.{guide.name}.rate", schedule.base_hz / guide.divisor, "Hz", ticks)
     for environment in structure.environment:
         word(f"environment.{environment.name}.model", environment.model, environment.place)
     word("environment.velocity_products", "on" if structure.velocity_products else "off")

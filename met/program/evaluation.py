@@ -152,7 +152,7 @@ def driven_by(
         found = law(actuator, p, Values(owner, integrals), Seen(q, qd, asked, 0.0, time, natural))
         held = Values(owner, {**found.outputs, **integrals})
         slopes.update(found.slopes)
-        shown.update({"command": asked.value} if actuator.profile is not None else {}, **found.outputs)
+        shown.update({"command": asked.value} if actuator.use.command is not None else {}, **found.outputs)
     motion = JointMotion(q, qd, time, begin, actuator.asked)
     drive = answer(owner, servo.drive, p, held, natural, motion)
     slopes.update(returned(owner, "slopes", drive.slopes, (state.name for state in parts.natural)))

@@ -47,6 +47,7 @@ run it {{
     record      = [q, qd, qdd, tau];
     metric m    = {metric};
     {substitute}
+    {guide}
 }}
 sweep cases of it {{ vary initial.hinge.q = linspace(-1, 1, 7) rad; }}
 """
@@ -102,6 +103,17 @@ SMALLEST: dict[tuple[str, str], dict[str, str]] = {
         "  axis = [0, 0, -1]; thrust = 50 N; exponent = 5; duty = 50 %; period = 0.03 s; };"
     },
     **{("command", name): {"servos": DRIVEN.format(asked("rate", name))} for name in COURSES},
+    ("guide", "resolved_rate"): {
+        "servos": "hinge = follow { command = rate(tip); }; slide = follow { command = position(tip); };",
+        "guide": "guide tip = resolved_rate { link = tip; guides = xz; z = ramp(to = 5 cm, over = 0.2 s);"
+        "  rate = 250 Hz; damping = 0.2 m; threshold = 0.5 m; hinge.max_rate = 9 rad/s; slide.max_rate = 1 m/s; }",
+    },
+    ("guide", "together"): {
+        "servos": "hinge = follow { command = position(move); }; slide = follow { command = position(move); };",
+        "guide": "guide move = together { hinge.to = 0.2 rad; hinge.max_rate = 9 rad/s;"
+        "  hinge.max_acceleration = 90 rad/s^2; slide.to = 3 cm; slide.max_rate = 1 m/s;"
+        "  slide.max_acceleration = 9 m/s^2; }",
+    },
     ("metric", "final"): {"metric": "final { of = hinge.q; }"},
     ("metric", "max"): {"metric": "max { of = hinge.qd; }"},
     ("metric", "min"): {"metric": "min { of = slide.qdd; }"},
@@ -118,12 +130,12 @@ SMALLEST: dict[tuple[str, str], dict[str, str]] = {
 }
 PLAIN = {
     "more": "", "servos": "", "environment": "", "integrator": "modified_euler", "metric": "final { of = slide.q; }",
-    "substitute": "",
+    "substitute": "", "guide": "",
 }  # fmt: skip
 
 
 def parameters(model: Any) -> tuple[Parameter, ...]:
-    return tuple(getattr(model, "parameters", ()))
+    return (*getattr(model, "parameters", ()), *getattr(model, "of_joint", ()))
 
 
 def test_every_model_has_a_small_deck() -> None:
