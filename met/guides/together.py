@@ -28,11 +28,10 @@ def course(p: Any, joints: Sequence[Any], begins: Sequence[Real], t: Real) -> li
     for way, joint in zip(ways, joints, strict=True):
         slow = maximum(slow, absolute(way) / joint.max_rate)
         late = maximum(late, absolute(way) / joint.max_acceleration)
-    moves = slow > 0.0
     s, rate = trapezoid.course(
         SimpleNamespace(
-            start=0.0, to=1.0, begin=p.begin, max_rate=1.0 / where(moves, slow, 1.0),
-            max_acceleration=1.0 / where(moves, late, 1.0),
+            start=0.0, to=1.0, begin=p.begin, max_rate=1.0 / where(slow == 0.0, 1.0, slow),
+            max_acceleration=1.0 / where(late == 0.0, 1.0, late),
         ),
         t,
     )
