@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, Final
 
@@ -33,6 +34,7 @@ class Guiding:
     """A guide of the run. rate None: that of the servos, or none where it has no computer (`ticks`).
 
     link, components  what is guided, of one with a path
+    whole             whether the command of every joint is known, so that none is missing among `joints`
     """
 
     name: str
@@ -42,6 +44,7 @@ class Guiding:
     rate: Rate | None
     link: str
     components: tuple[str, ...]
+    whole: bool
     place: Place
 
     @property
@@ -84,7 +87,7 @@ def check_guides(scope: Scope, guides: Iterable[Guiding], structure: Structure) 
             scope.complaints.error("D276", f"joint `{idle[0]}` follows guide `{guide.name}`, and does not carry link "
                                    f"`{guide.link}`", guide.place,
                                    help="give it a command of its own, or guide a link that it carries")
-        elif len(guide.joints) < len(guide.components) and not scope.lost:
+        elif guide.whole and 0 < len(guide.joints) < len(guide.components):
             words = next((p for p in guide.model.parameters if p.name == "guides"), None)
             others = words.words if words is not None else ()
             scope.complaints.error(
@@ -127,7 +130,8 @@ def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use]) -> Guiding | Non
         return None
     body = item.body or Block()
     follow = [use for use in uses if use.command is not None and use.command.guide == item.name]
-    if not follow and not scope.lost:
+    whole = not scope.lost and all(use.command is not None or not use.servo.commands for use in uses)
+    if not follow and whole:
         kind = guide.commands[0]
         scope.complaints.error("D272", f"no joint follows guide `{item.name}`", item.place,
                                help=f"write `command = {kind}({item.name});` in the servo of each joint that it moves, "
@@ -153,24 +157,28 @@ def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use]) -> Guiding | Non
     guided = guide.components(SimpleNamespace(**values)) if values is not None and paths else ()
     courses = _courses(scope, owner, body, paths, guided if values is not None else COMPONENTS)
     rate = None
+    scope.whole[owner.path] = f"is a guide: vary a parameter of it, `{owner.path}.PARAMETER`"
     if guide.steer is not None and body.get("rate") is not None:
         rate = fixed_rate(scope, owner, body.items["rate"], owner.label)
+    scope.whole[owner.join("rate")] = "decides the program: write a run for each, and `sweep NAME = ONE + OTHER;`"
     link = named.get("link", "") if guide.components is not None else ""
     if link not in known["link"]:
         link = ""
-    return Guiding(item.name, guide, joints, courses, rate, link, tuple(guided), item.place)
+    return Guiding(item.name, guide, joints, courses, rate, link, tuple(guided), whole, item.place)
 
 
 def _of_joints(scope: Scope, owner: Owner, guide: Any, body: Block, arm: Arm, joints: Iterable[str]) -> None:
-    """The parameters of each joint: as written for it, else as written for all."""
+    """The parameters of each joint: as written for it, else as written for all, whom a path without a joint reaches."""
     kinds = {joint.name: joint.kind for joint in arm.moving}
     for wanted in guide.of_joint:
         general = body.get(wanted.name)
         for joint in joints:
             own = body.get(f"{joint}.{wanted.name}")
-            item = own or general
+            all_of_them = () if own is not None else (owner.path,)
+            item = own if own is not None else general
+            item = replace(item, homes=all_of_them) if item is not None else None
             whose = Owner(f"joint `{joint}` of {owner.label}", item.place if item is not None else owner.place,
-                          f"{owner.path}.{joint}", homes=owner.homes, joint=kinds[joint])
+                          f"{owner.path}.{joint}", homes=all_of_them, local="", joint=kinds[joint])
             if scope.number(whose, wanted, item) is None and own is None:
                 break  # the same would be told of every joint
 

@@ -315,8 +315,11 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
         scope.complaints.error("D152", f"the model `{servo.name}` takes no command `{kind}`", call.name.place,
                                help=[*did_you_mean(kind, servo.commands), f"it takes {known}"])
         return None
-    if (guide := word_of(call.positional[0])) in scope.guides and isinstance(call.positional[0], Name):
-        return Command(kind, "", guide or "")
+    if isinstance(call.positional[0], Name) and scope.guides:
+        guide = call.positional[0].text
+        if guide in scope.guides:
+            return Command(kind, "", guide)
+        _check_known(scope, call.positional[0])
     inner = _asked(scope, call)
     told = f"the command of {owner.label}"
     spot = replace(owner, label=told, called=told, place=place, path=f"{owner.path}.command", local="command",
@@ -374,6 +377,15 @@ def course_named(scope: Scope, inner: Expression) -> Expression:
     if isinstance(inner, Name) and inner.text in models.available("command") and not scope.names.knows(inner.text):
         return Call(inner, (), (), None, inner.place)
     return inner
+
+
+def _check_known(scope: Scope, inner: Name) -> None:
+    """Raises Problem D278 for the name of nothing, where guides are what a command may follow too."""
+    if len(inner.path) > 1 or scope.names.knows(inner.text) or inner.text in models.available("command"):
+        return
+    raise Problem(error("D278", f"no guide, value or course in time `{inner.text}`", inner.place,
+                        help=[*did_you_mean(inner.text, [*scope.guides, *scope.definitions.lets]),
+                              known_words("guides of this run", scope.guides)]))
 
 
 def _is_guide(scope: Scope, inner: Expression) -> bool:
