@@ -30,6 +30,10 @@ USES = {
     },
     "environment": {"environment": "drag = begun { link = tip; damping = 3 N*s/m; };"},
     "command": {"servos": every.DRIVEN.format("rate(begun(to = 0.5 rad/s, over = 0.1 s))")},
+    "guide": {
+        "servos": "hinge = follow { command = position(lead); };",
+        "guide": "guide lead = begun { over = 0.2 s; to = 0.3 rad; }",
+    },
     "metric": {"metric": "begun { of = slide.qd; }"},
     "integrator": {"integrator": "begun"},
 }
