@@ -60,12 +60,18 @@ def name_guides(scope: Scope, block: Block) -> None:
     scope.guides = {item.name: item for item in block.of_kind(KIND)}
     for name, item in scope.guides.items():
         let = scope.definitions.lets.get(name)
-        is_else = "a unit" if units.is_unit(name) else "a course in time" if name in models.available("command") else ""
-        if let is not None or is_else:
+        if meaning := _meaning(scope, name):
             scope.complaints.error(
-                "D271", f"`{name}` is {is_else or 'a value'}, so no guide can be called so", item.place,
+                "D271", f"`{name}` is {meaning}, so no guide can be called so", item.place,
                 also=[Label(let.name.place, "the value")] if let is not None else [],
                 help="give the guide another name: `rate(NAME)` is to mean one thing")
+
+
+def _meaning(scope: Scope, name: str) -> str:
+    """What else a name means where a command's value stands; nothing where it may be a guide's."""
+    if name in scope.definitions.lets:
+        return "a value"
+    return "a unit" if units.is_unit(name) else "a course in time" if name in models.available("command") else ""
 
 
 def resolve_guides(scope: Scope, block: Block, arm: Arm, uses: list[Use]) -> list[Guiding]:
@@ -131,7 +137,7 @@ def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use]) -> Guiding | Non
     body = item.body or Block()
     follow = [use for use in uses if use.command is not None and use.command.guide == item.name]
     whole = not scope.lost and all(use.command is not None or not use.servo.commands for use in uses)
-    if not follow and whole:
+    if not follow and whole and not _meaning(scope, item.name):
         kind = guide.commands[0]
         scope.complaints.error("D272", f"no joint follows guide `{item.name}`", item.place,
                                help=f"write `command = {kind}({item.name});` in the servo of each joint that it moves, "

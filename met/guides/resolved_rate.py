@@ -2,13 +2,13 @@
 
     v      = path's rate + gain * (path - where it is) - what it does with these joints at rest
     qd     = J' (J J' + lambda^2 I)^-1 v                           (Whitney 1969; damped, met/guides/damped.py)
-    lambda^2 = damping^2 (1 - (sigma/threshold)^2)  where sigma < threshold, else 0
+    lambda^2 = max_damping^2 (1 - (sigma/threshold)^2)  where sigma < threshold, else 0
     qd     is made shorter as a whole, where a joint would go faster than its `max_rate`
 
 Turns count as the way of a point `length` away, and a prismatic joint's way as a turn of it over `length`: so J is in
 metres, and sigma, its smallest singular value, is the velocity of the end in its worst direction for one rad/s. Below
 the threshold the task gives way, so that rates stay small through a singularity, by as much as `error` shows; the gain
-brings the point back. With damping = threshold no joint motion exceeds |v|/threshold. Damping 0 is the pseudo-inverse.
+brings the point back. With max_damping = threshold no joint motion exceeds |v|/threshold. 0 is the pseudo-inverse.
 
 The path is given by the components that are written, in world axes, as offsets from where point and link begin: x, y,
 z of the point; roll, pitch, yaw of the link, R = Rz(yaw) Ry(pitch) Rx(roll). Those left out stay 0, so a link that
@@ -66,7 +66,7 @@ def steer(p: Any, joints: Sequence[Any], seen: Sight) -> Steered:
     sigma = least_singular_value(square)
     low = sigma < p.threshold
     share = sigma / where(low, p.threshold, 1.0)
-    damping = where(low, p.damping * p.damping * (1.0 - share * share), 0.0)
+    damping = where(low, p.max_damping * p.max_damping * (1.0 - share * share), 0.0)
     rates = [unit * u for unit, u in zip(units, damped(J, square, damping, task), strict=True)]
 
     most: Real = 1.0
@@ -104,7 +104,7 @@ GUIDE = Guide(
         Parameter(name="point", unit="m", shape="vector", default=ZEROS, doc="point of it that is guided, link frame"),
         Parameter(name="guides", shape="word", words=tuple(GUIDED), default="pose", doc="which components are guided"),
         Parameter(
-            name="damping", unit="m", at_least=0.0, doc="lambda at a singularity; 0: none",
+            name="max_damping", unit="m", at_least=0.0, doc="lambda at a singularity; 0: none",
             source="Nakamura and Hanafusa 1986; how it grows: Chiaverini, IEEE Trans. Robotics Autom. 13, 1997",
         ),
         Parameter(name="threshold", unit="m", at_least=0.0, doc="singular value of J below which it is damped"),

@@ -208,10 +208,10 @@ def test_every_function_shape_key_and_model_is_on_the_page() -> None:
     assert {word for row in table("key of a joint") for word in ticked(row[0])} == set(arm.JOINT_KEYS)
     entries = {entry.split()[0] for row in table("entry of a run") for entry in ticked(row[0])}
     assert {word for row in table("key of `substitute`") for word in ticked(row[0])} == set(DEFAULTS)
-    assert entries == {*run.KEYS, "metric", "require", "substitute"}
+    assert entries == {*run.KEYS, *run.NAMED, "require"}
     words = ticked(re.sub(r"```.*?```", "", PAGE, flags=re.DOTALL))
     assert set(run.RATES) <= words
-    for kind in ("servo", "environment", "metric", "integrator"):
+    for kind in ("servo", "environment", "guide", "metric", "integrator"):
         assert set(models.find_own(kind)) <= words, kind
     assert set(models.find_own("command")) - {"constant"} <= words
 

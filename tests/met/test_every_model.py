@@ -106,7 +106,7 @@ SMALLEST: dict[tuple[str, str], dict[str, str]] = {
     ("guide", "resolved_rate"): {
         "servos": "hinge = follow { command = rate(tip); }; slide = follow { command = position(tip); };",
         "guide": "guide tip = resolved_rate { link = tip; guides = xz; z = ramp(to = 5 cm, over = 0.2 s);"
-        "  rate = 250 Hz; damping = 0.2 m; threshold = 0.5 m; hinge.max_rate = 9 rad/s; slide.max_rate = 1 m/s; }",
+        "  rate = 250 Hz; max_damping = 0.2 m; threshold = 0.5 m; hinge.max_rate = 9 rad/s; slide.max_rate = 1 m/s; }",
     },
     ("guide", "together"): {
         "servos": "hinge = follow { command = position(move); }; slide = follow { command = position(move); };",

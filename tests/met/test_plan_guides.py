@@ -28,7 +28,7 @@ run it {
     arm = pair;
     servos { low = follow; high = follow; out = go; }
     guide tip = resolved_rate {
-        link = two; point = [1, 0, 0] m; guides = xy; damping = 0.1 m; threshold = 0.2 m;
+        link = two; point = [1, 0, 0] m; guides = xy; max_damping = 0.1 m; threshold = 0.2 m;
         x = table(times = [0, 1] s, values = [0, 0.2] m); y = ramp(to = 1 cm, over = 1 s);
     }
     guide move = together { to = 1 cm; max_rate = 1 cm/s; max_acceleration = 1 cm/s^2; }

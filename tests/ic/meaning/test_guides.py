@@ -29,7 +29,7 @@ run it {
     arm = pair;
     servos { low = follow; high = follow; }
     guide tip = resolved_rate {
-        link = two; point = [1, 0, 0] m; guides = xy; damping = 0.1 m; threshold = 0.2 m;
+        link = two; point = [1, 0, 0] m; guides = xy; max_damping = 0.1 m; threshold = 0.2 m;
         x = ramp(to = -20 cm, over = 1 s); max_rate = 1 rad/s;
     }
     initial { low.q = 20 deg; high.q = 60 deg; }
@@ -58,7 +58,7 @@ def test_its_parameters(tmp_path: Path) -> None:
     assert numbers(tmp_path) == {
         "guides.tip.link": "two", "guides.tip.guides": "xy", "guides.tip.loop": "closed",
         "guides.tip.jacobian": "arm", "guides.tip.point.x": 1.0, "guides.tip.point.y": 0.0, "guides.tip.point.z": 0.0,
-        "guides.tip.damping": 0.1, "guides.tip.threshold": 0.2, "guides.tip.gain": 1.0, "guides.tip.length": 1.0,
+        "guides.tip.max_damping": 0.1, "guides.tip.threshold": 0.2, "guides.tip.gain": 1.0, "guides.tip.length": 1.0,
         "guides.tip.low.max_rate": 1.0, "guides.tip.high.max_rate": 1.0,
         "guides.tip.x.start": 0.0, "guides.tip.x.to": -0.2, "guides.tip.x.begin": 0.0, "guides.tip.x.over": 1.0,
     }
@@ -85,7 +85,7 @@ def test_a_path_comes_from_a_file(tmp_path: Path) -> None:
 
 
 def test_a_sweep_varies_its_numbers_those_of_all_joints_too(tmp_path: Path) -> None:
-    sweep = "sweep s of it { vary guides.tip.damping = [0, 0.1] m; vary guides.tip.max_rate = [0.1, 1] rad/s;"
+    sweep = "sweep s of it { vary guides.tip.max_damping = [0, 0.1] m; vary guides.tip.max_rate = [0.1, 1] rad/s;"
     sweep += " vary guides.tip.x.to = [10, 20] cm; }"
     made = experiment(tmp_path, ARM, changed(RUN, ("threshold = 0.2 m", "threshold = 2 m")), sweep, select=["s"])
     assert made.cases.coordinates[1].sets == ("guides.tip.low.max_rate", "guides.tip.high.max_rate")
@@ -186,7 +186,7 @@ error[D125]: no channel `guides.tip.error`
 error[D159]: no link `tow` in arm `pair`
   --> deck.ic:12:16
    |
-12 |         link = tow; point = [1, 0, 0] m; guides = xy; damping = 0.1 m; threshold = 0.2 m;
+12 |         link = tow; point = [1, 0, 0] m; guides = xy; max_damping = 0.1 m; threshold = 0.2 m;
    |                ^^^
    = help: did you mean `two`?
    = help: links: one, two
@@ -203,13 +203,13 @@ error[D276]: joint `high` follows guide `tip`, and does not carry link `one`
 
 1 error
 """),
-    ("damping = 0.1 m;", "", """\
-error[D075]: guide `tip` has no `damping`
+    ("max_damping = 0.1 m;", "", """\
+error[D075]: guide `tip` has no `max_damping`
   --> deck.ic:11:5
    |
 11 |     guide tip = resolved_rate {
    |     ^^^^^^^^^
-   = help: write `damping = ... m;` (lambda at a singularity; 0: none)
+   = help: write `max_damping = ... m;` (lambda at a singularity; 0: none)
 
 1 error
 """),
@@ -240,7 +240,7 @@ error[D141]: guide `tip` has no `lo.max_rate`
 13 |         x = ramp(to = -20 cm, over = 1 s); lo.max_rate = 1 rad/s;
    |                                            ^^^^^^^^^^^
    = help: did you mean `low.max_rate`?
-   = help: it has: link, point, guides, damping, threshold, gain, length, loop, jacobian, rate, x, y, z, roll, pitch, yaw, max_rate, low.max_rate, high.max_rate
+   = help: it has: link, point, guides, max_damping, threshold, gain, length, loop, jacobian, rate, x, y, z, roll, pitch, yaw, max_rate, low.max_rate, high.max_rate
 
 1 error
 """),
@@ -280,7 +280,7 @@ error[D275]: guide `tip` moves 2 joints and guides 6 components: x, y, z, roll, 
 error[D277]: guide `tip` ticks at 2000 Hz, between the steps of the dynamics
   --> deck.ic:12:62
    |
-12 |         link = two; point = [1, 0, 0] m; guides = xy; rate = 2 kHz; damping = 0.1 m; threshold = 0.2 m;
+12 |         link = two; point = [1, 0, 0] m; guides = xy; rate = 2 kHz; max_damping = 0.1 m; threshold = 0.2 m;
    |                                                              ^^^^^
   ::: deck.ic:17:24  1000 Hz
    = help: give the guide a `rate` that divides 1000 Hz, or quicken the dynamics

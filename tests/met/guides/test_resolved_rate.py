@@ -12,7 +12,7 @@ from met import run as engine
 from tests.ic.small_decks import experiment
 from tests.met.guides.chains import HZ, PATH, Oracle, chain, least_squares, path, wanted
 
-LAW = f"{path()} damping = 0.4 m; threshold = 0.6 m; gain = 3 1/s; length = 0.7 m;"
+LAW = f"{path()} max_damping = 0.4 m; threshold = 0.6 m; gain = 3 1/s; length = 0.7 m;"
 LENGTH, GAIN, DAMPING, THRESHOLD = 0.7, 3.0, 0.4, 0.6
 
 
@@ -62,7 +62,7 @@ def test_every_tick_is_the_damped_least_squares(
 
 
 def test_without_damping_the_path_is_kept(tmp_path: Path) -> None:
-    text = f"{path()} damping = 0 m; threshold = 0 m; gain = 3 1/s;"
+    text = f"{path()} max_damping = 0 m; threshold = 0 m; gain = 3 1/s;"
     plan = experiment(tmp_path, chain(3, 7, text))
     run, oracle = engine.run(plan), Oracle(plan)
     for i, t in enumerate(run.time):
@@ -118,7 +118,7 @@ def test_the_path_is_kept_better_in_proportion_to_the_period(tmp_path: Path) -> 
     errors = []
     for hz in (50, 100, 200, 400):
         rates = f"dynamics = 400 Hz; servos = {hz} Hz; record = 50 Hz;"
-        text = f"{path()} damping = 0 m; threshold = 0 m; gain = 2 1/s; loop = open;"
+        text = f"{path()} max_damping = 0 m; threshold = 0 m; gain = 2 1/s; loop = open;"
         plan = experiment(tmp_path, chain(3, 7, text, command="position", rates=rates, duration="1 s"))
         run, oracle = engine.run(plan), Oracle(plan)
         begun = oracle.at(run.signals["q"][0, 0])[:2]
@@ -144,7 +144,7 @@ def test_a_base_that_is_moved_is_made_up_for(tmp_path: Path) -> None:
     errors = []
     for hz in (200, 400, 800):
         # without a gain only what the base does is told to the joints; a stiff servo, so that the period's is left
-        text = chain(3, 7, "damping = 0 m; threshold = 0 m; gain = 0 1/s;", base=base, command="position",
+        text = chain(3, 7, "max_damping = 0 m; threshold = 0 m; gain = 0 1/s;", base=base, command="position",
                      bandwidth=300.0, rates=f"dynamics = 1600 Hz; servos = {hz} Hz; record = 50 Hz;")
         run = engine.run(experiment(tmp_path, text))
         errors.append(run.signals["guides.tip.error"][0].max())
@@ -159,7 +159,7 @@ TUMBLING = "base.velocity = [0.02, -0.01, 0.03] m/s; base.rate = [3, -2, 4] deg/
 
 @pytest.mark.parametrize("initial", ["", TUMBLING])
 def test_the_generalized_jacobian_knows_what_a_free_base_does(initial: str, tmp_path: Path) -> None:
-    text = f"{path()} damping = 0 m; threshold = 0 m; gain = 3 1/s; jacobian = "
+    text = f"{path()} max_damping = 0 m; threshold = 0 m; gain = 3 1/s; jacobian = "
     link = "    link base { mass = 30 kg; com = [0.1, 0, -0.2] m; inertia = [3, 4, 5, 0.1, 0.2, -0.3] kg*m^2; }\n"
     errors = {}
     for jacobian in ("arm", "generalized"):
