@@ -8,6 +8,8 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, Final
 
+import numpy as np
+
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
@@ -24,6 +26,7 @@ from met.diagnostic import Label, Place
 from met.frozen import frozen
 from met.plan import COMPONENTS, Course, GuideUse, Structure
 from met.plan_defaults import component
+from met.trace import Real
 
 KIND: Final = "guide"
 USAGE = "write `guide NAME = MODEL { ... }`"
@@ -35,6 +38,7 @@ class Guiding:
 
     link, components  what is guided, of one with a path
     whole             whether the command of every joint is known, so that none is missing among `joints`
+    fastest           of its error, 1/s (`Guide.fastest`); None where that is unknown
     """
 
     name: str
@@ -45,6 +49,7 @@ class Guiding:
     link: str
     components: tuple[str, ...]
     whole: bool
+    fastest: Real | None
     place: Place
 
     @property
@@ -112,6 +117,22 @@ def check_instants(scope: Scope, guide: Guiding, divisor: int, dynamics: int, ra
             help=f"give the guide a `rate` that divides {step.hz:g} Hz, or quicken the dynamics")
 
 
+def check_period(scope: Scope, guide: Guiding, rate: Rate) -> None:
+    """A guide brings its error down from tick to tick."""
+    if guide.fastest is None:
+        return
+
+    def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+        bad = ~(values[:, 0] < 2.0 * rate.hz)
+        return bad, [f"{x / rate.hz:.3g} times the error is taken off at each tick" for x in values[bad, 0][:1]]
+
+    scope.checks.hold(
+        (guide.fastest,), test, code="D279", message=f"guide `{guide.name}` is unstable at {rate.hz:g} Hz",
+        place=guide.place, needs=(f"guides.{guide.name}",),
+        help=f"what it takes off in a second, its gain, must stay below twice its rate, {2.0 * rate.hz:g}/s, and well "
+             "below what its servos can follow")
+
+
 def rate_of(scope: Scope, guide: Guiding, shared: Rate | None) -> Rate | None:
     """How often a guide ticks: as it says, else as the servos do; None where that is nothing, which was told."""
     found = guide.rate or shared
@@ -161,16 +182,20 @@ def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use]) -> Guiding | Non
     values = use_model(scope, owner, guide.parameters, body, extra)
     _of_joints(scope, owner, guide, body, arm, joints)
     guided = guide.components(SimpleNamespace(**values)) if values is not None and paths else ()
-    courses = _courses(scope, owner, body, paths, guided if values is not None else COMPONENTS)
+    courses = _courses(scope, owner, body, paths, guided if values is not None else COMPONENTS, joints)
     rate = None
     scope.whole[owner.path] = f"is a guide: vary a parameter of it, `{owner.path}.PARAMETER`"
     if guide.steer is not None and body.get("rate") is not None:
         rate = fixed_rate(scope, owner, body.items["rate"], owner.label)
     scope.whole[owner.join("rate")] = "decides the program: write a run for each, and `sweep NAME = ONE + OTHER;`"
+    fastest = None
+    if guide.fastest is not None and values is not None:
+        with scope.complaints.gather():
+            fastest = guide.fastest(SimpleNamespace(**values))
     link = named.get("link", "") if guide.components is not None else ""
     if link not in known["link"]:
         link = ""
-    return Guiding(item.name, guide, joints, courses, rate, link, tuple(guided), whole, item.place)
+    return Guiding(item.name, guide, joints, courses, rate, link, tuple(guided), whole, fastest, item.place)
 
 
 def _of_joints(scope: Scope, owner: Owner, guide: Any, body: Block, arm: Arm, joints: Iterable[str]) -> None:
@@ -190,13 +215,17 @@ def _of_joints(scope: Scope, owner: Owner, guide: Any, body: Block, arm: Arm, jo
 
 
 def _courses(
-    scope: Scope, owner: Owner, body: Block, known: Iterable[str], guided: Iterable[str]
+    scope: Scope, owner: Owner, body: Block, known: Iterable[str], guided: Iterable[str], joints: Iterable[str]
 ) -> tuple[Course, ...]:
     """The courses of the path's components that are written, in order."""
     found = []
     for name in known:
         part = body.get(name)
         if part is None:
+            continue
+        if name in joints:
+            scope.complaints.error("D274", f"`{name}` of {owner.label} is a component of its path, and a joint that "
+                                   "follows it", part.place, help="give the joint another name")
             continue
         if name not in guided:
             scope.complaints.error("D274", f"`{name}` is not guided by {owner.label}", part.place,

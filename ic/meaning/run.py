@@ -11,7 +11,15 @@ from ic.grammar.syntax import Call, Name, Word
 from ic.meaning.arm import Arm, resolve_arm
 from ic.meaning.base import INITIAL, check_base, initial_base, remark_ground, resolve_base
 from ic.meaning.complaints import belongs, known_words
-from ic.meaning.guides import Guiding, check_guides, check_instants, name_guides, rate_of, resolve_guides
+from ic.meaning.guides import (
+    Guiding,
+    check_guides,
+    check_instants,
+    check_period,
+    name_guides,
+    rate_of,
+    resolve_guides,
+)
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import find_bare_model, find_model, refuse_values, use_model, word_of
 from ic.meaning.owner import Owner
@@ -444,6 +452,7 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
         if rate_of_guide is not None:
             guide_ticks[guide.name] = divisor(scope.complaints, rate_of_guide, base, everyone, written=written)
             check_instants(scope, guide, guide_ticks[guide.name], schedule.dynamics, rate_of_guide, dynamics)
+            check_period(scope, guide, rate_of_guide)
     if record.hz > dynamics.hz:
         scope.complaints.remark(
             "D167", f"`record` is faster than the dynamics: rows repeat, {record.hz / dynamics.hz:g} for each step",

@@ -84,6 +84,7 @@ class Guide:
     components  (p) -> which of the pose (`met.plan.COMPONENTS`) the path has; None: there is no path. Words of p alone
     commands    kinds of command that its joints may take of it
     memory      what its computer shows of a tick
+    fastest     (p) -> the rate constant with which its error falls, 1/s: 2 over its period, and it grows; None: unknown
     steer       (p, joints, sight) -> Steered, joints the parameters of each; None: it is a course
     course      (p, joints, begins, t) -> position and rate of each joint at time t (s); begins: where each begins
     """
@@ -95,6 +96,7 @@ class Guide:
     components: Callable[[Any], tuple[str, ...]] | None = None
     commands: tuple[str, ...]
     memory: tuple[Memory, ...] = ()
+    fastest: Callable[[Any], Real] | None = None
     steer: Steer | None = None
     course: Course | None = None
 

@@ -44,6 +44,10 @@ def components(p: Any) -> tuple[str, ...]:
     return GUIDED[p.guides]
 
 
+def fastest(p: Any) -> Real:
+    return p.gain
+
+
 def steer(p: Any, joints: Sequence[Any], seen: Sight) -> Steered:
     rows = [POSE.index(name) for name in GUIDED[p.guides]]
     turns = p.guides == "pose"
@@ -132,5 +136,6 @@ GUIDE = Guide(
         Memory(name="damping", unit="m", doc="lambda, the damping of the rates"),
         Memory(name="share", unit="1", doc="share of the rates that the joints' limits leave"),
     ),
+    fastest=fastest,
     steer=steer,
 )

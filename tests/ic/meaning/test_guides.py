@@ -340,6 +340,16 @@ error[D125]: no channel `guides.tip.eror`
 
 1 error
 """),
+    ("guides = xy;", "guides = xy; gain = 1000 1/s;", """\
+error[D279]: guide `tip` is unstable at 500 Hz
+  --> deck.ic:11:5
+   |
+11 |     guide tip = resolved_rate {
+   |     ^^^^^^^^^ 2 times the error is taken off at each tick
+   = help: what it takes off in a second, its gain, must stay below twice its rate, 1000/s, and well below what its servos can follow
+
+1 error
+"""),
     ("run it {", "let tip = 3;\nrun it {", """\
 error[D271]: `tip` is a value, so no guide can be called so
   --> deck.ic:12:5
@@ -366,6 +376,29 @@ def test_a_unit_and_a_course_are_no_names_of_guides(tmp_path: Path) -> None:
 error[D271]: `{name}` is {what}, so no guide can be called so
   --> deck.ic:11:5
 """ in text
+
+
+def test_a_joint_is_not_called_as_a_component_of_the_path(tmp_path: Path) -> None:
+    assert told(check(tmp_path, ARM.replace("high", "x"), RUN.replace("high", "x"))) == """\
+error[D274]: `x` of guide `tip` is a component of its path, and a joint that follows it
+  --> deck.ic:13:9
+   |
+13 |         x = ramp(to = -20 cm, over = 1 s); max_rate = 1 rad/s;
+   |         ^
+   = help: give the joint another name
+
+1 error
+"""
+
+
+@pytest.mark.parametrize("vary", [
+    "high.at.x = [1, 1.2] m", "initial.low.q = [10, 30] deg", "guides.tip.point.x = [0.5, 1] m",
+    "guides.tip.gain = [1, 100] 1/s",
+])
+def test_what_a_sweep_varies_reaches_the_law(vary: str, tmp_path: Path) -> None:
+    run = engine.run(experiment(tmp_path, ARM, RUN, f"sweep s of it {{ vary {vary}; }}", select=["s"]))
+    assert run.cause == ["", ""]
+    assert run.signals["guides.tip.error"][0].tobytes() != run.signals["guides.tip.error"][1].tobytes()
 
 
 VARY = [
