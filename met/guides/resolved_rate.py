@@ -16,7 +16,7 @@ begins anyhow is held so. `guides = position` leaves the attitude free; `xy` and
 
 The path's error falls as exp(-gain t), but for the lag of the servos, the tick (by a part that is proportional to its
 period) and what limits and damping leave undone. At a singularity itself no joint moves the point along the direction
-that is lost: a path that begins there in that direction does not begin.
+that is lost: a path that begins there in that direction does not begin; without damping the case fails.
 
 Not a planner: it knows neither joint stops nor collisions, and of a redundant arm's motions takes the smallest.
 """

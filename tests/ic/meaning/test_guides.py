@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from met import models
@@ -376,6 +377,16 @@ def test_a_unit_and_a_course_are_no_names_of_guides(tmp_path: Path) -> None:
 error[D271]: `{name}` is {what}, so no guide can be called so
   --> deck.ic:11:5
 """ in text
+
+
+def test_at_a_singularity_a_damped_guide_stays_and_another_fails(tmp_path: Path) -> None:
+    stretched = changed(RUN, ("low.q = 20 deg", "low.q = 0 deg"), ("high.q = 60 deg", "high.q = 0 deg"))
+    run = engine.run(experiment(tmp_path, ARM, stretched))
+    assert run.cause == [""]
+    np.testing.assert_array_equal(run.signals["q"][0], 0.0)
+    assert run.signals["guides.tip.error"][0, -1] == pytest.approx(0.2, rel=1e-12)
+    bare = engine.run(experiment(tmp_path, ARM, changed(stretched, ("max_damping = 0.1 m", "max_damping = 0 m"))))
+    assert "position, rate or acceleration is no longer a finite number" in bare.cause[0]
 
 
 def test_a_joint_is_not_called_as_a_component_of_the_path(tmp_path: Path) -> None:

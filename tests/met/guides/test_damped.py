@@ -69,6 +69,23 @@ def test_the_smallest_singular_value_is_never_overstated_and_at_most_seven_perce
     assert worst < 0.999 or rows < 3, "the bound is no equality: some of these matrices have several small values"
 
 
+@pytest.mark.parametrize(("rows", "columns"), SHAPES)
+def test_with_the_threshold_as_damping_no_rate_is_larger_than_the_task_over_the_threshold(
+    rows: int, columns: int
+) -> None:
+    # lambda^2 = threshold^2 - sigma^2 below the threshold; a sigma that is understated damps more
+    random = np.random.default_rng(3)
+    worst = 0.0
+    for J in matrices(rows, columns):
+        exact = np.linalg.svd(J, compute_uv=False)[-1]
+        threshold = exact * 10.0 ** random.uniform(-0.3, 3.0)
+        sigma = float(least_singular_value(gram(J.tolist())))
+        v = random.standard_normal(rows)
+        u = solved(J, max(threshold**2 - sigma**2, 0.0), v)
+        worst = max(worst, np.linalg.norm(u) * threshold / np.linalg.norm(v))
+    assert worst < 1.0 + 1e-9
+
+
 def test_where_rows_depend_on_each_other_it_is_nothing_and_a_task_is_done_as_well_as_can_be() -> None:
     J = np.array([[1.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 3.0]])
     assert float(least_singular_value(gram(J.tolist()))) < 1e-5

@@ -137,6 +137,17 @@ def test_between_its_ticks_a_position_goes_on_with_the_rate(tmp_path: Path) -> N
     np.testing.assert_allclose(steps, np.broadcast_to(steps[:, :1], steps.shape), rtol=0, atol=1e-14)
 
 
+def test_a_continuous_servo_follows_between_the_ticks(tmp_path: Path) -> None:
+    ends = []
+    for servos in ("2 kHz", "continuous"):
+        rates = f"dynamics = 2 kHz; servos = {servos}; record = 100 Hz;"
+        plan = experiment(tmp_path, chain(5, 7, f"{LAW} rate = 100 Hz;", command="position", rates=rates))
+        ends.append(engine.run(plan).signals["q"][0])
+    # a command that is held for half a millisecond lags by a quarter of one on the mean, at rates below 1 rad/s
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=3e-4)
+    assert np.ptp(ends[0], axis=0).max() > 0.1
+
+
 def test_a_base_that_is_moved_is_made_up_for(tmp_path: Path) -> None:
     # It begins at rest, as the joints do: else these lag behind it from the first step on.
     base = "base = prescribed { x = sine(amplitude = 5 cm, frequency = 0.7 Hz, phase = 90 deg);"
