@@ -12,7 +12,7 @@ from met.cli import loudness_options
 
 
 @click.command()
-@click.argument("kind", type=click.Choice(["deck", "servo", "environment", "command", "metric", "integrator"]))
+@click.argument("kind", type=click.Choice(["deck", "servo", "environment", "command", "guide", "metric", "integrator"]))
 @click.argument("name")
 @click.option("-o", "output", metavar="PATH", help="The deck's file, or the model's folder; else it is named NAME.")
 @click.option("--force", is_flag=True, help="Write over what is there.")

@@ -12,6 +12,8 @@
     <joint>.law.torque .rate        load torque that the law asks (N m), rate of the shaft that it believes (rad/s)
     <joint>.law.unknown_torque .reference_rate                  of a law with an observer
 
+    guides.<guide>.<name>           what a guide's computer shows, by its declaration
+
 Derived, that is computed from the state only where a record or a metric asks for them (docs/physics.md, section 1):
 
     <joint>.tau_load .J_eff .b      what the arm takes, tau_load = J_eff qdd + b, all other joints in their modes
@@ -215,6 +217,9 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
                 add(f"{joint.name}.bed.{name}", joint_unit(unit, joint), doc, use.divisor, joint.name)
             for name, unit, doc in of_law(law):
                 add(f"{joint.name}.law.{name}", joint_unit(unit, joint), doc, use.divisor, joint.name)
+    for guide in structure.guides:
+        for part in models.find("guide", guide.model, guide.place).memory:
+            add(f"guides.{guide.name}.{part.name}", part.unit, part.doc, guide.divisor, "")
     told = (*names, *(recorded.name for recorded in structure.record), *(metric.of for metric in structure.metrics))
     mentioned = {name.split(".")[1] for name in told if name.startswith("links.")}
     mentioned |= {link.name for link in structure.links[:1]}
@@ -269,8 +274,8 @@ def channel_paths(name: str, joints: tuple[str, ...], components: tuple[str, ...
 
 
 def joint_of(name: str) -> str:
-    """The joint that a variable of one thing belongs to, by its name; none for a link's, a payload's and the arm's."""
-    if name.startswith(("links.", "payloads.", *(own for own, *_ in OF_ARM))):
+    """The joint that a variable of one thing belongs to, by its name; none where that is no joint."""
+    if name.startswith(("links.", "payloads.", "guides.", *(own for own, *_ in OF_ARM))):
         return ""
     return name.partition(".")[0]
 

@@ -26,7 +26,7 @@ from met.plan import SensorUse, ServoUse, Structure
 if TYPE_CHECKING:
     from met.servos.servo import Parts
 
-Kind = Literal["servo", "sensor", "environment", "command", "metric", "integrator", "bed", "law"]
+Kind = Literal["servo", "sensor", "environment", "command", "guide", "metric", "integrator", "bed", "law"]
 
 
 OF_ONES_OWN = ("a model of your own is known once its package is installed, `pip install -e FOLDER`; `met new` writes "
@@ -80,6 +80,12 @@ def _commands() -> tuple[Iterable[Any], type]:
     return PROFILES, Profile
 
 
+def _guides() -> tuple[Iterable[Any], type]:
+    from met.guides import GUIDES, Guide
+
+    return GUIDES, Guide
+
+
 def _metrics() -> tuple[Iterable[Any], type]:
     from met.metrics import METRICS, Metric
 
@@ -109,6 +115,7 @@ GROUPS: dict[Kind, Group] = {
     "sensor": Group("met.sensors", _sensors),
     "environment": Group("met.environments", _environments),
     "command": Group("met.profiles", _commands),
+    "guide": Group("met.guides", _guides),
     "metric": Group("met.metrics", _metrics),
     "integrator": Group("met.integrators", _integrators),
     "bed": Group("met.beds", _beds),
@@ -152,7 +159,8 @@ def _check_names(kind: Kind, model: Any, found_at: str) -> None:
     own = {"bed": OF_BED, "law": OF_LAW + OF_OBSERVER}.get(kind, ())
     taken = [name for name, *_ in own] or ["command"]
     shown = [part.name for group in HELD for part in getattr(model, group, ())]
-    for names in ([*taken, *shown], [parameter.name for parameter in getattr(model, "parameters", ())]):
+    parameters = [*getattr(model, "parameters", ()), *getattr(model, "of_joint", ())]
+    for names in ([*taken, *shown], [parameter.name for parameter in parameters]):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             message = f"{found_at} declares `{twice[0]}` twice"
@@ -162,7 +170,7 @@ def _check_names(kind: Kind, model: Any, found_at: str) -> None:
 def _check_units(model: Any, found_at: str) -> None:
     """Every declared unit can be read."""
     words = {word: units.parse_unit("1") for word in ("joint", "effort", "command", "of")}
-    for part in (p for group in ("parameters", *HELD) for p in getattr(model, group, ())):
+    for part in (p for group in ("parameters", "of_joint", *HELD) for p in getattr(model, group, ())):
         try:
             units.parse_unit(part.unit, words)
         except ValueError as reason:
@@ -190,8 +198,11 @@ def packages(structures: Iterable[Structure]) -> tuple[str, ...]:
     for each in structures:
         used["servo"] |= {servo.model for servo in each.servos}
         used["sensor"] |= {sensor.model for servo in each.servos for sensor in servo.sensors}
-        used["command"] |= {servo.command.model for servo in each.servos if servo.command is not None}
+        told = [servo.command for servo in each.servos if servo.command is not None]
+        used["command"] |= {command.model for command in told if not command.guide}
+        used["command"] |= {course.model for use in (each.base, *each.guides) if use for course in use.courses}
         used["environment"] |= {use.model for use in each.environment}
+        used["guide"] |= {use.model for use in each.guides}
         used["metric"] |= {use.model for use in each.metrics}
         used["integrator"].add(each.integrator)
         used["bed"] |= {use.bed for use in each.substitutions}
@@ -244,4 +255,4 @@ def servo_parts(use: ServoUse) -> Parts:
 
 def parameter(model: Any, name: str) -> Parameter | None:
     """The declared parameter of this name, None where there is none."""
-    return next((p for p in model.parameters if p.name == name), None)
+    return next((p for p in (*model.parameters, *getattr(model, "of_joint", ())) if p.name == name), None)

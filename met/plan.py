@@ -22,6 +22,9 @@ Parameters are named by paths, the ones a deck uses inside a run:
     initial.base.position|velocity.x|y|z   of a free base, world axes, m, m/s; .rpy (rad, fixed x-y-z), .rate (rad/s)
     base.<component>.<parameter>           of a prescribed base, as the profile declares that gives this component
     environment.<name>.<parameter>         as the environment model declares; uniform gravity is `gravity`, `g`
+    guides.<name>.<parameter>              as the guide declares
+    guides.<name>.<joint>.<parameter>      of each joint that the guide moves, as the guide declares
+    guides.<name>.<component>.<parameter>  of its path, as the profile declares that gives this component
     metrics.<name>.<parameter>             as the metric declares
     payloads.<name>.mass .com.x .inertia.xx ...             of a payload, as of a link, in its own frame
     payloads.<name>.at|rpy.x|y|z           its frame in its link's, m, rad (fixed x-y-z): where it is held from the
@@ -51,7 +54,7 @@ BASE = "base"
 """The link that the arm stands on. It has no joint, and matter only where a deck gives it some."""
 
 COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
-"""Of the pose of a prescribed base: m, and rad about fixed x, y, z."""
+"""Of the pose of a prescribed base, and of a guide's path: m, and rad about fixed x, y, z."""
 
 INSTANT = 1e-6
 """Share of a step of the dynamics by which a written time may lie after the instant that it means: rounding."""
@@ -112,7 +115,7 @@ class Joint:
 
 @frozen
 class Course:
-    """One of `COMPONENTS` of a prescribed base, and the model of its course in time."""
+    """One of `COMPONENTS` of a prescribed base or a guide's path, and the model of its course in time."""
 
     component: str
     model: str
@@ -136,10 +139,14 @@ class Base:
 
 @frozen
 class Command:
-    """What a servo is told: "rate", "position", "torque" or "acceleration", and the model of its course in time."""
+    """What a servo is told: "rate", "position", "torque" or "acceleration", and the model of its course in time.
+
+    guide  the guide that tells it, by its name in the deck; then there is no model, ""
+    """
 
     kind: str
     model: str
+    guide: str = ""
 
 
 @frozen
@@ -172,6 +179,23 @@ class ServoUse:
     words: tuple[tuple[str, str], ...] = ()
     continuous: bool = False
     sensors: tuple[SensorUse, ...] = ()
+
+
+@frozen
+class GuideUse:
+    """A guide under a name of the deck's, which commands several joints.
+
+    joints   that it moves, in the arm's order
+    divisor  base ticks a tick of its computer, a multiple of the dynamics' step; of one without, that step
+    courses  of its path's components; those left out stay 0
+    """
+
+    name: str
+    model: str
+    joints: tuple[str, ...]
+    divisor: int
+    courses: tuple[Course, ...] = ()
+    place: Place | None = None
 
 
 @frozen
@@ -327,6 +351,7 @@ class Structure:
     substitutions: tuple[Substitution, ...] = ()
     base: Base | None = None
     payloads: tuple[Payload, ...] = ()
+    guides: tuple[GuideUse, ...] = ()
 
     @property
     def free(self) -> bool:

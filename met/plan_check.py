@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from met import models, units
+from met import plan_guides as guides
 from met import plan_relations as relations
 from met import plan_rest as rest
 from met.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
@@ -33,7 +34,7 @@ from met.plan import (
     Structure,
 )
 from met.plan_codec import Damaged
-from met.plan_defaults import INERTIA, declared, heads_of_models, of_environment
+from met.plan_defaults import INERTIA, declared, heads_of_models, related
 from met.trace.graph import TRUTHS, Formulas
 
 NAME = re.compile(r"[^\W\d]\w*")
@@ -67,6 +68,7 @@ def check(experiments: Iterable[Experiment]) -> None:
         _check_payloads(experiment.structure, f"{where}.structure.payloads")
         _check_schedule(experiment.structure, f"{where}.structure")
         _check_uses(experiment.structure, f"{where}.structure")
+        guides.check(experiment.structure, f"{where}.structure")
         _check_record(experiment.structure, f"{where}.structure.record")
         _check_requirements(experiment, f"{where}.requirements")
         _check_tolerances(experiment, f"{where}.tolerances")
@@ -228,6 +230,11 @@ def _check_uses(structure: Structure, where: str) -> None:
     for index, environment in enumerate(structure.environment):
         _name(environment.name, f"{where}.environment[{index}].name", names)
         names.append(environment.name)
+    names = []
+    for index, guide in enumerate(structure.guides):
+        _name(guide.name, f"{where}.guides[{index}].name", names)
+        _whole(guide.divisor, 1, MOST_TICKS, f"{where}.guides[{index}].divisor")
+        names.append(guide.name)
     names = []
     known_channels = channels(structure) if structure.metrics else {}
     for index, metric in enumerate(structure.metrics):
@@ -413,7 +420,7 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
     structure, parameters = experiment.structure, experiment.parameters
     known: set[str] = set()
     models_of = heads_of_models(structure)
-    relations.check_uses(experiment, of_environment(structure), where)  # first, for units go by a model's joint
+    relations.check_uses(experiment, related(structure), where)  # first, for units go by a model's joint
     for path, unit, _, parameter in declared(experiment):
         if path in known:
             raise Damaged(where, f"two things are called `{path}`")
@@ -436,6 +443,11 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
     for course in structure.base.courses if structure.base is not None else ():
         if course.model in TABLES:
             _check_table(experiment, f"base.{course.component}", TABLES[course.model], where)
+    for guide in structure.guides:
+        for course in guide.courses:
+            if course.model in TABLES:
+                _check_table(experiment, f"guides.{guide.name}.{course.component}", TABLES[course.model], where)
+    guides.check_paths(experiment, where)
     _check_bodies(experiment, where)
 
 
@@ -573,7 +585,7 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
     if structure.free:
         masses = [f"links.{name}.mass" for name in structure.ground]
         tests.append((f"links.{BASE}.mass", masses, _is_some, "the base moves freely and has no mass"))
-    tests += [*rest.tests(experiment), *relations.tests(experiment, of_environment(structure))]
+    tests += [*rest.tests(experiment), *relations.tests(experiment, related(structure))]
     varied = []
     for path, paths, holds, message in tests:
         if any(path not in experiment.parameters for path in paths):

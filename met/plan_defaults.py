@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from met import models
 from met.channel import channels, joint_unit, watched_unit
-from met.diagnostic import nearest
+from met.diagnostic import Place, nearest
 from met.parameter import Parameter, under
-from met.plan import COMPONENTS, Experiment, Joint, Origin, Quantity, Structure
+from met.plan import COMPONENTS, Course, Experiment, Joint, Origin, Quantity, Structure
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
@@ -51,6 +51,7 @@ def heads_of_models(structure: Structure) -> tuple[str, ...]:
         *(f"{use.joint}.{kind}." for use in structure.substitutions for kind in ("bed", "law")),
         *(f"base.{course.component}." for course in (structure.base.courses if structure.base else ())),
         *(f"environment.{use.name}." for use in structure.environment),
+        *(f"guides.{use.name}." for use in structure.guides),
         *(f"metrics.{use.name}." for use in structure.metrics),
     )
 
@@ -63,6 +64,13 @@ def of_environment(structure: Structure) -> Iterator[tuple[str, tuple[Parameter,
     """What the paths of each environment model's parameters begin with, and their declarations."""
     for use in structure.environment:
         yield f"environment.{use.name}", models.find("environment", use.model, use.place).parameters
+
+
+def related(structure: Structure) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
+    """`of_environment`, and the same of guides: parameters that may name parts of the arm, or go together."""
+    yield from of_environment(structure)
+    for use in structure.guides:
+        yield f"guides.{use.name}", models.find("guide", use.model, use.place).parameters
 
 
 def declared(experiment: Experiment) -> Iterator[Declared]:
@@ -95,7 +103,7 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
             head = f"{use.joint}.servo.sensor.{sensor.of}"
             for parameter in models.sensor_parts(sensor, "parameters"):
                 yield from _numbers(head, parameter, watched_unit(parameter.unit, of))
-        if use.command is not None:
+        if use.command is not None and not use.command.guide:
             for parameter in models.find("command", use.command.model, use.place).parameters:
                 unit = joint_unit(parameter.unit, joint, use.command.kind)
                 yield from _numbers(f"{use.joint}.servo.command", parameter, unit)
@@ -113,6 +121,7 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
         on = kinds.get(str(about.value)) if about is not None else None
         for parameter in parameters:
             yield from _numbers(prefix, parameter, parameter.unit if on is None else joint_unit(parameter.unit, on))
+    yield from _of_guides(structure)
     watched = channels(structure) if structure.metrics else {}
     for metric in structure.metrics:
         of = watched[metric.of].unit if metric.of in watched else "1"
@@ -140,15 +149,32 @@ def _of_base(structure: Structure) -> Iterator[Declared]:
         for name, unit in OF_FREE_BASE:
             for axis in "xyz":
                 yield f"initial.base.{name}.{axis}", unit, None, None
-    for course in structure.base.courses if structure.base is not None else ():
-        model = models.find("command", course.model, structure.base.place if structure.base else None)
-        for parameter in model.parameters:
+    if structure.base is not None:
+        yield from _of_courses("base", structure.base.courses, structure.base.place)
+
+
+def _of_guides(structure: Structure) -> Iterator[Declared]:
+    """Of the guides: their own, those of each joint, and those of their paths' courses."""
+    kinds = {joint.name: joint for joint in structure.joints}
+    for use in structure.guides:
+        head, guide = f"guides.{use.name}", models.find("guide", use.model, use.place)
+        for parameter in guide.parameters:
+            yield from _numbers(head, parameter, parameter.unit)
+        for joint in use.joints:
+            for parameter in guide.of_joint:
+                yield from _numbers(f"{head}.{joint}", parameter, joint_unit(parameter.unit, kinds[joint]))
+        yield from _of_courses(head, use.courses, use.place)
+
+
+def _of_courses(head: str, courses: Iterable[Course], place: Place | None) -> Iterator[Declared]:
+    for course in courses:
+        for parameter in models.find("command", course.model, place).parameters:
             unit = joint_unit(parameter.unit, component(course.component), "position")
-            yield from _numbers(f"base.{course.component}", parameter, unit)
+            yield from _numbers(f"{head}.{course.component}", parameter, unit)
 
 
 def component(name: str) -> Joint:
-    """A component of the base's pose as the joint that would move so: for its units."""
+    """A component of a pose as the joint that would move so: for its units."""
     kind = "prismatic" if COMPONENTS.index(name) < 3 else "revolute"
     return Joint(name, kind, "", "")  # type: ignore[arg-type]
 

@@ -55,7 +55,8 @@ FLOPS = {"add": 1, "sub": 1, "mul": 1, "div": 1, "sqrt": 1, "fma": 2}
 """Operations that count as arithmetic, and for how much; comparing, choosing and moving count for none."""
 
 WORK = {
-    "bed": "emulated beds", "read": "observers", "follow": "observers", "servos_": "servo computers",
+    "bed": "emulated beds", "read": "observers", "follow": "observers", "guides_": "guides",
+    "servos_": "servo computers",
     "modes": "friction modes", "decide": "friction decisions", "arm": "arm on a bed", "law": "laws", "given": "laws",
     "derive": "first stage", "judge": "failures", "left_open": "friction decisions", "advance": "integrator",
     "carry": "integrator", "slope": "further stages", "split": "friction splits", "metrics_": "metrics",

@@ -153,11 +153,14 @@ def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Fact, ...
     for experiment in experiments.values():
         structure, base = experiment.structure, experiment.structure.schedule.base_hz
         for use in structure.servos:
-            command = f", told a {use.command.kind} ({use.command.model})" if use.command is not None else ""
+            told = use.command
+            command = f", told a {told.kind} ({told.model or told.guide})" if told is not None else ""
             rate = "continuous" if use.continuous else f"at {base / use.divisor:g} Hz"
             servos.setdefault(f"{use.model} {rate}{command}", {})[use.joint] = None
         for on_bed in structure.substitutions:
             others.setdefault(f"bed of {on_bed.joint}", {})[f"{on_bed.bed}, law {on_bed.law}"] = None
+        for guide in structure.guides:
+            others.setdefault(f"guide {guide.name}", {})[f"{guide.model}, of {', '.join(guide.joints)}"] = None
         for environment in structure.environment:
             others.setdefault(f"environment {environment.name}", {})[environment.model] = None
     for text, joints in servos.items():

@@ -13,7 +13,7 @@ class Beginning:
     declaration  what the entry point gives of the file
     module       the file
     said         what there is to be seen in the deck
-    servo, environment, integrator, metric, require     what stands in the deck
+    servo, guide, environment, integrator, metric, require      what stands in the deck
     """
 
     group: str
@@ -21,6 +21,7 @@ class Beginning:
     said: str
     module: str
     servo: str = "{ model = ideal;  bandwidth = 40 1/s;  command = rate(step(to = 0.5 rad/s, at = 0.1 s)); }"
+    guide: str = ""
     environment: str = " "
     integrator: str = "modified_euler"
     metric: str = "final { of = hinge.qd; }"
@@ -274,8 +275,60 @@ INTEGRATOR = Integrator(name="$name", doc=__doc__, order=2, real_limit=2.0, adva
 ''',
 )
 
+GUIDE = Beginning(
+    group="met.guides",
+    declaration="GUIDE",
+    said="the bar is brought to 0.5 rad along half a wave, as all joints would be that follow the guide",
+    servo="{ model = ideal;  bandwidth = 40 1/s;  command = position(lead); }",
+    guide="\n    guide lead  = $name { over = 1 s;  hinge.to = 0.5 rad; }",
+    metric="final { of = hinge.q; }",
+    require="seen > 0.49 rad",
+    module='''\
+"""$name: every joint goes to where it is told along half a cosine wave, all in the same time.
+
+    q = begins + (to - begins) (1 - cos(pi t/over))/2       while t < over
+
+Say here what the guide is, and what it is not. `met doc $name` prints it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from met.guides import Guide
+from met.parameter import Parameter
+from met.trace import Real, cos, sin, where
+
+# This function is called while the program is built, with recorded numbers: no `if` on a number, but
+# `where(condition, a, b)` of met.trace; no `min` or math.sin, but `minimum`, `sin`. docs/models.md has the table.
+
+
+def course(p: Any, joints: Sequence[Any], begins: Sequence[Real], t: Real) -> list[tuple[Real, Real]]:
+    """Position and rate of each joint at a time, s. `begins`: where they are when the run begins."""
+    turn = math.pi * t / p.over
+    share = where(t < p.over, 0.5 * (1.0 - cos(turn)), 1.0)
+    rate = where(t < p.over, 0.5 * math.pi / p.over * sin(turn), 0.0)
+    ways = [(begin, joint.to - begin) for joint, begin in zip(joints, begins, strict=True)]
+    return [(begin + share * way, rate * way) for begin, way in ways]
+
+
+# of_joint: what each joint that follows has of its own; a deck writes it for all, or as `JOINT.to`.
+GUIDE = Guide(
+    name="$name",
+    doc=__doc__,
+    parameters=(Parameter(name="over", unit="s", above=0.0, doc="how long the move lasts"),),
+    of_joint=(Parameter(name="to", unit="joint", doc="position that is reached"),),
+    commands=("position",),
+    course=course,
+)
+''',
+)
+
 MODELS = {
-    "servo": SERVO, "environment": ENVIRONMENT, "command": COMMAND, "metric": METRIC, "integrator": INTEGRATOR,
+    "servo": SERVO, "environment": ENVIRONMENT, "command": COMMAND, "guide": GUIDE, "metric": METRIC,
+    "integrator": INTEGRATOR,
 }  # fmt: skip
 
 TRIAL = """\
@@ -294,7 +347,7 @@ servo drive $servo
 
 run try {
     arm         = trial;
-    servos      { hinge = drive; }
+    servos      { hinge = drive; }$guide
     environment {$environment}
     rates       { dynamics = 1 kHz;  servos = 500 Hz;  record = 100 Hz; }
     integrator  = $integrator;

@@ -87,7 +87,8 @@ class Complaints:
 def belongs(word: str) -> list[str]:
     """Where a word of the language stands that stands elsewhere only."""
     told = {"substitute": "`substitute JOINT { ... }`, in a run, puts a joint's motor on a bed",
-            "payload": "`payload NAME { ... }`, in a run, is a body that a link carries or grapples"}
+            "payload": "`payload NAME { ... }`, in a run, is a body that a link carries or grapples",
+            "guide": "`guide NAME = MODEL { ... }`, in a run, commands several joints together"}
     return [told[word]] if word in told else []
 
 

@@ -45,6 +45,8 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
         made = known.get(name.text)
         if made is None and scope.lost and not OF_SERVO.isdisjoint(word.text for word in name.path):
             continue
+        if made is None and _of_lost_guide(scope, name, structure):
+            continue
         if made is None and scope.gone and (name.path[0].text in scope.gone or not structure.moving):
             continue
         if made is None:
@@ -57,6 +59,13 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
             else:
                 found[each.name] = (each, name.place)
     return tuple(recorded for recorded, _ in found.values())
+
+
+def _of_lost_guide(scope: Scope, name: Name, structure: Structure) -> bool:
+    """Whether this is a channel of a guide that failed, which was told."""
+    words = [word.text for word in name.path]
+    lost = set(scope.guides) - {guide.name for guide in structure.guides}
+    return len(words) > 1 and words[0] == "guides" and words[1] in lost
 
 
 def _names(scope: Scope, item: Item, expression: Expression | None) -> Iterator[Name]:
@@ -151,7 +160,9 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
                                help="write `of = CHANNEL;`, such as `of = shoulder.qd;`")
     elif not isinstance(of.value, Name) or of.value.text not in known:
         name = of.value if isinstance(of.value, Name) else None
-        if name is not None and name.path[0].text in scope.lost | scope.gone:
+        if name is not None and (
+            name.path[0].text in scope.lost | scope.gone or _of_lost_guide(scope, name, structure)
+        ):
             return None
         message, helps = "a channel is needed here", ["write `of = CHANNEL;`, such as `of = shoulder.qd;`"]
         if name is not None:

@@ -19,7 +19,8 @@ from met.frozen import frozen
 from met.render import shown_place
 
 KINDS = ("arm", "servo", "run", "sweep")
-RESERVED = ("links", "initial", "environment", "metrics", "payloads", "rates")  # paths begin so, or with a joint
+RESERVED = ("links", "initial", "environment", "guides", "metrics", "payloads", "rates")
+"""What paths of a run begin with, besides joints."""
 
 
 @frozen

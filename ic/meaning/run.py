@@ -12,6 +12,15 @@ from ic.meaning.arm import Arm, resolve_arm
 from ic.meaning.base import INITIAL, check_base, initial_base, remark_ground, resolve_base
 from ic.meaning.complaints import belongs, known_words
 from ic.meaning.failures import check_failures
+from ic.meaning.guides import (
+    Guiding,
+    check_guides,
+    check_instants,
+    check_period,
+    name_guides,
+    rate_of,
+    resolve_guides,
+)
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import find_bare_model, find_model, refuse_values, use_model, word_of
 from ic.meaning.owner import Owner
@@ -45,8 +54,11 @@ from met.units import PURE
 
 KEYS = ("arm", "base", "servos", "initial", "environment", "rates", "integrator", "duration", "record", "tolerances",
         "seed")
-KINDS = ("metric", "payload", "substitute")
+KINDS = ("metric", "guide", "payload", "substitute")
+"""Words of entries that have names."""
+
 BLOCKS = ("servos", "initial", "environment", "rates", "tolerances")
+
 RATES = ("dynamics", "servos", "record", "base")
 DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
 SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")
@@ -89,7 +101,9 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         return None
     scope.gone = arm.lost
     base, arm = resolve_base(scope, block.get("base"), arm)
+    name_guides(scope, block)
     uses, scope.lost = resolve_servos(scope, _body(scope, block.get("servos")), arm)
+    guides = resolve_guides(scope, block, arm, uses)
     substitutions = resolve_substitutions(scope, block, arm, uses)
     payloads = resolve_payloads(scope, block, arm)
     environment, products = _environment(scope, _body(scope, block.get("environment")), arm, base, payloads, duration)
@@ -98,7 +112,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     for use in uses:
         check_rest(scope, use)
         check_start(scope, use)
-    schedule, ticks = _schedule(scope, run, block, rates, uses, duration)
+    schedule, ticks, guide_ticks = _schedule(scope, run, block, rates, uses, guides, duration)
     if schedule is None or integrator is None:
         return None
     check_ticks(scope, substitutions, ticks, schedule)
@@ -123,10 +137,11 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
                             use.words, ticks[use.joint].continuous, use.sensors) for use in uses)  # fmt: skip
     structure = Structure(
         arm.name, arm.links, arm.joints, servos, environment, (), products, integrator.name, schedule, (),
-        substitutions, base, payloads,
+        substitutions, base, payloads, tuple(guide.use(guide_ticks[guide.name]) for guide in guides),
     )  # fmt: skip
     check_base(scope, base, structure, _body(scope, block.get("environment")), block.get("base"))
     check_payloads(scope, block, structure)
+    check_guides(scope, guides, structure)
     metrics = resolve_metrics(scope, block, structure)
     record = resolve_record(scope, run, block.get("record"), structure)
     structure = replace(structure, metrics=metrics, record=record)
@@ -161,10 +176,9 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
             scope.complaints.error("D108", f"`{item.name}` after `{item.kind}`, which takes no name", item.place,
                                    help=f"write `{item.kind} {'= ...;' if item.body is None else '{ ... }'}`")
         elif item.kind:
+            has = (*KEYS, "metric NAME", "guide NAME", "payload NAME", "substitute JOINT", "require")
             scope.complaints.error("D108", f"no `{item.kind}` in a run", item.place,
-                                   help=[*did_you_mean(item.kind, (*KINDS, *KEYS)),
-                                         known_words("a run has", (*KEYS, "metric NAME", "payload NAME",
-                                                                   "substitute JOINT", "require"))])
+                                   help=[*did_you_mean(item.kind, (*KINDS, *KEYS)), known_words("a run has", has)])
         elif item.body is not None:
             adds = f"`metric {item.name} = ...` would add a metric"
             if not {"bed", "law"}.isdisjoint(item.body.items):
@@ -412,8 +426,9 @@ def _rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate]:
     return rates
 
 
-def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], uses: list[Use],
-              duration: float | None) -> tuple[Schedule | None, dict[str, Ticks]]:
+def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], uses: list[Use], guides: list[Guiding],
+              duration: float | None) -> tuple[Schedule | None, dict[str, Ticks], dict[str, int]]:
+    """The schedule, when each servo's law acts, and base ticks a tick of each guide."""
     dynamics = rates.get("dynamics")
     rates_item = block.get("rates")
     body = rates_item.body if rates_item is not None else None
@@ -423,9 +438,9 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
             scope.complaints.error("D118", "no rate of the servos", rates_item.place,
                                    help="write `servos = 1 kHz;`, or a `rate` in each servo's definition")
     if dynamics is None or duration is None:
-        return None, {}
+        return None, {}, {}
     shared = rates.get("servos")
-    own = [use.rate for use in uses if use.rate is not None]
+    own = [rate for rate in (*(use.rate for use in uses), *(guide.rate for guide in guides)) if rate is not None]
     others = [rate for rate in (shared, *own) if rate is not None and rate.hz != CONTINUOUS]
     record = rates.get("record") or dynamics
     base = base_rate([dynamics, record, *others], rates.get("base"))
@@ -449,6 +464,13 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
         if continuous:
             rate = dynamics
         ticks[use.joint] = Ticks(divisor(scope.complaints, rate, base, everyone, written=written), continuous)
+    guide_ticks = dict.fromkeys((guide.name for guide in guides), schedule.dynamics)
+    for guide in (guide for guide in guides if guide.ticks):
+        rate_of_guide = rate_of(scope, guide, shared)
+        if rate_of_guide is not None:
+            guide_ticks[guide.name] = divisor(scope.complaints, rate_of_guide, base, everyone, written=written)
+            check_instants(scope, guide, guide_ticks[guide.name], schedule.dynamics, rate_of_guide, dynamics)
+            check_period(scope, guide, rate_of_guide)
     if record.hz > dynamics.hz:
         scope.complaints.remark(
             "D167", f"`record` is faster than the dynamics: rows repeat, {record.hz / dynamics.hz:g} for each step",
@@ -456,7 +478,7 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
             help="record at the rate of the dynamics, or slower")
     if shared is not None and shared.hz != CONTINUOUS and not uses:
         divisor(scope.complaints, shared, base, everyone, written=written)
-    return schedule, ticks
+    return schedule, ticks, guide_ticks
 
 
 __all__ = ["KEYS", "RATE", "RATES", "Call", "Resolved", "resolve_run"]

@@ -53,6 +53,7 @@ class Scope:
     moved: dict[str, set[str]] = field(default_factory=dict)  # servo definition -> kinds of joints it moves
     lost: frozenset[str] = frozenset()  # joints whose servo failed: nothing can be said of its channels
     gone: frozenset[str] = frozenset()  # joints and links that failed: nothing can be said of what begins with them
+    guides: Mapping[str, Item] = field(default_factory=dict)  # of the run, by name: what commands may follow
     settings: Mapping[str, Setting] = field(default_factory=dict)  # by path, numbers given from outside of the deck
 
     def __post_init__(self) -> None:

@@ -323,6 +323,11 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
         scope.complaints.error("D152", f"the model `{servo.name}` takes no command `{kind}`", call.name.place,
                                help=[*did_you_mean(kind, servo.commands), f"it takes {known}"])
         return None
+    if isinstance(call.positional[0], Name) and scope.guides:
+        guide = call.positional[0].text
+        if guide in scope.guides:
+            return Command(kind, "", guide)
+        _check_known(scope, call.positional[0])
     inner = _asked(scope, call)
     told = f"the command of {owner.label}"
     spot = replace(owner, label=told, called=told, place=place, path=f"{owner.path}.command", local="command",
@@ -382,6 +387,21 @@ def course_named(scope: Scope, inner: Expression) -> Expression:
     return inner
 
 
+def _check_known(scope: Scope, inner: Name) -> None:
+    """Raises Problem D278 for the name of nothing, where guides are what a command may follow too."""
+    if len(inner.path) > 1 or scope.names.knows(inner.text) or inner.text in models.available("command"):
+        return
+    raise Problem(error("D278", f"no guide, value or course in time `{inner.text}`", inner.place,
+                        help=[*did_you_mean(inner.text, [*scope.guides, *scope.definitions.lets]),
+                              known_words("guides of this run", scope.guides)]))
+
+
+def _is_guide(scope: Scope, inner: Expression) -> bool:
+    """Whether this names a guide of one of the deck's runs."""
+    runs = [scope.definitions.block(run) for run in scope.definitions.of_kind("run").values()]
+    return any(run is not None and run.get(f"guide {word_of(inner)}") is not None for run in runs)
+
+
 def check_servo_definition(scope: Scope, name: str) -> None:
     """What can be told of a definition that no run uses: its model and its keys."""
     definition = scope.definitions.of_kind("servo")[name]
@@ -404,7 +424,7 @@ def check_servo_definition(scope: Scope, name: str) -> None:
             if (command is not None and isinstance(command.value, Call) and len(command.value.positional) == 1
                     and command.value.name.text in COMMAND_UNIT):
                 inner = _asked(scope, command.value)
-                if not isinstance(inner, Call):
+                if not isinstance(inner, Call) and not _is_guide(scope, inner):
                     scope.names.evaluate(inner)
             words = {p.name: p for p in servo.parameters if p.shape == "word"}
             for key, item in block.items.items():

@@ -26,7 +26,7 @@ SAID = {
     "default": "the default",
     "derived": "computed",
 }
-HEADS = ("links", "metrics", "environment", "initial", "payloads")
+HEADS = ("links", "metrics", "environment", "guides", "initial", "payloads")
 IN_PLAN = "as the plan has it"
 NO_MORE: Mapping[str, Sequence[str]] = MappingProxyType({})
 MOST_NEAR = 12
@@ -278,7 +278,7 @@ def _declaration(experiment: Experiment, name: str) -> tuple[Parameter | None, s
     words = name.split(".")
     model: Any = None
     for use in structure.servos:
-        if name.startswith(f"{use.joint}.servo.command.") and use.command is not None:
+        if name.startswith(f"{use.joint}.servo.command.") and use.command is not None and use.command.model:
             model, own = models.find("command", use.command.model), words[len(use.joint.split(".")) + 2]
         elif name.startswith(f"{use.joint}.servo."):
             model, own = models.find("servo", use.model), words[len(use.joint.split(".")) + 1]
@@ -290,6 +290,14 @@ def _declaration(experiment: Experiment, name: str) -> tuple[Parameter | None, s
     for environment in structure.environment:
         if name.startswith(f"environment.{environment.name}."):
             model, own = models.find("environment", environment.model), words[2]
+    for guide in structure.guides:
+        courses = {course.component: course.model for course in guide.courses}
+        if name.startswith(f"guides.{guide.name}."):
+            model, own = models.find("guide", guide.model), words[2]
+            if own in courses and len(words) > 3:
+                model, own = models.find("command", courses[own]), words[3]
+            elif own in guide.joints and len(words) > 3:
+                own = words[3]
     for metric in structure.metrics:
         if name.startswith(f"metrics.{metric.name}."):
             model, own = models.find("metric", metric.model), words[2]

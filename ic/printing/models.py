@@ -20,6 +20,7 @@ HOW = {
     "sensor": "sensor QUANTITY = MODEL { ... }, in a servo: of q, qd or a state of the servo",
     "command": "command = rate(MODEL(...)), position(...), torque(...) or acceleration(...), in a servo",
     "environment": "environment { NAME = MODEL { ... } }, in a run",
+    "guide": "guide NAME = MODEL { ... }, in a run; command = rate(NAME) or position(NAME) in servos",
     "metric": "metric NAME = MODEL { of = CHANNEL; ... }, in a run",
     "integrator": "integrator = MODEL, in a run",
     "bed": "substitute JOINT { bed = MODEL(...); ... }, in a run",
@@ -126,6 +127,9 @@ def shown_of(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[st
         parts = getattr(model, words, ())
         if parts and kind == "servo":
             yield f"{text}; recorded as JOINT.servo.NAME", [(p.name, unit_in_words(p.unit), p.doc) for p in parts]
+    if kind == "guide" and model.memory:
+        told = [(p.name, unit_in_words(p.unit), p.doc) for p in model.memory]
+        yield "Given by its law, at its ticks; recorded as guides.NAME.NAME", told
     shown = list(of_bed(model) if kind == "bed" else of_law(model) if kind == "law" else ())
     if shown:
         told = [(name, unit_in_words(unit), doc) for name, unit, doc in shown]
@@ -141,6 +145,7 @@ def facts(kind: models.Kind, model: Any) -> Iterator[str]:
     ):
         value = getattr(model, words, None)
         if value:
+            text = "Commands it gives" if kind == "guide" else text
             yield f"{text}: {', '.join(value) if isinstance(value, tuple) else number(value)}"
     if kind == "metric":
         yield f"Unit of the result: {WORDS.get(model.unit, unit_in_words(model.unit))}"

@@ -90,6 +90,9 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
     if structure.substitutions:
         yield from _substitutions(experiment)
         yield ""
+    if structure.guides:
+        yield from _guides(experiment)
+        yield ""
     yield from _environment(experiment)
     yield ""
     yield from _channels(structure)
@@ -128,7 +131,7 @@ def _arm(experiment: Experiment) -> Iterator[str]:
         use = servos.get(joint.name)
         servo = "" if joint.kind == "fixed" else "passive"
         if use is not None:
-            asked = f": {use.command.kind}, {use.command.model}" if use.command else ""
+            asked = f": {use.command.kind}, {use.command.model or use.command.guide}" if use.command else ""
             servo = f"{use.definition} ({use.model}){asked}"
         at = values.vector(f"{joint.name}.at")
         place = "varies" if at is None else vector(at, "m") if any(at) else ""
@@ -243,6 +246,10 @@ def _schedule(experiment: Experiment) -> Iterator[str]:
         what = f"servo {definition} of {', '.join(joints)}"
         ticks = count(schedule.ticks // divisor + 1, "tick")
         rows.append((what, "continuous", "", "a part of each step") if continuous else row(what, divisor, ticks))
+    for guide in structure.guides:
+        if models.find("guide", guide.model).steer is not None:
+            ticks = count(schedule.ticks // guide.divisor + 1, "tick")
+            rows.append(row(f"guide {guide.name} of {', '.join(guide.joints)}", guide.divisor, ticks))
     steps = f"{count(schedule.ticks // schedule.dynamics, 'step')} of {number(schedule.step * 1e3)} ms"
     rows.append(row("dynamics", schedule.dynamics, f"{steps}, {structure.integrator}"))
     rows.append(row("record", schedule.record, count(schedule.rows, "row")))
@@ -280,6 +287,20 @@ def _substitutions(experiment: Experiment) -> Iterator[str]:
             first, *more = textwrap.wrap(whole, CHOSEN, break_on_hyphens=False) or [""]
             lines = [(joint, kind, model.name, first), *(("", "", "", line) for line in more)]
             rows += [tuple(cell.replace(FIXED_SPACE, " ") for cell in line) for line in lines]
+    yield from columns(rows)
+
+
+def _guides(experiment: Experiment) -> Iterator[str]:
+    """The guides: the joints that follow each, its parameters, those of its joints and of its path's components."""
+    yield "Guides: each commands the joints that follow it"
+    rows: list[tuple[str, ...]] = []
+    for use in experiment.structure.guides:
+        guide, head = models.find("guide", use.model, use.place), f"guides.{use.name}"
+        rows.append((use.name, use.model, ", ".join(_given(experiment, head, guide.parameters))))
+        rows += [("", joint, ", ".join(_given(experiment, f"{head}.{joint}", guide.of_joint))) for joint in use.joints]
+        for course in use.courses:
+            given = _given(experiment, f"{head}.{course.component}", models.find("command", course.model).parameters)
+            rows.append(("", course.component, ", ".join([course.model, *given])))
     yield from columns(rows)
 
 

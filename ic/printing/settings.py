@@ -39,6 +39,11 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
         word(f"{on_bed.joint}.law.model", on_bed.law, on_bed.place)
     for payload in structure.payloads:
         word(f"payloads.{payload.name}.on", payload.link, payload.place)
+    for guide in structure.guides:
+        word(f"guides.{guide.name}.model", guide.model, guide.place)
+        if models.find("guide", guide.model).steer is not None:
+            ticks = f"{guide.divisor} base ticks a tick"
+            number(f"guides.{guide.name}.rate", schedule.base_hz / guide.divisor, "Hz", ticks)
     for environment in structure.environment:
         word(f"environment.{environment.name}.model", environment.model, environment.place)
     word("environment.velocity_products", "on" if structure.velocity_products else "off")

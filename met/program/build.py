@@ -1,9 +1,9 @@
 """From an experiment to its program: which phase runs when (docs/physics.md, "An instant").
 
-At an instant t_k, in this order: the step that ends there is finished; payloads are grappled and released; servos tick
-(their commands first); friction modes are decided; derivatives are taken, which is the first stage of the step that
-begins; metrics and the recorder see the instant. Servos faster than the dynamics tick between instants, on the state
-carried forward.
+At an instant t_k, in this order: the step that ends there is finished; payloads are grappled and released; guides
+tick; servos tick (their commands first); friction modes are decided; derivatives are taken, which is the first stage of
+the step that begins; metrics and the recorder see the instant. Servos faster than the dynamics tick between instants,
+on the state carried forward.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 
 from met.channel import Channel
 from met.plan import Experiment
-from met.program import base, failing, payloads, sensing
+from met.program import base, failing, guiding, payloads, sensing
 from met.program.evaluation import law
 from met.program.machine import PARAMETER, Actuator, Machine
 from met.program.observe import derived
@@ -58,6 +58,8 @@ class Builder:
         held, at_rows = derived(self.machine)
         tick: list[Control] = [Unless0((Every(instant, self.step.finish()),)), *self.step.grapple.events()]
         tick += self.step.beds.before_servos()
+        for divisor in sorted({use.divisor for use in guiding.ticking(self.machine)}):
+            tick.append(Every(divisor, (Run(Phase(f"guides_{divisor}", self._guides(divisor))),)))
         for divisor in sorted({actuator.use.divisor for actuator in self.machine.working if actuator.ticks}):
             tick.append(Every(divisor, (Run(Phase(f"servos_{divisor}", self._servos(divisor))),)))
         tick += self.step.begin()
@@ -99,6 +101,7 @@ class Builder:
                 tape.write(f"{joint}.{name}", self.machine.value(f"initial.{joint}.{name}", tape.read))
         base.start(self.machine, tape)
         payloads.start(self.machine, tape)
+        guiding.start(self.machine, tape)
         for actuator in self.machine.working:
             self._start_servo(tape, actuator)
         for name, metric, _ in self.machine.metrics:
@@ -133,7 +136,15 @@ class Builder:
         for name, cell in self.step.beds.wire_outputs.items():
             tape.output(name, tape.read(cell))
 
-    # Servos.
+    # Guides and servos.
+
+    def _guides(self, divisor: int) -> Body:
+        def body(tape: Tape) -> None:
+            for use in guiding.ticking(self.machine):
+                if use.divisor == divisor:
+                    guiding.tick(self.machine, tape, use)
+
+        return body
 
     def _servos(self, divisor: int) -> Body:
         def body(tape: Tape) -> None:
@@ -147,7 +158,7 @@ class Builder:
         """One tick of one servo's computer, on the state at this time."""
         joint = self.joints[actuator.index]
         asked = self.machine.asked(actuator, tape.read, tape.time)
-        if actuator.profile is not None:
+        if actuator.use.command is not None:
             tape.write(f"{actuator.path}.command", asked.value)
         on_bed, between = self.step.beds.seen(tape, actuator), actuator in self.machine.between
 

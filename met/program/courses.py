@@ -7,12 +7,14 @@ the acceleration is that of the piece which the profile takes there.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from met import models
+from met.diagnostic import Place
 from met.dynamics.spatial import Real, Vector, add, rotation_rpy, turn_vector
-from met.plan import COMPONENTS, Experiment, Formula
-from met.program.values import answer, parameters
+from met.plan import COMPONENTS, Course, Experiment, Formula
+from met.program.values import Read, answer, parameters
 from met.trace import Formulas, Graph, Scalar
 from met.trace.derivative import derivative
 
@@ -29,21 +31,33 @@ def recorded(experiment: Experiment) -> Formulas:
         return graph.input(path) if isinstance(value, Formula) else value
 
     base = experiment.structure.base
-    values: dict[str, Real] = dict.fromkeys(COMPONENTS, 0.0)
-    rates: dict[str, Real] = dict.fromkeys(COMPONENTS, 0.0)
-    for course in base.courses if base is not None else ():
-        profile = models.find("command", course.model, base.place if base is not None else None)
-        owner = f"course `{profile.name}` of `{course.component}` of the base"
-        p = parameters(owner, f"base.{course.component}", profile.parameters, number)
-        values[course.component], rates[course.component] = answer(owner, profile.course, p, graph.input(TIME))
+    courses, written = (base.courses, base.place) if base is not None else ((), None)
+    values, rates = values_and_rates("the base", "base", courses, written, number, graph.input(TIME))
     place, moving = ([part[name] for name in COMPONENTS[:3]] for part in (values, rates))
     angles, turning = ([part[name] for name in COMPONENTS[3:]] for part in (values, rates))
-    w = _rate_of_rpy(angles, turning)
+    w = rate_of_rpy(angles, turning)
     vectors = [*rotation_rpy(*angles), place, w, moving, *([_changing(x) for x in vector] for vector in (w, moving))]
     return Formulas.of(graph, [x for vector in vectors for x in vector])
 
 
-def _rate_of_rpy(angles: list[Real], rates: list[Real]) -> Vector:
+def values_and_rates(
+    whose: str, head: str, courses: Iterable[Course], written: Place | None, number: Read, time: Real
+) -> tuple[dict[str, Real], dict[str, Real]]:
+    """Every component of a pose at a time (s), and its rate; 0 where there is no course.
+
+    whose  for messages;  head  of the paths of the courses' parameters, which `number` gives
+    """
+    values: dict[str, Real] = dict.fromkeys(COMPONENTS, 0.0)
+    rates: dict[str, Real] = dict.fromkeys(COMPONENTS, 0.0)
+    for course in courses:
+        profile = models.find("command", course.model, written)
+        owner = f"course `{profile.name}` of `{course.component}` of {whose}"
+        p = parameters(owner, f"{head}.{course.component}", profile.parameters, number)
+        values[course.component], rates[course.component] = answer(owner, profile.course, p, time)
+    return values, rates
+
+
+def rate_of_rpy(angles: list[Real], rates: list[Real]) -> Vector:
     """Angular velocity in world axes of R = Rz(yaw) Ry(pitch) Rx(roll)."""
     _, pitch, yaw = angles
     roll_rate, pitch_rate, yaw_rate = rates

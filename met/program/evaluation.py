@@ -167,7 +167,7 @@ def driven_by(
         found = failing.given(machine, actuator, read, p, seen.time, found)
         held = Values(owner, {**found.outputs, **integrals})
         slopes.update(found.slopes)
-        shown.update({"command": seen.asked.value} if actuator.profile is not None else {}, **found.outputs)
+        shown.update({"command": seen.asked.value} if actuator.use.command is not None else {}, **found.outputs)
         shown.update({f"sensor.{each.use.of}": sensing.truth(seen, each.use.of) for each in actuator.sensors})
     coupled = failing.coupled(machine, actuator, read, begin)
     motion = JointMotion(q, qd, time, begin, actuator.asked, 1.0 if coupled is None else coupled)

@@ -23,6 +23,7 @@ from met.integrators.integrator import Integrator
 from met.metrics.metric import Metric
 from met.parameter import Memory, Parameter, State
 from met.plan import BASE, Experiment, Formula, Joint, Payload, SensorUse, ServoUse, Structure
+from met.program import guided
 from met.program.courses import recorded
 from met.program.values import Values, answer, parameters, returned
 from met.sensors.sensor import Sensor
@@ -239,6 +240,9 @@ class Machine:
 
     def asked(self, actuator: Actuator, read: ReadCell, time: Real) -> Asked:
         """What the joint's command asks at a time; kind "none" where it has none."""
+        if actuator.use.command is not None and actuator.use.command.guide:
+            guide = next(use for use in self.structure.guides if use.name == actuator.use.command.guide)
+            return guided.asked(self, actuator.use.joint, actuator.asked, guide, read, time)
         if actuator.profile is None:
             return Asked("none", 0.0, 0.0)
         p = parameters(
@@ -319,7 +323,8 @@ class Machine:
 
     def _actuator(self, index: int, use: ServoUse) -> Actuator:
         servo = models.find("servo", use.model, use.place)
-        profile = models.find("command", use.command.model, use.place) if use.command is not None else None
+        told = use.command is not None and not use.command.guide
+        profile = models.find("command", use.command.model, use.place) if use.command and told else None
         sensors = tuple(self._fitted(use, each) for each in use.sensors)
         bare = Actuator(index, use, servo, profile, models.servo_parts(use), None, False, {}, sensors)
         drive, level, levels = self._probe(bare)

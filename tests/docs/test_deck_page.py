@@ -212,7 +212,7 @@ def test_every_function_shape_key_and_model_is_on_the_page() -> None:
     assert entries == {*run.KEYS, *run.KINDS, "require"}
     words = ticked(re.sub(r"```.*?```", "", PAGE, flags=re.DOTALL))
     assert set(run.RATES) <= words
-    for kind in ("servo", "environment", "metric", "integrator"):
+    for kind in ("servo", "environment", "guide", "metric", "integrator"):
         assert set(models.find_own(kind)) <= words, kind
     assert set(models.find_own("command")) - {"constant"} <= words
 

@@ -23,7 +23,8 @@ from met.servos.servo import Parts, parts
 from met.units import PURE, Dimension, parse_unit
 
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
-EVERY = [(kind, name) for kind in KINDS for name in models.find_own(kind)]
+EVERY = [(kind, name) for kind in KINDS if kind != "guide" for name in models.find_own(kind)]
+"""All but guides, which are about several joints: tests/met/guides."""
 
 JOINTS: dict[str, JointKind] = {"hinge": "revolute", "slide": "prismatic"}
 """The joints of the deck's arm, and their kinds."""

@@ -24,7 +24,7 @@ from tests.met.small_models import EVERY, SMALLEST, Use, smallest
 
 
 def parameters(model: Any) -> tuple[Parameter, ...]:
-    return tuple(getattr(model, "parameters", ()))
+    return (*getattr(model, "parameters", ()), *getattr(model, "of_joint", ()))
 
 
 def test_every_model_has_a_small_deck() -> None:

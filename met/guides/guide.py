@@ -1,0 +1,106 @@
+"""What a guide is to the engine: it commands several joints together, which servos of theirs then follow.
+
+In a deck a guide stands in a run, `guide tip = resolved_rate { ... }`, and moves the joints whose servos name it:
+`command = rate(tip)`, `command = position(tip)`. A guide is one of two things. A computer that ticks (`steer`) sees
+the arm and gives each joint's rate; the rate is held to its next tick, and a position command is the integral of the
+rates from where the joint begins. A course in time (`course`) gives each joint's position and rate, and sees nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field, replace
+from typing import Any, Protocol
+
+from met.frozen import frozen
+from met.parameter import Memory, Parameter
+from met.trace import Real
+from met.vectors import Matrix, Vector
+
+
+@frozen
+class Stance:
+    """A frame that moves: its axes and origin in the world, its angular velocity and velocity, world axes."""
+
+    R: Matrix
+    p: Vector
+    w: Vector
+    v: Vector
+
+
+class Arm(Protocol):
+    """The arm at a tick, with the guide's joints at some positions. The guided frame has the axes of the parameter
+    `link`, and its origin at the parameter `point` of it.
+
+    stance(answers)   the guided frame; its velocities are those that it has with the guide's joints at rest
+    columns(answers)  for each of the guide's joints, in order: angular velocity and velocity of the frame, world axes,
+                      for each unit of the joint's rate
+
+    answers  whether a free base answers the joints' rates as the conservation of momentum has it (the generalized
+             Jacobian). Else it is taken as held. A base that is fixed or prescribed does what it does either way
+    """
+
+    def stance(self, *, answers: bool) -> Stance: ...
+    def columns(self, *, answers: bool) -> Sequence[tuple[Vector, Vector]]: ...
+
+
+@frozen
+class Sight:
+    """What a guide's computer sees at its tick.
+
+    time     s
+    slides   of each of its joints, whether it is prismatic
+    arm      as it is
+    asked    with the guide's joints where it has asked them to be, the integral of its rates
+    wanted   the path: where the guided frame is to be, and how it moves there
+    """
+
+    time: Real
+    slides: tuple[bool, ...]
+    arm: Arm
+    asked: Arm
+    wanted: Stance
+
+
+@frozen
+class Steered:
+    """What a guide's computer gives: each joint's rate, in order, rad/s (m/s), and all its memory by name."""
+
+    rates: Sequence[Real]
+    memory: Mapping[str, Real] = field(default_factory=dict)
+
+
+Steer = Callable[[Any, Sequence[Any], Sight], Steered]
+Course = Callable[[Any, Sequence[Any], Sequence[Real], Real], Sequence[tuple[Real, Real]]]
+
+
+@frozen(kw_only=True)
+class Guide:
+    """The declaration of a guide; one a file, in met/guides or in a package of your own.
+
+    parameters  read under their names from `p`. A guide with a path has `link`, a word, and `point`, a vector
+    of_joint    parameters that each of its joints has; a deck writes one for all, `max_rate = 4 deg/s`, or one for a
+                joint, `elbow.max_rate = 3 deg/s`
+    components  (p) -> which of the pose (`met.plan.COMPONENTS`) the path has; None: there is no path. Words of p alone
+    commands    kinds of command that its joints may take of it
+    memory      what its computer shows of a tick
+    fastest     (p) -> the rate constant with which its error falls, 1/s: 2 over its period, and it grows; None: unknown
+    steer       (p, joints, sight) -> Steered, joints the parameters of each; None: it is a course
+    course      (p, joints, begins, t) -> position and rate of each joint at time t (s); begins: where each begins
+    """
+
+    name: str
+    doc: str
+    parameters: tuple[Parameter, ...] = ()
+    of_joint: tuple[Parameter, ...] = ()
+    components: Callable[[Any], tuple[str, ...]] | None = None
+    commands: tuple[str, ...]
+    memory: tuple[Memory, ...] = ()
+    fastest: Callable[[Any], Real] | None = None
+    steer: Steer | None = None
+    course: Course | None = None
+
+    @property
+    def written(self) -> tuple[Parameter, ...]:
+        """The parameters as a deck writes them: those of each joint too."""
+        return (*self.parameters, *(replace(p, doc=f"of each joint: {p.doc}") for p in self.of_joint))

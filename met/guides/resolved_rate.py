@@ -1,0 +1,141 @@
+"""Resolved rate: the joints' rates that take a point of a link, and the link's attitude, along a path in the world.
+
+    v      = path's rate + gain * (path - where it is) - what it does with these joints at rest
+    qd     = J' (J J' + lambda^2 I)^-1 v                           (Whitney 1969; damped, met/guides/damped.py)
+    lambda^2 = max_damping^2 (1 - (sigma/threshold)^2)  where sigma < threshold, else 0
+    qd     is made shorter as a whole, where a joint would go faster than its `max_rate`
+
+Turns count as the way of a point `length` away, and a prismatic joint's way as a turn of it over `length`: so J is in
+metres, and sigma, its smallest singular value, is the velocity of the end in its worst direction for one rad/s. Below
+the threshold the task gives way, so that rates stay small through a singularity, by as much as `error` shows; the gain
+brings the point back. With max_damping = threshold no joint motion exceeds |v|/threshold. 0 is the pseudo-inverse.
+
+The path is given by the components that are written, in world axes, as offsets from where point and link begin: x, y,
+z of the point; roll, pitch, yaw of the link, R = Rz(yaw) Ry(pitch) Rx(roll). Those left out stay 0, so a link that
+begins anyhow is held so. `guides = position` leaves the attitude free; `xy` and the like guide two components alone.
+
+The path's error falls as exp(-gain t), but for the lag of the servos, the tick (by a part that is proportional to its
+period) and what limits and damping leave undone. At a singularity itself no joint moves the point along the direction
+that is lost: a path that begins there in that direction does not begin; without damping the case fails.
+
+Not a planner: it knows neither joint stops nor collisions, and of a redundant arm's motions takes the smallest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import MappingProxyType
+from typing import Any
+
+from met.guides.damped import damped, gram, least_singular_value
+from met.guides.guide import Guide, Sight, Stance, Steered
+from met.parameter import ZEROS, Memory, Parameter
+from met.trace import Real, absolute, maximum, sqrt, where
+from met.vectors import Vector, add, dot, product, rotation_vector, scale, sub, transposed
+
+POSE = ("x", "y", "z", "roll", "pitch", "yaw")
+GUIDED = MappingProxyType({
+    "pose": POSE, "position": POSE[:3], "xy": ("x", "y"), "xz": ("x", "z"), "yz": ("y", "z"),
+})  # fmt: skip
+"""Components of the path, by the word that says what is guided."""
+
+
+def components(p: Any) -> tuple[str, ...]:
+    return GUIDED[p.guides]
+
+
+def fastest(p: Any) -> Real:
+    return p.gain
+
+
+def steer(p: Any, joints: Sequence[Any], seen: Sight) -> Steered:
+    rows = [POSE.index(name) for name in GUIDED[p.guides]]
+    turns = p.guides == "pose"
+    answers = p.jacobian == "generalized"
+    away, turned = _behind(seen.wanted, seen.arm.stance(answers=answers))
+    arm = seen.arm if p.loop == "closed" else seen.asked
+    there = arm.stance(answers=answers)
+    behind, aside = _behind(seen.wanted, there)
+    v = sub(add(seen.wanted.v, scale(p.gain, behind)), there.v)
+    w = sub(add(seen.wanted.w, scale(p.gain, aside)), there.w)
+    task = _chosen(rows, v, w, p.length)
+
+    units = [p.length if slides else 1.0 for slides in seen.slides]  # of a joint's share in |u|
+    columns = [
+        [unit * part for part in _chosen(rows, linear, angular, p.length)]
+        for unit, (angular, linear) in zip(units, arm.columns(answers=answers), strict=True)
+    ]
+    J = [[column[k] for column in columns] for k in range(len(rows))]
+    square = gram(J)
+    sigma = least_singular_value(square)
+    low = sigma < p.threshold
+    share = sigma / where(low, p.threshold, 1.0)
+    damping = where(low, p.max_damping * p.max_damping * (1.0 - share * share), 0.0)
+    rates = [unit * u for unit, u in zip(units, damped(J, square, damping, task), strict=True)]
+
+    most: Real = 1.0
+    for rate, joint in zip(rates, joints, strict=True):
+        most = maximum(most, absolute(rate) / joint.max_rate)
+    left = 1.0 / most
+    return Steered(
+        [left * rate for rate in rates],
+        {
+            "error": sqrt(sum((away[row] * away[row] for row in rows if row < 3), 0.0)),
+            "turn_error": sqrt(dot(turned, turned)) if turns else 0.0,
+            "manipulability": sigma,
+            "damping": sqrt(damping),
+            "share": left,
+        },
+    )
+
+
+def _behind(wanted: Stance, there: Stance) -> tuple[Vector, Vector]:
+    """How far the path is ahead: a way and a turn (axis times angle), world axes, m and rad."""
+    return sub(wanted.p, there.p), rotation_vector(product(wanted.R, transposed(there.R)))
+
+
+def _chosen(rows: Sequence[int], linear: Vector, angular: Vector, length: Real) -> list[Real]:
+    """The guided components of a motion, its turns as ways at `length`."""
+    whole = (*linear, *scale(length, angular))
+    return [whole[row] for row in rows]
+
+
+GUIDE = Guide(
+    name="resolved_rate",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="link", shape="word", names="link", doc="link that is guided"),
+        Parameter(name="point", unit="m", shape="vector", default=ZEROS, doc="point of it that is guided, link frame"),
+        Parameter(name="guides", shape="word", words=tuple(GUIDED), default="pose", doc="which components are guided"),
+        Parameter(
+            name="max_damping", unit="m", at_least=0.0, doc="lambda at a singularity; 0: none",
+            source="Nakamura and Hanafusa 1986; how it grows: Chiaverini, IEEE Trans. Robotics Autom. 13, 1997",
+        ),
+        Parameter(name="threshold", unit="m", at_least=0.0, doc="singular value of J below which it is damped"),
+        Parameter(name="gain", unit="1/s", default=1.0, at_least=0.0, doc="rate per error of the path"),
+        Parameter(name="length", unit="m", default=1.0, above=0.0, doc="way that counts as much as a turn of 1 rad"),
+        Parameter(
+            name="loop", shape="word", words=("closed", "open"), default="closed",
+            doc="the joints that the law goes by: where they are, or where it has asked them to be",
+        ),
+        Parameter(
+            name="jacobian", shape="word", words=("arm", "generalized"), default="arm",
+            doc="on a free base: as if it were held, or with its answer to the arm",
+            source="generalized: Umetani and Yoshida, IEEE Trans. Robotics Autom. 5, 1989",
+        ),
+    ),
+    of_joint=(
+        Parameter(name="max_rate", unit="joint/s", default=float("inf"), above=0.0, doc="rate that is not exceeded"),
+    ),
+    components=components,
+    commands=("rate", "position"),
+    memory=(
+        Memory(name="error", unit="m", doc="distance of the point from the path, guided components"),
+        Memory(name="turn_error", unit="rad", doc="angle between the link and the path; 0 where it is not guided"),
+        Memory(name="manipulability", unit="m", doc="smallest singular value of J, or up to 7 % less"),
+        Memory(name="damping", unit="m", doc="lambda, the damping of the rates"),
+        Memory(name="share", unit="1", doc="share of the rates that the joints' limits leave"),
+    ),
+    fastest=fastest,
+    steer=steer,
+)

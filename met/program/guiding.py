@@ -1,0 +1,156 @@
+"""The computers of guides: what they see of the arm at their ticks, and what they ask of their joints.
+
+A guide ticks at instants, before the servos, so that what these ask of it is of this instant. Of its rates it keeps the
+integral, which begins where the joints do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+
+from met import models
+from met.dynamics.generalized import base_answers
+from met.dynamics.kinematics import jacobian
+from met.dynamics.spatial import (
+    Matrix,
+    Vector,
+    add,
+    cross,
+    product,
+    rotation_rpy,
+    scale,
+    sub,
+    turn_vector,
+)
+from met.guides.guide import Sight, Stance
+from met.integrators.integrator import Motion
+from met.plan import COMPONENTS, GuideUse
+from met.program import base, bodies, cells
+from met.program.base import Base
+from met.program.courses import rate_of_rpy, values_and_rates
+from met.program.guided import GUIDE, own, owner
+from met.program.machine import Machine, ReadCell
+from met.program.values import answer, returned
+from met.trace import Real
+from met.trace.program import Tape
+
+
+def ticking(machine: Machine) -> Iterator[GuideUse]:
+    """The guides that have a computer."""
+    return (use for use in machine.structure.guides if models.find("guide", use.model, use.place).steer is not None)
+
+
+def start(machine: Machine, tape: Tape) -> None:
+    """Where guides begin: their joints' positions, no rates, and the guided frames, from which paths are counted."""
+    for use in ticking(machine):
+        tape.write(f"{GUIDE}{use.name}.time", 0.0)
+        for joint in use.joints:
+            tape.write(f"{GUIDE}{joint}.position", tape.read(f"{joint}.q"))
+            tape.write(f"{GUIDE}{joint}.rate", 0.0)
+        guide = models.find("guide", use.model, use.place)
+        for memory in guide.memory:
+            tape.write(f"guides.{use.name}.{memory.name}", memory.start)
+        if guide.components is not None:
+            found = _ArmAt(machine, use, tape.read, *_state(machine, tape, 0.0)).stance(answers=False)
+            for name, value in zip(_begun(use), (*(x for row in found.R for x in row), *found.p), strict=True):
+                tape.write(name, value)
+
+
+def tick(machine: Machine, tape: Tape, use: GuideUse) -> None:
+    """One tick of a guide's computer, on the state at this time."""
+    guide = models.find("guide", use.model, use.place)
+    assert guide.steer is not None
+    period = use.divisor / machine.structure.schedule.base_hz
+    begun = {joint: tape.read(f"{GUIDE}{joint}.position") for joint in use.joints}
+    positions = {joint: at + period * tape.read(f"{GUIDE}{joint}.rate") for joint, at in begun.items()}
+    y, stands = _state(machine, tape, tape.time)
+    number = {joint.name: i for i, joint in enumerate(machine.joints)}
+    q = [positions.get(joint.name, y.q[i]) for i, joint in enumerate(machine.joints)]
+    sight = Sight(
+        time=tape.time,
+        slides=tuple(machine.joints[number[joint]].kind == "prismatic" for joint in use.joints),
+        arm=_ArmAt(machine, use, tape.read, y, stands),
+        asked=_ArmAt(machine, use, tape.read, Motion((*q, *y.q[len(q) :]), y.qd, y.x), stands),
+        wanted=_wanted(machine, tape, use),
+    )
+    found = answer(owner(use), guide.steer, *own(machine, use, tape.read), sight)
+    shown = returned(owner(use), "steer", found.memory, (memory.name for memory in guide.memory))
+    for name, value in shown.items():
+        tape.write(f"guides.{use.name}.{name}", value)
+    for joint, rate in zip(use.joints, found.rates, strict=True):
+        tape.write(f"{GUIDE}{joint}.position", positions[joint])
+        tape.write(f"{GUIDE}{joint}.rate", rate)
+    tape.write(f"{GUIDE}{use.name}.time", tape.time)
+
+
+class _ArmAt:
+    """A `met.guides.guide.Arm`: the arm with its joints at y.q, and what else is known of its motion at this time."""
+
+    def __init__(self, machine: Machine, use: GuideUse, read: ReadCell, y: Motion, stands: Base) -> None:
+        n = len(machine.joints)
+        self._tree, self._base = machine.tree(read), stands
+        self._free = machine.structure.free
+        self._q, self._qd = y.q[:n], y.qd[:n]
+        names = [joint.name for joint in machine.joints]
+        self._own = [names.index(joint) for joint in use.joints]
+        point = tuple(machine.value(f"guides.{use.name}.point.{axis}", read) for axis in "xyz")
+        link = machine.value(f"guides.{use.name}.link", read)
+        self._moves = jacobian(self._tree, self._q, link, point, stands.pose)
+        at_rest = [0.0] * n
+        frame = base.motions(self._tree, self._q, at_rest, Base(stands.pose))[link]
+        self._R, self._p = frame.pose.R, frame.position(point)
+
+    def stance(self, *, answers: bool) -> Stance:
+        """The guided frame. Its joints' own rates count only in what a free base does about them."""
+        w, v = turn_vector(self._base.pose.R, self._base.w), turn_vector(self._base.pose.R, self._base.v)
+        if self._free and not answers:
+            w, v = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        v = add(v, cross(w, sub(self._p, self._base.pose.p)))
+        for i, (angular, linear) in enumerate(self._moves):
+            if i not in self._own:
+                w, v = add(w, scale(self._qd[i], angular)), add(v, scale(self._qd[i], linear))
+            elif self._free and answers:
+                angular, linear = self._answers[i]
+                w, v = sub(w, scale(self._qd[i], angular)), sub(v, scale(self._qd[i], linear))
+        return Stance(self._R, self._p, w, v)
+
+    def columns(self, *, answers: bool) -> Sequence[tuple[Vector, Vector]]:
+        found = [self._moves[i] for i in self._own]
+        if not (self._free and answers):
+            return found
+        theirs = [self._answers[i] for i in self._own]
+        return [(add(w, more), add(v, far)) for (w, v), (more, far) in zip(found, theirs, strict=True)]
+
+    @cached_property
+    def _answers(self) -> list[tuple[Vector, Vector]]:
+        """What a free base does to the frame for each unit of each joint's rate: angular velocity and velocity."""
+        arm = sub(self._p, self._base.pose.p)
+        found = base_answers(self._tree, self._q, self._base.pose)
+        return [(w, add(v, cross(w, arm))) for w, v in found]
+
+
+def _state(machine: Machine, tape: Tape, time: Real) -> tuple[Motion, Base]:
+    """The arm at an instant, and its base."""
+    y = bodies.begun(machine, cells.state(tape, bodies.coordinates(machine), machine.states))
+    return y, base.base_of(machine, tape.read, y, time)
+
+
+def _begun(use: GuideUse) -> list[str]:
+    """The cells that hold where a guided frame began: the rows of its axes, and its origin."""
+    return [f"{GUIDE}{use.name}.{name}" for name in (*(f"R{i}{j}" for i in range(3) for j in range(3)), *"xyz")]
+
+
+def _wanted(machine: Machine, tape: Tape, use: GuideUse) -> Stance:
+    """The path at this time: its courses, counted from where the guided frame began."""
+    begun = [tape.read(name) for name in _begun(use)]
+    R: Matrix = tuple(tuple(begun[i : i + 3]) for i in (0, 3, 6))  # type: ignore[assignment]
+    values, rates = values_and_rates(
+        f"path of guide `{use.name}`", f"guides.{use.name}", use.courses, use.place,
+        lambda path: machine.value(path, tape.read), tape.time,
+    )  # fmt: skip
+    place, moving = ([part[name] for name in COMPONENTS[:3]] for part in (values, rates))
+    angles, turning = ([part[name] for name in COMPONENTS[3:]] for part in (values, rates))
+    p = add((begun[9], begun[10], begun[11]), (place[0], place[1], place[2]))
+    v = (moving[0], moving[1], moving[2])
+    return Stance(product(rotation_rpy(*angles), R), p, rate_of_rpy(angles, turning), v)

@@ -1,0 +1,429 @@
+"""Guides in a deck: what they set, who follows them, when they tick, and every mistake's whole message."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from met import models
+from met import run as engine
+from met.keys import structure_key
+from met.plan import Command, Course, GuideUse
+from met.plan_file import dumps, loads
+from tests.ic.small_decks import changed, check, experiment, told
+
+# ruff: noqa: E501 - messages are as wide as they are
+
+ARM = """\
+arm pair {
+    link one { mass = 2 kg; shape = rod(length = 1 m, along = x); }
+    link two { mass = 1 kg; shape = rod(length = 1 m, along = x); }
+    joint low  revolute { parent = base; child = one; axis = z; }
+    joint high revolute { parent = one;  child = two; axis = z; at = [1, 0, 0] m; }
+}
+servo follow { model = ideal; bandwidth = 20 1/s; command = rate(tip); }
+"""
+RUN = """\
+run it {
+    arm = pair;
+    servos { low = follow; high = follow; }
+    guide tip = resolved_rate {
+        link = two; point = [1, 0, 0] m; guides = xy; max_damping = 0.1 m; threshold = 0.2 m;
+        x = ramp(to = -20 cm, over = 1 s); max_rate = 1 rad/s;
+    }
+    initial { low.q = 20 deg; high.q = 60 deg; }
+    environment {}
+    rates { dynamics = 1 kHz; servos = 500 Hz; record = 100 Hz; }
+    duration = 1 s;
+    record = [q, guides.tip.error];
+}
+"""
+
+
+def numbers(folder: Path, *changes: tuple[str, str], more: str = "") -> dict[str, object]:
+    parameters = experiment(folder, ARM, changed(RUN, *changes), more, select=["it"]).parameters
+    return {path: each.value for path, each in parameters.items() if path.startswith("guides.")}
+
+
+def test_a_guide_is_what_the_servos_that_name_it_follow(tmp_path: Path) -> None:
+    structure = experiment(tmp_path, ARM, RUN).structure
+    (use,) = structure.guides
+    assert (use.name, use.model, use.joints, use.divisor) == ("tip", "resolved_rate", ("low", "high"), 2)
+    assert use.courses == (Course("x", "ramp"),)
+    assert {servo.command for servo in structure.servos} == {Command("rate", "", "tip")}
+
+
+def test_its_parameters(tmp_path: Path) -> None:
+    assert numbers(tmp_path) == {
+        "guides.tip.link": "two", "guides.tip.guides": "xy", "guides.tip.loop": "closed",
+        "guides.tip.jacobian": "arm", "guides.tip.point.x": 1.0, "guides.tip.point.y": 0.0, "guides.tip.point.z": 0.0,
+        "guides.tip.max_damping": 0.1, "guides.tip.threshold": 0.2, "guides.tip.gain": 1.0, "guides.tip.length": 1.0,
+        "guides.tip.low.max_rate": 1.0, "guides.tip.high.max_rate": 1.0,
+        "guides.tip.x.start": 0.0, "guides.tip.x.to": -0.2, "guides.tip.x.begin": 0.0, "guides.tip.x.over": 1.0,
+    }
+
+
+def test_a_joint_has_a_number_of_its_own(tmp_path: Path) -> None:
+    found = numbers(tmp_path, ("max_rate = 1 rad/s;", "max_rate = 1 rad/s;  high.max_rate = 60 deg/s;"))
+    assert found["guides.tip.low.max_rate"] == 1.0
+    assert found["guides.tip.high.max_rate"] == pytest.approx(1.0471975511965976)
+
+
+def test_a_run_like_another_changes_a_guide(tmp_path: Path) -> None:
+    more = "run more like it { guide tip { gain = 3 1/s;  x { to = 5 cm; } } }\n".replace("guide tip", "tip")
+    found = experiment(tmp_path, ARM, RUN, more, select=["more"]).parameters
+    assert (found["guides.tip.gain"].value, found["guides.tip.x.to"].value) == (3.0, 0.05)
+
+
+def test_a_path_comes_from_a_file(tmp_path: Path) -> None:
+    (tmp_path / "way.csv").write_text("time [s], x [cm], far [m]\n0, 0, 0\n1, -20, 0.1\n", encoding="utf-8")
+    course = 'x = trajectory("way.csv"); y = trajectory("way.csv", column = "far");'
+    found = numbers(tmp_path, ("x = ramp(to = -20 cm, over = 1 s);", course))
+    assert found["guides.tip.x.values"] == (0.0, -0.2)
+    assert found["guides.tip.y.values"] == (0.0, 0.1)
+
+
+def test_a_sweep_varies_its_numbers_those_of_all_joints_too(tmp_path: Path) -> None:
+    sweep = "sweep s of it { vary guides.tip.max_damping = [0, 0.1] m; vary guides.tip.max_rate = [0.1, 1] rad/s;"
+    sweep += " vary guides.tip.x.to = [10, 20] cm; }"
+    made = experiment(tmp_path, ARM, changed(RUN, ("threshold = 0.2 m", "threshold = 2 m")), sweep, select=["s"])
+    assert made.cases.coordinates[1].sets == ("guides.tip.low.max_rate", "guides.tip.high.max_rate")
+    run = engine.run(made)
+    assert run.cause == [""] * 8
+    assert len({run.signals["q"][case].tobytes() for case in range(8)}) == 8
+
+
+def test_a_guide_ticks_as_it_says_else_as_the_servos_do(tmp_path: Path) -> None:
+    text = changed(RUN, ("guides = xy;", "guides = xy; rate = 100 Hz;"), ("servos = 500 Hz;", "servos = continuous;"))
+    assert experiment(tmp_path, ARM, text).structure.guides[0].divisor == 10
+
+
+def test_a_plan_with_guides_is_read_as_it_was_written(tmp_path: Path) -> None:
+    compiled = check(tmp_path, ARM, RUN)
+    assert compiled.plan is not None
+    assert loads(dumps(compiled.plan)) == compiled.plan
+
+
+def test_a_plan_without_guides_says_nothing_of_them(tmp_path: Path) -> None:
+    begin, end = RUN.index("    guide tip"), RUN.index("    initial")
+    bare = (RUN[:begin] + RUN[end:]).replace(", guides.tip.error", "")
+    text = ARM.replace("rate(tip)", "rate(1 rad/s)")
+    compiled = check(tmp_path, text, bare)
+    assert compiled.plan is not None, told(compiled)
+    assert '"guides"' not in dumps(compiled.plan)
+    structure = compiled.plan.experiments[0].structure
+    assert structure.guides == ()
+    assert structure_key(structure) == "ffd7ff3480f40261", "as it was before there were guides"
+
+
+def test_every_guide_has_a_kind_and_a_name_of_its_own() -> None:
+    assert sorted(models.find_own("guide")) == ["resolved_rate", "together"]
+    assert GuideUse("tip", "together", ("low",), 1).courses == ()
+
+
+MISTAKES = [
+    ("guide tip = resolved_rate {", "guide tip {", """\
+error[D270]: guide `tip` has no model
+  --> deck.ic:11:5
+   |
+11 |     guide tip {
+   |     ^^^^^^^^^
+   = help: write `guide NAME = MODEL { ... }`
+   = help: guide models: resolved_rate, together
+
+1 error
+"""),
+    ("guide tip = resolved_rate {", "guide tip = resolved_rat {", """\
+error[D140]: no guide model `resolved_rat`
+  --> deck.ic:11:17
+   |
+11 |     guide tip = resolved_rat {
+   |                 ^^^^^^^^^^^^
+   = help: did you mean `resolved_rate`?
+   = help: guide models: resolved_rate, together
+
+1 error
+"""),
+    ("guide tip = resolved_rate {", "guide tip one = resolved_rate {", """\
+error[D270]: `one` after the name of a guide
+  --> deck.ic:11:15
+   |
+11 |     guide tip one = resolved_rate {
+   |               ^^^
+   = help: write `guide NAME = MODEL { ... }`
+   = help: guide models: resolved_rate, together
+
+1 error
+"""),
+    ("guide tip = resolved_rate {", "guides tip = resolved_rate {", """\
+error[D065]: no value `tip`
+ --> deck.ic:7:66
+  |
+7 | servo follow { model = ideal; bandwidth = 20 1/s; command = rate(tip); }
+  |                                                                  ^^^
+  = help: define it: `let tip = ...;`
+
+error[D108]: no `guides` in a run
+  --> deck.ic:11:5
+   |
+11 |     guides tip = resolved_rate {
+   |     ^^^^^^^^^^
+   = help: did you mean `guide`?
+   = help: a run has: arm, base, servos, initial, environment, rates, integrator, duration, record, tolerances, seed, metric NAME, guide NAME, payload NAME, substitute JOINT, require
+
+error[D125]: no channel `guides.tip.error`
+  --> deck.ic:19:18
+   |
+19 |     record = [q, guides.tip.error];
+   |                  ^^^^^^^^^^^^^^^^
+   = help: channels of all joints: q, qd, qdd, tau, tau_load, J_eff, b, mode, reaction, servo.command, servo.value, servo.slope, servo.since
+   = help: channels of the arm, and of a link: energy, momentum, links.one.position, links.one.orientation, links.one.velocity, links.one.rate, links.one.jacobian
+
+3 errors
+"""),
+    ("link = two;", "link = tow;", """\
+error[D159]: no link `tow` in arm `pair`
+  --> deck.ic:12:16
+   |
+12 |         link = tow; point = [1, 0, 0] m; guides = xy; max_damping = 0.1 m; threshold = 0.2 m;
+   |                ^^^
+   = help: did you mean `two`?
+   = help: links: one, two
+
+1 error
+"""),
+    ("link = two;", "link = one;", """\
+error[D276]: joint `high` follows guide `tip`, and does not carry link `one`
+  --> deck.ic:11:5
+   |
+11 |     guide tip = resolved_rate {
+   |     ^^^^^^^^^
+   = help: give it a command of its own, or guide a link that it carries
+
+1 error
+"""),
+    ("max_damping = 0.1 m;", "", """\
+error[D075]: guide `tip` has no `max_damping`
+  --> deck.ic:11:5
+   |
+11 |     guide tip = resolved_rate {
+   |     ^^^^^^^^^
+   = help: write `max_damping = ... m;` (lambda at a singularity; 0: none)
+
+1 error
+"""),
+    ("max_rate = 1 rad/s;", "max_rate = 1 m/s;", """\
+error[D061]: `max_rate` of joint `low` of guide `tip` is in rad/s, and this is in m/s
+  --> deck.ic:13:55
+   |
+13 |         x = ramp(to = -20 cm, over = 1 s); max_rate = 1 m/s;
+   |                                                       ^^^^^
+   = help: write it in rad/s, deg/s or rpm
+
+1 error
+"""),
+    ("max_rate = 1 rad/s;", "low.max_rate = 0 rad/s;", """\
+error[D077]: `max_rate` of joint `low` of guide `tip` must be above 0 rad/s
+  --> deck.ic:13:59
+   |
+13 |         x = ramp(to = -20 cm, over = 1 s); low.max_rate = 0 rad/s;
+   |                                                           ^^^^^^^ this is 0 rad/s
+   = help: write a number above 0 rad/s (rate that is not exceeded)
+
+1 error
+"""),
+    ("max_rate = 1 rad/s;", "lo.max_rate = 1 rad/s;", """\
+error[D141]: guide `tip` has no `lo.max_rate`
+  --> deck.ic:13:44
+   |
+13 |         x = ramp(to = -20 cm, over = 1 s); lo.max_rate = 1 rad/s;
+   |                                            ^^^^^^^^^^^
+   = help: did you mean `low.max_rate`?
+   = help: it has: link, point, guides, max_damping, threshold, gain, length, loop, jacobian, rate, x, y, z, roll, pitch, yaw, max_rate, low.max_rate, high.max_rate
+
+1 error
+"""),
+    ("x = ramp(", "z = ramp(", """\
+error[D274]: `z` is not guided by guide `tip`
+  --> deck.ic:13:9
+   |
+13 |         z = ramp(to = -20 cm, over = 1 s); max_rate = 1 rad/s;
+   |         ^
+   = help: it guides x, y
+   = help: leave it out, or guide more
+
+1 error
+"""),
+    ("x = ramp(to = -20 cm, over = 1 s);", "x { to = 1 m; }", """\
+error[D274]: `x` of guide `tip` is a value or a course in time
+  --> deck.ic:13:9
+   |
+13 |         x { to = 1 m; } max_rate = 1 rad/s;
+   |         ^
+   = help: write `x = ramp(to = 1 m, over = 10 s);`
+
+1 error
+"""),
+    ("guides = xy;", "guides = pose;", """\
+error[D275]: guide `tip` moves 2 joints and guides 6 components: x, y, z, roll, pitch, yaw
+  --> deck.ic:11:5
+   |
+11 |     guide tip = resolved_rate {
+   |     ^^^^^^^^^
+   = help: let more joints follow it, or guide less
+   = help: `guides` may be: pose, position, xy, xz, yz
+
+1 error
+"""),
+    ("guides = xy;", "guides = xy; rate = 2 kHz;", """\
+error[D277]: guide `tip` ticks at 2000 Hz, between the steps of the dynamics
+  --> deck.ic:12:62
+   |
+12 |         link = two; point = [1, 0, 0] m; guides = xy; rate = 2 kHz; max_damping = 0.1 m; threshold = 0.2 m;
+   |                                                              ^^^^^
+  ::: deck.ic:17:24  1000 Hz
+   = help: give the guide a `rate` that divides 1000 Hz, or quicken the dynamics
+
+1 error
+"""),
+    ("servos = 500 Hz;", "servos = continuous;", """\
+error[D277]: guide `tip` has no rate, and the servos are continuous
+  --> deck.ic:11:5
+   |
+11 |     guide tip = resolved_rate {
+   |     ^^^^^^^^^
+   = help: write `rate = 100 Hz;` in the guide
+
+1 error
+"""),
+    ("low = follow; high = follow;", "low = follow { command = rate(0 rad/s); }; high = follow { command = rate(0 rad/s); };", """\
+error[D272]: no joint follows guide `tip`
+  --> deck.ic:11:5
+   |
+11 |     guide tip = resolved_rate {
+   |     ^^^^^^^^^
+   = help: write `command = rate(tip);` in the servo of each joint that it moves, or leave the guide out
+
+1 error
+"""),
+    ("low = follow; high = follow;", "low = follow { command = acceleration(tip); }; high = follow;", """\
+error[D273]: guide `tip` (resolved_rate) commands no acceleration
+  --> deck.ic:10:14
+   |
+10 |     servos { low = follow { command = acceleration(tip); }; high = follow; }
+   |              ^^^
+  ::: deck.ic:11:5  the guide
+   = help: write `command = rate(tip);` for joint `low`
+
+1 error
+"""),
+    ("low = follow; high = follow;", "low = follow { command = rate(tp); }; high = follow;", """\
+error[D278]: no guide, value or course in time `tp`
+  --> deck.ic:10:44
+   |
+10 |     servos { low = follow { command = rate(tp); }; high = follow; }
+   |                                            ^^
+   = help: did you mean `tip`?
+   = help: guides of this run: tip
+
+1 error
+"""),
+    ("guides.tip.error", "guides.tip.eror", """\
+error[D125]: no channel `guides.tip.eror`
+  --> deck.ic:19:18
+   |
+19 |     record = [q, guides.tip.eror];
+   |                  ^^^^^^^^^^^^^^^
+   = help: did you mean `guides.tip.error`?
+   = help: channels of `guides`: guides.tip.error, guides.tip.turn_error, guides.tip.manipulability, guides.tip.damping, guides.tip.share
+
+1 error
+"""),
+    ("guides = xy;", "guides = xy; gain = 1000 1/s;", """\
+error[D279]: guide `tip` is unstable at 500 Hz
+  --> deck.ic:11:5
+   |
+11 |     guide tip = resolved_rate {
+   |     ^^^^^^^^^ 2 times the error is taken off at each tick
+   = help: what it takes off in a second, its gain, must stay below twice its rate, 1000/s, and well below what its servos can follow
+
+1 error
+"""),
+    ("run it {", "let tip = 3;\nrun it {", """\
+error[D271]: `tip` is a value, so no guide can be called so
+  --> deck.ic:12:5
+   |
+12 |     guide tip = resolved_rate {
+   |     ^^^^^^^^^
+  ::: deck.ic:8:5  the value
+   = help: give the guide another name: `rate(NAME)` is to mean one thing
+
+1 error
+"""),
+]
+
+
+@pytest.mark.parametrize(("text", "instead", "expected"), MISTAKES)
+def test_a_mistake_is_told_with_its_place_and_a_remedy(tmp_path: Path, text: str, instead: str, expected: str) -> None:
+    assert told(check(tmp_path, ARM, changed(RUN, (text, instead)))) == expected
+
+
+def test_a_unit_and_a_course_are_no_names_of_guides(tmp_path: Path) -> None:
+    for name, what in (("m", "a unit"), ("step", "a course in time")):
+        text = told(check(tmp_path, ARM, changed(RUN, ("guide tip", f"guide {name}"))))
+        assert f"""\
+error[D271]: `{name}` is {what}, so no guide can be called so
+  --> deck.ic:11:5
+""" in text
+
+
+def test_at_a_singularity_a_damped_guide_stays_and_another_fails(tmp_path: Path) -> None:
+    stretched = changed(RUN, ("low.q = 20 deg", "low.q = 0 deg"), ("high.q = 60 deg", "high.q = 0 deg"))
+    run = engine.run(experiment(tmp_path, ARM, stretched))
+    assert run.cause == [""]
+    np.testing.assert_array_equal(run.signals["q"][0], 0.0)
+    assert run.signals["guides.tip.error"][0, -1] == pytest.approx(0.2, rel=1e-12)
+    bare = engine.run(experiment(tmp_path, ARM, changed(stretched, ("max_damping = 0.1 m", "max_damping = 0 m"))))
+    assert "position, rate or acceleration is no longer a finite number" in bare.cause[0]
+
+
+def test_a_joint_is_not_called_as_a_component_of_the_path(tmp_path: Path) -> None:
+    assert told(check(tmp_path, ARM.replace("high", "x"), RUN.replace("high", "x"))) == """\
+error[D274]: `x` of guide `tip` is a component of its path, and a joint that follows it
+  --> deck.ic:13:9
+   |
+13 |         x = ramp(to = -20 cm, over = 1 s); max_rate = 1 rad/s;
+   |         ^
+   = help: give the joint another name
+
+1 error
+"""
+
+
+@pytest.mark.parametrize("vary", [
+    "high.at.x = [1, 1.2] m", "initial.low.q = [10, 30] deg", "guides.tip.point.x = [0.5, 1] m",
+    "guides.tip.gain = [1, 100] 1/s",
+])
+def test_what_a_sweep_varies_reaches_the_law(vary: str, tmp_path: Path) -> None:
+    run = engine.run(experiment(tmp_path, ARM, RUN, f"sweep s of it {{ vary {vary}; }}", select=["s"]))
+    assert run.cause == ["", ""]
+    assert run.signals["guides.tip.error"][0].tobytes() != run.signals["guides.tip.error"][1].tobytes()
+
+
+VARY = [
+    ("guides.tip = [1, 2]", "cannot vary", "it is a guide: vary a parameter of it, `guides.tip.PARAMETER`"),
+    ("guides.tip.x = [1, 2] m", "cannot vary",
+     "it is a course in time: vary a parameter of it, `guides.tip.x.PARAMETER`"),
+    ("guides.tip.rate = [100, 200] Hz", "cannot vary",
+     "it decides the program: write a run for each, and `sweep NAME = ONE + OTHER;`"),
+]
+
+
+@pytest.mark.parametrize(("vary", "message", "remedy"), VARY)
+def test_what_of_a_guide_does_not_vary(vary: str, message: str, remedy: str, tmp_path: Path) -> None:
+    path = vary.partition(" ")[0]
+    text = told(check(tmp_path, ARM, RUN, f"sweep s of it {{ vary {vary}; }}", select=["s"]))
+    assert text.startswith(f"error[D122]: `{path}` {message}\n")
+    assert f"= help: {remedy}\n" in text
