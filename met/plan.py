@@ -165,7 +165,8 @@ class ServoUse:
 
     divisor     base ticks a tick of its control law; of one that is continuous, and where there is none, a step of the
                 dynamics
-    words       those of its parameters on which parts of the model depend (`Servo.deciding`): name and word
+    words       those of its parameters on which parts of the model depend (`Servo.deciding`), where they are not the
+                defaults: name and word
     continuous  whether its control law is a part of the derivative
     sensors     through which its law sees; what none of them is of, it sees as it is
     """

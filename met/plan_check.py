@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -435,10 +435,10 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
     for use in structure.servos:
         if use.command is not None and use.command.model in TABLES:
             _check_table(experiment, f"{use.joint}.servo.command", TABLES[use.command.model], where)
-        for name, word in use.words:
+        for name, word in _words(models.find("servo", use.model, use.place), use.words):
             _is_word(parameters, f"{use.joint}.servo.{name}", word, where)
         for sensor in use.sensors:
-            for name, word in sensor.words:
+            for name, word in _words(models.find("sensor", sensor.model, sensor.place), sensor.words):
                 _is_word(parameters, f"{use.joint}.servo.sensor.{sensor.of}.{name}", word, where)
     for course in structure.base.courses if structure.base is not None else ():
         if course.model in TABLES:
@@ -449,6 +449,15 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
                 _check_table(experiment, f"guides.{guide.name}.{course.component}", TABLES[course.model], where)
     guides.check_paths(experiment, where)
     _check_bodies(experiment, where)
+
+
+def _words(model: Any, chosen: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+    """Every word of a model that a structure decides: those chosen, else the defaults."""
+    deciding = getattr(model, "deciding", [each.name for each in model.parameters if each.shape == "word"])
+    given = dict(chosen)
+    for each in model.parameters:
+        if each.name in deciding and isinstance(each.default, str):
+            yield each.name, given.get(each.name, each.default)
 
 
 def _is_word(parameters: Mapping[str, Quantity], path: str, word: str, where: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -30,6 +30,13 @@ def word_of(expression: Expression | None) -> str | None:
 def value_at(item: Item) -> Place:
     """Where an entry's value is; the entry itself, where it has none."""
     return place_of(item.value) if item.value is not None else item.place
+
+
+def words_chosen(parameters: Sequence[Parameter], body: Block) -> tuple[tuple[str, str], ...]:
+    """The words that a body writes for these parameters, defaults left out."""
+    found = ((each.name, word_written(each, body)) for each in parameters)
+    defaults = {each.name: each.default for each in parameters}
+    return tuple((name, word) for name, word in found if word != defaults[name])
 
 
 def word_written(wanted: Parameter, body: Block) -> str:

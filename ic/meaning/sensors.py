@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
-from ic.meaning.models import find_model, refuse_values, use_model, word_of, word_written
+from ic.meaning.models import find_model, refuse_values, use_model, word_of, words_chosen
 from ic.meaning.owner import Owner
 from ic.meaning.scope import Scope
 from ic.meaning.unit_words import unit_here
@@ -52,5 +52,5 @@ def use_sensor(scope: Scope, servo: Owner, use: ServoUse, item: Item) -> SensorU
     body = item.body or Block()
     use_model(scope, owner, sensor.parameters, body)
     scope.setting(f"{owner.path}.model", sensor.name, item=item)
-    words = tuple((p.name, word_written(p, body)) for p in sensor.parameters if p.shape == "word")
-    return SensorUse(item.name, sensor.name, words, item.place)
+    words = [each for each in sensor.parameters if each.shape == "word"]
+    return SensorUse(item.name, sensor.name, words_chosen(words, body), item.place)

@@ -20,7 +20,7 @@ from ic.meaning.models import (
     refuse_values,
     use_model,
     word_of,
-    word_written,
+    words_chosen,
 )
 from ic.meaning.owner import Owner, Settled
 from ic.meaning.schedule import CONTINUOUS, Rate
@@ -153,7 +153,7 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
                           continuous=True)
     scope.setting(f"{item.name}.servo.model", servo.name, item=model)
     scope.whole[f"{item.name}.servo.model"] = f"decides the program: vary `{item.name}.servo` over definitions"
-    words = tuple((each.name, word_written(each, block)) for each in servo.parameters if each.name in servo.deciding)
+    words = words_chosen([each for each in servo.parameters if each.name in servo.deciding], block)
     bare = ServoUse(item.name, name, servo.name, command, 1, words=words)
     sensors = tuple(use for each in sensed if (use := use_sensor(scope, owner, bare, each)) is not None)
     return Use(item.name, name, servo, command, rate, parameters, item.place, words, sensors)
