@@ -15,34 +15,26 @@ from typing import Any
 
 import numpy as np
 
-from met import models, units
+from met import models, plan_structure, units
 from met import plan_guides as guides
 from met import plan_relations as relations
 from met import plan_rest as rest
-from met.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.outputs import tolerable
-from met.parameter import WORLD, Parameter
+from met.parameter import Parameter
 from met.plan import (
     BASE,
-    COMPONENTS,
     Coordinate,
     Experiment,
     Formula,
     Quantity,
     Requirement,
-    ServoUse,
-    Structure,
 )
 from met.plan_codec import Damaged
 from met.plan_defaults import INERTIA, declared, heads_of_models, related
 from met.trace.graph import TRUTHS, Formulas
 
-NAME = re.compile(r"[^\W\d]\w*")
 GROUP = re.compile(r"[\w+-]+(\.[\w+-]+)*")
-"""What a deck can name: a name is part of paths, of messages, of files' names."""
-
-MOST_TICKS = 10**12
-"""Of a run: thirty years at a kilohertz. A divisor may not be larger either."""
+"""What a group of a sweep is called by, behind the sweep's name."""
 
 TABLES = {"table": 1, "trajectory": 2}
 """Profiles of points, and how many points each needs."""
@@ -63,13 +55,7 @@ def check(experiments: Iterable[Experiment]) -> None:
         where = f"experiments[{index}]"
         _group_name(experiment, f"{where}.name", names)
         names.append(experiment.name)
-        _check_arm(experiment.structure, f"{where}.structure")
-        _check_base(experiment.structure, f"{where}.structure")
-        _check_payloads(experiment.structure, f"{where}.structure.payloads")
-        _check_schedule(experiment.structure, f"{where}.structure")
-        _check_uses(experiment.structure, f"{where}.structure")
-        guides.check(experiment.structure, f"{where}.structure")
-        _check_record(experiment.structure, f"{where}.structure.record")
+        plan_structure.check(experiment.structure, f"{where}.structure")
         _check_requirements(experiment, f"{where}.requirements")
         _check_tolerances(experiment, f"{where}.tolerances")
         _check_cases(experiment, f"{where}.cases")
@@ -96,233 +82,14 @@ def check_text(document: Any, where: str = "") -> None:
             check_text(part, f"{where}[{index}]")
 
 
-def _name(name: str, where: str, before: Collection[str] = ()) -> None:
-    if not NAME.fullmatch(name):
-        raise Damaged(where, f"{name!r} is no name: letters, digits and _")
-    if name in before:
-        raise Damaged(where, f"`{name}` is there twice")
-
-
 def _group_name(experiment: Experiment, where: str, before: Collection[str]) -> None:
     """A run's or sweep's name; behind it, for a group of a sweep, what tells it from the others."""
     head, _, rest = experiment.name.partition(".")
-    _name(head, where)
+    plan_structure.check_name(head, where)
     if experiment.name in before:
         raise Damaged(where, f"`{experiment.name}` is there twice")
     if (rest or experiment.sweep) and not (GROUP.fullmatch(rest) and experiment.sweep == head):
         raise Damaged(where, f"{experiment.name!r} is no name of a group of the sweep `{experiment.sweep}`")
-
-
-def _whole(number: int | None, low: int, high: int, where: str) -> None:
-    if number is not None and not low <= number <= high:
-        raise Damaged(where, f"it should be a whole number from {low} to {high}")
-
-
-# Structure
-
-
-def _check_arm(structure: Structure, where: str) -> None:
-    """Links and joints are a tree that stands on the base."""
-    links: list[str] = []
-    for index, link in enumerate(structure.links):
-        _name(link.name, f"{where}.links[{index}].name", links)
-        links.append(link.name)
-    if not links:
-        raise Damaged(f"{where}.links", "there is none")
-    names: list[str] = []
-    parents: dict[str, str] = {}
-    for index, joint in enumerate(structure.joints):
-        path = f"{where}.joints[{index}]"
-        _name(joint.name, f"{path}.name", names)
-        names.append(joint.name)
-        for end, name in (("parent", joint.parent), ("child", joint.child)):
-            if name not in (BASE, *links) or (end == "child" and name == BASE):
-                raise Damaged(f"{path}.{end}", f"there is no link `{name}`")
-        if joint.child in parents:
-            raise Damaged(f"{path}.child", f"link `{joint.child}` is another joint's child already")
-        parents[joint.child] = joint.parent
-    for index, name in enumerate(links):
-        if name not in parents and name != BASE:
-            raise Damaged(f"{where}.links[{index}]", f"no joint holds link `{name}`")
-    standing = {BASE}
-    for joint_index, joint in enumerate(structure.joints):
-        passed: set[str] = set()
-        at = joint.child
-        while at not in standing:
-            if at in passed:
-                raise Damaged(f"{where}.joints[{joint_index}].parent", f"link `{at}` hangs on itself")
-            passed.add(at)
-            at = parents[at]
-        standing |= passed
-
-
-def _check_base(structure: Structure, where: str) -> None:
-    """A base that moves is a link; its courses are those of components, and its turns keep the velocity products."""
-    base, links = structure.base, [link.name for link in structure.links]
-    if base is None:
-        return
-    if BASE not in links:
-        raise Damaged(f"{where}.base", f"there is no link `{BASE}`, and it moves")
-    if base.kind == "free" and base.courses:
-        raise Damaged(f"{where}.base.courses", "a free base has none")
-    known = list(COMPONENTS)
-    for index, course in enumerate(base.courses):
-        if course.component not in known:
-            listed = ", ".join(COMPONENTS)
-            raise Damaged(f"{where}.base.courses[{index}].component", f"it should be one of {listed}, in this order")
-        known = known[known.index(course.component) + 1 :]
-        models.find("command", course.model, base.place)
-    if not structure.velocity_products and base.turns:
-        raise Damaged(f"{where}.velocity_products", "a base that turns needs them")
-
-
-def _check_payloads(structure: Structure, where: str) -> None:
-    """Payloads have names of their own, and links that carry them; their flight keeps the velocity products."""
-    names = [BASE, WORLD, *(link.name for link in structure.links)]
-    links = (BASE, *(link.name for link in structure.links))
-    for index, payload in enumerate(structure.payloads):
-        _name(payload.name, f"{where}[{index}].name", names)
-        names.append(payload.name)
-        if payload.link not in links:
-            raise Damaged(f"{where}[{index}].link", f"there is no link `{payload.link}`")
-    if not structure.velocity_products and any(payload.flies for payload in structure.payloads):
-        raise Damaged(f"{where.rpartition('.')[0]}.velocity_products", "a payload that flies needs them")
-
-
-def _check_schedule(structure: Structure, where: str) -> None:
-    schedule, path = structure.schedule, f"{where}.schedule"
-    if not 0.0 < schedule.base_hz < math.inf:
-        raise Damaged(f"{path}.base_hz", "it should be above 0, and finite")
-    _whole(schedule.ticks, 0, MOST_TICKS, f"{path}.ticks")
-    _whole(schedule.dynamics, 1, MOST_TICKS, f"{path}.dynamics")
-    _whole(schedule.record, 1, MOST_TICKS, f"{path}.record")
-    for index, use in enumerate(structure.servos):
-        _whole(use.divisor, 1, MOST_TICKS, f"{where}.servos[{index}].divisor")
-    for index, environment in enumerate(structure.environment):
-        _whole(environment.divisor, 1, MOST_TICKS, f"{where}.environment[{index}].divisor")
-
-
-def _check_uses(structure: Structure, where: str) -> None:
-    """Servos on moving joints, one each; commands that they take; metrics of channels that are there."""
-    kinds = {joint.name: joint.kind for joint in structure.joints}
-    driven: set[str] = set()
-    for index, use in enumerate(structure.servos):
-        path = f"{where}.servos[{index}]"
-        _moves(kinds, use.joint, path)
-        if use.joint in driven:
-            raise Damaged(f"{path}.joint", f"joint `{use.joint}` has a servo already")
-        driven.add(use.joint)
-        servo = models.find("servo", use.model, use.place)
-        if use.command is None:
-            if servo.commands:
-                raise Damaged(f"{path}.command", f"a {use.model} needs one")
-        elif use.command.kind not in servo.commands or use.command.kind not in COMMAND_UNIT:
-            known = ", ".join(servo.commands) or "none"
-            raise Damaged(f"{path}.command.kind", f"{use.model} takes no command `{use.command.kind}`, but {known}")
-        if unknown := [name for name, _ in use.words if name not in servo.deciding]:
-            raise Damaged(f"{path}.words", f"no part of a {use.model} depends on a word `{unknown[0]}`")
-        if use.continuous and (servo.control is None or servo.clocked):
-            raise Damaged(f"{path}.continuous", f"a {use.model} has no continuous law")
-        _check_sensors(use, path)
-        if use.continuous and use.divisor != structure.schedule.dynamics:
-            raise Damaged(f"{path}.divisor", "of a continuous law it should be that of the dynamics")
-    names: list[str] = []
-    for index, environment in enumerate(structure.environment):
-        _name(environment.name, f"{where}.environment[{index}].name", names)
-        names.append(environment.name)
-    names = []
-    for index, guide in enumerate(structure.guides):
-        _name(guide.name, f"{where}.guides[{index}].name", names)
-        _whole(guide.divisor, 1, MOST_TICKS, f"{where}.guides[{index}].divisor")
-        names.append(guide.name)
-    names = []
-    known_channels = channels(structure) if structure.metrics else {}
-    for index, metric in enumerate(structure.metrics):
-        _name(metric.name, f"{where}.metrics[{index}].name", names)
-        names.append(metric.name)
-        if metric.of not in known_channels:
-            raise Damaged(f"{where}.metrics[{index}].of", f"there is no channel `{metric.of}`")
-    models.find("integrator", structure.integrator)
-    _check_substitutions(structure, where)
-
-
-def _check_sensors(use: ServoUse, path: str) -> None:
-    """Sensors of quantities that there are, once each, which the law can see."""
-    if use.sensors and models.find("servo", use.model, use.place).control is None:
-        raise Damaged(f"{path}.sensors", f"a {use.model} has no law that would see them")
-    seen: set[str] = set()
-    for index, sensor in enumerate(use.sensors):
-        where = f"{path}.sensors[{index}]"
-        if sensor.of not in models.quantities(use) or sensor.of in seen:
-            raise Damaged(f"{where}.of", f"there is no `{sensor.of}` to be sensed, or it has a sensor already")
-        seen.add(sensor.of)
-        if use.continuous and models.find("sensor", sensor.model, sensor.place).clocked:
-            raise Damaged(f"{where}.model", f"a {sensor.model} reads at ticks, and the law is continuous")
-
-
-def _moves(kinds: Mapping[str, str], joint: str, path: str) -> None:
-    """The joint that something is on is there, and no fixed one."""
-    if joint not in kinds:
-        raise Damaged(f"{path}.joint", f"there is no joint `{joint}`")
-    if kinds[joint] == "fixed":
-        raise Damaged(f"{path}.joint", f"joint `{joint}` is fixed")
-
-
-def _check_substitutions(structure: Structure, where: str) -> None:
-    """Motors on beds are there, once each; one law for all, and servos that tick together."""
-    kinds = {joint.name: joint.kind for joint in structure.joints}
-    servos = {use.joint: use for use in structure.servos}
-    on_beds: set[str] = set()
-    for index, use in enumerate(structure.substitutions):
-        path = f"{where}.substitutions[{index}]"
-        _moves(kinds, use.joint, path)
-        if use.joint not in servos:
-            raise Damaged(f"{path}.joint", f"joint `{use.joint}` has no servo")
-        if use.joint in on_beds:
-            raise Damaged(f"{path}.joint", f"joint `{use.joint}` is on a bed already")
-        on_beds.add(use.joint)
-        servo = servos[use.joint]
-        if not models.has_motor(models.find("servo", servo.model, servo.place)):
-            raise Damaged(f"{path}.joint", f"the servo of joint `{use.joint}`, {servo.model}, has no motor for a bed")
-        only = models.find("servo", servo.model, servo.place).motor_only
-        if only is not None and dict(servo.words).get(only[0], only[1][0]) not in only[1]:
-            message = f"the servo of joint `{use.joint}` has another `{only[0]}` than {only[1][0]}"
-            raise Damaged(f"{path}.joint", message)
-        for kind in ("bed", "law"):
-            models.find(kind, getattr(use, kind), use.place)
-        first = structure.substitutions[0]
-        if use.law != first.law:
-            raise Damaged(f"{path}.law", f"it should be {first.law}, that of the first substituted joint")
-        if servo.continuous:
-            raise Damaged(f"{path}.joint", f"the servo of joint `{use.joint}` is continuous: a bed's has a rate")
-        if servo.sensors:
-            raise Damaged(f"{path}.joint", f"the servo of joint `{use.joint}` has sensors: on a bed they are the bed's")
-        if servo.divisor != servos[first.joint].divisor:
-            message = f"the servo of joint `{use.joint}` should tick with that of `{first.joint}`, the first on a bed"
-            raise Damaged(f"{path}.joint", message)
-
-
-def _check_record(structure: Structure, where: str) -> None:
-    known = channels(structure) if structure.record else {}
-    names: list[str] = []
-    for index, recorded in enumerate(structure.record):
-        path = f"{where}[{index}]"
-        if recorded.name in names:
-            raise Damaged(f"{path}.name", f"`{recorded.name}` is there twice")
-        names.append(recorded.name)
-        for channel in recorded.channels:
-            if channel not in known:
-                raise Damaged(f"{path}.channels", f"there is no channel `{channel}`")
-        if len(set(recorded.joints)) < len(recorded.joints):
-            raise Damaged(f"{path}.joints", "a joint is there twice")
-        if recorded.components and recorded.components not in DIMENSIONS:
-            listed = " or ".join(", ".join(names) for names in DIMENSIONS)
-            raise Damaged(f"{path}.components", f"it should be {listed}")
-        wanted = channel_paths(recorded.name, recorded.joints, recorded.components)
-        if recorded.channels != wanted:
-            raise Damaged(f"{path}.channels", f"`{recorded.name}` of these joints is {', '.join(wanted)}")
-        if len(recorded.unit) not in (1, len(recorded.channels)):
-            raise Damaged(f"{path}.unit", "it should be one unit, or one a channel")
 
 
 # Cases
@@ -357,15 +124,15 @@ def _check_tolerances(experiment: Experiment, where: str) -> None:
 def _check_cases(experiment: Experiment, where: str) -> None:
     cases = experiment.cases
     many = cases.coordinates or cases.repeats is not None
-    _whole(cases.count, 1, 2**63 - 1 if many else 1, f"{where}.count")
-    _whole(cases.seed, 0, MOST_SEED, f"{where}.seed")
+    plan_structure.check_whole(cases.count, 1, 2**63 - 1 if many else 1, f"{where}.count")
+    plan_structure.check_whole(cases.seed, 0, MOST_SEED, f"{where}.seed")
     for name, column in (("repeats", cases.repeats), ("positions", cases.positions)):
         if column is not None:
             _check_numbering(column, cases.count, name == "positions", f"{where}.{name}")
     paths: set[str] = set()
     for index, coordinate in enumerate(cases.coordinates):
         path = f"{where}.coordinates[{index}]"
-        if not all(NAME.fullmatch(part) for part in coordinate.path.split(".")):
+        if not all(plan_structure.NAME.fullmatch(part) for part in coordinate.path.split(".")):
             raise Damaged(f"{path}.path", f"{coordinate.path!r} is no path")
         if coordinate.path in paths:
             raise Damaged(f"{path}.path", f"`{coordinate.path}` is there twice")

@@ -21,7 +21,7 @@ from met.trace import Real
 if TYPE_CHECKING:
     from fractions import Fraction
 
-MOST_TICKS = 10**12  # what a plan may have (met/plan_check): thirty years at a kilohertz
+MOST_TICKS = 10**12  # what a plan may have (met/plan_structure): thirty years at a kilohertz
 WARN_ABOVE = 0.5  # of h lambda: above it, a step sees less than the decay it should follow
 
 
