@@ -7,13 +7,14 @@ the derivative of the velocity (Pinocchio's is spatial: it lacks w x v).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 from met.dynamics.tree import Body
+from tests.oracles.pinocchio_tree import on_joints
 
 Array = np.ndarray
 
@@ -80,28 +81,18 @@ class FloatingPinocchio:
         theirs[self.at] = ours
         return theirs
 
-    def loads(self, wrenches: Mapping[str, tuple[Sequence[float], Sequence[float]]]) -> pin.StdVec_Force:
-        """External wrenches (moment about a link's origin, force, link axes) on Pinocchio's joints."""
-        total = [pin.Force.Zero() for _ in range(self.model.njoints)]
-        for name, (moment, force) in wrenches.items():
-            b = self.link[name]
-            total[self.joint_of[b]] += self.placed[b].act(pin.Force(np.array(force, float), np.array(moment, float)))
-        result = pin.StdVec_Force()
-        result.extend(total)
-        return result
-
     def accelerations(self, base, q, qd, tau, wrenches) -> tuple[Array, Array, Array]:
         """Forward dynamics: angular and linear acceleration of the base, qdd."""
         v = self.velocity(base.w, base.v, qd)
         forces = self.velocity(np.zeros(3), np.zeros(3), tau)
-        a = pin.aba(self.model, self.data, self.configuration(base, q), v, forces, self.loads(wrenches))
+        a = pin.aba(self.model, self.data, self.configuration(base, q), v, forces, on_joints(self, wrenches))
         return a[3:6], a[:3] + np.cross(base.w, base.v), a[self.at]
 
     def forces(self, base, q, qd, wd, a, qdd, wrenches) -> tuple[Array, Array]:
         """Inverse dynamics: the wrench that the base would need (moment over force), and the joints' torques."""
         v = self.velocity(base.w, base.v, qd)
         given = self.velocity(wd, np.array(a) - np.cross(base.w, base.v), qdd)
-        found = pin.rnea(self.model, self.data, self.configuration(base, q), v, given, self.loads(wrenches))
+        found = pin.rnea(self.model, self.data, self.configuration(base, q), v, given, on_joints(self, wrenches))
         return np.concatenate([found[3:6], found[:3]]), found[self.at]
 
     def energy(self, base, q, qd) -> tuple[float, float]:

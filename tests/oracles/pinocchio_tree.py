@@ -6,11 +6,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from met.dynamics.tree import Body
+
+
+def on_joints(arm: Any, wrenches: Mapping[str, tuple[Sequence[float], Sequence[float]]]) -> pin.StdVec_Force:
+    """External wrenches (moment about a link's origin, force, link axes) on Pinocchio's joints."""
+    total = [pin.Force.Zero() for _ in range(arm.model.njoints)]
+    for name, (moment, force) in wrenches.items():
+        b = arm.link[name]
+        total[arm.joint_of[b]] += arm.placed[b].act(pin.Force(np.array(force, float), np.array(moment, float)))
+    result = pin.StdVec_Force()
+    result.extend(total)
+    return result
 
 
 class PinocchioTree:
@@ -51,25 +63,15 @@ class PinocchioTree:
         theirs[self.at] = ours
         return theirs
 
-    def loads(self, wrenches: Mapping[str, tuple[Sequence[float], Sequence[float]]]) -> pin.StdVec_Force:
-        """External wrenches (moment about a link's origin, force, link axes) on Pinocchio's joints."""
-        total = [pin.Force.Zero() for _ in range(self.model.njoints)]
-        for name, (moment, force) in wrenches.items():
-            b = self.link[name]
-            total[self.joint_of[b]] += self.placed[b].act(pin.Force(np.array(force, float), np.array(moment, float)))
-        result = pin.StdVec_Force()
-        result.extend(total)
-        return result
-
     def accelerations(self, q, qd, tau, wrenches) -> np.ndarray:
         """Forward dynamics, rotor inertia included."""
         v = self.vector
-        return pin.aba(self.model, self.data, v(q), v(qd), v(tau), self.loads(wrenches))[self.at]
+        return pin.aba(self.model, self.data, v(q), v(qd), v(tau), on_joints(self, wrenches))[self.at]
 
     def torques(self, q, qd, qdd, wrenches) -> np.ndarray:
         """Inverse dynamics, rotor inertia included."""
         v = self.vector
-        return pin.rnea(self.model, self.data, v(q), v(qd), v(qdd), self.loads(wrenches))[self.at]
+        return pin.rnea(self.model, self.data, v(q), v(qd), v(qdd), on_joints(self, wrenches))[self.at]
 
     def link_pose(self, q, name: str) -> tuple[np.ndarray, np.ndarray]:
         """R and p of a link's frame in the world."""
