@@ -201,13 +201,14 @@ def _metric_table(summary: Summary) -> list[str]:
 
 
 def _metric_numbers(metric: MetricSummary, single: bool) -> tuple[str, ...]:
-    scale = metric.deck_scale
+    """Of the finite values; `_metric_words` says how many others there are."""
     if single:
-        return ("inf" if metric.infinite else "-" if metric.unknown else number_text(metric.median / scale),)
-    values = (metric.minimum, metric.median, metric.maximum)
-    return tuple(
-        "-" if math.isnan(value) else "inf" if math.isinf(value) else number_text(value / scale) for value in values
-    )
+        return ("inf" if metric.infinite else _text(metric.median, metric),)
+    return tuple(_text(value, metric) for value in (metric.minimum, metric.median, metric.maximum))
+
+
+def _text(value: float, metric: MetricSummary) -> str:
+    return "-" if math.isnan(value) else number_text(value / metric.deck_scale)
 
 
 def _metric_words(metric: MetricSummary, single: bool) -> str:

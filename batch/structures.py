@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group
-from batch.signals import deck_unit, number_text
-from batch.summary import Summary, median, summary_of
+from batch.signals import deck_unit
+from batch.summary import Summary, median_text, summary_of
 
 
 def structures(archive: ArchiveFile) -> Iterator[list[str]]:
@@ -47,13 +47,6 @@ def _table(groups: Sequence[Group]) -> list[str]:
         met = group.values("met") if "met" in group.variables else np.ones((group.count, 0), np.int8)
         whole = [str(int((met == 1).all(axis=1).sum()))] if judged else []
         scales = {variable.name: deck_unit(variable)[0] for variable in group.role("metric")}
-        cells = [_median(group, name, scales[name]) if name in scales else "" for name in metrics]
+        cells = [median_text(group.values(name) / scales[name]) if name in scales else "" for name in metrics]
         rows.append([group.name, str(group.count), *whole, *cells])
     return ["", *columns(rows, right=range(1, len(head)))]
-
-
-def _median(group: Group, name: str, scale: float) -> str:
-    """The middle of a metric's values, of which infinite ones count; `-` where none is a number."""
-    values = np.sort(group.values(name))
-    values = values[~np.isnan(values)] / scale
-    return number_text(median(values)) if len(values) else "-"

@@ -9,15 +9,28 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, Group, Stored
 from batch.failures import Failure, failures
+from batch.signals import number_text
 from met.frozen import frozen
 
 
 @frozen
-class MetricSummary:
-    """A metric over the cases that have one (SI): the smallest and largest finite values, and the median of all, of
-    which infinite ones are part: what half of the cases keep within.
+class Spread:
+    """Smallest, median and largest of the values that are finite, not-a-number where none is; how many are not.
 
-    infinite    cases where it is infinite (a settling time that never comes);  unknown  where it is not a number
+    infinite  such as a settling time that never comes;  unknown  not a number
+    """
+
+    minimum: float
+    median: float
+    maximum: float
+    infinite: int
+    unknown: int
+
+
+@frozen
+class MetricSummary:
+    """A metric over cases (SI), as `Spread` has it.
+
     deck_unit   the unit its requirement is written in, else that of its values; shown = value / deck_scale
     """
 
@@ -113,23 +126,30 @@ def summary_of(group: Group, position: int | None = None) -> Summary:
 
 
 def _metric(variable: Stored, values: np.ndarray) -> MetricSummary:
-    finite, known = np.sort(values[np.isfinite(values)]), np.sort(values[~np.isnan(values)])
-    low, high = (finite[0], finite[-1]) if len(finite) else (np.nan, np.nan)
-    middle = median(known) if len(known) else np.nan
-    infinite, unknown = int(np.isinf(values).sum()), int(np.isnan(values).sum())
-    told = variable.attributes
+    found, told = spread(values), variable.attributes
     return MetricSummary(
-        variable.name, variable.unit, variable.long_name, float(low), float(middle), float(high), infinite, unknown,
-        str(told.get("deck_unit", variable.unit)), float(told.get("deck_scale", 1.0)),
+        variable.name, variable.unit, variable.long_name, found.minimum, found.median, found.maximum, found.infinite,
+        found.unknown, str(told.get("deck_unit", variable.unit)), float(told.get("deck_scale", 1.0)),
     )  # fmt: skip
 
 
-def median(rising: np.ndarray) -> float:
-    """The median of sorted numbers; numpy's own takes 60 ms to import."""
-    half = len(rising) // 2
-    if len(rising) % 2 or rising[half - 1] == rising[half]:  # two infinite ones have no mean of another kind
-        return float(rising[half])
-    return float(0.5 * (rising[half - 1] + rising[half]))
+def spread(values: np.ndarray) -> Spread:
+    """How a metric's values lie: the one rule of tables, reports and comparisons."""
+    rising = np.sort(values[np.isfinite(values)])
+    infinite, unknown = int(np.isinf(values).sum()), int(np.isnan(values).sum())
+    if not len(rising):
+        return Spread(np.nan, np.nan, np.nan, infinite, unknown)
+    half = len(rising) // 2  # numpy's own median takes 60 ms to import
+    middle = rising[half] if len(rising) % 2 else 0.5 * rising[half - 1] + 0.5 * rising[half]
+    return Spread(float(rising[0]), float(middle), float(rising[-1]), infinite, unknown)
+
+
+def median_text(values: np.ndarray, *, infinite: str = "inf", none: str = "-") -> str:
+    """The median in a table that has no other word of the values, and how many are infinite: `2.44, 2 inf`."""
+    found = spread(values)
+    if np.isnan(found.median):
+        return infinite if found.infinite else none
+    return number_text(found.median) + (f", {found.infinite:,} {infinite}" if found.infinite else "")
 
 
 def as_json(summary: Summary) -> dict[str, Any]:

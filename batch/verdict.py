@@ -124,7 +124,10 @@ def told(
     path = campaign.output
     out += ["", f"archive  {path}  ({size_text(path.stat().st_size)})"]
     if picture is not None:
+        names = list(dict.fromkeys(summary.sweep or summary.name for summary in summaries))
         out.append(f"picture  {picture}")
+        if len(names) > 1:
+            out[-1] += f", of {names[0]} alone: `met plot {quoted(path)} --run {quoted(names[1])}` draws another"
     elif excuse:
         out.append(f"picture  none: {excuse}")
     if exported is not None:

@@ -10,9 +10,11 @@ import click
 
 from met.cli import loudness_options
 
+KINDS = ["deck", "servo", "sensor", "environment", "command", "guide", "metric", "integrator"]
+
 
 @click.command()
-@click.argument("kind", type=click.Choice(["deck", "servo", "environment", "command", "guide", "metric", "integrator"]))
+@click.argument("kind", type=click.Choice(KINDS))
 @click.argument("name")
 @click.option("-o", "output", metavar="PATH", help="The deck's file, or the model's folder; else it is named NAME.")
 @click.option("--force", is_flag=True, help="Write over what is there.")

@@ -13,6 +13,8 @@
     <joint>.law.unknown_torque .reference_rate                  of a law with an observer
 
     guides.<guide>.<name>           what a guide's computer shows, by its declaration
+    sensors.<sensor>                what a sensor of a link reads
+    sensors.<sensor>.<name>         its states
 
 Derived, that is computed from the state only where a record or a metric asks for them (docs/physics.md, section 1):
 
@@ -95,8 +97,8 @@ JACOBIAN = (
     ("jacobian.linear", "linear", "velocity of the link by the joint's rate"),
 )
 OF_ARM = (
-    ("energy.kinetic", "J", "kinetic energy, rotors included", (), ""),
-    ("energy.potential", "J", "potential energy in gravity", (), ""),
+    ("energy.kinetic", "J", "kinetic energy, rotors and motors included", (), ""),
+    ("energy.potential", "J", "potential energy in gravity, and of gears that are wound up", (), ""),
     ("momentum.linear", "kg*m/s", "momentum", XYZ, WORLD_AXES),
     ("momentum.angular", "kg*m^2/s", "angular momentum about the origin", XYZ, WORLD_AXES),
 )
@@ -220,6 +222,11 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
     for guide in structure.guides:
         for part in models.find("guide", guide.model, guide.place).memory:
             add(f"guides.{guide.name}.{part.name}", part.unit, part.doc, guide.divisor, "")
+    for on_link in structure.sensors:
+        unit, path = models.find("sensor", on_link.model, on_link.place).unit, f"sensors.{on_link.name}"
+        add(path, unit, f"what the {on_link.model} reads", on_link.divisor, "")
+        for state in models.sensor_parts(on_link, "states"):
+            add(f"{path}.{state.name}", watched_unit(state.unit, unit), state.doc, dynamics, "")
     told = (*names, *(recorded.name for recorded in structure.record), *(metric.of for metric in structure.metrics))
     mentioned = {name.split(".")[1] for name in told if name.startswith("links.")}
     mentioned |= {link.name for link in structure.links[:1]}
@@ -275,7 +282,7 @@ def channel_paths(name: str, joints: tuple[str, ...], components: tuple[str, ...
 
 def joint_of(name: str) -> str:
     """The joint that a variable of one thing belongs to, by its name; none where that is no joint."""
-    if name.startswith(("links.", "payloads.", "guides.", *(own for own, *_ in OF_ARM))):
+    if name.startswith(("links.", "payloads.", "guides.", "sensors.", *(own for own, *_ in OF_ARM))):
         return ""
     return name.partition(".")[0]
 
@@ -284,7 +291,8 @@ def recordable(structure: Structure, names: Iterable[str] = ()) -> dict[str, tup
     """Every name that a record may write, with the variables that it stands for (names: as of `channels`).
 
     A name stands for one number (`elbow.q`, `elbow.reaction.force.x`), for a vector (`links.tip.position`), for that of
-    all joints that have it (`q`, `reaction.force`), or for several variables (`reaction`, `energy`).
+    all joints that have it (`q`, `reaction.force`), or for several variables (`reaction`, `energy`; `sensors`: what
+    those of links read).
     """
     known = channels(structure, names)
     own: dict[str, Channel] = {}  # numbers and vectors, a vector before its components
@@ -302,6 +310,8 @@ def recordable(structure: Structure, names: Iterable[str] = ()) -> dict[str, tup
     for name, of in joints.items():
         (one,) = channel_paths(name, (of[0],), ())
         _enter(found, known, name, tuple(of), () if one in known else own[one].components)
+    if structure.sensors:
+        found["sensors"] = tuple(found[f"sensors.{use.name}"][0] for use in structure.sensors)
     return found
 
 

@@ -108,8 +108,14 @@ def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
     return close[0] if close else None
 
 
-def did_you_mean(word: str, known: Iterable[str]) -> tuple[str, ...]:
-    """The help line that offers the nearest known word, capitals or not; or none."""
+def meant(word: str, known: Iterable[str]) -> str | None:
+    """The known word that this one may have been meant for, capitals or not; or none."""
     folded = {candidate.lower(): candidate for candidate in dict.fromkeys(known)}
     close = nearest(word.lower(), folded)
-    return (f"did you mean `{folded[close]}`?",) if close is not None else ()
+    return folded[close] if close is not None else None
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> tuple[str, ...]:
+    """The help line that offers the word that may have been meant; or none."""
+    close = meant(word, known)
+    return (f"did you mean `{close}`?",) if close is not None else ()

@@ -27,7 +27,9 @@ DIGEST_BYTES = 8
 SILENT_FIELDS = frozenset({"place", "definition", "shape", "doc", "unit", "components"})
 """Fields of a structure that change no number: where it was written, its names and units for the reader."""
 
-LATER_FIELDS = frozenset({"substitutions", "words", "continuous", "sensors", "base", "payloads", "guide", "guides"})
+LATER_FIELDS = frozenset({
+    "substitutions", "words", "continuous", "sensors", "base", "payloads", "guide", "guides", "balanced",
+})  # fmt: skip
 """Fields that structures have got since: left out where empty or false, so that the keys of older archives stay."""
 
 

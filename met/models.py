@@ -11,7 +11,7 @@ offer the same name are an error, never a race.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, Protocol
@@ -21,7 +21,7 @@ from met.diagnostic import Place, Problem, did_you_mean, error
 from met.entry_points import offered
 from met.frozen import frozen
 from met.parameter import Parameter, there
-from met.plan import SensorUse, ServoUse, Structure
+from met.plan import LinkSensor, SensorUse, ServoUse, Structure
 
 if TYPE_CHECKING:
     from met.servos.servo import Parts
@@ -160,16 +160,35 @@ def _check_names(kind: Kind, model: Any, found_at: str) -> None:
     taken = [name for name, *_ in own] or ["command"]
     shown = [part.name for group in HELD for part in getattr(model, group, ())]
     parameters = [*getattr(model, "parameters", ()), *getattr(model, "of_joint", ())]
-    for names in ([*taken, *shown], [parameter.name for parameter in parameters]):
+    for names in ([*taken, *shown], there_together(parameters)):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             message = f"{found_at} declares `{twice[0]}` twice"
             raise Problem(error("E215", message, help="each memory, state, signal and parameter has its own name"))
 
 
+def there_together(parameters: Sequence[Parameter]) -> list[str]:
+    """Names of parameters; of those that are there under different words of the same parameter, once."""
+    names: list[str] = []
+    for n, one in enumerate(parameters):
+        others = [each for each in parameters[:n] if each.name == one.name]
+        apart = one.only is not None and all(
+            each.only is not None and each.only[0] == one.only[0] and not {*each.only[1]} & {*one.only[1]}
+            for each in others
+        )
+        names += [] if others and apart else [one.name]
+    return names
+
+
 def _check_units(model: Any, found_at: str) -> None:
     """Every declared unit can be read."""
     words = {word: units.parse_unit("1") for word in ("joint", "effort", "command", "of")}
+    if getattr(model, "measures", None) is not None:
+        try:
+            units.parse_unit(model.unit)
+        except ValueError as reason:
+            message = f"{found_at} measures something with {reason}"
+            raise Problem(error("E215", message, help="give its `unit`, as decks write it: `m/s^2`")) from None
     for part in (p for group in ("parameters", "of_joint", *HELD) for p in getattr(model, group, ())):
         try:
             units.parse_unit(part.unit, words)
@@ -198,6 +217,7 @@ def packages(structures: Iterable[Structure]) -> tuple[str, ...]:
     for each in structures:
         used["servo"] |= {servo.model for servo in each.servos}
         used["sensor"] |= {sensor.model for servo in each.servos for sensor in servo.sensors}
+        used["sensor"] |= {sensor.model for sensor in each.sensors}
         told = [servo.command for servo in each.servos if servo.command is not None]
         used["command"] |= {command.model for command in told if not command.guide}
         used["command"] |= {course.model for use in (each.base, *each.guides) if use for course in use.courses}
@@ -239,7 +259,7 @@ def quantities(use: ServoUse) -> dict[str, str]:
     return {"q": "joint", "qd": "joint/s", **{state.name: state.unit for state in servo_parts(use).natural}}
 
 
-def sensor_parts(use: SensorUse, group: str) -> tuple[Any, ...]:
+def sensor_parts(use: SensorUse | LinkSensor, group: str) -> tuple[Any, ...]:
     """Those of a sensor's `parameters`, `states` or `memory` that are there under this use's words."""
     sensor = find("sensor", use.model, use.place)
     defaults = {each.name: each.default for each in sensor.parameters if isinstance(each.default, str)}

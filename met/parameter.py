@@ -5,7 +5,7 @@ meaning and source are written once, in the model's own file.
 
 A unit is written as in a deck (`"V*s/rad"`, `"1"` for a pure number). Four names stand for what only the use
 decides: `joint` (rad, or m on a prismatic joint), `effort` (N*m, or N), `command` (the unit of what is commanded)
-and `of` (the unit of the channel that a metric watches).
+and `of` (the unit of the channel that a metric watches, of what a sensor is of).
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ class Parameter:
 
     names        of an environment's word: it names one of the arm's links or moving joints, or is one of `words`. Where
                  it is a joint, the unit words `joint` and `effort` of the model's other parameters are this joint's
+    joints       of an environment's number: it is about joints of this kind alone, and an arm without is warned
     decides      of a number: it decides the program, as a word does, and is a plain float when the model is recorded
     direction    of a vector: its length does not count, so it may not be nothing
     less_than    of a number: the parameter that it is less than, in every case
@@ -64,6 +65,7 @@ class Parameter:
     of_servo: str = ""
     source: str = ""
     names: Literal["", "link", "joint"] = ""
+    joints: Literal["", "revolute", "prismatic"] = ""
     decides: bool = False
     direction: bool = False
     less_than: str = ""
@@ -97,12 +99,17 @@ class Memory:
 
 @frozen(kw_only=True)
 class State:
-    """A number that nature integrates for a model, with the motion of the arm; recorded under its name."""
+    """A number that nature integrates for a model, with the motion of the arm; recorded under its name.
+
+    between  of a servo: whether it is of what joins motor and joint, such as how far a gear is wound up. Where the
+             servo has let go of the joint it goes back to `start`, by half in each step of modified Euler
+    """
 
     name: str
     unit: str
     doc: str
     start: float = 0.0
+    between: bool = False
     only: Only | None = None
 
 

@@ -26,6 +26,7 @@ Parameters are named by paths, the ones a deck uses inside a run:
     guides.<name>.<joint>.<parameter>      of each joint that the guide moves, as the guide declares
     guides.<name>.<component>.<parameter>  of its path, as the profile declares that gives this component
     metrics.<name>.<parameter>             as the metric declares
+    sensors.<name>.<parameter>             as the sensor declares that is on a link
     payloads.<name>.mass .com.x .inertia.xx ...             of a payload, as of a link, in its own frame
     payloads.<name>.at|rpy.x|y|z           its frame in its link's, m, rad (fixed x-y-z): where it is held from the
                                            start; of one that is grappled `at` alone, the point that it should come to
@@ -200,6 +201,20 @@ class GuideUse:
 
 
 @frozen
+class LinkSensor:
+    """A sensor of a link under a name of the deck's; which link is a parameter. words: as a servo's.
+
+    divisor  base ticks a tick of it, a multiple of the dynamics' step
+    """
+
+    name: str
+    model: str
+    divisor: int
+    words: tuple[tuple[str, str], ...] = ()
+    place: Place | None = None
+
+
+@frozen
 class Substitution:
     """A joint whose motor is on a bed: the models of bed and law. Its servo stays what it is.
 
@@ -336,7 +351,8 @@ class Recorded:
 class Structure:
     """All that decides which program is compiled, values apart.
 
-    base  None: it is fixed. A base that moves is among the links
+    base      None: it is fixed. A base that moves is among the links
+    balanced  whether servos begin with what keeps their joints from accelerating
     """
 
     arm: str
@@ -353,6 +369,8 @@ class Structure:
     base: Base | None = None
     payloads: tuple[Payload, ...] = ()
     guides: tuple[GuideUse, ...] = ()
+    sensors: tuple[LinkSensor, ...] = ()
+    balanced: bool = False
 
     @property
     def free(self) -> bool:

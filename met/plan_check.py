@@ -207,6 +207,9 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
         for sensor in use.sensors:
             for name, word in _words(models.find("sensor", sensor.model, sensor.place), sensor.words):
                 _is_word(parameters, f"{use.joint}.servo.sensor.{sensor.of}.{name}", word, where)
+    for on_link in structure.sensors:
+        for name, word in _words(models.find("sensor", on_link.model, on_link.place), on_link.words):
+            _is_word(parameters, f"sensors.{on_link.name}.{name}", word, where)
     for course in structure.base.courses if structure.base is not None else ():
         if course.model in TABLES:
             _check_table(experiment, f"base.{course.component}", TABLES[course.model], where)

@@ -52,6 +52,7 @@ def heads_of_models(structure: Structure) -> tuple[str, ...]:
         *(f"base.{course.component}." for course in (structure.base.courses if structure.base else ())),
         *(f"environment.{use.name}." for use in structure.environment),
         *(f"guides.{use.name}." for use in structure.guides),
+        *(f"sensors.{use.name}." for use in structure.sensors),
         *(f"metrics.{use.name}." for use in structure.metrics),
     )
 
@@ -67,8 +68,11 @@ def of_environment(structure: Structure) -> Iterator[tuple[str, tuple[Parameter,
 
 
 def related(structure: Structure) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
-    """`of_environment`, and the same of guides: parameters that may name parts of the arm, or go together."""
+    """`of_environment`, and the same of guides and links' sensors: parameters that may name parts of the arm, or go
+    together."""
     yield from of_environment(structure)
+    for sensor in structure.sensors:
+        yield f"sensors.{sensor.name}", models.sensor_parts(sensor, "parameters")
     for use in structure.guides:
         yield f"guides.{use.name}", models.find("guide", use.model, use.place).parameters
 
@@ -122,6 +126,10 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
         for parameter in parameters:
             yield from _numbers(prefix, parameter, parameter.unit if on is None else joint_unit(parameter.unit, on))
     yield from _of_guides(structure)
+    for on_link in structure.sensors:
+        unit = models.find("sensor", on_link.model, on_link.place).unit
+        for parameter in models.sensor_parts(on_link, "parameters"):
+            yield from _numbers(f"sensors.{on_link.name}", parameter, watched_unit(parameter.unit, unit))
     watched = channels(structure) if structure.metrics else {}
     for metric in structure.metrics:
         of = watched[metric.of].unit if metric.of in watched else "1"

@@ -157,6 +157,7 @@ def _check_uses(structure: Structure, where: str) -> None:
         check_name(guide.name, f"{where}.guides[{index}].name", names)
         check_whole(guide.divisor, 1, MOST_TICKS, f"{where}.guides[{index}].divisor")
         names.append(guide.name)
+    _check_link_sensors(structure, f"{where}.sensors")
     names = []
     known_channels = channels(structure) if structure.metrics else {}
     for index, metric in enumerate(structure.metrics):
@@ -177,9 +178,30 @@ def _check_sensors(use: ServoUse, path: str) -> None:
         where = f"{path}.sensors[{index}]"
         if sensor.of not in models.quantities(use) or sensor.of in seen:
             raise Damaged(f"{where}.of", f"there is no `{sensor.of}` to be sensed, or it has a sensor already")
+        if models.find("sensor", sensor.model, sensor.place).measures is not None:
+            raise Damaged(f"{where}.model", f"`{sensor.model}` is a sensor of a link: it stands in a run")
         seen.add(sensor.of)
         if use.continuous and models.find("sensor", sensor.model, sensor.place).clocked:
             raise Damaged(f"{where}.model", f"a {sensor.model} reads at ticks, and the law is continuous")
+
+
+def _check_link_sensors(structure: Structure, where: str) -> None:
+    """Sensors of links have names of their own, models that measure something of a link, and tick at instants."""
+    names: list[str] = []
+    for index, use in enumerate(structure.sensors):
+        path = f"{where}[{index}]"
+        check_name(use.name, f"{path}.name", names)
+        names.append(use.name)
+        model = models.find("sensor", use.model, use.place)
+        if model.measures is None:
+            raise Damaged(f"{path}.model", f"`{use.model}` is a sensor of a joint: it stands in a servo")
+        words = [each.name for each in model.parameters if each.shape == "word" and not each.names]
+        if unknown := [name for name, _ in use.words if name not in words]:
+            raise Damaged(f"{path}.words", f"`{use.model}` has no word `{unknown[0]}`")
+        check_whole(use.divisor, 1, MOST_TICKS, f"{path}.divisor")
+        step = structure.schedule.dynamics
+        if use.divisor % step:
+            raise Damaged(f"{path}.divisor", f"it should be a multiple of that of the dynamics, {step}")
 
 
 def _moves(kinds: Mapping[str, str], joint: str, path: str) -> None:

@@ -56,6 +56,7 @@ FLOPS = {"add": 1, "sub": 1, "mul": 1, "div": 1, "sqrt": 1, "fma": 2}
 
 WORK = {
     "bed": "emulated beds", "read": "observers", "follow": "observers", "guides_": "guides",
+    "sensors_": "sensors of links",
     "servos_": "servo computers",
     "modes": "friction modes", "decide": "friction decisions", "arm": "arm on a bed", "law": "laws", "given": "laws",
     "derive": "first stage", "judge": "failures", "left_open": "friction decisions", "advance": "integrator",
@@ -64,7 +65,7 @@ WORK = {
 }  # fmt: skip
 """What a phase's work is called, by the beginning of its name; in the order of an instant and the step after it."""
 
-WITHIN = ("servo physics", "environment", "dynamics")
+WITHIN = ("servo physics", "environment", "dynamics", "sensors")
 """Parts of a stage (met/program/evaluation.py), in order."""
 
 _BLOCKS, _MANY = 4, 256  # blocks of cases that are timed together, and of a short run at most

@@ -10,11 +10,11 @@ from functools import cached_property
 
 import numpy as np
 
-from met import keys
+from met import keys, models
 from met.frozen import frozen
 from met.plan import REPEAT, Experiment
 from met.program.build import COORDINATE, METRIC, OUTPUTS, build
-from met.program.step import EVENTS, NOT_FINITE, SINGULAR
+from met.program.step import ASTRAY, EVENTS, NOT_FINITE, SINGULAR
 from met.program.substituted import LIMITED
 from met.trace.ir import emit
 from met.trace.program import Program, Recording, record
@@ -232,6 +232,9 @@ def _cause(experiment: Experiment, failure: float, number: float, tick: float) -
     moving = experiment.structure.moving
     if int(number) == len(moving) and experiment.structure.free:
         return _cause_of_base(experiment, failure, tick)
+    others = len(moving) + experiment.structure.free + sum(each.flies for each in experiment.structure.payloads)
+    if int(number) >= others:
+        return _cause_of_sensor(experiment, int(number) - others, tick)
     if int(number) >= len(moving):
         return _cause_of_payload(experiment, int(number) - len(moving) - experiment.structure.free, tick)
     joint = moving[int(number)]
@@ -250,12 +253,29 @@ def _cause(experiment: Experiment, failure: float, number: float, tick: float) -
             f"{head}D is not above 0 {unit}, so qdd is undefined. Nothing outboard has inertia about this "
             f"joint{where}. Give the link mass or the servo a rotor inertia."
         )
+    if failure == ASTRAY:
+        return (
+            f"{head}a state of its servo is where it can never be{where}: a step is too long for the servo (try a "
+            f"faster rate for the dynamics). The bristles of `friction = lugre` want sigma_0 |motor rate|/f_c times "
+            f"the step to stay below the integrator's limit."
+        )
     assert failure == NOT_FINITE
+    what = "the servo, the arm or what acts on its base" if experiment.structure.free else "the servo or the arm"
     return (
-        f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: a step too long for "
-        f"the servo or the arm (see the stability figures of `met plan`; try a faster rate for the dynamics), or a "
-        f"model that divides by zero."
+        f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: "
+        f"{_of_guide(experiment, joint.name)}a step too long for {what} (see the stability figures of `met plan`; try "
+        f"a faster rate for the dynamics), or a model that divides by zero."
     )
+
+
+def _of_guide(experiment: Experiment, joint: str) -> str:
+    """Where the guide that a joint follows gives it no number, in words; empty where there is none that may."""
+    for use in experiment.structure.guides:
+        undefined = models.find("guide", use.model, use.place).undefined
+        if joint in use.joints and undefined:
+            where = f" ({use.place.file}:{use.place.line})" if use.place else ""
+            return f"guide `{use.name}`{where}, which it follows, {undefined}; "
+    return ""
 
 
 def _cause_of_payload(experiment: Experiment, number: int, tick: float) -> str:
@@ -269,11 +289,28 @@ def _cause_of_payload(experiment: Experiment, number: int, tick: float) -> str:
     )
 
 
+def _cause_of_sensor(experiment: Experiment, number: int, tick: float) -> str:
+    """Why a case failed by one of the sensors of links, in words."""
+    sensor = experiment.structure.sensors[number]
+    where = f" ({sensor.place.file}:{sensor.place.line})" if sensor.place else ""
+    return (
+        f"t = {tick / experiment.structure.schedule.base_hz:g} s: sensor {sensor.name}: its filter is no longer a "
+        f"finite number{where}. Usual reasons: a step too long for its `cutoff` (try a faster rate for the dynamics), "
+        f"or numbers that no double holds."
+    )
+
+
 def _cause_of_base(experiment: Experiment, failure: float, tick: float) -> str:
     """Why a case failed by its free base, in words."""
     base = experiment.structure.base
     head = f"t = {tick / experiment.structure.schedule.base_hz:g} s: the base: "
     where = f" ({base.place.file}:{base.place.line})" if base is not None and base.place else ""
+    if failure == SINGULAR and tick > 0.0:
+        return (
+            f"{head}it moves freely and has no inertia in some direction any more, so its acceleration is "
+            f"undefined{where}. At the start it had: usually the motion has diverged, and a step is too long for what "
+            f"acts on the base or for a servo (try a faster rate for the dynamics)."
+        )
     if failure == SINGULAR:
         return (
             f"{head}it moves freely and has no inertia in some direction, so its acceleration is undefined{where}. "

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from batch.archive.read import Group
+from batch.summary import spread
 from met.frozen import frozen
 
 LEVEL = 0.01
@@ -52,7 +53,7 @@ def samples(a: Group, b: Group) -> list[Sample]:
         finite: Any = [values[np.isfinite(values)] for values in both]
         sizes = len(finite[0]), len(finite[1])
         lost = len(both[0]) - sizes[0], len(both[1]) - sizes[1]
-        medians = tuple(float(np.median(values)) if len(values) else float("nan") for values in finite)
+        medians = tuple(spread(values).median for values in both)
         distance, chance = 0.0, 1.0
         if min(sizes) > 0:
             result: Any = ks_2samp(finite[0], finite[1], method="auto" if max(sizes) <= 10_000 else "asymp")

@@ -156,9 +156,8 @@ class Histories:
         for index, position in enumerate(self.positions):
             y = layout.drawable(history(self.group, panel, position)[:, line])
             if colour is not None:
-                alpha = 1.0 - 0.7 * index / max(1, count - 1)
                 label = layout.named(panel.lines[line]) if index == 0 else None
-                _line(ax, self.time, y, color=colour, alpha=alpha, linewidth=1.0, label=label)
+                _line(ax, self.time, y, color=colour, alpha=_faint(index, count), linewidth=1.0, label=label)
             else:
                 _line(ax, self.time, y, color=sequence(index, count), label=_case_label(self.group, position))
 
@@ -218,6 +217,7 @@ class Histories:
                         bbox_to_anchor=(1.005, 1.06), fontsize=self.sheet.small, handlelength=1.4,
                     )  # fmt: skip
                     last, since = labels, 1
+            layout.legend(figure, self._cases(), self.sheet, below=True)
             return
         known = layout.labelled([[ax for cell, ax in zip(cells, row, strict=True) if cell is not None]
                                  for cells, row in zip(rows, axes, strict=True)])  # fmt: skip
@@ -225,7 +225,18 @@ class Histories:
             known = {text: handle for text, handle in known.items() if text == COMMAND}
         command = {text: known.pop(text) for text in [COMMAND] if text in known}
         title = _case_title(self.group) if known and not self.fan and not by_joint else None
-        layout.legend(figure, known | command | archives, self.sheet, title)
+        cases = self._cases() if by_joint else {}
+        layout.legend(figure, known | command | archives | cases, self.sheet, title)
+
+    def _cases(self) -> dict[str, Any]:
+        """What the legend says of cases that are told apart by how faint they are."""
+        from matplotlib.lines import Line2D
+
+        count = len(self.positions)
+        if self.single or self.fan:
+            return {}
+        return {_case_words(self.group, position): Line2D([], [], color=INK, linewidth=1.4, alpha=_faint(index, count))
+                for index, position in enumerate(self.positions)}  # fmt: skip
 
     def _archives(self) -> dict[str, Any]:
         """What the legend says of the two archives."""
@@ -259,6 +270,19 @@ def _line(ax: Any, time: np.ndarray, y: np.ndarray, **style: Any) -> None:
 def _differing(group: Group) -> list[Stored]:
     """The varied parameters that tell the cases here apart."""
     return [v for v in group.role("coordinate") if len(distinct(group.values(v.name))) > 1]
+
+
+def _faint(index: int, count: int) -> float:
+    """How opaque the lines of one of some cases are, that share their joints' colours."""
+    return 1.0 - 0.75 * index / max(1, count - 1)
+
+
+def _case_words(group: Group, position: int) -> str:
+    """What differs, by name, for a legend without a title."""
+    scales = {v.name: deck_unit(v) for v in _differing(group)}
+    texts = [f"{name} = {number_text(group.values(name)[position] / scale)} {unit}".rstrip()
+             for name, (scale, unit) in scales.items()]  # fmt: skip
+    return layout.named(", ".join(texts)) or f"case #{group.values('case')[position]}"
 
 
 def _case_label(group: Group, position: int) -> str:

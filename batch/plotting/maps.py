@@ -52,7 +52,7 @@ class Plan:
 
 
 def plan(x: Column, y: Column, third: Column | None, other: tuple[str, str] | None) -> Plan:
-    """Sides and cells. Cases fill the grid if most of its cells hold one."""
+    """Sides and cells. Cases fill the grid if most of its cells hold one; else they are points, by their values."""
     if x.role == "choice" and y.role != "choice":
         x, y = y, x
     across, up = sides.side(x), sides.side(y)
@@ -61,6 +61,8 @@ def plan(x: Column, y: Column, third: Column | None, other: tuple[str, str] | No
     filled = len(distinct(there)) > FULL * len(across.levels.texts) * len(up.levels.texts)
     apart = there if third is None else there * 1000 + levelled(third.values).places[cells >= 0]
     several = int(np.unique(apart, return_counts=True)[1].max(initial=0))
+    if not filled:
+        across, up = sides.line(x), sides.line(y)
     return Plan(across, up, cells, filled, several, other)
 
 
@@ -296,7 +298,6 @@ def _points(ax: Any, each: Measured, found: Plan, here: np.ndarray, norm: Any) -
                            (here & np.isneginf(shown), _infinity("−∞"))):  # fmt: skip
         if marked.any():
             ax.scatter(x[marked], y[marked], marker=marker, color=FAINT, linewidths=0.8, **style)
-    ax.margins(0.04)
     return mapped
 
 
@@ -308,8 +309,8 @@ def _sides(axes: Sequence[Sequence[Any]], found: Plan, sheet: Sheet) -> None:
     width, height = axes[0][0].figure.get_size_inches()
     across = max(0.6, width / len(axes[0]) - (0.9 if sheet.paper else 1.5))
     up = max(0.5, height / len(axes) - 0.6)
-    sides.write(axes[0][0].xaxis, found.x, across, sheet, upright=False)
-    sides.write(axes[0][0].yaxis, found.y, up, sheet, upright=True)
+    sides.write(axes[0][0].xaxis, found.x, across, sheet, upright=False, cells=found.filled)
+    sides.write(axes[0][0].yaxis, found.y, up, sheet, upright=True, cells=found.filled)
     for number, row in enumerate(axes):
         for column, ax in enumerate(row):
             last = all(not later[column].get_visible() for later in axes[number + 1 :])

@@ -69,7 +69,7 @@ def _points(
         text = " · ".join(part for part in (each.about, points.lost(each.values)) if part)
         layout.head(ax, text, sheet, 1)
         ax.set_ylabel(layout.broken(each.label))
-        points.below(ax, x)
+        points.below(ax, x, sheet)
     axes[-1][0].set_xlabel(f"{x.label}  ({x.unit})" if x.unit else x.label)
     if mapped is not None and by is not None:
         points.bar(figure, mapped, [ax for [ax] in axes], by, sheet)

@@ -11,9 +11,8 @@ from batch.grids import MOST_LEVELS, is_grid, levelled, levels
 from batch.plotting import layout
 from batch.plotting.measured import Measured
 from batch.plotting.sheet import COLOURS, FAINT, INK, Sheet, sequence
-from batch.plotting.sides import is_log
+from batch.plotting.sides import is_log, line, write_log
 from batch.pool import Column
-from batch.signals import number_text
 from met.frozen import frozen
 
 MARKER, NAMED = 14, 8
@@ -26,6 +25,9 @@ RASTERED = 2000
 """More points than these are a raster within an SVG or a PDF."""
 
 BEHIND, PALE = 3.0, 0.3
+
+PANEL = 0.6
+"""Of a picture's width, what a panel beside a legend has at least."""
 
 
 @frozen
@@ -198,11 +200,14 @@ def bar(figure: Any, mapped: Any, axes: list[Any], by: Column, sheet: Sheet) -> 
     drawn.outline.set_visible(False)
 
 
-def below(ax: Any, x: Column) -> None:
+def below(ax: Any, x: Column, sheet: Sheet) -> None:
     """The axis of what is varied: a choice's words at their places, whole numbers of cases, orders of magnitude."""
     if is_log(x):
+        found, wide = line(x), ax.figure.get_figwidth()
         ax.set_xscale("log")
-        ax.xaxis.set_major_formatter(lambda value, _: number_text(value))
+        ax.set_xlim(found.edges[0], found.edges[-1])
+        inches = wide - layout.BESIDE_ON_PAPER if sheet.narrow else PANEL * wide
+        write_log(ax.xaxis, found, inches, sheet)
     if x.words:
         ax.set_xticks(range(len(x.words)), x.words)
         ax.set_xlim(-0.5, len(x.words) - 0.5)

@@ -1,8 +1,11 @@
-"""The side of a map: where the cells of a parameter's values lie, and which of the values are written there."""
+"""The side of a map: where the cells or points of a parameter's values lie, and which numbers are written there."""
 
 from __future__ import annotations
 
-from typing import Literal
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any, Literal
 
 import numpy as np
 
@@ -10,6 +13,7 @@ from batch.grids import Levels, levelled, levels
 from batch.plotting.layout import LETTER
 from batch.plotting.sheet import Sheet
 from batch.pool import Column
+from batch.signals import number_text
 from met.frozen import frozen
 
 EVEN, EVEN_LOG = 0.02, 0.15
@@ -23,10 +27,20 @@ SPAN = 100.0
 SHORT = 5
 """Letters of values that are written rather than round numbers between them."""
 
+ROUND = ((1, 2, 5), (1, 3), (1,))
+"""Steps within a power of ten of a logarithmic axis, the densest first."""
+
+APART = 0.1
+"""Inches between numbers on an axis."""
+
+BEYOND = 0.05
+"""Room beyond the first and the last point, against the span of all."""
+
 
 @frozen
 class Side:
-    """edges: of the cells, one more than there are;  scale: `place` where all cells have one width."""
+    """edges: of the cells, one more than there are, or of points the two ends of the axis;  scale: `place` where all
+    cells have one width."""
 
     column: Column
     levels: Levels
@@ -66,6 +80,20 @@ def side(column: Column) -> Side:
     return Side(column, found, np.arange(len(values) + 1) - 0.5, "place")
 
 
+def line(column: Column) -> Side:
+    """The side of points, which lie by their values whatever these are; words, at their places."""
+    found = levelled(column.values, column.words)
+    if column.words:
+        return side(column)
+    values = levels(column.values)
+    if not len(values):
+        return Side(column, found, np.array([0.0, 1.0]), "linear")
+    log = is_log(column)
+    ends = np.log(values[[0, -1]]) if log else values[[0, -1]]
+    ends = ends + BEYOND * (float(ends[1] - ends[0]) or abs(float(ends[0])) or 1.0) * np.array([-1.0, 1.0])
+    return Side(column, found, np.exp(ends) if log else ends, "log" if log else "linear")
+
+
 def is_log(column: Column) -> bool:
     """Whether a parameter's values rise by factors, or span so many that the small ones would be one on another."""
     values = levels(column.values)
@@ -85,15 +113,63 @@ def _edges(values: np.ndarray) -> np.ndarray:
     return np.concatenate([[1.5 * values[0] - 0.5 * values[1]], middles, [1.5 * values[-1] - 0.5 * values[-2]]])
 
 
-def write(axis: object, found: Side, inches: float, sheet: Sheet, *, upright: bool) -> None:
-    """The values that have room on an axis of this length; of many that rise evenly, round numbers between them."""
+def write(axis: Any, found: Side, inches: float, sheet: Sheet, *, upright: bool, cells: bool = True) -> None:
+    """The values that have room on an axis of this length; of many, or of points, round numbers between them."""
     from matplotlib.ticker import NullLocator
 
-    axis.set_minor_locator(NullLocator())  # type: ignore[attr-defined]
+    axis.set_minor_locator(NullLocator())
     texts = found.levels.texts
-    wide = max(map(len, texts)) * LETTER * sheet.normal / 72 + 0.1
-    room = max(2, int(inches / (1.9 * sheet.normal / 72 if upright else wide)))
+    room = max(2, int(inches / (1.9 * sheet.normal / 72 if upright else _wide(texts, sheet) + APART)))
     every = -(-len(texts) // room)
-    if found.scale == "linear" and (every > 1 or found.levels.stretches or max(map(len, texts)) > SHORT):
-        return
-    axis.set_ticks(found.at[::every], texts[::every])  # type: ignore[attr-defined]
+    whole = cells and every == 1 and max(map(len, texts)) <= SHORT and not found.levels.stretches
+    if found.scale == "log" and not whole:
+        write_log(axis, found, inches, sheet, upright=upright)
+    elif found.scale == "place" or whole:
+        axis.set_ticks(found.at[::every], texts[::every])
+
+
+def write_log(axis: Any, found: Side, inches: float, sheet: Sheet, *, upright: bool = False) -> None:
+    """On a logarithmic axis of this length the values, where they are few and short, else round numbers, as many as
+    have room; no others."""
+    from matplotlib.ticker import NullLocator
+
+    axis.set_minor_locator(NullLocator())
+    low, high = float(found.edges[0]), float(found.edges[-1])
+    tries = [_round(low, high, steps) for steps in ROUND]
+    if max(map(len, found.levels.texts)) <= SHORT and not found.levels.stretches:
+        tries.insert(0, found.levels.values.tolist())
+    values = next((each for each in tries if _apart(each, low, high, inches, sheet, upright=upright)), tries[-1])
+    while not _apart(values, low, high, inches, sheet, upright=upright):
+        values = values[::2]
+    if len(values) < 2:  # less than a factor of 2.5: rises nearly as a linear axis does
+        values = [x for x in _even_numbers(low, high, inches, sheet) if low <= x <= high]
+    axis.set_ticks(values, [number_text(x) for x in values])
+
+
+def _round(low: float, high: float, steps: Sequence[int]) -> list[float]:
+    """The numbers from low to high that are one of these, times a power of ten."""
+    powers = range(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
+    found = (float(f"{step}e{power}") for power in powers for step in steps)
+    return [x for x in found if low <= x <= high]
+
+
+def _even_numbers(low: float, high: float, inches: float, sheet: Sheet) -> list[float]:
+    from matplotlib.ticker import MaxNLocator
+
+    wide = _wide([number_text(low), number_text(high)], sheet) + APART
+    return [float(x) for x in MaxNLocator(nbins=max(2, min(5, int(inches / wide)))).tick_values(low, high)]
+
+
+def _apart(values: Sequence[float], low: float, high: float, inches: float, sheet: Sheet, *, upright: bool) -> bool:
+    """Whether the numbers stand clear of one another on a logarithmic axis."""
+    if len(values) < 2 or not high > low:
+        return True
+    places = [inches * math.log(x / low) / math.log(high / low) for x in values]
+    sizes = [1.5 * sheet.normal / 72 if upright else _wide([number_text(x)], sheet) + APART for x in values]
+    between = zip(pairwise(places), pairwise(sizes), strict=True)
+    return all(b - a >= (one + other) / 2 for (a, b), (one, other) in between)
+
+
+def _wide(texts: Sequence[str], sheet: Sheet) -> float:
+    """Inches of the longest."""
+    return max(map(len, texts)) * LETTER * sheet.normal / 72

@@ -161,6 +161,8 @@ def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Fact, ...
             others.setdefault(f"bed of {on_bed.joint}", {})[f"{on_bed.bed}, law {on_bed.law}"] = None
         for guide in structure.guides:
             others.setdefault(f"guide {guide.name}", {})[f"{guide.model}, of {', '.join(guide.joints)}"] = None
+        for sensor in structure.sensors:
+            others.setdefault(f"sensor {sensor.name}", {})[f"{sensor.model} at {base / sensor.divisor:g} Hz"] = None
         for environment in structure.environment:
             others.setdefault(f"environment {environment.name}", {})[environment.model] = None
     for text, joints in servos.items():

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from batch.output import quoted
 from batch.pool import ENDED, Column, Pool, shown
 from batch.report.against import GOOD, Before
 from batch.report.content import Table, Worst
+from batch.summary import median_text
 from met.distinct import distinct
 
 MOST_CASES = 20
@@ -94,7 +93,8 @@ def structures(pool: Pool, before: Before | None = None) -> Table | None:
         if before is not None:
             both = here[before.there[here]]
             counts.append(_good(before.ended[both]) if len(both) else shown(np.nan))
-        rows.append((*chosen, f"{len(here):,}", *counts, *(_median(column.values[here]) for column in metrics)))
+        medians = (median_text(column.values[here], infinite="∞", none=shown(np.nan)) for column in metrics)
+        rows.append((*chosen, f"{len(here):,}", *counts, *medians))
     heads = (*(c.label for c in choices), "cases", "meet all" if judged else "reached their end")
     heads += ("before",) if before is not None else ()
     return Table(
@@ -108,14 +108,3 @@ def structures(pool: Pool, before: Before | None = None) -> Table | None:
 def _good(ended: np.ndarray) -> str:
     good = int(np.isin(ended, GOOD).sum())
     return f"{good:,} ({100 * good / max(1, len(ended)):.3g} %)"
-
-
-def _median(values: Sequence[float] | np.ndarray) -> str:
-    """The middle of a metric's values, of which infinite ones count."""
-    rising = np.sort(np.asarray(values))
-    rising = rising[~np.isnan(rising)]
-    if not len(rising):
-        return shown(np.nan)
-    half = len(rising) // 2
-    low, high = rising[half if len(rising) % 2 else half - 1], rising[half]
-    return shown(float(low if low == high else 0.5 * (low + high)))

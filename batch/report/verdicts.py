@@ -8,7 +8,7 @@ from batch.failures import failures, ranges
 from batch.pool import ENDED, Column, Pool, shown
 from batch.report.against import Before
 from batch.report.content import Demand, Failing, MetricRow, Part, Verdict
-from batch.summary import median
+from batch.summary import spread
 from ic.printing.columns import count as counted
 from met.run import DONE
 
@@ -94,16 +94,15 @@ def metric_rows(pool: Pool, before: Before | None = None) -> tuple[MetricRow, ..
 
 def _metric(column: Column, before: np.ndarray | None) -> MetricRow:
     """Spread of the finite values; of how many there are others is said. before: the values of the other archive."""
-    finite = np.sort(column.values[np.isfinite(column.values)])
+    found, finite = spread(column.values), column.values[np.isfinite(column.values)]
     was = np.zeros(0) if before is None else np.sort(before[np.isfinite(before)])
-    was_text = shown(median(was)) if len(was) else "" if before is None else shown(np.nan)
-    infinite, unknown = int(np.isinf(column.values).sum()), int(np.isnan(column.values).sum())
-    said = [f"infinite in {counted(infinite, 'case')}"] if infinite else []
-    said += [f"no value in {counted(unknown, 'case')}"] if unknown else []
+    was_text = "" if before is None else shown(spread(was).median)
+    said = [f"infinite in {counted(found.infinite, 'case')}"] if found.infinite else []
+    said += [f"no value in {counted(found.unknown, 'case')}"] if found.unknown else []
     if not len(finite):
         none = shown(np.nan)
         return MetricRow(column.label, column.about, column.unit, none, none, none, ", ".join(said), before=was_text)
-    low, middle, high = float(finite[0]), median(finite), float(finite[-1])
+    low, middle, high = found.minimum, found.median, found.maximum
     bars: tuple[int, ...] = ()
     bars_before: tuple[int, ...] = ()
     from_, to = min([low, *was[:1]]), max([high, *was[-1:]])

@@ -95,6 +95,80 @@ SERVO = Servo(
 ''',
 )
 
+SENSOR = Beginning(
+    group="met.sensors",
+    declaration="SENSOR",
+    said="the bar goes slower than the 0.5 rad/s asked, by the bias of what its servo sees",
+    servo="""{
+    model      = rigid_gearbox;
+    ratio      = 100;
+    kp         = 0.1 V*s/rad;
+    ki         = 2 V/rad;
+    v_max      = 48 V;
+    resistance = 0.5 ohm;
+    kt         = 0.1 N*m/A;
+    tau_max    = 1.2 N*m;
+    j_m        = 6e-5 kg*m^2;
+    sensor qd  = $name { cutoff = 50 Hz;  bias = 0.05 rad/s;  noise = 0.002 rad/s; }
+    command    = rate(step(to = 0.5 rad/s, at = 0.1 s));
+}""",
+    require="seen < 0.47 rad/s",
+    module='''\
+"""$name: a filter of order 1, then a bias and noise.
+
+    y' = 2 pi cutoff (x - y)        x is the quantity that it is of; integrated with the arm
+    reading = y + bias + noise n_k  n_k a normal deviate of tick k
+
+Say here what the model is, with its equations and their source, and what it is not. `met doc $name` prints it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from met.parameter import Parameter, State
+from met.sensors import Sensor
+from met.sensors.sensor import Reading, Sensed
+from met.trace import Real
+
+# These functions are called while the program is built, with recorded numbers: no `if` on a number, but
+# `where(condition, a, b)` of met.trace; no `min` or math.sin, but `minimum`, `sin`. docs/models.md has the table.
+
+
+def follow(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
+    """The sensor's circuit, at every stage of every step: gives the slope of every State below."""
+    return {"filtered": 2.0 * math.pi * p.cutoff * (value - states.filtered)}
+
+
+def begin(p: Any, value: Real) -> Mapping[str, Real]:
+    """Every State where a run begins: here the filter is settled."""
+    return {"filtered": value}
+
+
+def read(p: Any, held: Any, states: Any, sensed: Sensed) -> Reading:
+    """The sensor's computer, at the servo's ticks: gives what the law sees."""
+    return Reading(states.filtered + p.bias + p.noise * sensed.draw())
+
+
+# `of` is the unit of the quantity: rad/s of `sensor qd`, rad of `sensor q`, ...
+SENSOR = Sensor(
+    name="$name",
+    doc=__doc__,
+    parameters=(
+        Parameter(name="cutoff", unit="Hz", above=0.0, doc="cut-off of the filter"),
+        Parameter(name="bias", unit="of", default=0.0, doc="what is read where the quantity is 0"),
+        Parameter(name="noise", unit="of", default=0.0, at_least=0.0, doc="noise at each tick, rms"),
+    ),
+    states=(State(name="filtered", unit="of", doc="what is behind the filter"),),
+    follow=follow,
+    begin=begin,
+    read=read,
+)
+''',
+)
+
 ENVIRONMENT = Beginning(
     group="met.environments",
     declaration="ENVIRONMENT",
@@ -327,8 +401,8 @@ GUIDE = Guide(
 )
 
 MODELS = {
-    "servo": SERVO, "environment": ENVIRONMENT, "command": COMMAND, "guide": GUIDE, "metric": METRIC,
-    "integrator": INTEGRATOR,
+    "servo": SERVO, "sensor": SENSOR, "environment": ENVIRONMENT, "command": COMMAND, "guide": GUIDE,
+    "metric": METRIC, "integrator": INTEGRATOR,
 }  # fmt: skip
 
 TRIAL = """\

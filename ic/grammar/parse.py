@@ -107,6 +107,8 @@ class _Parser(Expressions):
             self.replaced_name()
         while self.token.kind == NAME and not (len(names) > 0 and self.line_break_in(names)):
             names.append(self.advance())
+        if _arm_from(names) and self.token.text in (".", "..", "/", "-"):
+            self.file_without_quotes(names)
         tail: list[Token] = []
         if self.token.text == ".":
             self.at -= 1
@@ -134,6 +136,17 @@ class _Parser(Expressions):
         if _base_at(names) is not None and not self.begins_value_on_this_line():
             self.no_brace([*names, *tail])
         return self.statement(start, names, tail)
+
+    def file_without_quotes(self, names: list[Token]) -> None:
+        """`arm panda from robots/panda.urdf { }`, with or without `urdf` before the name."""
+        first = self.at if len(names) == 3 else self.at - 1
+        last = self.at
+        while self.tokens[last + 1].text not in ("{", ";", ")") and self.tokens[last + 1].kind != END \
+                and not self.on_new_line(last + 1):
+            last += 1
+        file = "".join(token.text for token in self.tokens[first:last + 1])
+        self.fail("D020", "the name of a file stands in quotes", span(self.tokens[first], self.tokens[last]),
+                  help=f'write `from urdf("{file[:SHOWN]}")`')  # fmt: skip
 
     def line_break_in(self, names: list[Token]) -> bool:
         """Whether a new line breaks a run of names that cannot be one entry: `q` and, below it, `mass = 3;`."""
@@ -332,6 +345,11 @@ def _base_at(names: Sequence[Token]) -> int | None:
 def _made_from(names: Sequence[Token], tail: Sequence[Token]) -> bool:
     """Whether the names of a definition end in `from MODEL`, before the arguments of the model."""
     return len(names) >= 4 and names[-2].text == "from" and not tail
+
+
+def _arm_from(names: Sequence[Token]) -> bool:
+    """Whether the names begin `arm NAME from`."""
+    return len(names) >= 3 and (names[0].text, names[2].text) == ("arm", "from")
 
 
 def _words_before_value(names: Sequence[Token], dotted: bool, following: Token) -> int:

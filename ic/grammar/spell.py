@@ -2,7 +2,22 @@
 
 from __future__ import annotations
 
-from ic.grammar.syntax import Binary, Call, Expression, List, Name, Number, Range, String, Unary, WithUnit
+from ic.grammar.syntax import (
+    Binary,
+    Call,
+    Entry,
+    Expression,
+    Group,
+    Let,
+    List,
+    Name,
+    Number,
+    Range,
+    Setting,
+    String,
+    Unary,
+    WithUnit,
+)
 
 LOOSE = {"or": 1, "and": 2, "<": 3, "<=": 3, ">": 3, ">=": 3, "==": 3, "!=": 3, "+": 4, "-": 4, "*": 5, "/": 5, "^": 7}
 
@@ -27,7 +42,9 @@ def spell(expression: Expression, within: int = 0) -> str:
             return f"{inner if closed else f'({inner})'} {expression.unit.text}"
         case Call():
             named = (f"{word.text} = {spell(value)}" for word, value in expression.named)
-            return f"{expression.name.text}({', '.join([*(spell(value) for value in expression.positional), *named])})"
+            inside = ", ".join([*(spell(value) for value in expression.positional), *named])
+            head = expression.name.text + (f"({inside})" if inside or expression.body is None else "")
+            return head if expression.body is None else f"{head} {_body(expression.body)}"
         case Range():
             return f"{spell(expression.first)} .. {spell(expression.last)} by {spell(expression.step)}"
         case Unary():
@@ -38,3 +55,19 @@ def spell(expression: Expression, within: int = 0) -> str:
             text = f"{spell(expression.left, binds)} {expression.operator} {spell(expression.right, binds + 1)}"
             return f"({text})" if binds < within else text
     raise AssertionError(expression)
+
+
+def _body(entries: tuple[Entry, ...]) -> str:
+    """What stands in braces, in one line."""
+    return " ".join(["{", *map(_entry, entries), "}"])
+
+
+def _entry(entry: Entry) -> str:
+    if isinstance(entry, Setting):
+        name = ".".join(word.text for word in entry.path)
+        return " ".join([*(word.text for word in entry.words), name, entry.operator, f"{spell(entry.value)};"])
+    if isinstance(entry, Group):
+        return " ".join([*(word.text for word in entry.words), _body(entry.body)])
+    if isinstance(entry, Let):
+        return f"let {entry.name.text} = {spell(entry.value)};"
+    return " ".join([*(word.text for word in entry.words), f"{spell(entry.value)};"])

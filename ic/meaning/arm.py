@@ -39,12 +39,13 @@ NOT_OF_A_JOINT = dict.fromkeys(("limit", "limits", "range", "stops"), NO_STOPS)
 
 @frozen
 class Arm:
-    """lost: names of joints and links that failed, which was told."""
+    """lost: names of joints and links that failed, which was told;  whole: nothing at all was wrong before."""
 
     name: str
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
     lost: frozenset[str] = frozenset()
+    whole: bool = True
 
     def kind(self, joint: str) -> str | None:
         return next((j.kind for j in self.joints if j.name == joint), None)
@@ -74,11 +75,17 @@ def resolve_arm(scope: Scope, definition: Definition) -> Arm | None:
         scope.complaints.error("D081", f"arm `{definition.name}` has no links", definition.place,
                                help="write `link NAME { ... }` and a joint to hold it")
     check_tree(scope, definition.name, links, joints, complete=len(joints) == len(made))
-    if not scope.complaints.errors:
-        check_moved(scope, links, joints)
+    whole = not scope.complaints.errors
     written = {item.name for kind in ("link", "joint") for item in block.of_kind(kind)}
     lost = frozenset(written - {link.name for link in links} - {joint.name for joint in joints})
-    return Arm(definition.name, tuple(links), tuple(joints), lost)
+    return Arm(definition.name, tuple(links), tuple(joints), lost, whole)
+
+
+def check_arm(scope: Scope, definition: Definition) -> None:
+    """Tells what is wrong with an arm by itself, without payloads."""
+    arm = resolve_arm(scope, definition)
+    if arm is not None and arm.whole:
+        check_moved(scope, arm.links, arm.joints)
 
 
 def _stray(scope: Scope, item: Item, block: Block) -> None:
@@ -156,7 +163,8 @@ def _frame(scope: Scope, owner: Owner, kind: str, body: Block) -> None:
 
 def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping[str, None]) -> str | None:
     if item is None:
-        scope.complaints.error("D092", f"{owner.label} has no {key}", owner.place, help=f"write `{key} = LINK;`")
+        scope.complaints.missing(owner.place, (key,), "D092", f"{owner.label} has no {key}",
+                                 help=f"write `{key} = LINK;`")
         return None
     name = None if isinstance(item.value, Call) else word_of(item.value)
     if name in known:
@@ -181,8 +189,8 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
             scope.complaints.error("D095", "a fixed joint has no axis", item.place, help="leave `axis` out")
         return
     if item is None:
-        scope.complaints.error("D096", f"{owner.label} has no axis", owner.place,
-                               help="write `axis = z;`, or x, y, -x, ... or [0, 0.6, 0.8]")
+        scope.complaints.missing(owner.place, ("axis", "dh"), "D096", f"{owner.label} has no axis",
+                                 help="write `axis = z;`, or x, y, -x, ... or [0, 0.6, 0.8]")
         return
     named = _named_axis(item.value)
     value = item.value.operand if isinstance(item.value, Unary) else item.value

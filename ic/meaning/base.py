@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 from ic.grammar.syntax import Call, Expression
 from ic.meaning.arm import Arm
+from ic.meaning.bodies import carried_loads
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, refuse_values, word_of
@@ -17,8 +19,8 @@ from ic.meaning.servos import course_named, use_course
 from ic.meaning.values import place_of
 from met import models
 from met.diagnostic import Label, Place, did_you_mean
-from met.parameter import Parameter
-from met.plan import BASE, COMPONENTS, Base, Course, Link, Structure, ground
+from met.parameter import WORLD, Parameter
+from met.plan import BASE, COMPONENTS, Base, Course, Link, Payload, Structure, ground
 from met.plan_defaults import INERTIA, OF_FREE_BASE, component
 
 KINDS = ("fixed", "prescribed", "free")
@@ -31,6 +33,8 @@ DOCS = {
     "velocity": "velocity of the base's origin at the start, world axes",
     "rate": "angular velocity of the base at the start, world axes",
 }  # fmt: skip
+OTHERS = ("rate", "position", "acceleration", "torque", "force")
+"""Kinds of command, which stand in servos."""
 NOTHING = (0.0, 0.0, 0.0)
 
 
@@ -73,14 +77,17 @@ def check_base(scope: Scope, base: Base | None, structure: Structure, environmen
             help="leave `velocity_products = off` out")
     if base is None or base.kind != "free" or item is None:
         return
+    loads, passing = carried_loads(scope, structure.payloads)
     paths = [f"links.{name}.mass" for name in structure.ground]
+    paths += [path for name in structure.ground for path, _ in loads.get(name, ())]
     masses = [settled.value for path in paths if (settled := scope.parameters.get(path)) is not None]
     scope.checks.hold(
         tuple(masses),  # type: ignore[arg-type]  # masses are numbers
         lambda rows: (~(rows.sum(axis=1) > 0.0), []), code="D254", message="the base moves freely and has no mass",
         place=item.place, needs=tuple(paths),
         help=("give the arm the base's body: `link base { mass = 400 kg; shape = sphere(radius = 0.5 m); }`",
-              "or write the mass of a link that is fixed to the base"))
+              "or write the mass of a link that is fixed to the base",
+              *(word for name in structure.ground for word in passing.get(name, ()))))
 
 
 def initial_base(scope: Scope, body: Block, base: Base | None) -> None:
@@ -101,13 +108,35 @@ def initial_base(scope: Scope, body: Block, base: Base | None) -> None:
             scope.complaints.error("D255", f"{told}, so `{item.name}` has no effect", item.place, help=help)
 
 
-def remark_ground(scope: Scope, item: Item, arm: Arm, base: Base | None, key: str, link: str) -> None:
-    """Tells of an environment model that acts upon a link which does not yield to it."""
-    if link != BASE and link not in ground(arm.links, arm.joints):
+def held_by(arm: Arm, payloads: Sequence[Payload]) -> dict[str, str]:
+    """What each link and payload is fixed to for good, down to a link that moves against it, or the base."""
+    held = {joint.child: joint.parent for joint in arm.joints if joint.kind == "fixed"}
+    held |= {payload.name: payload.link for payload in payloads if not payload.flies}
+    found = {}
+    for name in held:
+        last = name
+        for _ in held:  # as many steps as there can be: joints that go round were told of
+            last = held.get(last, last)
+        found[name] = last
+    return found
+
+
+def remark_ground(scope: Scope, item: Item, arm: Arm, base: Base | None, environment: Any, values: Mapping[str, Any],
+                  payloads: Sequence[Payload]) -> None:
+    """Tells of an environment model that acts upon links none of which yields to it."""
+    if environment.pushes is None or (base is not None and base.kind == "free"):
         return
+    keys = environment.pushes(SimpleNamespace(**values))
+    carriers = {payload.name: payload.link for payload in payloads if not payload.flies}
+    links = [carriers.get(values[key], values[key]) for key in keys]
+    still = (BASE, WORLD, *ground(arm.links, arm.joints))
+    if any(link not in still for link in links):
+        return
+    key, link = next((key, link) for key, link in zip(keys, links, strict=True) if link != WORLD)
     given = (item.body or Block()).get(key)
     place = place_of(given.value) if given is not None and given.value is not None else item.place
     is_base = f"link `{link}`" + ("" if link == BASE else ", which is fixed to the base,")
+    is_base += " with all that it acts upon" if len(set(links) - {link, WORLD}) else ""
     why = "moves as it is told" if base is not None else "is part of the ground"
     scope.complaints.remark("D256", f"environment `{item.name}` changes nothing: {is_base} {why}", place,
                             help="write `base = free;` in the run, or name a link that a joint moves")
@@ -152,6 +181,12 @@ def _course(scope: Scope, item: Item) -> str | None:
         scope.complaints.error("D250", f"`{item.name}` of the base is a value or a course in time", item.place,
                                help=f"write `{item.name} = {_example(item.name)};`")
         return None
+    other = item.value.name.text if isinstance(item.value, Call) else ""
+    if other in OTHERS and other not in models.available("command"):
+        scope.complaints.error(
+            "D250", f"`{item.name}` of the base is told its positions, and `{other}` is a kind of command "
+            "of servos", place_of(item.value), help=f"write the course alone: `{item.name} = {_example(item.name)};`")
+        return None
     inner: Expression = course_named(scope, item.value)
     told = f"`{item.name}` of the base"
     spot = Owner(told, item.place, f"{BASE}.{item.name}", homes=item.homes, joint=component(item.name).kind,
@@ -185,8 +220,17 @@ def _check_jumps(scope: Scope, item: Item, model: str, place: Place) -> None:
 
 
 def _smooth() -> Iterable[str]:
-    """Courses that are known never to jump."""
-    return sorted(name for name, each in models.find_own("command").items() if each.jumps == "none")
+    """Courses that are known never to jump, with the word that says so where one does."""
+    found = []
+    for name, each in models.find_own("command").items():
+        words = [(p.name, word) for p in each.parameters for word in p.words]
+        known = {p.name: p.default for p in each.parameters if p.words}
+        if not callable(each.jumps):
+            found += [name] * (each.jumps == "none")
+        else:
+            found += [f"{name}({key} = {word})" for key, word in words
+                      if each.jump(SimpleNamespace(**{**known, key: word})) == "none"]
+    return sorted(found)
 
 
 def _example(name: str) -> str:

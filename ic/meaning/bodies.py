@@ -15,7 +15,7 @@ from ic.meaning.owner import Owner
 from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
 from met.diagnostic import Place
-from met.plan import Joint, Link
+from met.plan import Joint, Link, Payload
 from met.trace import Real
 
 
@@ -79,8 +79,9 @@ def _not_a_body(values: np.ndarray, kind: str, strict: bool) -> tuple[np.ndarray
     return bad, causes
 
 
-def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint]) -> None:
-    """Every joint that moves carries a link with mass, in every case; where one does not, those behind it are not told.
+def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint], payloads: Sequence[Payload] = ()) -> None:
+    """Every joint that moves carries a link with mass, or a payload that is carried throughout, in every case; where
+    one does not, those behind it are not told.
 
     The joints make a tree.
     """
@@ -88,6 +89,7 @@ def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint]) ->
               if (settled := scope.parameters.get(f"links.{link.name}.mass")) is not None}
     if all(isinstance(mass, float) and mass > 0.0 for mass in masses.values()):
         return
+    loads, passing = carried_loads(scope, payloads)
     carried: dict[str, list[Joint]] = {}
     for joint in joints:
         carried.setdefault(joint.parent, []).append(joint)
@@ -98,7 +100,8 @@ def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint]) ->
     for joint in reversed(order):
         mass = masses.get(joint.child)
         outboard = (heavy[each.child] for each in carried.get(joint.child, ()))
-        heavy[joint.child] = (isinstance(mass, float) and mass > 0.0) or any(outboard)
+        own = [mass, *(value for _, value in loads.get(joint.child, ()))]
+        heavy[joint.child] = any([*outboard, *(isinstance(each, float) and each > 0.0 for each in own)])
     above: dict[str, tuple[str, ...]] = {"base": ()}  # the light joints that move, between the base and a link
     for joint in order:
         before = above[joint.child] = above[joint.parent]
@@ -110,13 +113,36 @@ def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint]) ->
         for name in names:
             names += [each.child for each in carried.get(name, ())]
         values = [value for name in names if (value := masses.get(name)) is not None]
+        values += [value for name in names for _, value in loads.get(name, ())]
+        also = [word for name in names for word in passing.get(name, ())]
         scope.checks.hold(
             tuple(values),  # type: ignore[arg-type]  # masses are numbers
             lambda rows: (~(rows.sum(axis=1) > 0.0), []),
             code="D217",
             path=f"{joint.name}.moved",
-            needs=(*before, *(f"links.{name}.mass" for name in names)),
+            needs=(*before, *(f"links.{name}.mass" for name in names),
+                   *(path for name in names for path, _ in loads.get(name, ()))),
             message=f"joint `{joint.name}` moves nothing that has mass",
             place=joint.place,
-            help=(f"write the mass of link `{joint.child}`, or of one that it carries", "or make the joint fixed"),
+            help=(f"write the mass of link `{joint.child}`, or of one that it carries", "or make the joint fixed",
+                  *also),
         )
+
+
+Loads = dict[str, list[tuple[str, Real]]]
+
+
+def carried_loads(scope: Scope, payloads: Sequence[Payload]) -> tuple[Loads, dict[str, list[str]]]:
+    """By link: path and mass of the payloads that it carries throughout, and what to tell of those that come or go."""
+    loads: Loads = {}
+    passing: dict[str, list[str]] = {}
+    for payload in payloads:
+        path = f"payloads.{payload.name}.mass"
+        settled = scope.parameters.get(path)
+        if payload.flies:
+            word = "grapple" if payload.grappled else "release"
+            passing.setdefault(payload.link, []).append(
+                f"payload `{payload.name}` is not always there: one without `{word}` would count")
+        elif settled is not None:
+            loads.setdefault(payload.link, []).append((path, settled.value))  # type: ignore[arg-type]  # a number
+    return loads, passing

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
-from met.diagnostic import Diagnostic, Label, Place, Problem, error
+from met.diagnostic import Diagnostic, Label, Place, Problem, error, meant
 
 MOST = 200  # a deck with more mistakes than this is told the first ones: the rest seldom say more
 
@@ -20,7 +20,7 @@ class Complaints:
     def __init__(self, found: Iterable[Diagnostic] = ()) -> None:
         self._found: dict[Diagnostic, None] = dict.fromkeys(found)
         self._remarks: dict[Diagnostic, None] = {}
-        self.lacking: set[tuple[Place, str]] = set()  # definitions, and what they lack, as was told
+        self.lacking: set[tuple[Place, str]] = set()  # definitions, and entries that they lack, as was told
 
     @property
     def all(self) -> tuple[Diagnostic, ...]:
@@ -49,6 +49,23 @@ class Complaints:
     def error(self, code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
               help: Iterable[str] | str = ()) -> None:
         self.add(error(code, message, at, also=also, help=help))
+
+    def taken_for(self, of: Place, word: str, known: Iterable[str]) -> None:
+        """Notes what an unknown entry of what is defined at `of` may have been meant for: that is not missing besides.
+        """
+        near = meant(word, known)
+        if near is not None:
+            self.lacking.add((of, near.rpartition(".")[2]))
+
+    def lacks(self, of: Place, *names: str) -> bool:
+        """Whether it was told that what is defined at `of` lacks one of these entries, or has another word for it."""
+        return any((of, name) in self.lacking for name in names)
+
+    def missing(self, of: Place, names: tuple[str, ...], code: str, message: str, at: Place | None = None, *,
+                also: Iterable[Label] = (), help: Iterable[str] | str = ()) -> None:
+        """An error about what is defined at `of`, which has none of these entries, unless `lacks` says so."""
+        if not self.lacks(of, *names):
+            self.error(code, message, at or of, also=also, help=help)
 
     def warn(self, code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
              help: Iterable[str] | str = ()) -> None:
@@ -88,13 +105,15 @@ def belongs(word: str) -> list[str]:
     """Where a word of the language stands that stands elsewhere only."""
     told = {"substitute": "`substitute JOINT { ... }`, in a run, puts a joint's motor on a bed",
             "payload": "`payload NAME { ... }`, in a run, is a body that a link carries or grapples",
-            "guide": "`guide NAME = MODEL { ... }`, in a run, commands several joints together"}
+            "guide": "`guide NAME = MODEL { ... }`, in a run, commands several joints together",
+            "sensor": "`sensor NAME = MODEL { link = LINK; ... }`, in a run, is on a link; `sensor QUANTITY = MODEL "
+                      "{ ... }`, in a servo, is of its joint"}
     return [told[word]] if word in told else []
 
 
-def an(word: str) -> str:
-    """`an arm`, `a servo`."""
-    return f"an {word}" if word[:1] in tuple("aeiou") else f"a {word}"
+def an(word: str, *, quoted: bool = False) -> str:
+    """`an arm`, `a servo`; quoted: in the quotes of what a deck writes."""
+    return f"{'an' if word[:1] in tuple('aeiou') else 'a'} {f'`{word}`' if quoted else word}"
 
 
 def known_words(what: str, known: Iterable[str], most: int = 24) -> str:

@@ -27,7 +27,8 @@ def _stability(scope: Scope, resolved: Resolved, cases: Cases) -> list[str]:
     for joint, x in resolved.stability:
         if isinstance(x, Scalar):
             values = np.asarray(Formulas.of(scope.graph, [x]).replay(inputs)[0])
-            shown = f"{float(values.min()):.3g} to {float(values.max()):.3g}" if values.size else "?"
+            ends = dict.fromkeys(f"{float(x):.3g}" for x in (values.min(), values.max())) if values.size else ["?"]
+            shown = " to ".join(ends)
         else:
             shown = f"{float(x):.3g}"
         notes.append(f"stability of joint {joint}: h * lambda = {shown}")

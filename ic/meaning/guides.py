@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, Final
@@ -13,10 +13,10 @@ import numpy as np
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
-from ic.meaning.models import find_model, refuse_values, use_model, word_of
+from ic.meaning.models import find_model, refuse_values, use_model, value_at, word_of
 from ic.meaning.owner import Owner
 from ic.meaning.relations import check_names
-from ic.meaning.schedule import CONTINUOUS, Rate
+from ic.meaning.schedule import Rate
 from ic.meaning.scope import Scope
 from ic.meaning.servos import Use, course_named, fixed_rate, use_course
 from ic.meaning.values import place_of
@@ -26,7 +26,7 @@ from met.diagnostic import Label, Place
 from met.frozen import frozen
 from met.plan import COMPONENTS, Course, GuideUse, Structure
 from met.plan_defaults import component
-from met.trace import Real
+from met.trace import Real, Scalar
 
 KIND: Final = "guide"
 USAGE = "write `guide NAME = MODEL { ... }`"
@@ -51,6 +51,18 @@ class Guiding:
     whole: bool
     fastest: Real | None
     place: Place
+
+    kind = KIND
+    does = "ticks"
+    code = "D277"
+
+    @property
+    def label(self) -> str:
+        return f"guide `{self.name}`"
+
+    @property
+    def path(self) -> str:
+        return f"guides.{self.name}"
 
     @property
     def ticks(self) -> bool:
@@ -79,12 +91,14 @@ def _meaning(scope: Scope, name: str) -> str:
     return "a unit" if units.is_unit(name) else "a course in time" if name in models.available("command") else ""
 
 
-def resolve_guides(scope: Scope, block: Block, arm: Arm, uses: list[Use]) -> list[Guiding]:
-    """Every guide of the run, in the deck's order; what is wrong is told."""
+def resolve_guides(
+    scope: Scope, block: Block, arm: Arm, uses: list[Use], duration: float | None
+) -> list[Guiding]:
+    """Every guide of the run, in the deck's order; what is wrong is told. duration: of the run, s; None: unknown."""
     found = []
     for item in block.of_kind(KIND):
         with scope.complaints.gather():
-            guiding = _guide(scope, item, arm, uses)
+            guiding = _guide(scope, item, arm, uses, duration)
             if guiding is not None:
                 found.append(guiding)
     return found
@@ -108,15 +122,6 @@ def check_guides(scope: Scope, guides: Iterable[Guiding], structure: Structure) 
                       *([known_words("`guides` may be", others)] if others else ())])
 
 
-def check_instants(scope: Scope, guide: Guiding, divisor: int, dynamics: int, rate: Rate, step: Rate) -> None:
-    """A guide ticks at instants of the dynamics: it sees the arm as it is there."""
-    if divisor % dynamics:
-        scope.complaints.error(
-            "D277", f"guide `{guide.name}` ticks at {rate.hz:g} Hz, between the steps of the dynamics", rate.place,
-            also=[Label(step.place, f"{step.hz:g} Hz")],
-            help=f"give the guide a `rate` that divides {step.hz:g} Hz, or quicken the dynamics")
-
-
 def check_period(scope: Scope, guide: Guiding, rate: Rate) -> None:
     """A guide brings its error down from tick to tick."""
     if guide.fastest is None:
@@ -133,18 +138,7 @@ def check_period(scope: Scope, guide: Guiding, rate: Rate) -> None:
              "below what its servos can follow")
 
 
-def rate_of(scope: Scope, guide: Guiding, shared: Rate | None) -> Rate | None:
-    """How often a guide ticks: as it says, else as the servos do; None where that is nothing, which was told."""
-    found = guide.rate or shared
-    if found is None or found.hz == CONTINUOUS:
-        told = "the servos are continuous" if found is not None else "the run has no rate of the servos"
-        scope.complaints.error("D277", f"guide `{guide.name}` has no rate, and {told}", guide.place,
-                               help="write `rate = 100 Hz;` in the guide")
-        return None
-    return found
-
-
-def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use]) -> Guiding | None:
+def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use], duration: float | None) -> Guiding | None:
     if item.detail or item.value is None:
         at = item.detail[0].place if item.detail else item.place
         told = f"guide `{item.name}` has no model"
@@ -192,10 +186,24 @@ def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use]) -> Guiding | Non
     if guide.fastest is not None and values is not None:
         with scope.complaints.gather():
             fastest = guide.fastest(SimpleNamespace(**values))
+    if values is not None and duration is not None:
+        _remark_idle(scope, guide, item, values, duration)
     link = named.get("link", "") if guide.components is not None else ""
     if link not in known["link"]:
         link = ""
     return Guiding(item.name, guide, joints, courses, rate, link, tuple(guided), whole, fastest, item.place)
+
+
+def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any], duration: float) -> None:
+    """Tells of a guide that does nothing, or of a part of it, by its written constants."""
+    numbers = [x for value in values.values() for x in (value if isinstance(value, tuple) else (value,))]
+    if guide.idle is None or any(isinstance(x, Scalar) for x in numbers):
+        return
+    found = guide.idle(SimpleNamespace(**values), duration)
+    if found is not None:
+        written = [part for name in found[0] if (part := (item.body or Block()).get(name)) is not None]
+        scope.complaints.remark("D301", f"guide `{item.name}` {found[1]}", value_at(written[0] if written else item),
+                                help="change that, or leave it out")
 
 
 def _of_joints(scope: Scope, owner: Owner, guide: Any, body: Block, arm: Arm, joints: Iterable[str]) -> None:
@@ -228,8 +236,14 @@ def _courses(
                                    "follows it", part.place, help="give the joint another name")
             continue
         if name not in guided:
-            scope.complaints.error("D274", f"`{name}` is not guided by {owner.label}", part.place,
-                                   help=[f"it guides {', '.join(guided)}", "leave it out, or guide more"])
+            chosen = body.get("guides")
+            later = chosen is not None and len(chosen.homes) < len(part.homes)  # by a run `like` the one of the path
+            scope.complaints.error(
+                "D274", f"`{name}` is not guided by {owner.label}",
+                value_at(chosen) if chosen is not None and later else part.place,
+                also=[Label(part.place, "written here")] if later else [],
+                help=[f"it guides {', '.join(guided)}",
+                      f"write `remove {name};`, or guide more" if later else "leave it out, or guide more"])
             continue
         with scope.complaints.gather():
             model = _course(scope, owner, part)

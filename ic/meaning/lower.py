@@ -11,7 +11,7 @@ from typing import Literal
 
 from ic.grammar.settings import command_line, read_settings
 from ic.grammar.syntax import Deck, Setting
-from ic.meaning.arm import resolve_arm
+from ic.meaning.arm import check_arm, resolve_arm
 from ic.meaning.complaints import Complaints, known_words
 from ic.meaning.resolve import Definition, Definitions
 from ic.meaning.scope import Scope
@@ -80,8 +80,10 @@ def compile_deck(deck: Deck, *, select: Select = None, defines: Iterable[str] = 
             experiments += (made for made, _ in groups)
             scopes += (scope for _, scope in groups)
         source.effects.tell(complaints, [definition.name for definition in asked])
-        for arm in definitions.of_kind("arm").values():
-            resolve_arm(Scope(definitions, complaints), arm)
+        blocks = [definitions.block(definition) for definition in definitions.of_kind("run").values()]
+        loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
+        for arm in definitions.of_kind("arm").values():  # with a payload its joints may move what has mass
+            (resolve_arm if loaded else check_arm)(Scope(definitions, complaints), arm)
         for name in definitions.of_kind("servo"):
             with complaints.gather():
                 check_servo_definition(Scope(definitions, complaints), name)

@@ -99,8 +99,8 @@ def _inertia(scope: Scope, owner: Owner, kind: str, item: Item | None, solid: So
         if isinstance(mass, float) and mass == 0.0:
             return tuple(scope.derived(owner, f"inertia.{name}", 0.0, "kg*m^2", "without mass") for name in MOMENTS)
         if not scope.checks.failed(f"{owner.path}.shape"):
-            scope.complaints.error(
-                "D089", f"{owner.label} has no inertia", owner.place,
+            scope.complaints.missing(
+                owner.place, ("shape", "inertia"), "D089", f"{owner.label} has no inertia",
                 help=["write a shape, such as `shape = rod(length = 1 m, along = x);`",
                       "or `inertia = [xx, yy, zz] kg*m^2;`, about the centre of mass"])
         return None

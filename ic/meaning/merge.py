@@ -42,15 +42,25 @@ class Item:
 
 
 @frozen
+class Removed:
+    """What was taken away: its key, how many statements stood before its `remove`, and where that is written."""
+
+    key: str
+    before: int
+    place: Place
+
+
+@frozen
 class Block:
     """Merged entries by key ("kind name", or the name of a plain key), in order, and statements such as `require`.
 
-    removed  keys of what was removed, each with the number of statements that stood before its `remove`
+    pending  in a block upon a name: each `remove` of what the block itself does not have, for `overlay`
     """
 
     items: Mapping[str, Item] = field(default_factory=dict)
     statements: tuple[Statement, ...] = ()
-    removed: tuple[tuple[str, int], ...] = ()
+    removed: tuple[Removed, ...] = ()
+    pending: tuple[Statement, ...] = ()
 
     def of_kind(self, kind: str) -> Iterator[Item]:
         return (item for item in self.items.values() if item.kind == kind)
@@ -60,26 +70,30 @@ class Block:
 
 
 def merge(base: Block | None, body: tuple[Entry, ...], *, home: str | None, base_name: str | None,
-          complaints: Complaints) -> Block:
+          complaints: Complaints, upon_name: bool = False) -> Block:
     """The base's entries with `body` upon them.
 
     home       name of the definition that writes `body`; None for a use, whose entries no definition's path reaches
     base_name  what to call the base in messages; None where there is none
+    upon_name  the body stands behind the name of a definition or a model (`j = drive { ... }`): what it removes may be
+               the definition's, which is not known here
     """
-    merger = _Merger(base or Block(), home, base_name, complaints)
+    merger = _Merger(base or Block(), home, base_name, complaints, upon_name)
     for entry in body:
         with complaints.gather():
             merger.enter(entry)
-    return Block(merger.items, tuple(merger.statements), tuple(merger.removed))
+    return Block(merger.items, tuple(merger.statements), tuple(merger.removed), tuple(merger.pending))
 
 
 class _Merger:
-    def __init__(self, base: Block, home: str | None, base_name: str | None, complaints: Complaints) -> None:
+    def __init__(self, base: Block, home: str | None, base_name: str | None, complaints: Complaints,
+                 upon_name: bool) -> None:
         homes = (home,) if home else ()
         self.home, self.base_name, self.complaints = homes, base_name, complaints
         self.items = {key: _taken_over(item, homes) for key, item in base.items.items()}
         self.statements = list(base.statements)
         self.removed = list(base.removed)
+        self.upon_name, self.pending = upon_name, list(base.pending)
         self.names: dict[str, list[str]] = {}
         for key, item in self.items.items():
             self.names.setdefault(item.name, []).append(key)
@@ -149,7 +163,8 @@ class _Merger:
             raise Problem(error("D054", f"`{name}` is a value, not a block", entry.place,
                                 also=[Label(earlier.place, "written here")], help=f"write `{name} = ...;`"))
         body = merge(earlier.body if earlier else None, entry.body, home=self.home[0] if self.home else None,
-                     base_name=f"`{name}`" if earlier else None, complaints=self.complaints)
+                     base_name=f"`{name}`" if earlier else None, complaints=self.complaints,
+                     upon_name=self.upon_name or (earlier is not None and isinstance(earlier.value, (Call, Name))))
         if earlier is None:
             return Item(kind, name, detail, None, body, entry.place, homes=self.home)
         return replace(earlier, body=body, detail=detail or earlier.detail)
@@ -183,29 +198,64 @@ class _Merger:
         name = entry.value.text
         earlier = self._earlier("", name, entry.value.place)
         if earlier is None:
-            known = [item.name for item in self.items.values()]
-            raise Problem(error("D058", f"nothing named `{name}` to remove", entry.value.place,
-                                help=[*did_you_mean(name, known), known_words("there is", known)]))
+            if not self.upon_name:
+                raise Problem(_nothing(entry, self.items))
+            self.pending.append(entry)
+            return
         del self.items[earlier.key]
         self.names[name].remove(earlier.key)
         self.written.pop(earlier.key, None)
-        self.removed.append((earlier.key, len(self.statements)))
+        self.removed.append(Removed(earlier.key, len(self.statements), entry.place))
+        if self.upon_name and not earlier.kind:  # it was written over the definition's, which goes too
+            self.pending.append(entry)
 
 
-def overlay(base: Block, over: Block) -> Block:
-    """The base's entries with those of a use upon them, which no definition's path reaches."""
-    items = dict(base.items)
-    for key, item in over.items.items():
-        earlier = items.get(key)
+def _meant(entry: Statement) -> Name:
+    """What a `remove` names."""
+    assert isinstance(entry.value, Name)
+    return entry.value
+
+
+def _nothing(entry: Statement, items: Mapping[str, Item]) -> Diagnostic:
+    """Says of a `remove` that there is nothing of its name."""
+    name, known = _meant(entry), [item.name for item in items.values()]
+    return error("D058", f"nothing named `{name.text}` to remove", name.place,
+                 help=[*did_you_mean(name.text, known), known_words("there is", known)])
+
+
+def overlay(base: Block, over: Block, complaints: Complaints) -> Block:
+    """The base's entries with those of a use upon them, which no definition's path reaches. What the use removes goes
+    first, so that it may put another in its place."""
+    items, removed = dict(base.items), list(base.removed)
+    for entry in over.pending:
+        named = _of_name(items, _meant(entry).text)
+        if named is not None:
+            del items[named.key]
+            removed.append(Removed(named.key, len(base.statements), entry.place))
+        elif not any(each.key == _meant(entry).text for each in over.removed):
+            complaints.add(_nothing(entry, items))
+    for item in over.items.values():
+        earlier = items.get(item.key) if item.kind else _of_name(items, item.name)
         if earlier is None:
-            items[key] = replace(item, homes=())
+            items[item.key] = replace(item, homes=())
         elif item.value is None and item.body is not None:
-            body = overlay(earlier.body or Block(), item.body)
-            items[key] = replace(earlier, body=body)
+            items[earlier.key] = replace(earlier, body=overlay(earlier.body or Block(), item.body, complaints))
         else:
-            items[key] = replace(item, homes=(), overrides=(*item.overrides, earlier.place, *earlier.overrides))
-    removed = ((key, len(base.statements) + before) for key, before in over.removed)
-    return Block(items, (*base.statements, *over.statements), (*base.removed, *removed))
+            overrides = (*item.overrides, earlier.place, *earlier.overrides)
+            items[earlier.key] = replace(item, kind=earlier.kind, homes=(), overrides=overrides)
+    removed += (replace(each, before=len(base.statements) + each.before) for each in over.removed)
+    return Block(items, (*base.statements, *over.statements), tuple(removed))
+
+
+def _of_name(items: Mapping[str, Item], name: str) -> Item | None:
+    """The plain entry of a name, else the one that was added with a kind."""
+    return items.get(name) or next((item for item in items.values() if item.name == name), None)
+
+
+def refuse_pending(block: Block, complaints: Complaints) -> None:
+    """Tells each `remove` of a block upon a name that turned out to have no entries of its own, such as a model's."""
+    for entry in block.pending:
+        complaints.add(_nothing(entry, block.items))
 
 
 def open_call(value: Expression, home: str | None, complaints: Complaints) -> tuple[Expression, Block | None]:
@@ -213,7 +263,7 @@ def open_call(value: Expression, home: str | None, complaints: Complaints) -> tu
     if not isinstance(value, Call) or (value.body is None and not value.named):
         return value, None
     named = tuple(Setting((), (word,), "=", inner, word.place) for word, inner in value.named)
-    block = merge(None, (*named, *(value.body or ())), home=home, base_name=None, complaints=complaints)
+    block = merge(None, (*named, *(value.body or ())), home=home, base_name=None, complaints=complaints, upon_name=True)
     return Call(value.name, value.positional, (), None, value.place), block
 
 

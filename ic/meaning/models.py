@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
 from ic.grammar.syntax import Call, Expression, Name
 from ic.meaning.complaints import an, belongs, known_words
-from ic.meaning.merge import Block, Item
+from ic.meaning.merge import Block, Item, refuse_pending
 from ic.meaning.owner import Owner
 from ic.meaning.relations import check_relations
 from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
 from met import models
 from met.diagnostic import Label, Place, Problem, did_you_mean
+from met.environments.environment import FILE
 from met.parameter import Only, Parameter, there
 
 
@@ -30,6 +32,11 @@ def word_of(expression: Expression | None) -> str | None:
 def value_at(item: Item) -> Place:
     """Where an entry's value is; the entry itself, where it has none."""
     return place_of(item.value) if item.value is not None else item.place
+
+
+def upon(item: Item) -> Place | None:
+    """Where a block that was put upon an entry's value has its first entry; None where it has none."""
+    return next((each.place for each in item.body.items.values()), None) if item.body is not None else None
 
 
 def words_chosen(parameters: Sequence[Parameter], body: Block) -> tuple[tuple[str, str], ...]:
@@ -72,19 +79,26 @@ def refuse_values(scope: Scope, expression: Expression | None, names: Iterable[s
 
 def check_keys(scope: Scope, body: Block, known: Iterable[str], owner: Owner,
                others: Mapping[str, str] = MappingProxyType({})) -> None:
-    """Tells every entry of the body that is none of the known plain keys. others: what to say of keys one expects."""
+    """Tells every entry of the body that is none of the known plain keys, and notes what it was meant for.
+
+    others  what to say of keys one expects
+    """
     known = list(known)
     for item in body.items.values():
         if item.kind:
             scope.complaints.error("D141", f"no `{item.kind}` in {owner.label}", item.place,
                                    help=[*belongs(item.kind), known_words("it has", known)])
         elif item.name not in known:
+            if item.name not in others:
+                scope.complaints.taken_for(owner.place, item.name, known)
             scope.complaints.error("D141", f"{owner.label} has no `{item.name}`", item.place,
                                    help=[*([others[item.name]] if item.name in others
                                            else did_you_mean(item.name, known)), known_words("it has", known)])
     for statement in body.statements:
         scope.complaints.error("D142", f"`{statement.words[0].text}` inside {owner.label}", statement.place,
                                help="it belongs to a run or a sweep")
+    refuse_pending(body, scope.complaints)
+    scope.removed.update((owner.join(each.key), each.place) for each in body.removed if body.get(each.key) is None)
 
 
 def find_bare_model(scope: Scope, kind: models.Kind, item: Item, remedy: str) -> Any:
@@ -93,7 +107,8 @@ def find_bare_model(scope: Scope, kind: models.Kind, item: Item, remedy: str) ->
     remedy  what to write in the stead of parameters behind the name, with `{}` for the name
     """
     name, place = word_of(item.value), place_of(item.value) if item.value is not None else item.place
-    if name is not None and isinstance(item.value, Call):
+    if name is not None and (isinstance(item.value, Call) or item.body is not None):
+        place = place if isinstance(item.value, Call) else upon(item) or place
         scope.complaints.error("D143", f"`{item.name} = {name}` takes neither parentheses nor braces", place,
                                help=remedy.format(name))
         return None
@@ -117,13 +132,19 @@ def use_model(scope: Scope, owner: Owner, parameters: Iterable[Parameter], body:
               extra: Iterable[str] = ()) -> dict[str, Any] | None:
     """Every parameter of a model used with this body, entered in the scope; None where one is missing or wrong.
 
-    Of those that are there only under a word (`Parameter.only`), those under the words of this body.
+    Of those that are there only under a word (`Parameter.only`), those under the words of this body. Two of one name
+    are there under different words, as one that needs to be written under some.
     """
     parameters = tuple(parameters)
     words = {p.name: word_written(p, body) for p in parameters if p.shape == "word"}
     wrong = [p.name for p in parameters if p.words and not p.names and words[p.name] not in p.words]
     known = [p.name for p in parameters if there(p, words) or body.get(p.name) is not None]
+    extra = list(extra)
     check_keys(scope, body, [*known, *extra], owner)
+    if FILE.name in extra and scope.complaints.lacks(owner.place, FILE.name):  # which would have the lists
+        scope.complaints.lacking |= {(owner.place, each.name) for each in parameters if each.shape == "list"}
+    here = [p.name for p in parameters if there(p, words)]
+    owner = replace(owner, others=parameters)
     values: dict[str, Any] = {}
     for wanted in parameters:
         item = body.get(wanted.name)
@@ -131,7 +152,8 @@ def use_model(scope: Scope, owner: Owner, parameters: Iterable[Parameter], body:
             scope.checks.fail(owner.join(wanted.name))  # no word at all is told of where words are read
             continue
         if wanted.only is not None and not there(wanted, words):
-            _check_unused(scope, owner, wanted, wanted.only, body, words)
+            if wanted.name not in here:
+                _check_unused(scope, owner, wanted, wanted.only, body, words)
             continue
         if wanted.shape == "vector":
             values[wanted.name] = scope.vector(owner, wanted, item)

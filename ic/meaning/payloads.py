@@ -89,6 +89,11 @@ def _payload(scope: Scope, item: Item, arm: Arm, taken: Collection[str]) -> Payl
     for wanted in FLIGHT if grappled else ():
         scope.vector(owner, wanted, body.get(wanted.name))
     times = [scope.number(owner, wanted, given) for wanted in EVENTS if (given := body.get(wanted.name)) is not None]
+    for wanted in EVENTS:
+        if body.get(wanted.name) is None:
+            scope.whole[owner.join(wanted.name)] = (
+                f"is not written, and so decides the program: write `{wanted.name} = ...;` in the payload, and it "
+                "varies")
     payload = Payload(item.name, link or BASE, grappled, released, item.place, shape)
     if grappled and released:
         _check_order(scope, item, times, value_at(body.items["release"]))
@@ -103,9 +108,9 @@ def _link(scope: Scope, owner: Owner, item: Item | None, arm: Arm) -> str | None
     """The link that carries it, as written; None where it is none of the arm's, which was told."""
     known = [BASE, *(link.name for link in arm.links if link.name != BASE)]
     if item is None:
-        scope.complaints.error("D261", f"{owner.label} is on no link", owner.place,
-                               help=["write `on = LINK;`, the link that carries or grapples it",
-                                     known_words("links", known)])
+        scope.complaints.missing(owner.place, ("on",), "D261", f"{owner.label} is on no link",
+                                 help=["write `on = LINK;`, the link that carries or grapples it",
+                                       known_words("links", known)])
         return None
     name = item.value.text if isinstance(item.value, Name) else None
     if name in known or name in arm.lost:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Literal
 
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Binary, Expression, List, Name, Statement
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
-from ic.meaning.models import find_model, refuse_values, use_model, word_of
+from ic.meaning.models import check_keys, find_model, refuse_values, use_model, word_of
 from ic.meaning.owner import Owner
 from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
@@ -35,8 +36,9 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
     """The variables that are recorded, in the deck's order."""
     scope.whole["record"] = "is one for the whole sweep: record all that any case needs"
     if item is None:
-        scope.complaints.error("D124", f"{run.label} records nothing", run.place,
-                               help="write `record = [q, qd, tau];`, or `record = [];` where metrics are all you want")
+        scope.complaints.missing(run.place, ("record",), "D124", f"{run.label} records nothing",
+                                 help="write `record = [q, qd, tau];`, or `record = [];` where metrics are all you "
+                                      "want")
         return ()
     asked = [name for expression in (item.value, *item.appended) for name in _names(scope, item, expression)]
     known = recordable(structure, [name.text for name in asked])
@@ -45,7 +47,7 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
         made = known.get(name.text)
         if made is None and scope.lost and not OF_SERVO.isdisjoint(word.text for word in name.path):
             continue
-        if made is None and _of_lost_guide(scope, name, structure):
+        if made is None and _of_lost(scope, name, structure):
             continue
         if made is None and scope.gone and (name.path[0].text in scope.gone or not structure.moving):
             continue
@@ -61,11 +63,14 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
     return tuple(recorded for recorded, _ in found.values())
 
 
-def _of_lost_guide(scope: Scope, name: Name, structure: Structure) -> bool:
-    """Whether this is a channel of a guide that failed, which was told."""
+def _of_lost(scope: Scope, name: Name, structure: Structure) -> bool:
+    """Whether this is a channel of a guide or a link's sensor that failed, which was told."""
     words = [word.text for word in name.path]
-    lost = set(scope.guides) - {guide.name for guide in structure.guides}
-    return len(words) > 1 and words[0] == "guides" and words[1] in lost
+    lost = {
+        "guides": set(scope.guides) - {guide.name for guide in structure.guides},
+        "sensors": scope.sensors - {sensor.name for sensor in structure.sensors},
+    }.get(words[0], set())
+    return bool(lost) and (len(words) == 1 or words[1] in lost)
 
 
 def _names(scope: Scope, item: Item, expression: Expression | None) -> Iterator[Name]:
@@ -93,8 +98,11 @@ def _nearest(name: Name, known: dict[str, tuple[Recorded, ...]], structure: Stru
     why = _why_none([word.text for word in name.path], structure)
     if why:
         return [why]
-    whole = [each for each in known if each.rpartition(".")[0] not in known]
     first = name.path[0].text
+    if first == "sensors" and structure.sensors:
+        sensors = [each for each in known if each.startswith("sensors.")]
+        return [*did_you_mean(name.text, sensors), known_words("sensors of links", sensors)]
+    whole = [each for each in known if each.rpartition(".")[0] not in known]
     head = ".".join(word.text for word in name.path[:2]) if first in ("links", "payloads") else first
     own = [each for each in whole if each.startswith(head + ".")]
     if own:
@@ -117,10 +125,13 @@ def _nearest(name: Name, known: dict[str, tuple[Recorded, ...]], structure: Stru
 
 
 def _why_none(words: list[str], structure: Structure) -> str:
-    """Why a fixed joint has no channel, and a joint none of a link that it does not carry; "" where that is not it."""
+    """Why a fixed joint has no channel, a servo not this one, and a joint none of a link that it does not carry; ""
+    where that is not it."""
     if words[0] in {joint.name for joint in structure.joints if joint.kind == "fixed"}:
         return (f"joint `{words[0]}` is fixed: its two links move as one body, and nothing is computed between them; "
                 "what they take shows in the reaction of the moving joint that carries them")
+    if len(words) > 1 and words[-2] == "servo":
+        return _under_a_word(words, structure)
     moving, links = ({each.name for each in group} for group in (structure.moving, structure.links))
     if len(words) < 5 or (words[0], words[2]) != ("links", "jacobian") or words[3] not in FAMILIES["jacobian"]:
         return ""
@@ -128,6 +139,18 @@ def _why_none(words: list[str], structure: Structure) -> str:
     if link not in links or joint not in moving or carries(structure, link, joint):
         return ""
     return f"joint `{joint}` does not carry link `{link}`, so it does not move it"
+
+
+def _under_a_word(words: list[str], structure: Structure) -> str:
+    """Under which word of its model a servo would have this channel; "" where under none."""
+    for use in structure.servos:
+        model = models.find("servo", use.model, use.place)
+        parts = (part for group in models.HELD for part in getattr(model, group, ()) if part.name == words[-1])
+        only = next((part.only for part in parts if part.only is not None), None)
+        if only is not None and words[0] in ("servo", use.joint):
+            needed = " or ".join(f"`{only[0]} = {word};`" for word in only[1])
+            return f"the servo of joint `{use.joint}` ({use.model}) has it with {needed}"
+    return ""
 
 
 # Metrics
@@ -153,15 +176,17 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
     if metric is None or refuse_values(scope, item.value, ["of", *(p.name for p in metric.parameters)]):
         return None
     body = item.body or Block()
+    owner = Owner(f"metric `{item.name}`", item.place, f"metrics.{item.name}")
     of = body.get("of")
     channel = None
     if of is None:
-        scope.complaints.error("D125", f"metric `{item.name}` watches no channel", item.place,
-                               help="write `of = CHANNEL;`, such as `of = shoulder.qd;`")
+        check_keys(scope, body, ["of", *(p.name for p in metric.parameters)], owner)
+        scope.complaints.missing(item.place, ("of",), "D125", f"metric `{item.name}` watches no channel",
+                                 help="write `of = CHANNEL;`, such as `of = shoulder.qd;`")
     elif not isinstance(of.value, Name) or of.value.text not in known:
         name = of.value if isinstance(of.value, Name) else None
         if name is not None and (
-            name.path[0].text in scope.lost | scope.gone or _of_lost_guide(scope, name, structure)
+            name.path[0].text in scope.lost | scope.gone or _of_lost(scope, name, structure)
         ):
             return None
         message, helps = "a channel is needed here", ["write `of = CHANNEL;`, such as `of = shoulder.qd;`"]
@@ -174,8 +199,7 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
         return None
     scope.setting(f"metrics.{item.name}.model", metric.name, item=item)
     scope.setting(f"metrics.{item.name}.of", channel.path, item=of)
-    owner = Owner(f"metric `{item.name}`", item.place, f"metrics.{item.name}", of=channel.unit)
-    use_model(scope, owner, metric.parameters, body, ("of",))
+    use_model(scope, replace(owner, of=channel.unit), metric.parameters, body, ("of",))
     return MetricUse(item.name, metric.name, channel.path, item.place)
 
 
@@ -214,8 +238,8 @@ def read_requirements(scope: Scope, block: Block) -> list[Comparison]:
             scope.complaints.error("D131", "a requirement compares a metric with a limit", place_of(comparison),
                                    help="write `require METRIC < LIMIT;`, or <=, >, >=")
             continue
-        removed = {key.removeprefix("metric ") for key, before in block.removed
-                   if key.startswith("metric ") and position < before}
+        removed = {each.key.removeprefix("metric ") for each in block.removed
+                   if each.key.startswith("metric ") and position < each.before}
         operator, metric, limit = comparison.operator, comparison.left, comparison.right
         if not _is_metric(metric, written | removed) and _is_metric(limit, written | removed):
             operator, metric, limit = FLIPPED[operator], limit, metric

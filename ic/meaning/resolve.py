@@ -19,7 +19,7 @@ from met.frozen import frozen
 from met.render import shown_place
 
 KINDS = ("arm", "servo", "run", "sweep")
-RESERVED = ("links", "initial", "environment", "guides", "metrics", "payloads", "rates")
+RESERVED = ("links", "initial", "environment", "guides", "metrics", "payloads", "rates", "sensors")
 """What paths of a run begin with, besides joints."""
 
 

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 from ic.grammar.syntax import Call, Name, Word
 from ic.meaning.arm import Arm, resolve_arm
-from ic.meaning.base import INITIAL, check_base, initial_base, remark_ground, resolve_base
-from ic.meaning.complaints import belongs, known_words
-from ic.meaning.failures import check_failures
+from ic.meaning.base import INITIAL, check_base, held_by, initial_base, remark_ground, resolve_base
+from ic.meaning.bodies import check_moved
+from ic.meaning.complaints import an, belongs, known_words
+from ic.meaning.failures import check_failures, check_friction
 from ic.meaning.guides import (
     Guiding,
     check_guides,
-    check_instants,
     check_period,
     name_guides,
-    rate_of,
     resolve_guides,
 )
+from ic.meaning.idle import remark_beginnings, remark_idle, remark_kinds
+from ic.meaning.link_sensors import resolve_link_sensors
 from ic.meaning.merge import Block, Item
-from ic.meaning.models import find_bare_model, find_model, refuse_values, use_model, word_of
+from ic.meaning.models import find_bare_model, find_model, refuse_values, upon, use_model, word_of
 from ic.meaning.owner import Owner
 from ic.meaning.payloads import check_payloads, resolve_payloads
+from ic.meaning.reading import remark_unread
 from ic.meaning.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
 from ic.meaning.relations import check_names
 from ic.meaning.resolve import Definition
@@ -40,21 +41,24 @@ from ic.meaning.schedule import (
 )
 from ic.meaning.scope import Scope
 from ic.meaning.servos import RATE, Use, check_rest, check_start, fixed_rate, resolve_servos
+from ic.meaning.spin import check_spins
 from ic.meaning.substitution import check_brakes, check_ticks, resolve_substitutions
-from ic.meaning.tables import use_table
+from ic.meaning.swings import check_circuits, check_sensor
+from ic.meaning.tables import tell_named_lists, use_table
+from ic.meaning.ticking import Ticking, check_instants, rate_of
 from ic.meaning.tolerances import resolve_tolerances
 from ic.meaning.values import Value, Values, place_of
 from met import models, units
 from met.diagnostic import Label, Place, did_you_mean
 from met.frozen import frozen
-from met.parameter import Parameter
+from met.parameter import WORLD, Parameter
 from met.plan import BASE, Base, EnvironmentUse, Payload, Requirement, Schedule, ServoUse, Structure, Tolerance
 from met.trace import Real, Scalar
 from met.units import PURE
 
 KEYS = ("arm", "base", "servos", "initial", "environment", "rates", "integrator", "duration", "record", "tolerances",
         "seed")
-KINDS = ("metric", "guide", "payload", "substitute")
+KINDS = ("metric", "guide", "sensor", "payload", "substitute")
 """Words of entries that have names."""
 
 BLOCKS = ("servos", "initial", "environment", "rates", "tolerances")
@@ -64,6 +68,8 @@ DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the ru
 SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")
 ON_OFF = Parameter(name="velocity_products", shape="word", words=("on", "off"), default="on",
                    doc="Coriolis, centrifugal and gyroscopic torques")
+BEGIN = Parameter(name="servos", shape="word", words=("unloaded", "balanced"), default="unloaded",
+                  doc="whether servos begin with what keeps their joints from accelerating")
 
 
 @frozen
@@ -96,28 +102,35 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     duration = scope.constant(run, DURATION, block.items["duration"]) if "duration" in block.items else None
     if "duration" not in block.items:
         told = f"{run.label} has no duration"
-        scope.complaints.error("D107", told, definition.place, help="write `duration = 10 s;`")
+        scope.complaints.missing(run.place, ("duration",), "D107", told, help="write `duration = 10 s;`")
     if arm is None:
         return None
     scope.gone = arm.lost
     base, arm = resolve_base(scope, block.get("base"), arm)
     name_guides(scope, block)
     uses, scope.lost = resolve_servos(scope, _body(scope, block.get("servos")), arm)
-    guides = resolve_guides(scope, block, arm, uses)
+    if block.get("servos") is None and scope.complaints.lacks(run.place, "servos"):
+        scope.lost = frozenset(joint.name for joint in arm.moving)
+    guides = resolve_guides(scope, block, arm, uses, duration)
     substitutions = resolve_substitutions(scope, block, arm, uses)
     payloads = resolve_payloads(scope, block, arm)
+    if arm.whole:
+        check_moved(scope, arm.links, arm.joints, payloads)
+    sensors = resolve_link_sensors(scope, block, arm, payloads)
     environment, products = _environment(scope, _body(scope, block.get("environment")), arm, base, payloads, duration)
-    _initial(scope, _body(scope, block.get("initial")), arm)
+    balanced = _initial(scope, _body(scope, block.get("initial")), arm, uses)
+    remark_beginnings(scope, environment)
     initial_base(scope, _body(scope, block.get("initial")), base)
     for use in uses:
         check_rest(scope, use)
         check_start(scope, use)
-    schedule, ticks, guide_ticks = _schedule(scope, run, block, rates, uses, guides, duration)
+    schedule, ticks, others = _schedule(scope, run, block, rates, uses, [*guides, *sensors], duration)
     if schedule is None or integrator is None:
         return None
     check_ticks(scope, substitutions, ticks, schedule)
     check_brakes(scope, substitutions, environment)
-    check_failures(scope, uses, ticks, substitutions, environment)
+    check_failures(scope, uses, ticks, substitutions, environment, schedule)
+    check_friction(scope, uses, environment)
     _keep_settings(scope, block, arm, integrator, rates, schedule)
     fastest = {}
     on_beds = [each.joint for each in substitutions]
@@ -133,18 +146,27 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
                                    f"{use.joint}.servo")
         if h_lambda is not None:
             stability[use.joint] = h_lambda
+    for sensor in sensors:
+        if sensor.values:
+            check_sensor(scope, sensor.label, models.find("sensor", sensor.model), sensor.values, schedule, integrator,
+                         rates["dynamics"], sensor.path)
+    for use in uses:
+        check_circuits(scope, use, schedule, integrator, rates["dynamics"], on_bed=use.joint in on_beds)
     servos = tuple(ServoUse(use.joint, use.definition, use.servo.name, use.command, ticks[use.joint].divisor, use.place,
                             use.words, ticks[use.joint].continuous, use.sensors) for use in uses)  # fmt: skip
     structure = Structure(
         arm.name, arm.links, arm.joints, servos, environment, (), products, integrator.name, schedule, (),
-        substitutions, base, payloads, tuple(guide.use(guide_ticks[guide.name]) for guide in guides),
+        substitutions, base, payloads, tuple(guide.use(others[guide.path]) for guide in guides),
+        tuple(sensor.use(others[sensor.path]) for sensor in sensors), balanced,
     )  # fmt: skip
     check_base(scope, base, structure, _body(scope, block.get("environment")), block.get("base"))
     check_payloads(scope, block, structure)
+    check_spins(scope, block, structure)
     check_guides(scope, guides, structure)
     metrics = resolve_metrics(scope, block, structure)
     record = resolve_record(scope, run, block.get("record"), structure)
     structure = replace(structure, metrics=metrics, record=record)
+    remark_unread(scope, uses, structure)
     scope.setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure)
     tolerances = resolve_tolerances(scope, _body(scope, block.get("tolerances")), structure)
@@ -163,6 +185,8 @@ def _keep_settings(scope: Scope, block: Block, arm: Arm, integrator: Any, rates:
         scope.setting("rates.record", rates["dynamics"].hz, "Hz", note="that of the dynamics")
     if "environment.velocity_products" not in scope.beside:
         scope.setting("environment.velocity_products", "on")
+    if "initial.servos" not in scope.beside:
+        scope.setting("initial.servos", str(BEGIN.default))
     if "seed" not in scope.beside:
         scope.setting("seed", 0.0, "1")
 
@@ -176,21 +200,26 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
             scope.complaints.error("D108", f"`{item.name}` after `{item.kind}`, which takes no name", item.place,
                                    help=f"write `{item.kind} {'= ...;' if item.body is None else '{ ... }'}`")
         elif item.kind:
-            has = (*KEYS, "metric NAME", "guide NAME", "payload NAME", "substitute JOINT", "require")
+            has = (*KEYS, "metric NAME", "guide NAME", "sensor NAME", "payload NAME", "substitute JOINT", "require")
             scope.complaints.error("D108", f"no `{item.kind}` in a run", item.place,
                                    help=[*did_you_mean(item.kind, (*KINDS, *KEYS)), known_words("a run has", has)])
         elif item.body is not None:
             adds = f"`metric {item.name} = ...` would add a metric"
+            holder = next((key for key in BLOCKS if item.name in _inside(block, key)), None)
+            if holder is not None:
+                adds = f"write `{holder} {{ {item.name} {{ ... }} }}`: it is there that `{item.name}` stands"
             if not {"bed", "law"}.isdisjoint(item.body.items):
                 adds = f"`substitute {item.name} {{ ... }}` would put this joint's motor on a bed"
             if not {"on", "mass", "grapple", "release"}.isdisjoint(item.body.items):
                 adds = f"`payload {item.name} {{ ... }}` would add a payload"
+            scope.complaints.taken_for(definition.place, item.name, (*metrics, *KEYS))
             scope.complaints.error(
                 "D109", f"nothing named `{item.name}` in run `{definition.name}` to change", item.place,
                 help=belongs(item.name) or [*did_you_mean(item.name, (*metrics, *KEYS)), adds])
         else:
             block_name, _, rest = item.name.partition(".")
             helps = [*did_you_mean(item.name, (*KEYS, *metrics)), known_words("a run has", KEYS)]
+            scope.complaints.taken_for(definition.place, item.name, (*KEYS, *metrics))
             scope.complaints.error("D109", f"a run has no `{item.name}`", item.place,
                                    help=f"write `{block_name} {{ {rest} = ...; }}`" if block_name in BLOCKS else helps)
     for statement in block.statements:
@@ -209,6 +238,13 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
             )
 
 
+def _inside(block: Block, key: str) -> list[str]:
+    """Names of the entries of a run's block that are blocks, or take one."""
+    item = block.get(key)
+    body = item.body if item is not None and item.value is None else None
+    return [each.name for each in (body or Block()).items.values() if isinstance(each.value, Call | Name) or each.body]
+
+
 def _body(scope: Scope, item: Item | None) -> Block:
     if item is None:
         return Block()
@@ -222,12 +258,17 @@ def _body(scope: Scope, item: Item | None) -> Block:
 def _arm(scope: Scope, run: Owner, item: Item | None) -> Arm | None:
     if item is None:
         known = known_words("arms of this deck", scope.definitions.of_kind("arm"))
-        scope.complaints.error("D112", f"{run.label} has no arm", run.place, help=["write `arm = ARM;`", known])
+        scope.complaints.missing(run.place, ("arm",), "D112", f"{run.label} has no arm",
+                                 help=["write `arm = ARM;`", known])
         return None
     name = word_of(item.value)
     if name is None or not isinstance(item.value, Name):
         at = place_of(item.value) if item.value is not None else item.place
         scope.complaints.error("D112", "the name of an arm is needed here", at, help="write `arm = ARM;`")
+        return None
+    if item.body is not None:
+        scope.complaints.error("D112", f"a run does not change its arm `{name}`", upon(item) or item.place,
+                               help=f"define `arm NAME like {name} {{ ... }}`, and write `arm = NAME;`")
         return None
     with scope.complaints.gather():
         return resolve_arm(scope, scope.definitions.find("arm", Word(name, item.value.place)))
@@ -306,9 +347,11 @@ def _environment_use(
     if environment is None or refuse_values(scope, item.value, [p.name for p in environment.written]):
         return None
     body = item.body or Block()
-    bodies = [*(link.name for link in arm.links), *(payload.name for payload in payloads)]
+    # a payload called `world` was told of, and is no reason to tell of those that mean the ground
+    bodies = [*(link.name for link in arm.links), *(each.name for each in payloads if each.name != WORLD)]
+    lost = (*arm.lost, *(each.name for each in payloads if each.name == WORLD))
     known = {"joint": [joint.name for joint in arm.moving], "link": bodies}
-    named = check_names(scope, owner, environment.parameters, body, arm=arm.name, known=known, lost=arm.lost)
+    named = check_names(scope, owner, environment.parameters, body, arm=arm.name, known=known, lost=lost)
     about = next((named[p.name] for p in environment.parameters if p.names == "joint" and p.name in named), None)
     if about is not None:  # what the unit words `joint` and `effort` mean
         kinds = {joint.name: joint.kind for joint in arm.moving}
@@ -316,37 +359,29 @@ def _environment_use(
             scope.checks.fail(owner.path)
             return EnvironmentUse(item.name, environment.name, None, item.place)
         owner = replace(owner, joint=kinds[about])
+    lists = [each for each in environment.parameters if each.shape == "list" and environment.from_file]
+    if tell_named_lists(scope, owner, lists, body):
+        scope.checks.fail(owner.path)
+        return EnvironmentUse(item.name, environment.name, None, item.place)
     if environment.from_file and body.get("file") is not None:
         values = use_table(scope, owner, environment, body)
     else:
         values = use_model(scope, owner, environment.parameters, body,
                            extra=[each.name for each in environment.written[len(environment.parameters):]])
-    if values is not None and duration is not None:
-        _remark_idle(scope, environment, item, values, duration)
-    if values is not None and environment.pushes and (base is None or base.kind != "free"):
-        carriers = {payload.name: payload.link for payload in payloads if not payload.flies}
-        pushed = values[environment.pushes]
-        remark_ground(scope, item, arm, base, environment.pushes, carriers.get(pushed, pushed))
+    if values is not None:
+        held = held_by(arm, payloads)
+        words = {p.name: held.get(values[p.name], values[p.name]) for p in environment.parameters if p.names == "link"}
+        if not (duration is not None and remark_idle(scope, environment, item, {**values, **words}, duration)):
+            remark_ground(scope, item, arm, base, environment, values, payloads)
+            remark_kinds(scope, environment, item, arm)
     return EnvironmentUse(item.name, environment.name, None, item.place)
 
 
-def _remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str, Any], duration: float) -> None:
-    """Tells of a model whose written constants make it nothing, all through the run."""
-    numbers = [x for value in values.values() for x in (value if isinstance(value, tuple) else (value,))]
-    if environment.idle is None or any(isinstance(x, Scalar) for x in numbers):
-        return
-    found = environment.idle(SimpleNamespace(**values), duration)
-    if found is not None:
-        body = item.body or Block()
-        written = [part for name in found[0] if (part := body.get(name)) is not None and part.value is not None]
-        place = place_of(written[0].value) if written and written[0].value is not None else item.place
-        scope.complaints.remark("D168", f"environment `{item.name}` never acts: {found[1]}", place,
-                                help="change that, or leave it out")
-
-
-def _initial(scope: Scope, body: Block, arm: Arm) -> None:
+def _initial(scope: Scope, body: Block, arm: Arm, uses: Sequence[Use]) -> bool:
+    """What a run says of its start; whether its servos begin balanced."""
     known = dict.fromkeys(("q", "qd"), "")
     known |= {f"{joint.name}.{name}": "" for joint in arm.moving for name in ("q", "qd")}
+    known["servos"] = ""
     of_base = dict.fromkeys(INITIAL if any(link.name == BASE for link in arm.links) else (), "")
     for item in body.items.values():
         if not item.kind and item.name.partition(".")[0] in arm.lost:
@@ -383,6 +418,19 @@ def _initial(scope: Scope, body: Block, arm: Arm) -> None:
             if general is not None and own is None and listed is None and _mixed(scope, owner, wanted, general, arm):
                 break
             scope.number(owner, wanted, own or general, value=value)
+    return _balanced(scope, body.get("servos"), uses)
+
+
+def _balanced(scope: Scope, item: Item | None, uses: Sequence[Use]) -> bool:
+    """Whether servos begin balanced; a remark where none of them can."""
+    if item is None:
+        return False
+    balanced = scope.word(Owner("the initial state", item.place, "initial"), BEGIN, item) == "balanced"
+    if balanced and not any(use.servo.balance for use in uses):
+        able = [name for name, model in models.available("servo").items() if model.balance]
+        scope.complaints.remark("D248", "no servo of this run can begin balanced: this changes nothing", item.place,
+                                help=known_words("models that can", able))
+    return balanced
 
 
 def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: Arm) -> bool:
@@ -408,13 +456,14 @@ def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: Ar
 def _rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate]:
     rates: dict[str, Rate] = {}
     if item is None:
-        scope.complaints.error("D115", f"{run.label} has no rates", run.place,
-                               help="write `rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }`")
+        scope.complaints.missing(run.place, ("rates",), "D115", f"{run.label} has no rates",
+                                 help="write `rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }`")
         return rates
     body = _body(scope, item)
     owner = Owner("`rates`", item.place, "rates")
     for part in body.items.values():
         if part.kind or part.name not in RATES:
+            scope.complaints.taken_for(item.place, part.name, RATES)
             scope.complaints.error("D116", f"no rate `{part.name}`", part.place,
                                    help=[*did_you_mean(part.name, RATES), known_words("rates", RATES)])
             continue
@@ -422,25 +471,27 @@ def _rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate]:
         if rate is not None:
             rates[part.name] = rate
     if "dynamics" not in body.items and item.body is not None:
-        scope.complaints.error("D117", "no rate of the dynamics", item.place, help="write `dynamics = 1 kHz;`")
+        scope.complaints.missing(item.place, ("dynamics",), "D117", "no rate of the dynamics",
+                                 help="write `dynamics = 1 kHz;`")
     return rates
 
 
-def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], uses: list[Use], guides: list[Guiding],
-              duration: float | None) -> tuple[Schedule | None, dict[str, Ticks], dict[str, int]]:
-    """The schedule, when each servo's law acts, and base ticks a tick of each guide."""
+def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], uses: list[Use],
+              ticking: Sequence[Ticking], duration: float | None,
+              ) -> tuple[Schedule | None, dict[str, Ticks], dict[str, int]]:
+    """The schedule, when each servo's law acts, and base ticks a tick of guides and of links' sensors, by path."""
     dynamics = rates.get("dynamics")
     rates_item = block.get("rates")
     body = rates_item.body if rates_item is not None else None
     for use in uses:
         if use.rate is None and use.has_law and body is not None and "servos" not in body.items:
             assert rates_item is not None
-            scope.complaints.error("D118", "no rate of the servos", rates_item.place,
-                                   help="write `servos = 1 kHz;`, or a `rate` in each servo's definition")
+            scope.complaints.missing(rates_item.place, ("servos",), "D118", "no rate of the servos",
+                                     help="write `servos = 1 kHz;`, or a `rate` in each servo's definition")
     if dynamics is None or duration is None:
         return None, {}, {}
     shared = rates.get("servos")
-    own = [rate for rate in (*(use.rate for use in uses), *(guide.rate for guide in guides)) if rate is not None]
+    own = [rate for rate in (*(use.rate for use in uses), *(each.rate for each in ticking)) if rate is not None]
     others = [rate for rate in (shared, *own) if rate is not None and rate.hz != CONTINUOUS]
     record = rates.get("record") or dynamics
     base = base_rate([dynamics, record, *others], rates.get("base"))
@@ -458,19 +509,21 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
                                    rate.place, also=[Label(use.place, "used here")], help="write a rate in Hz")
         for sensor in use.sensors if continuous else ():
             if models.find("sensor", sensor.model).clocked and sensor.place is not None:
-                scope.complaints.error("D106", f"a `{sensor.model}` reads at ticks, and the law of joint `{use.joint}` "
-                                       "is continuous", sensor.place, also=[Label(rate.place, "continuous")],
+                reads = f"{an(sensor.model, quoted=True)} reads at ticks"
+                scope.complaints.error("D106", f"{reads}, and the law of joint `{use.joint}` is continuous",
+                                       sensor.place, also=[Label(rate.place, "continuous")],
                                        help="write a rate in Hz, or `low_pass` for a sensor that is analog")
         if continuous:
             rate = dynamics
         ticks[use.joint] = Ticks(divisor(scope.complaints, rate, base, everyone, written=written), continuous)
-    guide_ticks = dict.fromkeys((guide.name for guide in guides), schedule.dynamics)
-    for guide in (guide for guide in guides if guide.ticks):
-        rate_of_guide = rate_of(scope, guide, shared)
-        if rate_of_guide is not None:
-            guide_ticks[guide.name] = divisor(scope.complaints, rate_of_guide, base, everyone, written=written)
-            check_instants(scope, guide, guide_ticks[guide.name], schedule.dynamics, rate_of_guide, dynamics)
-            check_period(scope, guide, rate_of_guide)
+    own_ticks = dict.fromkeys((each.path for each in ticking), schedule.dynamics)
+    for each in (each for each in ticking if each.ticks):
+        rate_of_own = rate_of(scope, each, shared)
+        if rate_of_own is not None:
+            own_ticks[each.path] = divisor(scope.complaints, rate_of_own, base, everyone, written=written)
+            check_instants(scope, each, own_ticks[each.path], schedule.dynamics, rate_of_own, dynamics)
+            if isinstance(each, Guiding):
+                check_period(scope, each, rate_of_own)
     if record.hz > dynamics.hz:
         scope.complaints.remark(
             "D167", f"`record` is faster than the dynamics: rows repeat, {record.hz / dynamics.hz:g} for each step",
@@ -478,7 +531,7 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
             help="record at the rate of the dynamics, or slower")
     if shared is not None and shared.hz != CONTINUOUS and not uses:
         divisor(scope.complaints, shared, base, everyone, written=written)
-    return schedule, ticks, guide_ticks
+    return schedule, ticks, own_ticks
 
 
 __all__ = ["KEYS", "RATE", "RATES", "Call", "Resolved", "resolve_run"]

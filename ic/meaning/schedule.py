@@ -6,7 +6,7 @@ Rates are taken as fractions, so that 1000/3 Hz divides 1 kHz and 333.3 Hz does 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -71,13 +71,13 @@ def divisor(complaints: Complaints, rate: Rate, base: Rate, others: list[Rate], 
     ratio = exact(base.hz) / exact(rate.hz)
     if ratio.denominator == 1:
         return int(ratio)
-    label = Label(rate.place, f"{_hz(base.hz)}/{_hz(rate.hz)} = {float(ratio):.4g}")
+    label = Label(rate.place, f"{hz(base.hz)}/{hz(rate.hz)} = {float(ratio):.4g}")
     also = [Label(base.place, "base rate set here" if written else f"base rate set here: the fastest, {base.label}")]
     helps = []
     if ratio < 1:
-        message = f"{rate.label} at {_hz(rate.hz)} Hz is faster than the base rate, {_hz(base.hz)} Hz"
+        message = f"{rate.label} at {hz(rate.hz)} Hz is faster than the base rate, {hz(base.hz)} Hz"
     else:
-        message = f"{rate.label} at {_hz(rate.hz)} Hz does not divide the base rate, {_hz(base.hz)} Hz"
+        message = f"{rate.label} at {hz(rate.hz)} Hz does not divide the base rate, {hz(base.hz)} Hz"
         fits = dict.fromkeys((max(1, math.floor(ratio)), math.ceil(ratio)))
         helps.append("nearest that fit: " + ", ".join(_fitting(base.hz, n) for n in fits))
     common = _common([exact(each.hz) for each in (rate, base, *others)])
@@ -90,8 +90,8 @@ def divisor(complaints: Complaints, rate: Rate, base: Rate, others: list[Rate], 
 def _fitting(base_hz: float, n: int) -> str:
     exactly = exact(base_hz) / n
     if exactly.denominator == 1 or float(exactly) == float(f"{float(exactly):.6g}"):
-        return f"{_hz(float(exactly))} Hz ({_hz(base_hz)}/{n})"
-    return f"{_hz(float(exactly))} Hz, written ({_hz(base_hz)}/{n}) Hz"
+        return f"{hz(float(exactly))} Hz ({hz(base_hz)}/{n})"
+    return f"{hz(float(exactly))} Hz, written ({hz(base_hz)}/{n}) Hz"
 
 
 def _common(rates: list[Fraction]) -> str | None:
@@ -101,7 +101,7 @@ def _common(rates: list[Fraction]) -> str | None:
     common = Fraction(math.lcm(*(rate.numerator for rate in rates)), math.gcd(*(rate.denominator for rate in rates)))
     if common > 100_000:
         return None
-    return f"{_hz(float(common))} Hz"
+    return f"{hz(float(common))} Hz"
 
 
 def make_schedule(complaints: Complaints, dynamics: Rate, record: Rate, base: Rate, others: list[Rate],
@@ -164,16 +164,17 @@ def fastest_rate(
 
 
 def check_stability(scope: Scope, label: str, fastest: Real, schedule: Schedule, integrator: Any, dynamics: Rate,
-                    path: str) -> Real | None:
-    """h lambda of a joint under its servo: given back, and warned of or told as an error.
+                    path: str, of: str = "the servo's fastest rate constant, on any arm") -> Real | None:
+    """h lambda of a joint under its servo, or of a sensor: given back, and warned of or told as an error.
 
     label  the servo in words; joints with the same servo and the same figure are told of once, and of several servos
            for which one rate is too slow the first that is checked
     path   of the servo
+    of     what lambda is
     """
     with scope.complaints.gather():
         limit, h = integrator.real_limit, schedule.step
-        slowest = _slowest_that_fits(schedule, limit)
+        slowest = slowest_that_fits(schedule, limit)
 
         def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
             x = h * values[:, 0]
@@ -185,8 +186,9 @@ def check_stability(scope: Scope, label: str, fastest: Real, schedule: Schedule,
 
         def warn(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
             x = h * values[:, 0]
-            if WARN_ABOVE < float(np.max(x)) < limit:
-                better = _slowest_that_fits(schedule, WARN_ABOVE * (1.0 + 1e-9))(float(np.max(values[:, 0])))
+            above = WARN_ABOVE * (1.0 + 1e-9)
+            if above < float(np.max(x)) < limit:
+                better = slowest_that_fits(schedule, above)(float(np.max(values[:, 0])))
                 scope.complaints.remark(
                     "D105", f"{label} is fast for the dynamics' step: h * lambda = "
                     f"{float(np.max(x)):.3g}", Label(dynamics.place, f"h = {h:g} s"),
@@ -200,7 +202,7 @@ def check_stability(scope: Scope, label: str, fastest: Real, schedule: Schedule,
             code="D104",
             place=dynamics.place,
             message=f"{label} is unstable with {integrator.name} at this rate of the dynamics",
-            help=f"h * lambda must stay below {limit:g}; lambda is the servo's fastest rate constant, on any arm",
+            help=f"h * lambda must stay below {limit:g}; lambda is {of}",
             needs=(path,),
         )
         scope.checks.hold((fastest,), warn, code="D105", place=dynamics.place, message="", needs=(path,))
@@ -208,19 +210,21 @@ def check_stability(scope: Scope, label: str, fastest: Real, schedule: Schedule,
     return None
 
 
-def _slowest_that_fits(schedule: Schedule, limit: float) -> Any:
+def slowest_that_fits(schedule: Schedule, limit: float) -> Callable[[float], str]:
+    """Of a rate constant (1/s), the slowest rate of the dynamics with which h times it stays below the limit."""
     def name(fastest: float) -> str:
         if not math.isfinite(fastest):
             return "none"
         most = min(schedule.dynamics, math.ceil(limit * schedule.base_hz / fastest) - 1, 100_000)
         for n in range(most, 0, -1):
             if schedule.ticks % n == 0:
-                return f"{_hz(schedule.base_hz / n)} Hz"
+                return f"{hz(schedule.base_hz / n)} Hz"
         times = math.floor(fastest / limit / schedule.base_hz) + 1
-        return f"{_hz(schedule.base_hz * times)} Hz"
+        return f"{hz(schedule.base_hz * times)} Hz"
 
     return name
 
 
-def _hz(value: float) -> str:
+def hz(value: float) -> str:
+    """A rate as it is written."""
     return f"{value:.6g}"

@@ -54,6 +54,8 @@ class Scope:
     lost: frozenset[str] = frozenset()  # joints whose servo failed: nothing can be said of its channels
     gone: frozenset[str] = frozenset()  # joints and links that failed: nothing can be said of what begins with them
     guides: Mapping[str, Item] = field(default_factory=dict)  # of the run, by name: what commands may follow
+    sensors: frozenset[str] = frozenset()  # of links, in the run, by name
+    removed: dict[str, Place] = field(default_factory=dict)  # by path of a parameter, where `remove` took it away
     settings: Mapping[str, Setting] = field(default_factory=dict)  # by path, numbers given from outside of the deck
 
     def __post_init__(self) -> None:
@@ -327,13 +329,17 @@ class Scope:
         self.checks.fail(owner.join(wanted.name))
         servos = self.definitions.of_kind("servo")
         bases = [servos[home].place for home in owner.homes if home in servos]
-        if any((place, wanted.name) in self.complaints.lacking for place in (owner.place, *bases)):
-            return  # which was told: of another use, or of a base
-        self.complaints.lacking.add((owner.place, wanted.name))
+        removed = self.removed.get(owner.join(wanted.name))
+        lacks = removed or owner.place
+        if any(self.complaints.lacks(place, wanted.name) for place in (lacks, *bases)):
+            return  # which was told: of another use, or of a base, or another word was taken for it
+        self.complaints.lacking.add((lacks, wanted.name))
         unit = self.unit(owner, wanted)[0]
         shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
         shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {in_deck(unit)}"
-        self.complaints.error("D075", f"{owner.label} has no `{wanted.name}`", owner.place,
+        also = [Label(owner.place, f"{owner.label} stands here")] if removed is not None else []
+        at = Label(removed, "removed here") if removed is not None else owner.place
+        self.complaints.error("D075", f"{owner.label} has no `{wanted.name}`", at, also=also,
                               help=f"write `{wanted.name} = {shown};` ({wanted.doc})")
 
     def _settle(self, owner: Owner, wanted: Parameter, name: str, item: Item | None, written: Value | None,
@@ -468,8 +474,17 @@ class Scope:
                 help=apart or (f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}")))
         found = units.text(value.dimension)
         message = f"{what} is " + ("a pure number" if dimension == PURE else f"in {text}") + f", and this is in {found}"
+        other = self._other(owner, wanted, value) if dimension == PURE else []
         raise Problem(error("D061", message, value.place, also=also,
-                            help=apart or mended(value, text, dimension)))
+                            help=apart or [*other, mended(value, text, dimension)]))
+
+    def _other(self, owner: Owner, wanted: Parameter, value: Value) -> list[str]:
+        """The one optional parameter of the model that a number with this unit may be meant for."""
+        found = [each for each in owner.others if each.shape == "number" and each.default is not None
+                 and each.name != wanted.name and units.same(value.dimension, self.unit(owner, each)[1])]
+        if len(found) != 1:
+            return []
+        return [f"`{found[0].name}` is what is in {in_deck(self.unit(owner, found[0])[0])}: {found[0].doc}"]
 
     def _of_its_own(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> str:
         """The remedy where a value is right for the other joints of its servo definition, which move otherwise."""

@@ -45,6 +45,11 @@ def use_sensor(scope: Scope, servo: Owner, use: ServoUse, item: Item) -> SensorU
                         place_of(item.value))
     if sensor is None or refuse_values(scope, item.value, [p.name for p in sensor.parameters]):
         return None
+    if sensor.measures is not None:
+        scope.complaints.error("D281", f"`{sensor.name}` is a sensor of a link, and this is a servo",
+                               place_of(item.value) if item.value is not None else item.place,
+                               help=f"write `sensor NAME = {sensor.name} {{ link = LINK; ... }}` in a run")
+        return None
     unit = unit_here(known[item.name], servo.joint, None, None)[0]
     path = f"sensor.{item.name}"
     owner = replace(servo, label=f"sensor `{item.name}` of {servo.label}", place=item.place, of=unit,

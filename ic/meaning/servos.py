@@ -32,7 +32,7 @@ from ic.meaning.values import measure_of, place_of
 from ic.text.files import library_defines
 from met import models, units
 from met.channel import COMMAND_UNIT
-from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.diagnostic import Label, Place, Problem, did_you_mean, error, meant
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Command, SensorUse, ServoUse
@@ -73,9 +73,16 @@ class Use:
     def has_law(self) -> bool:
         return self.servo.control is not None
 
+    @property
+    def bare(self) -> ServoUse:
+        """As a plan has it, but for its rate and its sensors."""
+        return ServoUse(self.joint, self.definition, self.servo.name, self.command, 1, self.place, self.words)
+
 
 def resolve_servos(scope: Scope, body: Block, arm: Arm) -> tuple[list[Use], frozenset[str]]:
-    """Every servo of the run, in the order of the arm's joints, and the joints whose servo failed, which was told."""
+    """Every servo of the run, in the order of the arm's joints; the joints whose servo failed or may be one of a name
+    that is no joint's, which was told.
+    """
     uses = {}
     _note_kinds(scope, body, arm)
     for item in body.items.values():
@@ -83,7 +90,9 @@ def resolve_servos(scope: Scope, body: Block, arm: Arm) -> tuple[list[Use], froz
             use = _use(scope, item, arm)
             if use is not None:
                 uses[use.joint] = use
-    lost = frozenset(item.name for item in body.items.values()) - set(uses)
+    moving = [joint.name for joint in arm.moving]
+    lost = frozenset(name for item in body.items.values() for name in (item.name, meant(item.name, moving))
+                     if name is not None and name not in uses)  # fmt: skip
     return [uses[joint.name] for joint in arm.joints if joint.name in uses], lost
 
 
@@ -120,21 +129,15 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
     block = scope.definitions.block(definition)
     if block is None:
         return None
-    overridden = item.body is not None and bool(item.body.items)
+    overridden = item.body is not None and bool(item.body.items or item.body.pending)
     if item.body is not None:
-        block = overlay(block, item.body)
+        block = overlay(block, item.body, scope.complaints)
     label = f"servo `{name}` on joint `{item.name}`" if overridden else f"servo `{name}`"
     owner = Owner(label, definition.place, f"{item.name}.servo", homes=scope.definitions.homes(definition), local="",
                   joint=kind)  # type: ignore[arg-type]
     model = block.get("model")
     if model is None:
-        scope.complaints.error(
-            "D148",
-            f"{label} has no model",
-            definition.place,
-            also=[Label(place, "used here")],
-            help=["write `model = MODEL;`", known_words("servo models", sorted(models.find_own("servo")))],
-        )
+        _tell_no_model(scope, block, owner, place)
         return None
     servo = find_bare_model(scope, "servo", model, BESIDE)
     if servo is None:
@@ -157,6 +160,17 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
     bare = ServoUse(item.name, name, servo.name, command, 1, words=words)
     sensors = tuple(use for each in sensed if (use := use_sensor(scope, owner, bare, each)) is not None)
     return Use(item.name, name, servo, command, rate, parameters, item.place, words, sensors)
+
+
+def _tell_no_model(scope: Scope, block: Block, owner: Owner, used: Place) -> None:
+    """A servo without a model, or the entry that may have been meant for it; of the others nothing can be said."""
+    known = known_words("servo models", sorted(models.find_own("servo")))
+    for item in block.items.values():
+        if not item.kind and (helps := did_you_mean(item.name, ("model",))):
+            scope.complaints.error("D141", f"{owner.label} has no `{item.name}`", item.place, help=[*helps, known])
+            return
+    scope.complaints.error("D148", f"{owner.label} has no model", owner.place, also=[Label(used, "used here")],
+                           help=["write `model = MODEL;`", known])
 
 
 def moving_kind(scope: Scope, item: Item, arm: Arm, so: str) -> str | None:
@@ -184,7 +198,9 @@ def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, bloc
         given = block.get(parameter.name) is not None or (settled is not None and settled.origin.kind != "default")
         if command.kind in parameter.needed_for and not given:
             message = f"{owner.label} needs `{parameter.name}` under a {command.kind} command"
-            scope.complaints.error(
+            scope.complaints.missing(
+                owner.place,
+                (parameter.name,),
                 "D160",
                 message,
                 place,
@@ -249,7 +265,7 @@ def check_start(scope: Scope, use: Use) -> None:
         return
     if not isinstance(begins.value, (int, float)) or any(isinstance(value, Scalar) for value in values):
         return  # a sweep varies one of them
-    unit, scale = _unit_written([*asked.values(), begins], begins.unit)
+    unit, scale = unit_written([*asked.values(), begins], begins.unit)
     value, _ = profile.course(SimpleNamespace(**{name: each.value for name, each in asked.items()}), 0.0)
     if abs(value - begins.value) > APART:
         places = [each.origin.place for each in asked.values() if each.origin.place is not None]
@@ -260,7 +276,7 @@ def check_start(scope: Scope, use: Use) -> None:
             help=f"write `{use.joint}.q = {value / scale:.12g} {unit};` in `initial`, or begin the command elsewhere")
 
 
-def _unit_written(found: Iterable[Settled], wanted: str) -> tuple[str, float]:
+def unit_written(found: Iterable[Settled], wanted: str) -> tuple[str, float]:
     """The unit that the deck wrote first of the dimension of `wanted`, and its size; `wanted`, in SI, where none is."""
     dimension = units.parse_unit(wanted).dimension
     for each in found:
@@ -291,7 +307,9 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     known = ", ".join(f"{kind}(...)" for kind in servo.commands)
     if item is None:
         if servo.commands:
-            scope.complaints.error(
+            scope.complaints.missing(
+                owner.place,
+                ("command",),
                 "D149",
                 f"{owner.label} has no command",
                 used,
@@ -362,7 +380,9 @@ def use_course(scope: Scope, spot: Owner, inner: Expression, item: Item, *, doc:
     inside = {key: replace(part, homes=item.homes, overrides=item.overrides)
               for key, part in (named or Block()).items.items()}
     apart = body or Block()
-    opened = Block(inside | dict(apart.items), (*(named or Block()).statements, *apart.statements))
+    opened = replace(apart, items=inside | dict(apart.items),
+                     statements=(*(named or Block()).statements, *apart.statements),
+                     pending=(*(named or Block()).pending, *apart.pending))
     course = replace(spot, label=f"`{name}`", called=None, place=inner.name.place)
     if profile.from_file:
         use_file(scope, course, profile, opened, column, kind)
@@ -419,7 +439,8 @@ def check_servo_definition(scope: Scope, name: str) -> None:
                 find_model(scope, "sensor", word_of(sensor.value), place_of(sensor.value))
         block = without_sensors(block)
         if servo is not None:
-            check_keys(scope, block, [*(p.name for p in servo.parameters), *NOT_PARAMETERS], owner)
+            known = [*(p.name for p in servo.parameters), *NOT_PARAMETERS]
+            check_keys(scope, block, known, owner)
             command = block.get("command")
             if (command is not None and isinstance(command.value, Call) and len(command.value.positional) == 1
                     and command.value.name.text in COMMAND_UNIT):
@@ -428,7 +449,7 @@ def check_servo_definition(scope: Scope, name: str) -> None:
                     scope.names.evaluate(inner)
             words = {p.name: p for p in servo.parameters if p.shape == "word"}
             for key, item in block.items.items():
-                if key in NOT_PARAMETERS or item.value is None:
+                if key in NOT_PARAMETERS or key not in known or item.value is None:
                     continue
                 if key in words:
                     scope.word(owner, words[key], item)

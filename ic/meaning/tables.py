@@ -46,10 +46,21 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Block)
     return None if values is None or columns is None else {**values, **columns}
 
 
-def named_file(owner: Owner, item: Item | None) -> String:
-    """The name of the file that `file` is. Raises Problem D075, D076."""
-    if item is None:
-        raise Problem(error("D075", f"{owner.label} has no `file`", owner.place, help='write `file = "NAME.csv"`'))
+def tell_named_lists(scope: Scope, owner: Owner, lists: list[Parameter], body: Block) -> bool:
+    """Tells of a file's name that stands where a list does; whether one does."""
+    found = False
+    for each in lists:
+        item = body.get(each.name)
+        if item is not None and isinstance(item.value, String):
+            found = True
+            scope.complaints.error("D064", f"`{each.name}` of {owner.label} is a list of numbers, not text",
+                                   item.value.place, help=f'write `file = "{item.value.value}";` for a CSV file that '
+                                   f"has it in a column `{TIME if each.rises else each.name}`")
+    return found
+
+
+def named_file(owner: Owner, item: Item) -> String:
+    """The name of the file that `file` is. Raises Problem D076."""
     if not isinstance(item.value, String):
         raise Problem(error("D076", f"`file` of {owner.label} is the name of a file, in quotes",
                             place_of(item.value) if item.value is not None else item.place,
@@ -86,7 +97,7 @@ def _columns(scope: Scope, owner: Owner, lists: list[Parameter], item: Item) -> 
         found = table.column(name)
         if found is not None:
             columns[wanted.name] = keep_column(scope, owner, wanted, table, found, label)
-        elif isinstance(wanted.default, tuple):
+        elif isinstance(wanted.default, tuple) and name != TIME:
             text, _ = scope.unit(owner, wanted)
             columns[wanted.name] = wanted.default
             scope.parameters[owner.join(wanted.name)] = Settled(wanted.default, text, Origin("default"), wanted.doc)

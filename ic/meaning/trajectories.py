@@ -44,8 +44,13 @@ def use_file(
     for each in (FILE.name, COLUMN.name, *LISTS):
         scope.whole[owner.join(each)] = OF_A_FILE
     columns: dict[str, tuple[float, ...]] | None = None
-    with scope.complaints.gather():
-        columns = _columns(scope, owner, profile, body, name, kind)
+    file = body.get(FILE.name)
+    if file is None:
+        scope.complaints.missing(owner.place, (FILE.name,), "D075", f"{owner.label} has no `{FILE.name}`",
+                                 help='write `file = "NAME.csv"`')
+    else:
+        with scope.complaints.gather():
+            columns = _columns(scope, owner, profile, body, file, name, kind)
     if columns is None:
         for each in LISTS:
             scope.checks.fail(owner.join(each))
@@ -53,10 +58,10 @@ def use_file(
 
 
 def _columns(
-    scope: Scope, owner: Owner, profile: Profile, body: Block, own: str, kind: str
+    scope: Scope, owner: Owner, profile: Profile, body: Block, file: Item, own: str, kind: str
 ) -> dict[str, tuple[float, ...]]:
     """The two lists. Raises Problem."""
-    named = named_file(owner, body.get(FILE.name))
+    named = named_file(owner, file)
     wanted, place = _column_name(owner, body.get(COLUMN.name), own), named.place
     if body.get(COLUMN.name) is not None:
         place = place_of(body.items[COLUMN.name].value or named)
@@ -78,7 +83,7 @@ def _columns(
         raise Problem(error("D196", f"`{table.file}` has {len(table.rows) or 'no'} row"
                             f"{'s' if not table.rows else ''}", table.columns[0].place, also=[here],
                             help=f"a trajectory has {FEWEST} at least; `table` takes a single point"))
-    scope.setting(owner.join(FILE.name), table.file, item=body.get(FILE.name))
+    scope.setting(owner.join(FILE.name), table.file, item=file)
     scope.setting(owner.join(COLUMN.name), wanted, item=body.get(COLUMN.name), note=f"the {kind}'s name")
     return columns
 

@@ -26,7 +26,7 @@ SAID = {
     "default": "the default",
     "derived": "computed",
 }
-HEADS = ("links", "metrics", "environment", "guides", "initial", "payloads")
+HEADS = ("links", "metrics", "environment", "guides", "initial", "payloads", "sensors")
 IN_PLAN = "as the plan has it"
 NO_MORE: Mapping[str, Sequence[str]] = MappingProxyType({})
 MOST_NEAR = 12
@@ -298,6 +298,9 @@ def _declaration(experiment: Experiment, name: str) -> tuple[Parameter | None, s
                 model, own = models.find("command", courses[own]), words[3]
             elif own in guide.joints and len(words) > 3:
                 own = words[3]
+    for sensor in structure.sensors:
+        if name.startswith(f"sensors.{sensor.name}."):
+            model, own = models.find("sensor", sensor.model), words[2]
     for metric in structure.metrics:
         if name.startswith(f"metrics.{metric.name}."):
             model, own = models.find("metric", metric.model), words[2]

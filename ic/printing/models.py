@@ -10,14 +10,14 @@ from typing import Any, get_args
 
 from ic.printing.columns import columns, number, vector
 from met import models
-from met.channel import of_bed, of_law
+from met.channel import of_bed, of_law, watched_unit
 from met.diagnostic import Problem, did_you_mean, error
 from met.parameter import Parameter
 
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
 HOW = {
     "servo": "servo NAME { model = MODEL; ... }",
-    "sensor": "sensor QUANTITY = MODEL { ... }, in a servo: of q, qd or a state of the servo",
+    "sensor": "sensor QUANTITY = MODEL { ... }, in a servo: of q, qd or a state of the servo; of a link in a run",
     "command": "command = rate(MODEL(...)), position(...), torque(...) or acceleration(...), in a servo",
     "environment": "environment { NAME = MODEL { ... } }, in a run",
     "guide": "guide NAME = MODEL { ... }, in a run; command = rate(NAME) or position(NAME) in servos",
@@ -27,16 +27,21 @@ HOW = {
     "law": "substitute JOINT { law = MODEL(...); ... }, in a run",
 }
 
+ON_LINK = "sensor NAME = MODEL { link = LINK; ... }, in a run"
+
 OTHERS = ("channels", "designs", "dh", "distributions", "functions", "shapes", "substitute", "sweep", "units")
 """What else `met doc` has a page on (ic/printing/subjects.py)."""
 
 FIELDS = tuple(field.name for field in fields(Parameter))
 """What a program is told of a parameter."""
 
+OF = {"metric": "the unit of the channel that the metric watches", "sensor": "the unit of what is sensed"}
+"""What the word `of` in units means for a kind of model."""
+
 WORDS = {
     "joint": "rad, or m on a prismatic joint",
     "effort": "N*m, or N on a prismatic joint",
-    "of": "the unit of the channel that the metric watches",
+    "of": "the unit of what is watched, or sensed",
     "command": "the unit of what is commanded",
 }
 
@@ -86,7 +91,7 @@ def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
         yield ""
         yield "Parameters"
         yield from columns(rows(parameters))
-    yield from (f"  {word}: {text}" for word, text in words_in(parameters))
+    yield from (f"  {word}: {text}" for word, text in words_in(kind, parameters))
     for text, parts in shown_of(kind, model):
         yield ""
         yield text
@@ -98,7 +103,7 @@ def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
     told: dict[str, Any] = {"kind": kind, "name": model.name, "doc": textwrap.dedent(model.doc).strip()}
     told["parameters"] = [{field: getattr(p, field) for field in FIELDS} for p in models.written(model)]
     for words in ("commands", "unit", "order", "real_limit"):
-        if hasattr(model, words):
+        if hasattr(model, words) and (kind != "sensor" or getattr(model, words)):
             told[words] = getattr(model, words)
     for words in models.HELD:
         told[words] = [{"name": p.name, "unit": p.unit, "doc": p.doc} for p in getattr(model, words, ())]
@@ -113,11 +118,13 @@ def rows(parameters: Iterable[Parameter]) -> list[tuple[str, str, str, str, str]
 
 def how(kind: models.Kind, model: Any) -> str:
     """Where a deck writes this model."""
-    return HOW[kind].replace("MODEL", model.name)
+    usage = ON_LINK if kind == "sensor" and model.measures is not None else HOW[kind]
+    return usage.replace("MODEL", model.name)
 
 
 def shown_of(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
-    """What there is of a servo, bed or law to be recorded: in words, then name, unit and meaning of each."""
+    """What there is of a servo, guide, sensor of a link, bed or law to be recorded: in words, then name, unit and
+    meaning of each."""
     for words, text in (
         ("outputs", "Given by its law, at its ticks"),
         ("integrals", "Integrated by its law"),
@@ -130,6 +137,9 @@ def shown_of(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[st
     if kind == "guide" and model.memory:
         told = [(p.name, unit_in_words(p.unit), p.doc) for p in model.memory]
         yield "Given by its law, at its ticks; recorded as guides.NAME.NAME", told
+    if kind == "sensor" and model.measures is not None:
+        told = [(p.name, unit_in_words(watched_unit(p.unit, model.unit)), p.doc) for p in model.states]
+        yield "Integrated with the motion; recorded as sensors.NAME.NAME, what it reads as sensors.NAME", told
     shown = list(of_bed(model) if kind == "bed" else of_law(model) if kind == "law" else ())
     if shown:
         told = [(name, unit_in_words(unit), doc) for name, unit, doc in shown]
@@ -147,14 +157,17 @@ def facts(kind: models.Kind, model: Any) -> Iterator[str]:
         if value:
             text = "Commands it gives" if kind == "guide" else text
             yield f"{text}: {', '.join(value) if isinstance(value, tuple) else number(value)}"
+    if kind == "sensor" and model.unit:
+        yield f"Unit of what it reads: {model.unit}"
     if kind == "metric":
-        yield f"Unit of the result: {WORDS.get(model.unit, unit_in_words(model.unit))}"
+        meant = WORDS | {"of": OF["metric"]}
+        yield f"Unit of the result: {meant.get(model.unit, unit_in_words(model.unit))}"
 
 
-def words_in(parameters: tuple[Parameter, ...]) -> Iterator[tuple[str, str]]:
+def words_in(kind: models.Kind, parameters: tuple[Parameter, ...]) -> Iterator[tuple[str, str]]:
     """The words in units that the use decides, and what they stand for."""
     used = {word for p in parameters for word in WORDS if word in re.split(r"\W+", p.unit)}
-    return ((word, text) for word, text in WORDS.items() if word in used)
+    return ((word, OF.get(kind, text) if word == "of" else text) for word, text in WORDS.items() if word in used)
 
 
 def summary(model: Any) -> str:

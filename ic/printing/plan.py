@@ -93,7 +93,12 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
     if structure.guides:
         yield from _guides(experiment)
         yield ""
+    if structure.sensors:
+        yield from _sensors(experiment)
+        yield ""
     yield from _environment(experiment)
+    if structure.balanced:
+        yield "Start: servos begin balanced, with what keeps their joints from accelerating"
     yield ""
     yield from _channels(structure)
     if structure.metrics:
@@ -250,6 +255,8 @@ def _schedule(experiment: Experiment) -> Iterator[str]:
         if models.find("guide", guide.model).steer is not None:
             ticks = count(schedule.ticks // guide.divisor + 1, "tick")
             rows.append(row(f"guide {guide.name} of {', '.join(guide.joints)}", guide.divisor, ticks))
+    for sensor in structure.sensors:
+        rows.append(row(f"sensor {sensor.name}", sensor.divisor, count(schedule.ticks // sensor.divisor + 1, "tick")))
     steps = f"{count(schedule.ticks // schedule.dynamics, 'step')} of {number(schedule.step * 1e3)} ms"
     rows.append(row("dynamics", schedule.dynamics, f"{steps}, {structure.integrator}"))
     rows.append(row("record", schedule.record, count(schedule.rows, "row")))
@@ -301,6 +308,16 @@ def _guides(experiment: Experiment) -> Iterator[str]:
         for course in use.courses:
             given = _given(experiment, f"{head}.{course.component}", models.find("command", course.model).parameters)
             rows.append(("", course.component, ", ".join([course.model, *given])))
+    yield from columns(rows)
+
+
+def _sensors(experiment: Experiment) -> Iterator[str]:
+    """The sensors of links, with their parameters."""
+    yield "Sensors of links"
+    rows = []
+    for use in experiment.structure.sensors:
+        given = _given(experiment, f"sensors.{use.name}", models.sensor_parts(use, "parameters"))
+        rows.append((use.name, use.model, ", ".join(given)))
     yield from columns(rows)
 
 

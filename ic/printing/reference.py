@@ -73,7 +73,7 @@ def _model(kind: models.Kind, model: Any) -> Iterator[str]:
     if parameters:
         yield ""
         yield from _table(rows(parameters))
-    words = [f"`{word}`: {_escaped(text)}" for word, text in words_in(parameters)]
+    words = [f"`{word}`: {_escaped(text)}" for word, text in words_in(kind, parameters)]
     if words:
         yield ""
         yield ". ".join(words) + "."

@@ -44,9 +44,14 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
         if models.find("guide", guide.model).steer is not None:
             ticks = f"{guide.divisor} base ticks a tick"
             number(f"guides.{guide.name}.rate", schedule.base_hz / guide.divisor, "Hz", ticks)
+    for sensor in structure.sensors:
+        word(f"sensors.{sensor.name}.model", sensor.model, sensor.place)
+        ticks = f"{sensor.divisor} base ticks a tick"
+        number(f"sensors.{sensor.name}.rate", schedule.base_hz / sensor.divisor, "Hz", ticks)
     for environment in structure.environment:
         word(f"environment.{environment.name}.model", environment.model, environment.place)
     word("environment.velocity_products", "on" if structure.velocity_products else "off")
+    word("initial.servos", "balanced" if structure.balanced else "unloaded")
     number("rates.base", schedule.base_hz, "Hz")
     number("rates.dynamics", schedule.base_hz / schedule.dynamics, "Hz", f"{schedule.dynamics} base ticks a step")
     number("rates.record", schedule.base_hz / schedule.record, "Hz", f"{schedule.record} base ticks a row")

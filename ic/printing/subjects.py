@@ -20,6 +20,8 @@ OF_ANY = (
     ("JOINT.servo.NAME", "what a servo holds, integrates and shows: `met doc` and the name of its model"),
     ("JOINT.servo.command", "what the servo was asked at its last tick, in the command's unit"),
     ("JOINT.bed.NAME, JOINT.law.NAME", "of a joint whose motor is on a bed: `met doc bed`, `met doc law`"),
+    ("sensors.NAME, sensors.NAME.NAME", "what a sensor of a link reads, and its states; `sensors`: what all of "
+                                      "them read"),
 )
 
 

@@ -32,7 +32,7 @@ NAMES = ("met.tmLanguage.json", "met.tmLanguage")
 STATEMENTS = ("vary", "zip", "sample", "repeat", "exclude", "when", "require", "remove", "macro", "from")
 """Words that begin an entry, or stand in one, and name nothing."""
 
-PARTS = ("link", "joint", "metric", "payload", "substitute", "guide")
+PARTS = ("link", "joint", "metric", "payload", "substitute", "guide", "sensor")
 """Words that begin an entry and are followed by a name."""
 
 WORDS = ("on", "off", "base", "faults", "free", "prescribed")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Literal
 
 from ic.grammar.syntax import Deck, Group, Word
-from ic.meaning.arm import resolve_arm
+from ic.meaning.arm import check_arm
 from ic.meaning.complaints import Complaints
 from ic.meaning.resolve import Definitions
 from ic.meaning.scope import Scope
@@ -61,7 +61,7 @@ def _check(made: Body) -> None:
     complaints = Complaints()
     definitions = Definitions(Deck(made.robot.file, (Group(words, None, None, made.entries, place),), ()), complaints)
     for definition in definitions.of_kind("arm").values():
-        resolve_arm(Scope(definitions, complaints), definition)
+        check_arm(Scope(definitions, complaints), definition)
     if complaints.errors:
         raise Problem(_mended(complaints.errors))
 

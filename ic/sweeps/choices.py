@@ -14,6 +14,7 @@ from typing import Any
 
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Call, Entry, Expression, Group, List, Name, Number, Setting, String, Unit, WithUnit, Word
+from ic.meaning.merge import Block
 from ic.meaning.names import Names
 from ic.meaning.resolve import Definition, Definitions
 from ic.meaning.values import FUNCTIONS, Value, Values, evaluate, measure_of, place_of, spanned
@@ -28,6 +29,8 @@ MACRO = "macro"
 OF_RUN = ("integrator", "arm", "duration", "base")
 OF_JOINT = ("servo", "law", "bed")
 OF_SERVO = ("model", "command", "rate")
+SENSOR = "sensor"
+ONE_OF_TWO = ("environment.velocity_products", "initial.servos")
 NEVER_NUMBERS = ("shape", "along", "of", "parent", "child", "axes", "interpolation", "growth")
 A_RUN_FOR_EACH = "write a run for each, `like` the first, and `sweep NAME = ONE + OTHER;`"
 
@@ -67,7 +70,7 @@ def decides(definitions: Definitions, path: str, values: Expression, names: Name
     first, *rest = path.split(".")
     if path in definitions.lets:
         return False
-    if path in OF_RUN or (first == "rates" and rest) or path == "environment.velocity_products":
+    if path in OF_RUN or (first == "rates" and rest) or path in ONE_OF_TWO:
         return True
     if first in definitions.of_kind("servo"):
         return (len(rest) == 1 and rest[0] in OF_SERVO) or _are_words(values, names)
@@ -75,7 +78,10 @@ def decides(definitions: Definitions, path: str, values: Expression, names: Name
         return True
     if rest[:1] == ["servo"] and len(rest) == 2 and rest[1] in OF_SERVO:
         return True
-    return (first == "environment" or rest[:1] in [[each] for each in OF_JOINT]) and _are_words(values, names)
+    if first == "sensors" and len(rest) == 2 and rest[1] == "rate":
+        return True
+    has_words = first in ("environment", "sensors", "guides") or rest[:1] in [[each] for each in OF_JOINT]
+    return has_words and _are_words(values, names)
 
 
 def _are_words(values: Expression, names: Names) -> bool:
@@ -189,13 +195,14 @@ def put_in(definitions: Definitions, run: Definition, choices: Choices) -> tuple
         first, *rest = column.path.split(".")
         servo = definitions.of_kind("servo").get(first)
         if servo is not None and rest:
-            if len(rest) > 1:
+            if len(rest) > 1 and rest[0] != SENSOR:
                 raise Problem(error("D122", f"`{column.path}` cannot vary by itself", column.place,
                                     help=f"vary all of it: `vary {first}.{rest[0]} = [...];`"))
             earlier = next((each for each in servos if each.name == first), servo)
-            servos = [*(each for each in servos if each is not earlier), _changed(earlier, rest[0], column, option)]
+            entry = inside(in_servo(rest, definitions.block(earlier)), option.expression, column.place)
+            servos = [*(each for each in servos if each is not earlier), replace(earlier, upon=(*earlier.upon, entry))]
             continue
-        _place(tree, keys_of(first, rest), column, option)
+        _place(tree, keys_of(first, rest, definitions.block(run)), column, option)
     made = definitions.instead(*servos)
     if not tree:
         return made, run
@@ -206,11 +213,36 @@ def put_in(definitions: Definitions, run: Definition, choices: Choices) -> tuple
     return made, Definition("run", name, group)
 
 
-def keys_of(first: str, rest: Sequence[str]) -> tuple[str, ...]:
-    """Where in a run's block the path's value is written."""
+def keys_of(first: str, rest: Sequence[str], run: Block | None) -> tuple[str, ...]:
+    """Where in a run's block the path's value is written. run: that block, as it is so far."""
     if rest and rest[0] == "servo":
-        return ("servos", first, *rest[1:])
+        servos = run.get("servos") if run is not None else None
+        use = servos.body.get(first) if servos is not None and servos.body is not None else None
+        return ("servos", first, *in_servo(rest[1:], use.body if use is not None else None))
+    if first in ("sensors", "guides") and rest:
+        return tuple(rest)
     return (first, *rest)
+
+
+def in_servo(keys: Sequence[str], block: Block | None) -> tuple[str, ...]:
+    """Where in a servo's block the rest of a path is written; a sensor without its word where the block has it."""
+    if len(keys) < 2 or keys[0] != SENSOR:
+        return tuple(keys)
+    there = block is not None and f"{SENSOR} {keys[1]}" in block.items
+    return (keys[1] if there else f"{SENSOR} {keys[1]}", *keys[2:])
+
+
+def inside(keys: Sequence[str], value: Expression, place: Place) -> Entry:
+    """A value as a block writes it: `servos { elbow { rate = ...; } }`."""
+    *words, name = (Word(word, place) for word in keys[-1].split())
+    made: Entry = Setting(tuple(words), (name,), "=", value, place)
+    for key in reversed(keys[:-1]):
+        made = _group(key, (made,), place)
+    return made
+
+
+def _group(key: str, body: tuple[Entry, ...], place: Place) -> Group:
+    return Group(tuple(Word(word, place) for word in key.split()), None, None, body, place)
 
 
 def _place(tree: dict[str, Any], keys: Sequence[str], column: Chosen, option: Option) -> None:
@@ -237,14 +269,8 @@ def _entries(tree: dict[str, Any]) -> list[Entry]:
         if isinstance(inner, dict):
             entries = tuple(_entries(inner))
             place = entries[0].place
-            made.append(Group((Word(key, place),), None, None, entries, place))
+            made.append(_group(key, entries, place))
         else:
             column, option = inner
-            made.append(Setting((), (Word(key, column.place),), "=", option.expression, column.place))
+            made.append(inside((key,), option.expression, column.place))
     return made
-
-
-def _changed(servo: Definition, key: str, column: Chosen, option: Option) -> Definition:
-    """A servo's definition with one key set otherwise."""
-    entry = Setting((), (Word(key, column.place),), "=", option.expression, column.place)
-    return replace(servo, upon=(*servo.upon, entry))

@@ -14,6 +14,7 @@ from ic.meaning.experiment import experiment
 from ic.meaning.resolve import Definition, Definitions
 from ic.meaning.run import resolve_run
 from ic.meaning.scope import Scope
+from ic.meaning.stops import check_stops
 from ic.sweeps.axes import Sweep, read_sweep, whole
 from ic.sweeps.choices import Choices, put_in
 from ic.sweeps.effects import Effects
@@ -58,6 +59,8 @@ def lower(source: Source, definition: Definition) -> list[Group]:
             return []
         made = experiment(scope, run.name, run.place, resolved, Cases(1, (), resolved.seed))
         source.effects.look(scope, run, made)
+        if not source.complaints.errors:
+            check_stops(source.complaints, made)
         return [(made, scope)]
     return _sum(source, definition, ()) if definition.parts else _Sweep(source, definition).groups()
 
@@ -158,6 +161,7 @@ class _Sweep:
         made = replace(made, notes=(*(axis.note for axis in there.axes if axis.note), *made.notes))
         if not self.complaints.errors:
             idle(self.complaints, there, made)
+            check_stops(self.complaints, made)
         self.source.effects.look(scope, run, made, self.definition.group.body)
         return ((made, scope), rows[keep]), dropped
 
@@ -258,7 +262,8 @@ def _slugs(groups: Sequence[Experiment]) -> list[str]:
     """A short name for each group: what is chosen otherwise in others, in letters that a file's group may have."""
     rows = [[choice.value for choice in group.cases.choices] for group in groups]
     differ = [n for n, column in enumerate(zip(*rows, strict=True)) if len(set(column)) > 1]
-    made = ["-".join(re.sub(r"[^\w+-]+", "_", row[n]).strip("_") or "_" for n in differ) for row in rows]
+    heads = [[value.partition(" {")[0] for value in row] for row in rows]  # of a model, without its parameters
+    made = ["-".join(re.sub(r"[^\w+-]+", "_", row[n]).strip("_") or "_" for n in differ) for row in heads]
     repeated = {slug for slug in made if made.count(slug) > 1}
     return [f"{slug}-{n}" if slug in repeated else slug for n, slug in enumerate(made, start=1)]
 

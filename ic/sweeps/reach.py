@@ -7,6 +7,7 @@ import numpy as np
 from ic.meaning.complaints import Complaints, known_words
 from ic.meaning.scope import Scope
 from ic.sweeps.axes import Sweep
+from ic.sweeps.choices import ONE_OF_TWO
 from met import units
 from met.diagnostic import Label, did_you_mean
 from met.plan import REPEAT, Coordinate, Experiment
@@ -38,10 +39,7 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
                                    help=f"it varies over names: `vary {path} = [...];`")
             continue
         also = _overridden(scope, first, rest)
-        if (
-            first in ("rates", "duration", "record", "servos")
-            or path == "environment.velocity_products"
-        ):
+        if first in ("rates", "duration", "record", "servos") or path in ONE_OF_TWO:
             scope.complaints.error("D122", f"`{path}` cannot vary", place,
                                    help="vary one of its parts, or what it names")
         elif also is not None:
@@ -123,7 +121,9 @@ def idle(complaints: Complaints, sweep: Sweep, experiment: Experiment) -> None:
             elif name == REPEAT:
                 complaints.error("D230", "there is no noise in this run, so a repeat is the same case again",
                                  sweep.repeated, help=["leave `repeat` out",
-                                                       "the tachometer of a bed is noisy: `substitute JOINT "
+                                                       "a sensor may be noisy: `sensor qd = tachometer "
+                                                       "{ noise = 0.1 rad/s; }` in a servo",
+                                                       "and so may a bed: `substitute JOINT "
                                                        "{ bed = emulated(faults = typical); }`"])
             elif REPEAT not in experiment.cases.noise:
                 complaints.error("D230", "there is no noise in this run, so no case has noise of its own",

@@ -15,7 +15,7 @@ from dataclasses import replace
 from typing import Literal
 
 from ic.grammar.settings import path_of
-from ic.grammar.syntax import Entry, Group, List, Name, Setting, Word
+from ic.grammar.syntax import List, Name, Setting
 from ic.meaning.complaints import Complaints
 from ic.meaning.models import word_of
 from ic.meaning.names import Names
@@ -25,7 +25,7 @@ from ic.meaning.scope import VARIES
 from ic.meaning.unit_words import in_deck
 from ic.meaning.values import PURE, Value, place_of
 from ic.sweeps.axes import Sweep
-from ic.sweeps.choices import OF_RUN, decides, keys_of
+from ic.sweeps.choices import OF_RUN, ONE_OF_TWO, SENSOR, decides, in_servo, inside, keys_of
 from met import units
 from met.diagnostic import Label, Problem, error
 from met.frozen import frozen
@@ -50,9 +50,10 @@ class Settings:
                 for entry in self.that_go(definitions, "let")]
         servos: dict[str, Definition] = {}
         for entry in self.that_go(definitions, "servo"):
-            name, key = (word.text for word in entry.path)
+            name, *keys = (word.text for word in entry.path)
             servo = servos.get(name) or definitions.of_kind("servo")[name]
-            servos[name] = replace(servo, upon=(*servo.upon, _inside((key,), entry)))
+            made = inside(in_servo(keys, definitions.block(servo)), entry.value, entry.place)
+            servos[name] = replace(servo, upon=(*servo.upon, made))
         return definitions.instead(*servos.values(), lets=lets)
 
     def in_run(self, definitions: Definitions, run: Definition) -> tuple[Definitions, Definition]:
@@ -60,7 +61,8 @@ class Settings:
         for entry in sorted(self.that_go(definitions, "run"), key=lambda entry: len(entry.path)):
             if concerns(definitions, run, entry):
                 first, *rest = (word.text for word in entry.path)
-                run = replace(run, upon=(*run.upon, _inside(keys_of(first, rest), entry)))
+                keys = keys_of(first, rest, definitions.block(run))
+                run = replace(run, upon=(*run.upon, inside(keys, entry.value, entry.place)))
                 definitions = definitions.instead(run)
         return definitions, run
 
@@ -99,11 +101,13 @@ def goes(definitions: Definitions, entry: Setting) -> Goes:
     path = path_of(entry)
     if path in definitions.lets:
         return "let"
+    values = List((entry.value,), place_of(entry.value))
     if entry.path[0].text in definitions.of_kind("servo"):
-        return "servo" if len(entry.path) == 2 else "number"
+        of_sensor = len(entry.path) > 2 and entry.path[1].text == SENSOR
+        words = of_sensor and decides(definitions, path, values, Names(definitions, {}))
+        return "servo" if len(entry.path) == 2 or words else "number"
     if len(entry.path) == 1:
         return "run" if path in (*OF_RUN, SEED) else "number"
-    values = List((entry.value,), place_of(entry.value))
     return "run" if decides(definitions, path, values, Names(definitions, {})) else "number"
 
 
@@ -111,7 +115,7 @@ def concerns(definitions: Definitions, run: Definition, entry: Setting) -> bool:
     """Whether the run has what the path of its structure names; true where that cannot be said."""
     path, first = path_of(entry), entry.path[0].text
     block = definitions.block(run)
-    if block is None or path in OF_RUN or path == SEED or first == "rates":
+    if block is None or path in (*OF_RUN, *ONE_OF_TWO, SEED) or first == "rates":
         return True
     inside = entry.path[1].text
     if first == "environment":
@@ -123,14 +127,6 @@ def concerns(definitions: Definitions, run: Definition, entry: Setting) -> bool:
     arm = definitions.of_kind("arm").get(word_of(named.value) or "") if named is not None else None
     joints = definitions.block(arm) if arm is not None else None
     return joints is None or joints.get(f"joint {first}") is not None
-
-
-def _inside(keys: tuple[str, ...], entry: Setting) -> Entry:
-    """The entry as a block writes it: `servos { elbow { rate = ...; } }`."""
-    made: Entry = Setting((), (Word(keys[-1], entry.place),), "=", entry.value, entry.place)
-    for key in reversed(keys[:-1]):
-        made = Group((Word(key, entry.place),), None, None, (made,), entry.place)
-    return made
 
 
 def _of_another_dimension(path: str, old: Value, new: Value, defined) -> Problem:  # type: ignore[no-untyped-def]

@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from met.commands.profile import Profile
+from met.instants import has_come
 from met.parameter import Parameter
 from met.trace import Real, where
 
 
 def course(p: Any, t: Real) -> tuple[Real, Real]:
-    return where(t >= p.at, p.to, p.start), 0.0
+    return where(has_come(t, p.at), p.to, p.start), 0.0
 
 
 PROFILE = Profile(

@@ -14,6 +14,7 @@ from met.dynamics.spatial import (
     add,
     compose,
     cross,
+    scale,
     sub,
     turn_vector,
     turn_vector_back,
@@ -101,6 +102,39 @@ def joint_rates(
     return tuple(rates)
 
 
+def link_acceleration(
+    tree: Tree, q: Sequence[Real], qd: Sequence[Real], qdd: Sequence[Real], link: str,
+    base_rate: Vector = ZERO, base_acceleration: tuple[Vector, Vector] = (ZERO, ZERO),
+) -> tuple[Vector, Vector]:
+    """Angular acceleration of a link, and acceleration of its frame's origin, in link axes, rad/s^2, m/s^2.
+
+    Of a motion, however it came about: all products of velocities are in it. base_rate, base_acceleration: the
+    base frame's angular velocity; its angular acceleration and that of its origin; in its own axes.
+    """
+    steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
+    frame = tree.frames[link]
+    way: list[int] = []
+    i = frame.joint
+    while i >= 0:
+        way.insert(0, i)
+        i = tree.joints[i].parent
+    w = turn_vector_back(tree.base.R, base_rate)
+    wd, a = fixed_acceleration(base_rate, base_acceleration, tree.base)
+    for i in way:
+        kind, step = tree.joints[i].kind, steps[i]
+        carried = step.lower_rate(w)
+        wd, a = step.lower_acceleration(wd, a, step.offset_product(w))
+        a = add(a, cross(carried, cross(carried, (0.0, 0.0, step.slide))))
+        along, faster = (0.0, 0.0, qd[i]), (0.0, 0.0, qdd[i])
+        if kind == "revolute":
+            w = add(carried, along)
+            wd = add(add(wd, cross(carried, along)), faster)
+        else:
+            w = carried
+            a = add(add(a, scale(2.0, cross(carried, along))), faster)
+    return fixed_acceleration(w, (wd, a), frame.pose)
+
+
 def jacobian(
     tree: Tree, q: Sequence[Real], link: str, point: Vector = ZERO, base: Pose = HERE
 ) -> tuple[tuple[Vector, Vector], ...]:
@@ -122,6 +156,13 @@ def jacobian(
         columns[i] = (axis, cross(axis, sub(target, p))) if joint.kind == "revolute" else (ZERO, axis)
         i = joint.parent
     return tuple(columns)
+
+
+def fixed_acceleration(w: Vector, acceleration: tuple[Vector, Vector], inner: Pose) -> tuple[Vector, Vector]:
+    """The same of accelerations: of a frame that turns at w, to one fixed to it at the given pose, in its own axes."""
+    wd, a = acceleration
+    there = add(a, add(cross(wd, inner.p), cross(w, cross(w, inner.p))))
+    return turn_vector_back(inner.R, wd), turn_vector_back(inner.R, there)
 
 
 def fixed_motion(motion: tuple[Vector, Vector], inner: Pose) -> tuple[Vector, Vector]:

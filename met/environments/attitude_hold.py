@@ -78,5 +78,5 @@ ENVIRONMENT = Environment(
     ),
     loads=loads,
     idle=idle,
-    pushes="link",
+    pushes=lambda p: ("link",),
 )

@@ -118,4 +118,5 @@ ENVIRONMENT = Environment(
     ),
     loads=loads,
     idle=idle,
+    pushes=lambda p: ("link", "to"),
 )  # fmt: skip

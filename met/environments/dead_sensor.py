@@ -11,16 +11,15 @@ from __future__ import annotations
 from typing import Any
 
 from met.environments.environment import Environment
-from met.environments.window import WINDOW, never
+from met.environments.window import WINDOW, never, open_at
 from met.parameter import Parameter
-from met.trace import Real, both, where
+from met.trace import Real, where
 
 
 def sees(p: Any, time: Real, of: str, value: Real, last: Real) -> Real:
     if of != p.of:
         return value
-    dead = both(time >= getattr(p, "from"), time < p.until)
-    return where(dead, 0.0 if p.reads == "zero" else last, value)
+    return where(open_at(p, time), 0.0 if p.reads == "zero" else last, value)
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:

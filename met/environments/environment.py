@@ -95,8 +95,12 @@ class Environment:
     loads  (p, world) -> Loads. None: it is no load
     idle   (p, duration) -> the parameters because of which it never acts in a run of that length (s), and why, in
            words; None where it may act. Asked where all its numbers are constants. None: it always may
-    pushes the parameter that names the one link that it acts upon: a deck that names one which is part of the ground
-           is warned. "": none does
+    pushes (p) -> the parameters that name the links that it acts upon: a deck in which all of these are part of the
+           ground is warned. None: it may act upon others
+    between  the two parameters that are the ends between which its joint should begin: a deck whose joint begins
+           beyond is warned. (): there are none
+    springs  the parameters that name a joint, and are the stiffness with which it is pushed back where it touches: a
+           deck is warned where the dynamics' step is long for that (met/contact.py). (): there is none
     rubs   the parameter that names the one joint on which it puts dry friction. "": none does
 
     What it may do to the servo of one joint, such as to let it fail:
@@ -108,6 +112,12 @@ class Environment:
            servo's limits allow (`Servo.full`)
     sees   (p, time, of, value, last) -> what the law sees of the quantity `of` in the stead of this value; last: what
            it saw at its last tick
+    What of it no instrument on board feels:
+
+    falls  (p, world, position, velocity) -> acceleration of a body that falls freely there, and moves so, beside
+           `Loads.gravity`, world axes (m/s^2): of a model whose loads are gravitation, or that has the world turn
+    turns  (p, world) -> angular velocity of the world's axes against directions that do not turn, world axes (rad/s)
+
     from_file  a deck may write `file` in the stead of the lists: they are then the columns of their names, and the
            list that rises is the column `time`
     """
@@ -117,12 +127,16 @@ class Environment:
     parameters: tuple[Parameter, ...] = ()
     loads: Callable[[Any, World], Loads] | None = None
     idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None
-    pushes: str = ""
+    pushes: Callable[[Any], tuple[str, ...]] | None = None
+    between: tuple[str, ...] = ()
+    springs: tuple[str, ...] = ()
     rubs: str = ""
     servo_of: str = ""
     loose: Callable[[Any, Any], Real] | None = None
     gives: Callable[[Any, Real, Mapping[str, Real], Mapping[str, Real]], Mapping[str, Real]] | None = None
     sees: Callable[[Any, Real, str, Real, Real], Real] | None = None
+    falls: Callable[[Any, World, Vector, Vector], Vector] | None = None
+    turns: Callable[[Any, World], Vector] | None = None
     from_file: bool = False
 
     @property

@@ -2,8 +2,9 @@
 
 Torque, dry friction and acceleration of the joint's servo do not reach the joint at times t with from <= t < until; of
 a step that lies in this window in part, in proportion. What inertia of the rotor moves with the joint still does;
-behind an elastic gear the motor is let go too, and turns by itself. When it takes hold again, nothing is aligned: a
-position loop finds the joint where it is.
+behind an elastic gear the motor is let go too, and turns by itself, and the gear unwinds within a few steps. It takes
+hold again with nothing wound up, wherever motor and joint are by then; of other rates, with a blow. Nothing is aligned:
+a position loop finds the joint where it is.
 """
 
 from __future__ import annotations

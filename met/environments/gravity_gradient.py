@@ -28,28 +28,49 @@ from typing import Any
 from met.environments.environment import Environment, Force, Loads, World
 from met.parameter import ZEROS, Parameter
 from met.trace import Real, cos, sin, sqrt
-from met.vectors import Matrix, Vector, add, cross, product, rotation_rpy, scale, transposed, turn_vector
+from met.vectors import ZERO, Matrix, Vector, add, cross, product, rotation_rpy, scale, transposed, turn_vector
 
 
 def loads(p: Any, world: World) -> Loads:
+    field, turning = _around(p, world)
+    return Loads(forces=tuple(_on_link(p, world, link, field, turning) for link in world.links))
+
+
+def falls(p: Any, world: World, position: Vector, velocity: Vector) -> Vector:
+    field, turning = _around(p, world)
+    return _acceleration(p, field, turning, position, velocity)
+
+
+def turns(p: Any, world: World) -> Vector:
+    return _around(p, world)[1] if p.frame == "orbital" else ZERO
+
+
+def _around(p: Any, world: World) -> tuple[Matrix, Vector]:
+    """The acceleration of a part for each way from the origin, of a part at rest; the angular velocity of the orbit."""
     n = sqrt(p.mu / (p.radius * p.radius * p.radius))
     axes = transposed(rotation_rpy(*p.rpy))
     up, along, normal = axes
     if p.frame == "inertial":
         c, s = cos(n * world.time), sin(n * world.time)
         up = add(scale(c, up), scale(s, along))
-    field = _field(n, up, normal, turning=p.frame == "orbital")
-    return Loads(forces=tuple(_on_link(p, world, link, field, scale(n, normal)) for link in world.links))
+    return _field(n, up, normal, turning=p.frame == "orbital"), scale(n, normal)
+
+
+def _acceleration(p: Any, field: Matrix, turning: Vector, position: Vector, velocity: Vector) -> Vector:
+    """Of a part there that moves so, world axes; `field` and `turning` of `_around`."""
+    found = turn_vector(field, position)
+    if p.frame == "orbital":
+        found = add(found, scale(-2.0, cross(turning, velocity)))
+    return found
 
 
 def _on_link(p: Any, world: World, link: str, field: Matrix, turning: Vector) -> Force:
-    """field: the acceleration of a part for each way from the origin, of a part at rest."""
+    """`field` and `turning` of `_around`."""
     mass, com = world.mass(link), world.com(link)
     second = _second_moments(world, link)
-    acceleration = turn_vector(field, world.position(link, com))
+    acceleration = _acceleration(p, field, turning, world.position(link, com), world.velocity(link, com))
     spread = product(field, second)
     if p.frame == "orbital":
-        acceleration = add(acceleration, scale(-2.0, cross(turning, world.velocity(link, com))))
         coriolis = product(_crossing(scale(-2.0, turning)), _crossing(world.rate(link)))
         spread = _sum(spread, product(coriolis, second))
     moment = (spread[2][1] - spread[1][2], spread[0][2] - spread[2][0], spread[1][0] - spread[0][1])
@@ -105,4 +126,6 @@ ENVIRONMENT = Environment(
         ),
     ),
     loads=loads,
+    falls=falls,
+    turns=turns,
 )  # fmt: skip

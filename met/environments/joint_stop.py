@@ -63,5 +63,7 @@ ENVIRONMENT = Environment(
         ),
     ),
     loads=loads,
+    springs=("joint", "stiffness"),
     idle=idle,
+    between=("lower", "upper"),
 )  # fmt: skip

@@ -13,13 +13,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from met.environments.environment import Environment
-from met.environments.window import WINDOW, never
+from met.environments.window import WINDOW, never, open_at
 from met.parameter import Parameter
-from met.trace import Real, both, where
+from met.trace import Real, where
 
 
 def gives(p: Any, time: Real, outputs: Mapping[str, Real], full: Mapping[str, Real]) -> Mapping[str, Real]:
-    runs = both(time >= getattr(p, "from"), time < p.until)
+    runs = open_at(p, time)
     return {name: where(runs, p.level * full[name], value) for name, value in outputs.items()}
 
 

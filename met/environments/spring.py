@@ -58,4 +58,5 @@ ENVIRONMENT = Environment(
     ),
     loads=loads,
     idle=idle,
+    pushes=lambda p: ("link", "to"),
 )  # fmt: skip

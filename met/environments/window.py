@@ -7,10 +7,11 @@ window that begins and ends with steps is met exactly.
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import Any, Protocol
 
+from met.instants import has_come
 from met.parameter import Parameter
-from met.trace import Real, clip, maximum
+from met.trace import Real, Truth, both, clip, maximum, not_, where
 
 
 class Step(Protocol):
@@ -33,7 +34,14 @@ def share(world: Step, begins: Real, ends: Real) -> Real:
 
 def passed(world: Step, time: Real) -> Real:
     """The share of the step that lies before this time."""
-    return clip((time - world.begin) / world.step, 0.0, 1.0)
+    before = clip((time - world.begin) / world.step, 0.0, 1.0)
+    whole = has_come(time, world.begin + world.step)  # to rounding, as none of it is
+    return where(has_come(world.begin, time), 0.0, where(whole, 1.0, before))
+
+
+def open_at(p: Any, now: Real) -> Truth:
+    """Whether an instant lies in the window of a model that declares one: from <= now < until."""
+    return both(has_come(now, getattr(p, "from")), not_(has_come(now, p.until)))
 
 
 def never(begins: float, until: float, duration: float) -> tuple[tuple[str, ...], str] | None:

@@ -48,5 +48,5 @@ ENVIRONMENT = Environment(
     ),
     loads=loads,
     idle=idle,
-    pushes="link",
+    pushes=lambda p: ("link",),
 )

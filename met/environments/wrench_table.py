@@ -13,10 +13,12 @@ all seen: of what jumps, `wrench` keeps the impulse.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from met.commands.points import linear
 from met.environments.environment import Environment, Force, Loads, World
+from met.environments.window import never
 from met.parameter import ZEROS, Parameter
 from met.trace import Real
 from met.vectors import Vector
@@ -33,10 +35,17 @@ def loads(p: Any, world: World) -> Loads:
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
-    """Why these numbers make it nothing, with the parameters that say so."""
+    """Why these numbers make it nothing in a run of this length, with the parameters that say so."""
     if not any(number for name in NAMES for number in getattr(p, name)):
         return NAMES, "it has neither force nor moment"
-    return None
+    if any(len(getattr(p, name)) not in (0, len(p.times)) for name in NAMES):
+        return None  # which is told
+    rows = [any(values[row] for name in NAMES if (values := getattr(p, name))) for row in range(len(p.times))]
+    first, last = rows.index(True), len(rows) - 1 - rows[::-1].index(True)
+    begins = p.begin + p.times[first - 1] if first else -math.inf
+    until = p.begin + p.times[last + 1] if last + 1 < len(rows) else math.inf
+    found = never(begins, until, duration)
+    return (("begin", "times"), found[1]) if found is not None else None
 
 
 def _at(p: Any, values: tuple[float, ...], time: Real) -> Real:
@@ -68,4 +77,5 @@ ENVIRONMENT = Environment(
     ),
     loads=loads,
     idle=idle,
+    pushes=lambda p: ("link",),
 )  # fmt: skip

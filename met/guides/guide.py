@@ -86,6 +86,10 @@ class Guide:
     memory      what its computer shows of a tick
     fastest     (p) -> the rate constant with which its error falls, 1/s: 2 over its period, and it grows; None: unknown
     steer       (p, joints, sight) -> Steered, joints the parameters of each; None: it is a course
+    idle        (p, duration) -> the parameters because of which it, or some part of it, does nothing in a run of this
+                length (s), and why, in words that follow its name; None where all may act. Asked where all its numbers
+                are constants. None: it always may
+    undefined   where its rates are no numbers, in words that follow its name: told of a case that fails so. "": nowhere
     course      (p, joints, begins, t) -> position and rate of each joint at time t (s); begins: where each begins
     """
 
@@ -98,6 +102,8 @@ class Guide:
     memory: tuple[Memory, ...] = ()
     fastest: Callable[[Any], Real] | None = None
     steer: Steer | None = None
+    idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None
+    undefined: str = ""
     course: Course | None = None
 
     @property

@@ -48,6 +48,13 @@ def fastest(p: Any) -> Real:
     return p.gain
 
 
+def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
+    """Why its damping never acts, with the parameters that say so."""
+    if p.max_damping > 0.0 and p.threshold == 0.0:
+        return ("max_damping", "threshold"), "is never damped: no singular value is below a `threshold` of 0 m"
+    return None
+
+
 def steer(p: Any, joints: Sequence[Any], seen: Sight) -> Steered:
     rows = [POSE.index(name) for name in GUIDED[p.guides]]
     turns = p.guides == "pose"
@@ -138,4 +145,6 @@ GUIDE = Guide(
     ),
     fastest=fastest,
     steer=steer,
+    idle=idle,
+    undefined="at a singularity where its `max_damping` is 0 m",
 )

@@ -41,6 +41,13 @@ def course(p: Any, joints: Sequence[Any], begins: Sequence[Real], t: Real) -> li
     ]
 
 
+def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
+    """Why it moves nothing in a run of this length, with the parameters that say so."""
+    if p.begin >= duration:
+        return ("begin",), f"moves nothing: it would begin at {p.begin:g} s, and the run ends at {duration:g} s"
+    return None
+
+
 GUIDE = Guide(
     name="together",
     doc=__doc__,
@@ -53,5 +60,6 @@ GUIDE = Guide(
         Parameter(name="max_acceleration", unit="joint/s^2", above=0.0, doc="acceleration that is not exceeded"),
     ),
     commands=("position",),
+    idle=idle,
     course=course,
 )

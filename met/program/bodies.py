@@ -67,6 +67,10 @@ class FreeBody:
     def qd(self, y: Motion) -> tuple[Real, ...]:
         return y.qd[self.first : self.first + SIX]
 
+    def qdd(self, slopes: tuple[Real, ...]) -> tuple[Real, ...]:
+        """Of the slopes of all rates."""
+        return slopes[self.first : self.first + SIX]
+
 
 @frozen
 class Flight:

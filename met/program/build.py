@@ -1,9 +1,9 @@
 """From an experiment to its program: which phase runs when (docs/physics.md, "An instant").
 
-At an instant t_k, in this order: the step that ends there is finished; payloads are grappled and released; guides
-tick; servos tick (their commands first); friction modes are decided; derivatives are taken, which is the first stage of
-the step that begins; metrics and the recorder see the instant. Servos faster than the dynamics tick between instants,
-on the state carried forward.
+At an instant t_k, in this order: the step that ends there is finished; payloads are grappled and released; sensors of
+links read; guides tick; servos tick (their commands first); friction modes are decided; derivatives are taken, which is
+the first stage of the step that begins; metrics and the recorder see the instant. Servos faster than the dynamics tick
+between instants, on the state carried forward.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 
 from met.channel import Channel
 from met.plan import Experiment
-from met.program import base, failing, guiding, payloads, sensing
-from met.program.evaluation import law
+from met.program import balancing, base, failing, guiding, link_sensors, payloads, sensing
+from met.program.evaluation import gravity, law
 from met.program.machine import PARAMETER, Actuator, Machine
 from met.program.observe import derived
 from met.program.step import EVENTS, Step
@@ -58,6 +58,8 @@ class Builder:
         held, at_rows = derived(self.machine)
         tick: list[Control] = [Unless0((Every(instant, self.step.finish()),)), *self.step.grapple.events()]
         tick += self.step.beds.before_servos()
+        for divisor in sorted({use.divisor for use in self.machine.structure.sensors}):
+            tick.append(Every(divisor, (Run(Phase(f"sensors_{divisor}", self._sensors(divisor))),)))
         for divisor in sorted({use.divisor for use in guiding.ticking(self.machine)}):
             tick.append(Every(divisor, (Run(Phase(f"guides_{divisor}", self._guides(divisor))),)))
         for divisor in sorted({actuator.use.divisor for actuator in self.machine.working if actuator.ticks}):
@@ -102,14 +104,18 @@ class Builder:
         base.start(self.machine, tape)
         payloads.start(self.machine, tape)
         guiding.start(self.machine, tape)
+        link_sensors.start(self.machine, tape, lambda y: gravity(self.machine, tape.read, y, 0.0))
+        begun = {actuator.use.joint: self._begin_servo(tape, actuator) for actuator in self.machine.working}
+        if self.machine.structure.balanced:
+            balancing.balance(self.machine, tape, self.step.state(tape), begun)
         for actuator in self.machine.working:
-            self._start_servo(tape, actuator)
+            self._begin_sensors(tape, actuator)
         for name, metric, _ in self.machine.metrics:
             for memory in metric.memory:
                 tape.write(f"{METRIC}{name}.{memory.name}", memory.start)
 
-    def _start_servo(self, tape: Tape, actuator: Actuator) -> None:
-        """What a servo holds, and its states, where a run begins."""
+    def _begin_servo(self, tape: Tape, actuator: Actuator) -> dict[str, Real]:
+        """What a servo holds, and its states, where a run begins, by name; they are written, too."""
         parts, servo = actuator.parts, actuator.servo
         starts: dict[str, Real] = {part.name: part.start for part in (*parts.memory, *parts.states)}
         if servo.begin is not None:
@@ -118,9 +124,14 @@ class Builder:
             starts.update(returned(actuator.owner, "begin", found, (state.name for state in parts.natural)))
         for name, value in starts.items():
             tape.write(f"{actuator.path}.{name}", value)
-        states = Values(actuator.owner, {state.name: starts[state.name] for state in parts.natural})
-        q, qd = self._state_of(tape, self.joints[actuator.index])
-        seen = Seen(q, qd, Asked("none", 0.0, 0.0), 0.0, 0.0, states)
+        return starts
+
+    def _begin_sensors(self, tape: Tape, actuator: Actuator) -> None:
+        """What the servo's sensors hold, and what was seen, where a run begins."""
+        natural = {state.name: tape.read(f"{actuator.path}.{state.name}") for state in actuator.parts.natural}
+        states = Values(actuator.owner, natural)
+        p, state = self.machine.servo_values(actuator, tape.read), self._state_of(tape, self.joints[actuator.index])
+        seen = Seen(*sensing.measured(actuator, p, *state, states), Asked("none", 0.0, 0.0), 0.0, 0.0, states)
         sensing.start(self.machine, tape, actuator, seen)
         for of in failing.quantities(actuator) if actuator.use.joint in self.machine.failing else ():
             tape.write(f"saw:{actuator.use.joint}.{of}", sensing.truth(seen, of))
@@ -136,7 +147,10 @@ class Builder:
         for name, cell in self.step.beds.wire_outputs.items():
             tape.output(name, tape.read(cell))
 
-    # Guides and servos.
+    # Sensors of links, guides and servos.
+
+    def _sensors(self, divisor: int) -> Body:
+        return lambda tape: link_sensors.tick(self.machine, tape, divisor)
 
     def _guides(self, divisor: int) -> Body:
         def body(tape: Tape) -> None:
@@ -170,12 +184,17 @@ class Builder:
         else:
             q, qd = self._carried(tape, actuator) if between else self._state_of(tape, joint)
         states = {each.name: state(f"{actuator.path}.{each.name}") for each in actuator.parts.natural}
+        if on_bed is None:
+            p = self.machine.servo_values(actuator, tape.read)
+            q, qd = sensing.measured(actuator, p, q, qd, Values(actuator.owner, states))
         seen = self.seen(actuator, q, qd, asked, tape.time, states)
         seen = sensing.ticked(self.machine, tape, actuator, seen, state)
         if joint in self.machine.failing:
             seen = failing.seen(self.machine, actuator, tape.read, seen, f"saw:{joint}.")
             for of in failing.quantities(actuator):
                 tape.write(f"saw:{joint}.{of}", sensing.truth(seen, of))
+        for fitted in actuator.sensors:
+            tape.write(fitted.path, sensing.truth(seen, sensing.quantity(fitted)))
         self.compute(tape, actuator, seen)
 
     def seen(

@@ -11,13 +11,13 @@ from met.dynamics.tree import Tree
 from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
-from met.program import failing, sensing
+from met.program import failing, link_sensors, sensing
 from met.program.base import Base, base_of, free_base
 from met.program.bodies import slopes
 from met.program.machine import Actuator, Machine, ReadCell
 from met.program.payloads import laden, shared, slopes_of_payloads
-from met.program.values import Values, answer, parameters, returned
-from met.program.world import ArmWorld
+from met.program.values import Values, answer, returned
+from met.program.world import ArmWorld, environment_values
 from met.servos.servo import Asked, Control, Drive, JointMotion, Seen
 from met.trace import Real, Truth, both, not_, where
 from met.vectors import Vector
@@ -28,13 +28,18 @@ class Derivative:
     """What holds at one stage.
 
     slope    derivative of the state
-    tau      torque of the servo on each moving joint, its rotor's share included (N m; N)
+    tau      torque of the servo on each moving joint, its rotor's share included (N m; N); of dry friction that a brake
+             bears with it, the servo's share
     need     what dry friction must hold where it sticks, by the name of what sticks: of a joint the smooth torque less
              what the arm takes, of a servo's state its slope without friction
     solved   the recursion's own results
     shown    what servos show of this stage, by channel
     gravity  acceleration of free fall, of all environment models, world axes, m/s^2
     base     where the base is and how it moves
+    stored   kinetic and potential energy in the servos, of what does not move with their joints, J
+    astray   of each moving joint, whether a state of its servo is where it can never be
+    loads    what each moving joint would have to be driven with to move so, N m (N): what the arm takes less what the
+             environment gives
     """
 
     slope: Slope
@@ -44,6 +49,9 @@ class Derivative:
     shown: Mapping[str, Real]
     gravity: Vector
     base: Base
+    stored: tuple[Real, Real]
+    astray: tuple[Truth, ...]
+    loads: tuple[Real, ...]
 
 
 def derivative(
@@ -123,14 +131,30 @@ def derivative(
         of_base = slopes(body, y, pose=base.pose, turned=base.turned, solved=solved.base_acceleration)
         qd, qdd = (*qd, *of_base[0]), (*qdd, *of_base[1])
     of_payloads = slopes_of_payloads(machine, read, y, on_payloads, loads.gravity)
+    qdd = (*qdd, *of_payloads[1])
+    if machine.sensors:
+        with part("sensors"):
+            moved = link_sensors.Accelerations(qdd, solved.base_acceleration, loads.gravity)
+            felt = link_sensors.Aboard(machine, read, tree, y, base, time, begin, moved)
+            own = dict(zip(machine.states, y.x, strict=True))
+            of_states = (*of_states, *link_sensors.slopes(machine, read, felt, own))
     return Derivative(
-        slope=Slope((*qd, *of_payloads[0]), (*qdd, *of_payloads[1]), of_states),
-        tau=tuple(a - b for a, b in zip(solved.tau, loads.torques, strict=True)),
+        slope=Slope((*qd, *of_payloads[0]), qdd, of_states),
+        tau=tuple(
+            a - b + _of_brakes(machine, i, drives[i], loads, smooth[i] - a)
+            for i, (a, b) in enumerate(zip(solved.tau, loads.torques, strict=True))
+        ),
         need=needs | state_needs,
         solved=solved,
         shown={path: value for each in driven if each is not None for path, value in each.shown.items()},
         gravity=loads.gravity,
         base=base,
+        stored=(
+            sum((drive.kinetic for drive in drives if drive is not None), 0.0),
+            sum((drive.potential for drive in drives if drive is not None), 0.0),
+        ),
+        astray=tuple(False if drive is None else drive.astray for drive in drives),
+        loads=tuple(a - b for a, b in zip(solved.tau_load, loads.torques, strict=True)),
     )
 
 
@@ -157,7 +181,7 @@ def driven_by(
     q, qd = y.q[actuator.index], y.qd[actuator.index]
     slopes: dict[str, Real] = {}
     shown: dict[str, Real] = {}
-    seen = Seen(q, qd, Asked("none", 0.0, 0.0), 0.0, time, natural)
+    seen = Seen(*sensing.measured(actuator, p, q, qd, natural), Asked("none", 0.0, 0.0), 0.0, time, natural)
     of_sensors = sensing.slopes(machine, actuator, read, seen, own)
     if parts.continuous:
         seen = sensing.through(machine, actuator, read, replace(seen, asked=machine.asked(actuator, read, time)), own)
@@ -168,7 +192,8 @@ def driven_by(
         held = Values(owner, {**found.outputs, **integrals})
         slopes.update(found.slopes)
         shown.update({"command": seen.asked.value} if actuator.use.command is not None else {}, **found.outputs)
-        shown.update({f"sensor.{each.use.of}": sensing.truth(seen, each.use.of) for each in actuator.sensors})
+        for of in map(sensing.quantity, actuator.sensors):
+            shown[f"sensor.{of}"] = sensing.truth(seen, of)
     coupled = failing.coupled(machine, actuator, read, begin)
     motion = JointMotion(q, qd, time, begin, actuator.asked, 1.0 if coupled is None else coupled)
     drive = answer(owner, servo.drive, p, held, natural, motion)
@@ -176,6 +201,11 @@ def driven_by(
         given = None if drive.given is None else both(drive.given, coupled > 0.0)
         drive = replace(drive, torque=coupled * drive.torque, dry=coupled * drive.dry, given=given)
     slopes.update(returned(owner, "slopes", drive.slopes, (state.name for state in parts.natural)))
+    if coupled is not None:
+        for state in parts.natural:
+            if state.between:
+                back = (state.start - own[f"{actuator.path}.{state.name}"]) / machine.structure.schedule.step
+                slopes[state.name] = coupled * slopes[state.name] + (1.0 - coupled) * back
     shown.update(returned(owner, "signals", drive.signals, (signal.name for signal in parts.signals)))
     by_channel = {f"{actuator.path}.{name}": slope for name, slope in slopes.items()}
     return Driven(drive, by_channel | of_sensors, {f"{actuator.path}.{name}": x for name, x in shown.items()})
@@ -233,6 +263,22 @@ def level_of(machine: Machine, joint: int, drive: Drive | None, loads: _Loads) -
     return drive.dry + loads.dry[name] if name in loads.dry else drive.dry
 
 
+def _of_brakes(machine: Machine, joint: int, drive: Drive | None, loads: _Loads, friction: Real) -> Real:
+    """Of a joint's dry friction, against the motion, what its brakes bear: their share of the level."""
+    name = machine.joints[joint].name
+    if name not in loads.dry:
+        return 0.0
+    level, own = level_of(machine, joint, drive, loads), loads.dry[name]
+    rubs = level > 0.0
+    return where(rubs, own / where(rubs, level, 1.0) * friction, 0.0)
+
+
+def gravity(machine: Machine, read: ReadCell, y: Motion, time: Real) -> Vector:
+    """Uniform gravity of all environment models at state y, world axes, m/s^2."""
+    base = base_of(machine, read, y, time)
+    return _environment(machine, laden(machine, read), read, y, base, time, time).gravity
+
+
 def brakes(
     machine: Machine, read: ReadCell, y: Motion, time: Real, begin: Real
 ) -> dict[str, Real]:
@@ -254,11 +300,9 @@ def _environment(
     wrenches: dict[str, tuple[Vector, Vector]] = {}
     dry: dict[str, Real] = {}
     for name, model in machine.environment if models is None else models:
-        prefix = f"environment.{name}"
-        owner = f"environment model `{model.name}` (as `{name}`)"
-        p = parameters(owner, prefix, model.parameters, lambda path: machine.value(path, read))
         if model.loads is None:
             continue
+        owner, p = environment_values(machine, name, model, read)
         loads = answer(owner, model.loads, p, world)
         gravity = [a + b for a, b in zip(gravity, loads.gravity, strict=True)]
         for joint, torque in loads.torques.items():

@@ -26,7 +26,7 @@ from met.dynamics.spatial import (
 from met.guides.guide import Sight, Stance
 from met.integrators.integrator import Motion
 from met.plan import COMPONENTS, GuideUse
-from met.program import base, bodies, cells
+from met.program import base, bodies, cells, payloads
 from met.program.base import Base
 from met.program.courses import rate_of_rpy, values_and_rates
 from met.program.guided import GUIDE, own, owner
@@ -89,16 +89,17 @@ class _ArmAt:
 
     def __init__(self, machine: Machine, use: GuideUse, read: ReadCell, y: Motion, stands: Base) -> None:
         n = len(machine.joints)
-        self._tree, self._base = machine.tree(read), stands
+        tree, self._base = machine.tree(read), stands
         self._free = machine.structure.free
+        self._laden = payloads.laden(machine, read)
         self._q, self._qd = y.q[:n], y.qd[:n]
         names = [joint.name for joint in machine.joints]
         self._own = [names.index(joint) for joint in use.joints]
         point = tuple(machine.value(f"guides.{use.name}.point.{axis}", read) for axis in "xyz")
         link = machine.value(f"guides.{use.name}.link", read)
-        self._moves = jacobian(self._tree, self._q, link, point, stands.pose)
+        self._moves = jacobian(tree, self._q, link, point, stands.pose)
         at_rest = [0.0] * n
-        frame = base.motions(self._tree, self._q, at_rest, Base(stands.pose))[link]
+        frame = base.motions(tree, self._q, at_rest, Base(stands.pose))[link]
         self._R, self._p = frame.pose.R, frame.position(point)
 
     def stance(self, *, answers: bool) -> Stance:
@@ -124,9 +125,10 @@ class _ArmAt:
 
     @cached_property
     def _answers(self) -> list[tuple[Vector, Vector]]:
-        """What a free base does to the frame for each unit of each joint's rate: angular velocity and velocity."""
+        """What a free base does to the frame for each unit of each joint's rate: angular velocity and velocity; with
+        the payloads that the links carry at this time."""
         arm = sub(self._p, self._base.pose.p)
-        found = base_answers(self._tree, self._q, self._base.pose)
+        found = base_answers(self._laden, self._q, self._base.pose)
         return [(w, add(v, cross(w, arm))) for w, v in found]
 
 

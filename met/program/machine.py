@@ -22,7 +22,7 @@ from met.frozen import frozen
 from met.integrators.integrator import Integrator
 from met.metrics.metric import Metric
 from met.parameter import Memory, Parameter, State
-from met.plan import BASE, Experiment, Formula, Joint, Payload, SensorUse, ServoUse, Structure
+from met.plan import BASE, Experiment, Formula, Joint, LinkSensor, Payload, SensorUse, ServoUse, Structure
 from met.program import guided
 from met.program.courses import recorded
 from met.program.values import Values, answer, parameters, returned
@@ -40,9 +40,10 @@ ReadCell = Callable[[str], Real]
 
 @frozen
 class Fitted:
-    """A sensor in use: its declaration, what there is of it here, and what its cells' names begin with."""
+    """A sensor in use, of a joint or of a link: its declaration, what there is of it here, and what its cells' names
+    begin with."""
 
-    use: SensorUse
+    use: SensorUse | LinkSensor
     sensor: Sensor
     parameters: tuple[Parameter, ...]
     states: tuple[State, ...]
@@ -54,6 +55,11 @@ class Fitted:
         """Name for messages."""
         return f"sensor `{self.path}` (model {self.sensor.name})"
 
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels of its states."""
+        return tuple(f"{self.path}.{state.name}" for state in self.states)
+
 
 @frozen
 class Actuator:
@@ -62,6 +68,7 @@ class Actuator:
     parts    what there is of it in this use
     level    of its dry friction, where it is the same at all times and for all cases, N m (N); None where it varies
     gives    whether it may give the joint's acceleration
+    strays   whether its states may be where they can never be
     levels   of the dry friction on its states, by name, as `level`
     sensors  through which its law sees
     """
@@ -73,6 +80,7 @@ class Actuator:
     parts: Parts
     level: float | None
     gives: bool
+    strays: bool
     levels: Mapping[str, float | None]
     sensors: tuple[Fitted, ...] = ()
 
@@ -89,7 +97,7 @@ class Actuator:
     def states(self) -> tuple[str, ...]:
         """Channels of its states: the servo's, then its sensors'."""
         own = [f"{self.path}.{state.name}" for state in self.parts.states]
-        return (*own, *(f"{each.path}.{state.name}" for each in self.sensors for state in each.states))
+        return (*own, *(name for each in self.sensors for name in each.channels))
 
     @property
     def asked(self) -> str:
@@ -169,8 +177,14 @@ class Machine:
 
     @cached_property
     def states(self) -> tuple[str, ...]:
-        """Channels of the states of servos and their sensors, in the order of `Motion.x`."""
-        return tuple(name for actuator in self.working for name in actuator.states)
+        """Channels of the states of servos and their sensors, then of links' sensors, in the order of `Motion.x`."""
+        of_servos = (name for actuator in self.working for name in actuator.states)
+        return (*of_servos, *(name for each in self.sensors for name in each.channels))
+
+    @cached_property
+    def sensors(self) -> tuple[Fitted, ...]:
+        """The sensors of links."""
+        return tuple(self._fitted(use, f"sensors.{use.name}") for use in self.structure.sensors)
 
     @cached_property
     def between(self) -> tuple[Actuator, ...]:
@@ -325,8 +339,8 @@ class Machine:
         servo = models.find("servo", use.model, use.place)
         told = use.command is not None and not use.command.guide
         profile = models.find("command", use.command.model, use.place) if use.command and told else None
-        sensors = tuple(self._fitted(use, each) for each in use.sensors)
-        bare = Actuator(index, use, servo, profile, models.servo_parts(use), None, False, {}, sensors)
+        sensors = tuple(self._fitted(each, f"{use.joint}.servo.sensor.{each.of}") for each in use.sensors)
+        bare = Actuator(index, use, servo, profile, models.servo_parts(use), None, False, False, {}, sensors)
         drive, level, levels = self._probe(bare)
         if drive.given is not None and (level != 0.0 or use.joint in self.braked):
             message = f"{bare.owner} gives both an acceleration and dry friction"
@@ -336,12 +350,12 @@ class Machine:
             raise Problem(error("E219", message, use.place, help=help))
         if level != 0.0 and any(model.loose is not None for _, model in self.failing.get(use.joint, ())):
             level = None  # it comes and goes
-        return replace(bare, level=level, gives=drive.given is not None, levels=levels)
+        return replace(bare, level=level, gives=drive.given is not None, strays=drive.astray is not False,
+                       levels=levels)
 
-    def _fitted(self, use: ServoUse, sensor: SensorUse) -> Fitted:
-        declared, states, memory = (models.sensor_parts(sensor, group) for group in ("parameters", "states", "memory"))
-        model = models.find("sensor", sensor.model, sensor.place)
-        return Fitted(sensor, model, declared, states, memory, f"{use.joint}.servo.sensor.{sensor.of}")
+    def _fitted(self, use: SensorUse | LinkSensor, path: str) -> Fitted:
+        declared, states, memory = (models.sensor_parts(use, group) for group in ("parameters", "states", "memory"))
+        return Fitted(use, models.find("sensor", use.model, use.place), declared, states, memory, path)
 
     def _probe(self, actuator: Actuator) -> tuple[Drive, float | None, dict[str, float | None]]:
         """The servo's physics recorded once, to see what it uses; and its levels of dry friction, where known now."""
@@ -357,6 +371,6 @@ class Machine:
         def level(value: Real) -> float | None:
             return graph.value(value.ref) if isinstance(value, Scalar) else float(value)
 
-        unknown = set(drive.friction) - {state.name for state in parts.natural}
-        returned(actuator.owner, "friction", dict.fromkeys(unknown, 0.0), ())
+        states_of_it = (state.name for state in parts.natural)
+        returned(actuator.owner, "friction", drive.friction, states_of_it, all_of_them=False)
         return drive, level(drive.dry), {name: level(value) for name, value in drive.friction.items()}

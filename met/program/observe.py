@@ -101,9 +101,9 @@ class Observed:
     def _of_arm(self, parts: list[str]) -> Real:
         match parts:
             case ["energy", "kinetic"]:
-                return self.energy.kinetic
+                return self.energy.kinetic + self.derivative.stored[0]
             case ["energy", "potential"]:
-                return self.energy.potential
+                return self.energy.potential + self.derivative.stored[1]
             case ["momentum", kind, axis]:
                 return (self.energy.linear if kind == "linear" else self.energy.angular)[XYZ.index(axis)]
         raise KeyError(".".join(parts))

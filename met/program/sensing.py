@@ -1,13 +1,14 @@
-"""Sensors of joints: what a servo's law sees in the stead of how things are."""
+"""Sensors at work: their states, what they read at ticks; of joints, what a law sees in the stead of how things are."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from met.diagnostic import Problem, error
-from met.plan import REPEAT, SEED
+from met.plan import REPEAT, SEED, SensorUse
 from met.program.machine import Actuator, Fitted, Machine, ReadCell
 from met.program.values import Values, answer, parameters, returned
 from met.sensors.sensor import Reading, Sensed
@@ -15,6 +16,13 @@ from met.servos.servo import Seen
 from met.trace import Real
 from met.trace.noise import Stream, normal
 from met.trace.program import Tape
+
+
+def measured(actuator: Actuator, p: Values, q: Real, qd: Real, states: Values) -> tuple[Real, Real]:
+    """Position and rate where the servo's encoder and tachometer sit, of a joint that moves so."""
+    if actuator.servo.measured is None:
+        return q, qd
+    return answer(actuator.owner, actuator.servo.measured, p, q, qd, states)
 
 
 def truth(seen: Seen, of: str) -> Real:
@@ -26,13 +34,8 @@ def truth(seen: Seen, of: str) -> Real:
 def start(machine: Machine, tape: Tape, actuator: Actuator, seen: Seen) -> None:
     """States, memory and reading where a run begins."""
     for fitted in actuator.sensors:
-        value = truth(seen, fitted.use.of)
-        found = answer(fitted.owner, fitted.sensor.begin, values(machine, fitted, tape.read), value)
-        names = [*(state.name for state in fitted.states), *(memory.name for memory in fitted.memory)]
-        returned(fitted.owner, "begin", found, names)
-        for name, number in found.items():
-            tape.write(f"{fitted.path}.{name}", number)
-        tape.write(fitted.path, value)
+        value = truth(seen, quantity(fitted))
+        begin(machine, tape, fitted, value)
 
 
 def slopes(
@@ -43,11 +46,7 @@ def slopes(
     for fitted in actuator.sensors:
         if fitted.sensor.follow is None:
             continue
-        value = truth(seen, fitted.use.of)
-        p, states = values(machine, fitted, read), _states(fitted, own.__getitem__)
-        new = answer(fitted.owner, fitted.sensor.follow, p, states, value)
-        returned(fitted.owner, "follow", new, (state.name for state in fitted.states))
-        found.update({f"{fitted.path}.{name}": slope for name, slope in new.items()})
+        found.update(followed(machine, fitted, read, own, truth(seen, quantity(fitted))))
     return found
 
 
@@ -58,31 +57,74 @@ def through(machine: Machine, actuator: Actuator, read: ReadCell, seen: Seen, ow
         raise Problem(error("E213", "a sensor that a continuous law sees draws noise", help="declare it `clocked`"))
 
     for fitted in actuator.sensors:
-        sensed = Sensed(truth(seen, fitted.use.of), 0.0, never)
+        sensed = Sensed(partial(truth, seen, quantity(fitted)), 0.0, never)
         p, states = values(machine, fitted, read), _states(fitted, own.__getitem__)
         reading = answer(fitted.owner, fitted.sensor.read, p, Values(fitted.owner, {}), states, sensed)
-        seen = replaced(actuator, seen, fitted.use.of, reading.value)
+        seen = replaced(actuator, seen, quantity(fitted), reading.value)
     return seen
 
 
 def ticked(machine: Machine, tape: Tape, actuator: Actuator, seen: Seen, state: Callable[[str], Real]) -> Seen:
     """What a sampled law sees through its sensors at a tick. state: gives their states, by channel."""
-    cases = machine.experiment.cases
     found = seen
     for fitted in actuator.sensors:
-        seed = tape.input(SEED) if SEED in cases.noise else float(cases.seed)
-        repeat = tape.input(REPEAT) if REPEAT in cases.noise else 0.0
-        stream, tick = Stream(seed, repeat, fitted.path), tape.tick / float(actuator.use.divisor)
-        sensed = Sensed(truth(seen, fitted.use.of), seen.period, lambda s=stream, k=tick: normal(s, k))  # type: ignore[misc]
-        p = values(machine, fitted, tape.read)
-        held = Values(fitted.owner, {part.name: tape.read(f"{fitted.path}.{part.name}") for part in fitted.memory})
-        reading: Reading = answer(fitted.owner, fitted.sensor.read, p, held, _states(fitted, state), sensed)
-        returned(fitted.owner, "read", reading.held, (memory.name for memory in fitted.memory))
-        for name, number in reading.held.items():
-            tape.write(f"{fitted.path}.{name}", number)
-        tape.write(fitted.path, reading.value)
-        found = replaced(actuator, found, fitted.use.of, reading.value)
+        of = quantity(fitted)
+        value = tick(machine, tape, fitted, partial(truth, seen, of), actuator.use.divisor, seen.period, state)
+        found = replaced(actuator, found, of, value)
     return found
+
+
+# One sensor
+
+
+def begin(machine: Machine, tape: Tape, fitted: Fitted, value: Real) -> None:
+    """States, memory and reading where a run begins, the quantity having been at this value."""
+    found = answer(fitted.owner, fitted.sensor.begin, values(machine, fitted, tape.read), value)
+    names = [*(state.name for state in fitted.states), *(memory.name for memory in fitted.memory)]
+    returned(fitted.owner, "begin", found, names)
+    for name, number in found.items():
+        tape.write(f"{fitted.path}.{name}", number)
+    tape.write(fitted.path, value)
+
+
+def followed(
+    machine: Machine, fitted: Fitted, read: ReadCell, own: Mapping[str, Real], value: Real
+) -> dict[str, Real]:
+    """Slopes of the states of a sensor that has a circuit, by channel. own: the states, by channel."""
+    assert fitted.sensor.follow is not None
+    p, states = values(machine, fitted, read), _states(fitted, own.__getitem__)
+    new = answer(fitted.owner, fitted.sensor.follow, p, states, value)
+    returned(fitted.owner, "follow", new, (state.name for state in fitted.states))
+    return {f"{fitted.path}.{name}": slope for name, slope in new.items()}
+
+
+def tick(
+    machine: Machine, tape: Tape, fitted: Fitted, find: Callable[[], Real], divisor: int, period: float,
+    state: Callable[[str], Real],
+) -> Real:  # fmt: skip
+    """What a sensor reads at a tick of its computer, and its memory a tick on.
+
+    find   gives the quantity;  state  its states, by channel
+    """
+    cases = machine.experiment.cases
+    seed = tape.input(SEED) if SEED in cases.noise else float(cases.seed)
+    repeat = tape.input(REPEAT) if REPEAT in cases.noise else 0.0
+    stream, number = Stream(seed, repeat, fitted.path), tape.tick / float(divisor)
+    sensed = Sensed(find, period, partial(normal, stream, number))
+    p = values(machine, fitted, tape.read)
+    held = Values(fitted.owner, {part.name: tape.read(f"{fitted.path}.{part.name}") for part in fitted.memory})
+    reading: Reading = answer(fitted.owner, fitted.sensor.read, p, held, _states(fitted, state), sensed)
+    returned(fitted.owner, "read", reading.held, (memory.name for memory in fitted.memory))
+    for name, new in reading.held.items():
+        tape.write(f"{fitted.path}.{name}", new)
+    tape.write(fitted.path, reading.value)
+    return reading.value
+
+
+def quantity(fitted: Fitted) -> str:
+    """What a joint's sensor is of."""
+    assert isinstance(fitted.use, SensorUse)
+    return fitted.use.of
 
 
 def values(machine: Machine, fitted: Fitted, read: ReadCell) -> Values:

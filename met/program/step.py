@@ -27,8 +27,8 @@ from met.program.values import Values
 from met.trace import Real, Truth, any_of, both, either, isfinite, not_, sign, where
 from met.trace.program import Call, Control, Every, Phase, Run, Tape, WhileAny
 
-SINGULAR, NOT_FINITE = 1.0, 2.0
-"""Causes of a failed case (output `failure`); 0 is none."""
+SINGULAR, NOT_FINITE, ASTRAY = 1.0, 2.0, 4.0
+"""Causes of a failed case (output `failure`); 0 is none, 3 what ended it from outside (met/run.py)."""
 
 EVENTS = ("friction.splits", "friction.clamped", "friction.undecided")
 """Counts a case: steps split where a joint came to rest, crossings clamped, decisions at rest left open."""
@@ -48,19 +48,21 @@ class Step:
         self.coordinates = bodies.coordinates(machine)
         self.states = machine.states
         self.sticking = sticking(machine)
-        self.grapple = Grapple(machine, self._state, lambda tape, actuator: self._held(tape, actuator, 1.0))
+        self.grapple = Grapple(machine, self.state, lambda tape, actuator: self._held(tape, actuator, 1.0))
         self._asked = asked(machine.integrator, len(self.coordinates), len(self.states), self.schedule.step)
         self._derive = Call(Phase("derive", self.derive))
         self._slope = Call(Phase("slope", self.slope))
+        count = len(self.sticking)
+        one_by_one = Run(Phase("decide_one", self.decide_one))
         self._decide = (
-            WhileAny(
-                "undecided", friction.passes(len(self.sticking)), (self._derive, Run(Phase("decide", self.decide)))
-            ),
+            WhileAny("undecided", friction.passes(count), (self._derive, Run(Phase("decide", self.decide)))),
+            *([WhileAny("undecided", friction.passes_one_by_one(count), (self._derive, one_by_one))] * (count > 1)),
             WhileAny("undecided", 1, (Run(Phase("left_open", self.left_open)),)),
         )
         # what may hide that a number is none: joints whose acceleration may be given, and all that may stick
         gives = [a.use.joint for a in machine.working if a.gives or a.level != 0.0]
         self._needs = tuple(dict.fromkeys((*gives, *(each.name for each in self.sticking))))
+        self._straying = [actuator for actuator in self.machine.working if actuator.strays]
         self._split = WhileAny("crossing", 1, (Run(Phase("split", self.split)),))
 
     def begin(self) -> tuple[Control, ...]:
@@ -118,7 +120,7 @@ class Step:
 
     def _levels(self, tape: Tape) -> list[Real]:
         """The levels of dry friction at the state, where a step or substep begins, in the units of what they hold."""
-        fraction, y = tape.read("fraction"), self._state(tape)
+        fraction, y = tape.read("fraction"), self.state(tape)
         time, begin = self._time(tape, fraction), tape.read("instant")
         on_joints = brakes(self.machine, tape.read, y, time, begin)
         found: list[Real] = []
@@ -142,13 +144,21 @@ class Step:
 
     def decide(self, tape: Tape) -> None:
         """One decision at rest, on the derivative just taken: who breaks away, who turns back."""
-        active, y = tape.read_mask("undecided"), self._state(tape)
+        self._decided(tape, one=False)
+
+    def decide_one(self, tape: Tape) -> None:
+        """The same of the first alone whose mode is not what it should be."""
+        self._decided(tape, one=True)
+
+    def _decided(self, tape: Tape, *, one: bool) -> None:
+        active, y = tape.read_mask("undecided"), self.state(tape)
         changed: Truth = False
         for each, level in zip(self.sticking, self._levels(tape), strict=True):
             s = tape.read(f"friction:{each.name}")
             slope = tape.read(f"slope:{each.name}" if each.state else f"{each.name}.qdd")
             at_rest = both(self.rubs(tape, each.name), each.rate(y) == 0.0)
             s_new = friction.decide(s, at_rest, tape.read(f"need:{each.name}"), level, slope)
+            s_new = where(changed, s, s_new) if one else s_new
             changed = either(changed, s_new != s)
             cells.keep(tape, active, f"friction:{each.name}", s_new)
         tape.write_mask("undecided", both(active, changed))
@@ -161,7 +171,7 @@ class Step:
 
     def derive(self, tape: Tape) -> None:
         """The derivative at the state, with everything that is recorded of it, and whether all is well with it."""
-        y = self._state(tape)
+        y = self.state(tape)
         found = self._derivative(tape, y, tape.read("fraction"))
         for i, name in enumerate(self.coordinates):
             tape.write(f"{name}.qdd", found.slope.qdd[i])
@@ -177,15 +187,21 @@ class Step:
         for i in reversed(range(len(self.joints))):
             singular = where(found.solved.singular[i], float(i + 1), singular)
         tape.write("singular", singular)
+        astray: Real = 0.0
+        for actuator in reversed(self._straying):
+            astray = where(found.astray[actuator.index], float(actuator.index + 1), astray)
+        if self._straying:
+            tape.write("astray", astray)
         # Infinities that cancel leave not a number, so a plain sum misses none; a sum of numbers that is none only
         # makes `judge` look.
         parts = (*found.slope.qdd, *found.slope.xd, *y.q, *y.qd, *(found.need[name] for name in self._needs))
         total: Real = sum((*parts, *bodies.orientation(self.machine, tape)), 0.0)
-        tape.write_mask("suspect", either(not_(isfinite(total)), singular != 0.0))
+        wrong = either(not_(isfinite(total)), singular != 0.0)
+        tape.write_mask("suspect", either(wrong, astray != 0.0) if self._straying else wrong)
 
     def slope(self, tape: Tape) -> None:
         """The derivative at a stage on the way, its slopes alone."""
-        found = self._derivative(tape, self._state(tape, STAGE), tape.read(f"{STAGE}fraction"))
+        found = self._derivative(tape, self.state(tape, STAGE), tape.read(f"{STAGE}fraction"))
         for joint, qdd in zip(self.coordinates, found.slope.qdd, strict=True):
             tape.write(f"{STAGE}{joint}.qdd", qdd)
         for joint, qd in zip(self.coordinates[len(self.joints):], found.slope.qd[len(self.joints):], strict=True):
@@ -204,19 +220,29 @@ class Step:
 
         `need` tells where a joint that sticks hides it, the state where no acceleration depends on it.
         """
-        cause: Real = 0.0
-        number: Real = 0.0
-        for i, body in reversed(list(enumerate(bodies.bodies(self.machine), len(self.joints)))):
+        astray: Real = tape.read("astray") if self._straying else 0.0
+        cause: Real = where(astray != 0.0, ASTRAY, 0.0)
+        number: Real = where(astray != 0.0, astray - 1.0, 0.0)
+        of_bodies = list(enumerate(bodies.bodies(self.machine), len(self.joints)))
+        for i, fitted in reversed(list(enumerate(self.machine.sensors, len(self.joints) + len(of_bodies)))):
+            told = [part for name in fitted.channels for part in (name, f"slope:{name}")]
+            bad = not_(isfinite(sum((tape.read(name) for name in told), 0.0)))
+            cause, number = where(bad, NOT_FINITE, cause), where(bad, float(i), number)
+        for i, body in reversed(of_bodies):
             told = [f"{name}.{part}" for name in body.coordinates for part in ("qdd", "q", "qd")]
             turned = sum([tape.read(name) for name in body.orientation], 0.0)
             good = isfinite(sum((tape.read(name) for name in told), turned))
-            number = float(i) if isinstance(cause, float) else where(good, number, float(i))
+            number = where(good, number, float(i))
             cause = where(good, cause, NOT_FINITE)
+        elsewhere = cause == NOT_FINITE
         for i, joint in reversed(list(enumerate(self.joints))):
             told = [f"{joint}.qdd", f"{joint}.q", f"{joint}.qd"]
+            moves = isfinite(sum((tape.read(name) for name in told), 0.0))
             told += [f"need:{name}" for name in self._needs if name == joint or name.startswith(f"{joint}.servo.")]
             told += [f"slope:{name}" for name in self.states if name.startswith(f"{joint}.servo.")]
             bad = not_(isfinite(sum((tape.read(name) for name in told), 0.0)))
+            if bodies.bodies(self.machine):  # a joint that moves well, and only bears what a body does, is not named
+                bad = both(bad, either(not_(moves), not_(elsewhere)))
             cause, number = where(bad, NOT_FINITE, cause), where(bad, float(i), number)
         singular = tape.read("singular")
         cause, number = where(singular != 0.0, SINGULAR, cause), where(singular != 0.0, singular - 1.0, number)
@@ -227,7 +253,7 @@ class Step:
 
     def loads(self, tape: Tape) -> tuple[list[list[Real]], list[Real]]:
         """What the arm is to the substituted joints: tau_load = Lambda qdd + b_0, all other joints in their modes."""
-        y, numbers = self._state(tape), [each.index for each in self.beds.mounted]
+        y, numbers = self.state(tape), [each.index for each in self.beds.mounted]
         at_rest = self._derivative(tape, y, 0.0, dict.fromkeys(numbers, 0.0)).solved.tau_load
         columns = []
         for j in numbers:
@@ -237,7 +263,7 @@ class Step:
 
     def observed(self, tape: Tape) -> Observed:
         """The arm at an instant, with the derivative that `derive` took of it."""
-        y = self._state(tape)
+        y = self.state(tape)
         stands = base.base_of(self.machine, tape.read, y, tape.read("instant"))
         return Observed(self.machine, tape.read, y, stands, lambda: self._derivative(tape, y, 0.0))
 
@@ -301,7 +327,7 @@ class Step:
 
         def body(tape: Tape) -> None:
             active: Truth = tape.read_mask("again") if again else True
-            y = self._state(tape)
+            y = self.state(tape)
             y_new = self._integrate(tape, settled, tape.read("fraction") if again else 0.0)
             if isinstance(y_new, Question):
                 raise inconstant(self.machine.integrator)
@@ -318,7 +344,7 @@ class Step:
 
     def _integrate(self, tape: Tape, settled: int, fraction: Real) -> Motion | Question:
         """Runs the integrator with the first `settled` slopes from cells, up to the next question or to its end."""
-        y = self._state(tape)
+        y = self.state(tape)
         if settled:
             for joint in self.coordinates:
                 for part in ("qd", "qdd"):
@@ -350,7 +376,7 @@ class Step:
         fraction, splits = tape.read("fraction"), tape.read("splits")
         left = 1.0 - fraction
         may_split = splits < float(friction.SPLITS)
-        y = self._state(tape, FROM)
+        y = self.state(tape, FROM)
         reached = friction.split_at_rest(
             y,
             self._first_slope(tape, y.qd),
@@ -383,7 +409,7 @@ class Step:
 
     # What the phases share.
 
-    def _state(self, tape: Tape, copy: str = "") -> Motion:
+    def state(self, tape: Tape, copy: str = "") -> Motion:
         """The state, or a copy of it: a stage's as it is, another where a (sub)step begins."""
         y = cells.state(tape, self.coordinates, self.states, copy)
         return y if copy == STAGE else bodies.begun(self.machine, y)

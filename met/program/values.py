@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from met.diagnostic import Place, Problem, error
+from met.diagnostic import Place, Problem, did_you_mean, error
 from met.parameter import Parameter
 from met.trace import Real
 
@@ -74,13 +74,17 @@ def answer(owner: str, function: Callable[..., T], *arguments: Any) -> T:
         raise Problem(error("E213", message, place, help="mend the model, or tell its author"), sources) from reason
 
 
-def returned(owner: str, what: str, given: Mapping[str, Real], declared: Iterable[str]) -> Mapping[str, Real]:
-    """What a model's function gave back, checked to hold just the names that the model declares."""
+def returned(
+    owner: str, what: str, given: Mapping[str, Real], declared: Iterable[str], *, all_of_them: bool = True
+) -> Mapping[str, Real]:
+    """What a model's function gave back, checked to hold just the names that the model declares, or some of them."""
     names = list(declared)
-    missing = [name for name in names if name not in given]
+    missing = [name for name in names if name not in given] if all_of_them else []
     unknown = [name for name in given if name not in names]
     if missing or unknown:
         listed = ", ".join(given) or "nothing"
         message = f"{owner}: {what} gave back {listed}; declared are {', '.join(names) or 'none'}"
-        raise Problem(error("E212", message, help="give back every declared name and no other"))
+        remedy = "give back every declared name and no other" if all_of_them else "give back declared names alone"
+        raise Problem(error("E212", message, help=[*(near for name in unknown for near in did_you_mean(name, names)),
+                                                   remedy]))
     return given

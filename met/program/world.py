@@ -6,13 +6,22 @@ from met.diagnostic import Problem, error
 from met.dynamics.kinematics import LinkMotion
 from met.dynamics.spatial import HERE
 from met.dynamics.tree import Tree
+from met.environments.environment import Environment
 from met.integrators.integrator import Motion
 from met.parameter import WORLD
 from met.program.base import Base, motions
 from met.program.machine import Machine, ReadCell
 from met.program.payloads import seen
+from met.program.values import Values, parameters
 from met.trace import Real
 from met.vectors import ZERO, Matrix, Vector
+
+
+def environment_values(machine: Machine, name: str, model: Environment, read: ReadCell) -> tuple[str, Values]:
+    """What an environment model under the deck's name for it is called in messages, and its parameters."""
+    owner = f"environment model `{model.name}` (as `{name}`)"
+    head = f"environment.{name}"
+    return owner, parameters(owner, head, model.parameters, lambda path: machine.value(path, read))
 
 
 class ArmWorld:

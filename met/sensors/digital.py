@@ -18,7 +18,7 @@ RESOLUTION = Parameter(
 )
 DELAY = Parameter(
     name="delay", default=0.0, at_least=0.0, at_most=float(MOST), whole=True,
-    doc="ticks from reading to what the law sees",
+    doc="ticks from reading to what is seen",
 )  # fmt: skip
 PAST = tuple(Memory(name=f"past_{n}", unit="of", doc=f"reading {n} ticks before the last") for n in range(MOST))
 

@@ -15,6 +15,11 @@ def follow(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
     return {"filtered": 2.0 * math.pi * p.cutoff * (value - states.filtered)}
 
 
+def fastest(p: Any) -> Real:
+    found: Real = 2.0 * math.pi * p.cutoff
+    return found
+
+
 def begin(p: Any, value: Real) -> Mapping[str, Real]:
     return {"filtered": value}
 
@@ -28,6 +33,7 @@ SENSOR = Sensor(
     doc=__doc__,
     parameters=(Parameter(name="cutoff", unit="Hz", above=0.0, doc="cut-off of the filter"),),
     states=(State(name="filtered", unit="of", doc="what is behind the filter"),),
+    fastest=fastest,
     follow=follow,
     begin=begin,
     read=read,

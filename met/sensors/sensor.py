@@ -1,38 +1,66 @@
-"""What a sensor is to the engine: it stands between a quantity of a joint and the control law that sees it.
+"""What a sensor is to the engine: it reads a quantity, of a joint or of a link.
+
+A sensor of a joint stands in a servo, between a quantity and the control law that sees it, and reads at the servo's
+ticks. A sensor of a link (`measures`) stands in a run under a name of its own, and reads at ticks of its own.
 
 A sensor is split where the real one is. Its circuit (`follow`, over `State`) is integrated with the arm; what its
-computer makes of that (`read`, over `Memory`) happens at the servo's ticks. Both are ordinary functions over numbers
-that may be traced (docs/models.md). Units: `of` is that of the quantity.
+computer makes of that (`read`, over `Memory`) happens at ticks. All are ordinary functions over numbers that may be
+traced (docs/models.md). Units: `of` is that of the quantity.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import field
-from typing import Any
+from dataclasses import field, replace
+from typing import Any, Protocol
 
+from met.environments.environment import World
 from met.frozen import frozen
 from met.parameter import Memory, Parameter, State
 from met.trace import Real
+from met.vectors import ZERO, Vector
+
+
+class Felt(World, Protocol):
+    """What a sensor of a link may ask of the arm: a `World`, and what only shows on board. Links are those of a World,
+    and `base`, whether it moves or not.
+
+    acceleration(link, point)    of a point given in the link's frame (m), the second derivative of its position: world
+                                 axes, m/s^2
+    specific_force(link, point)  that acceleration less the one with which a body would fall freely there: link axes
+    spin(link)                   angular velocity against directions that do not turn: link axes, rad/s
+
+    Accelerations follow from a derivative: a circuit may ask for them, a reading at a tick may not, since what acts
+    from the tick on is not yet known.
+    """
+
+    def acceleration(self, link: str, point: Vector = ZERO) -> Vector: ...
+    def specific_force(self, link: str, point: Vector = ZERO) -> Vector: ...
+    def spin(self, link: str) -> Vector: ...
 
 
 @frozen
 class Sensed:
     """What there is to read at a tick.
 
-    value   the quantity itself
+    find    gives the quantity itself
     period  time from this tick to the next, s
     draw    a normal deviate of this tick, mean 0 and variance 1: the same each time it is asked for
     """
 
-    value: Real
+    find: Callable[[], Real]
     period: float
     draw: Callable[[], Real]
+
+    @property
+    def value(self) -> Real:
+        """The quantity itself: of a link's sensor only where it is no acceleration."""
+        return self.find()
 
 
 @frozen
 class Reading:
-    """What a sensor gives at a tick: the number that the law sees, and its new memory, by name."""
+    """What a sensor gives at a tick: the number that is seen, and its new memory, by name."""
 
     value: Real
     held: Mapping[str, Real] = field(default_factory=dict)
@@ -42,6 +70,11 @@ class Reading:
 class Sensor:
     """The declaration of a sensor; one a file.
 
+    measures (p, felt) -> the quantity, of a link's sensor; felt is a `Felt`. None: it is a joint's, in a servo
+    unit     of what it measures: the unit word `of`. "": of the quantity of the servo that it is put on
+    fastest  (p) -> rate constant of its circuit, 1/s: with the step it says whether that is stable. None: unknown, or
+             there is none
+    swing    (p) -> a and b of its circuit's y'' = -a y - b y' (1/s^2, 1/s), of one that swings. None: it does not
     follow   (p, states, value) -> slopes of its states, by name. None: it has none
     begin    (p, value) -> states and memory where a run begins, by name, the quantity having been at this value
     read     (p, held, states, sensed) -> Reading
@@ -57,3 +90,12 @@ class Sensor:
     begin: Callable[[Any, Real], Mapping[str, Real]]
     read: Callable[[Any, Any, Any, Sensed], Reading]
     clocked: bool = True
+    measures: Callable[[Any, Any], Real] | None = None
+    unit: str = ""
+    fastest: Callable[[Any], Real | None] | None = None
+    swing: Callable[[Any], tuple[Real, Real] | None] | None = None
+
+    @property
+    def written(self) -> tuple[Parameter, ...]:
+        """The parameters as a deck writes them: of a link's sensor in its own unit."""
+        return tuple(replace(p, unit=self.unit) if self.unit and p.unit == "of" else p for p in self.parameters)

@@ -10,11 +10,11 @@ frequency depends on the servo's rate. A run begins with the filter settled. Not
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
-from met.parameter import Parameter, State
+from met.parameter import Parameter
+from met.sensors import butterworth
 from met.sensors.digital import DELAY, NOISE, PAST, RESOLUTION, converted, delayed, filled, noisy
 from met.sensors.sensor import Reading, Sensed, Sensor
 from met.trace import Real
@@ -23,15 +23,19 @@ FILTERED = ("filter", ("butterworth",))
 
 
 def follow(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
-    if p.filter == "none":
-        return {}
-    w = 2.0 * math.pi * p.cutoff
-    bend = w * w * (value - states.filtered) - math.sqrt(2.0) * w * states.filtered_slope
-    return {"filtered": states.filtered_slope, "filtered_slope": bend}
+    return {} if p.filter == "none" else butterworth.slopes(p, states, value)
+
+
+def fastest(p: Any) -> Real | None:
+    return None if p.filter == "none" else butterworth.fastest(p)
+
+
+def swing(p: Any) -> tuple[Real, Real] | None:
+    return None if p.filter == "none" else butterworth.swing(p)
 
 
 def begin(p: Any, value: Real) -> Mapping[str, Real]:
-    return {**({} if p.filter == "none" else {"filtered": value, "filtered_slope": 0.0}), **filled(value)}
+    return {**({} if p.filter == "none" else butterworth.settled(value)), **filled(value)}
 
 
 def read(p: Any, held: Any, states: Any, sensed: Sensed) -> Reading:
@@ -46,16 +50,15 @@ SENSOR = Sensor(
         Parameter(
             name="filter", shape="word", words=("none", "butterworth"), default="none", doc="the filter behind it"
         ),
-        Parameter(name="cutoff", unit="Hz", above=0.0, only=FILTERED, doc="cut-off of the filter"),
+        butterworth.cutoff(FILTERED),
         NOISE,
         RESOLUTION,
         DELAY,
     ),
-    states=(
-        State(name="filtered", unit="of", only=FILTERED, doc="what is behind the filter"),
-        State(name="filtered_slope", unit="of/s", only=FILTERED, doc="its slope"),
-    ),
+    states=butterworth.states(FILTERED),
     memory=PAST,
+    fastest=fastest,
+    swing=swing,
     follow=follow,
     begin=begin,
     read=read,

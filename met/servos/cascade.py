@@ -25,13 +25,13 @@ from dataclasses import replace
 from typing import Any
 
 from met.parameter import Memory, Parameter, Signal, State
-from met.servos import compliant_gearbox, gear
+from met.servos import compliant_gearbox, gear, rate_loop
 from met.servos.compliant_gearbox import JOINT_FRICTION, geared
-from met.servos.friction import BRISTLE, LOSS, friction
+from met.servos.friction import BRISTLE, LOSS, SHAFT, friction, steady
 from met.servos.friction import PARAMETERS as FRICTION
-from met.servos.motor import ARMATURE, RATIO, SHAFT
-from met.servos.servo import Control, Drive, JointMotion, Seen, Servo
-from met.trace import Real, both, clip, either, maximum, sqrt, where
+from met.servos.motor import ARMATURE, RATIO
+from met.servos.servo import Asked, Control, Drive, JointMotion, Seen, Servo
+from met.trace import Real, both, clip, either, maximum, sign, sqrt, where
 
 ELASTIC = ("gear", ("elastic",))
 
@@ -41,18 +41,24 @@ def control(p: Any, held: Any, seen: Seen) -> Control:
     if seen.asked.kind == "torque":
         current = seen.asked.value / (p.ratio * p.kt)
         return Control({"current_cmd": clip(current, -p.i_max, p.i_max)}, {"integral": 0.0})
-    elastic = p.gear == "elastic"
-    w = seen.states.motor_rate if elastic else p.ratio * seen.qd
-    rate = p.ratio * seen.asked.value
-    if seen.asked.kind == "position":
-        at_motor = seen.q + seen.states.deflection if elastic else seen.q
-        ahead = p.feed_forward * (p.ratio * seen.asked.slope)
-        rate = ahead + p.k_position * (p.ratio * (seen.asked.value - at_motor))
-    error = rate - w
+    error = _error(p, seen.asked, seen.q, seen.qd)
     wanted = p.kp * error + p.ki * held.integral
     return Control(
         {"current_cmd": clip(wanted, -p.i_max, p.i_max)}, {"integral": _within(error, wanted, p.i_max)}
     )
+
+
+def _error(p: Any, asked: Asked, q: Real, qd: Real) -> Real:
+    """Error of the motor's rate, rad/s; q, qd: its angle and rate over the ratio."""
+    rate = p.ratio * asked.value
+    if asked.kind == "position":
+        rate = p.feed_forward * (p.ratio * asked.slope) + p.k_position * (p.ratio * (asked.value - q))
+    return rate - p.ratio * qd
+
+
+def measured(p: Any, q: Real, qd: Real, states: Any) -> tuple[Real, Real]:
+    """The motor's angle and rate over the ratio: the loops see its encoder and tachometer."""
+    return compliant_gearbox.measured(p, q, qd, states) if p.gear == "elastic" else (q, qd)
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
@@ -69,10 +75,8 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
     tau_m = p.kt * states.current
     shown = {"voltage": voltage, "motor_torque": tau_m}
     if elastic:
-        moved = geared(p, states, joint, tau_m, shown)
-        return Drive(
-            moved.torque, moved.dry, slopes={**electric, **moved.slopes}, friction=moved.friction, signals=moved.signals
-        )
+        moved = geared(p, states, joint, tau_m, p.kt * p.i_max, shown)
+        return replace(moved, slopes={**electric, **moved.slopes})
     rubs = friction(p, w, states)
     return Drive(
         torque=p.ratio * (tau_m - rubs.torque) - p.f_v_joint * joint.qd,
@@ -80,6 +84,7 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
         rotor=p.ratio * p.ratio * p.j_m,
         slopes={**electric, **rubs.bending},
         signals=shown,
+        astray=rubs.astray,
     )
 
 
@@ -96,6 +101,23 @@ def begin(p: Any, q: Real, qd: Real) -> Mapping[str, Real]:
     return starts | ({"bristle": 0.0} if p.friction == "lugre" else {})
 
 
+def balance(p: Any, torque: Real, seen: Seen) -> Mapping[str, Real]:
+    """The current is what joint, gear and friction take, steady under the amplifier; the integral is what wants it."""
+    w = p.ratio * seen.qd
+    if p.gear == "elastic":
+        states, tau_m = compliant_gearbox.balanced(p, torque, seen.qd)
+        at_motor = seen.q + states["deflection"]
+    else:
+        rubs, states = steady(p, w)
+        tau_m, at_motor = (torque + p.f_v_joint * seen.qd + sign(seen.qd) * p.f_c_joint) / p.ratio + rubs, seen.q
+    current = clip(tau_m / p.kt, -p.i_max, p.i_max)
+    voltage = clip(p.resistance * current + p.kt * w, -p.v_max, p.v_max)
+    torques = seen.asked.kind == "torque"
+    integral = 0.0 if torques else rate_loop.wound(p, current, _error(p, seen.asked, at_motor, seen.qd))
+    amplifier = where(p.ki_current > 0.0, voltage, 0.0)
+    return {**states, "current": current, "amplifier": amplifier, "integral": integral}
+
+
 def fastest(p: Any) -> Real:
     """The current loop, no root of L s^2 + (R + k_current) s + ki_current being larger in size; or the gear; 1/s."""
     resistance = p.resistance + p.k_current
@@ -106,8 +128,16 @@ def fastest(p: Any) -> Real:
 
 
 def fastest_law(p: Any) -> Real:
-    """As `fastest`, or the rate loop on the motor by itself: (Kt Kp + F_v)/J_m, 1/s."""
-    return maximum(fastest(p), (p.kt * p.kp + p.f_v) / p.j_m)
+    """As `fastest`, or the rate loop on the motor by itself, 1/s: s^2 + (Kt Kp + F_v)/J_m s + Kt Ki/J_m."""
+    return maximum(fastest(p), maximum((p.kt * p.kp + p.f_v) / p.j_m, sqrt(p.kt * p.ki / p.j_m)))
+
+
+def swings(p: Any, kind: str) -> Mapping[str, tuple[Real, Real]]:
+    """The current loop; the motor on its gear, braked by the rate loop's gain alone: the current is what is asked."""
+    found = {"current loop": (p.ki_current / p.inductance, (p.resistance + p.k_current) / p.inductance)}
+    if p.gear == "elastic":
+        found["gear"] = compliant_gearbox.swing(p, 0.0 if kind == "torque" else p.kt * p.kp)
+    return found
 
 
 def full(p: Any) -> Mapping[str, Real]:
@@ -159,9 +189,12 @@ SERVO = Servo(
         replace(compliant_gearbox.GEAR_TORQUE, only=ELASTIC),
     ),
     control=control,
+    measured=measured,
     drive=drive,
     begin=begin,
+    balance=balance,
     fastest=fastest,
     fastest_law=fastest_law,
+    swings=swings,
     full=full,
 )

@@ -9,7 +9,8 @@
 
 The rotor's inertia is not the joint's: with the joint held the motor swings at sqrt(k1/(N^2 J_m)), and against a joint
 of inertia J at sqrt(k1 (1/(N^2 J_m) + 1/J)). The loop sees the motor's tachometer and encoder, not the joint. A run
-begins with the gear not wound up, the motor turning with the joint: what gravity pulls at sinks in.
+begins with the gear not wound up, the motor turning with the joint: what gravity pulls at sinks in, unless servos begin
+balanced.
 
 Not a gear whose ratio wavers, and not a harmonic drive's hysteresis.
 """
@@ -21,38 +22,47 @@ from typing import Any
 
 from met.parameter import Parameter, Signal, State
 from met.servos import gear, rate_loop
-from met.servos.friction import BRISTLE, LOSS, friction
+from met.servos.friction import BRISTLE, LOSS, SHAFT, friction, steady
 from met.servos.friction import PARAMETERS as FRICTION
-from met.servos.motor import ARMATURE, RATIO, SHAFT, TAU_MAX, damping, torque
+from met.servos.motor import ARMATURE, RATIO, TAU_MAX, damping, torque
 from met.servos.servo import Control, Drive, JointMotion, Seen, Servo
-from met.trace import Real, maximum, sqrt
+from met.trace import Real, maximum, sign, sqrt
+
+
+def measured(p: Any, q: Real, qd: Real, states: Any) -> tuple[Real, Real]:
+    """The motor's angle and rate over the ratio: encoder and tachometer sit on its shaft."""
+    return q + states.deflection, states.motor_rate / p.ratio
 
 
 def control(p: Any, held: Any, seen: Seen) -> Control:
-    """The rate loop on the motor's tachometer and encoder: the motor's voltage."""
-    at_motor = seen.q + seen.states.deflection
-    return rate_loop.rate_loop(p, held.integral, seen.asked, q=at_motor, qd=seen.states.motor_rate / p.ratio)
+    """The rate loop: the motor's voltage."""
+    return rate_loop.rate_loop(p, held.integral, seen.asked, q=seen.q, qd=seen.qd)
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
     """The motor, the gear and their friction, under the voltage."""
     tau_m = torque(p.kt, p.resistance, p.tau_max, held.voltage, states.motor_rate)
-    return geared(p, states, joint, tau_m, {"motor_torque": tau_m})
+    return geared(p, states, joint, tau_m, p.tau_max, {"motor_torque": tau_m})
 
 
-def geared(p: Any, states: Any, joint: JointMotion, tau_m: Real, shown: Mapping[str, Real]) -> Drive:
-    """A motor that gives this torque (N m), behind the gear; shown: signals besides the gear's."""
+def geared(
+    p: Any, states: Any, joint: JointMotion, tau_m: Real, strongest: Real, shown: Mapping[str, Real]
+) -> Drive:
+    """A motor behind the gear that gives this torque, N m, and at most the strongest; shown: its own signals."""
     w = states.motor_rate
     rate = w / p.ratio - joint.qd
     T = gear.torque(p, states.deflection, rate)
     at_motor = joint.coupled * T / p.ratio
-    rubs = friction(p, w, states, at_motor)
+    rubs = friction(p, w, states, at_motor, strongest)
     return Drive(
         torque=T - p.f_v_joint * joint.qd,
         dry=p.f_c_joint,
         slopes={"deflection": rate, "motor_rate": (tau_m - at_motor - rubs.torque) / p.j_m, **rubs.bending},
         friction={"motor_rate": rubs.level / p.j_m},
-        signals={**shown, "gear_torque": T},
+        signals={**shown, "gear_torque": joint.coupled * T},
+        kinetic=0.5 * p.j_m * (w * w),
+        potential=gear.energy(p, states.deflection),
+        astray=rubs.astray,
     )
 
 
@@ -60,6 +70,20 @@ def begin(p: Any, q: Real, qd: Real) -> Mapping[str, Real]:
     """Nothing is wound up, and the motor turns with the joint."""
     starts: dict[str, Real] = {"deflection": 0.0, "motor_rate": p.ratio * qd}
     return starts | ({"bristle": 0.0} if p.friction == "lugre" else {})
+
+
+def balance(p: Any, torque: Real, seen: Seen) -> Mapping[str, Real]:
+    """The gear is wound up by what the joint takes, and the motor holds it so."""
+    states, tau_m = balanced(p, torque, seen.qd)
+    at_motor = seen.q + states["deflection"]  # seen with nothing wound up
+    return {**states, **rate_loop.balanced(p, tau_m, seen.asked, q=at_motor, qd=seen.qd)}
+
+
+def balanced(p: Any, torque: Real, qd: Real) -> tuple[dict[str, Real], Real]:
+    """States behind a gear that drives the joint with this torque at this rate that lasts, and the motor's torque."""
+    through = torque + p.f_v_joint * qd + sign(qd) * p.f_c_joint
+    rubs, bent = steady(p, p.ratio * qd, through / p.ratio)
+    return {"deflection": gear.wound(p, through), "motor_rate": p.ratio * qd, **bent}, through / p.ratio + rubs
 
 
 def fastest_law(p: Any) -> Real:
@@ -71,6 +95,18 @@ def fastest(p: Any) -> Real:
     """The motor with the joint held, 1/s: its damping, or the gear's frequency. Against a light joint it is faster."""
     inertia = p.ratio * p.ratio * p.j_m
     return maximum(damping(p.kt, p.resistance, p.f_v) / p.j_m + p.damping / inertia, sqrt(p.stiffness / inertia))
+
+
+def swings(p: Any, kind: str) -> Mapping[str, tuple[Real, Real]]:
+    """The motor on its gear, braked by back-EMF and by the loop's gain; a torque command takes both away."""
+    by_law = 0.0 if kind == "torque" else p.kt * p.kt / p.resistance + p.kt * p.kp / p.resistance
+    return {"gear": swing(p, by_law)}
+
+
+def swing(p: Any, by_law: Real) -> tuple[Real, Real]:
+    """a and b of a motor on its gear. by_law: what the law brakes the shaft with, N m s/rad."""
+    inertia = p.ratio * p.ratio * p.j_m
+    return p.stiffness / inertia, (by_law + p.f_v) / p.j_m + p.damping / inertia
 
 
 JOINT_FRICTION = (
@@ -92,9 +128,12 @@ SERVO = Servo(
     states=(gear.deflection(), MOTOR_RATE, BRISTLE),
     signals=(Signal(name="motor_torque", unit="N*m", doc="motor torque, before friction"), GEAR_TORQUE),
     control=control,
+    measured=measured,
     drive=drive,
     begin=begin,
+    balance=balance,
     fastest=fastest,
     fastest_law=fastest_law,
+    swings=swings,
     full=rate_loop.full,
 )  # fmt: skip

@@ -20,12 +20,15 @@ Depending on Load and Velocity, IROS 2010.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from met.frozen import frozen
 from met.parameter import Parameter, State
-from met.trace import Real, absolute, exp, where
+from met.servos import motor
+from met.trace import Real, Truth, absolute, exp, maximum, sign, where
 
+J_M, F_C, F_V = motor.SHAFT
 CURVED = ("friction", ("stribeck", "lugre"))
 LUGRE = ("friction", ("lugre",))
 
@@ -41,12 +44,21 @@ PARAMETERS = (
         name="sigma_1", unit="N*m*s/rad", default=0.0, at_least=0.0, only=LUGRE, doc="damping of the bristles"
     ),
 )  # fmt: skip
-"""What a servo declares besides f_c and f_v."""
+SHAFT = (
+    J_M,
+    replace(F_C, only=("friction", ("coulomb", "stribeck"))),
+    replace(F_C, default=None, at_least=None, above=0.0, only=LUGRE, source=""),  # bristles unbend with 1/g
+    F_V,
+)
+"""What a servo declares whose motor has such friction."""
 
 LOSS = Parameter(
     name="loss", default=0.0, at_least=0.0, below=1.0,
     doc="share of the gear's torque by which dry friction at the motor is higher",
 )  # fmt: skip
+
+BLOW = 10.0
+"""As many times what its motor gives at most a gear is thought to transmit."""
 
 BRISTLE = State(name="bristle", unit="rad", only=LUGRE, doc="by how much the bristles of friction are bent")
 
@@ -58,25 +70,47 @@ class Friction:
     level    of what sticks, against the motion, N m: for the engine to decide
     torque   of what does not, against the motion, N m
     bending  d(bristle)/dt, rad/s; nothing but with `lugre`
+    astray   whether the bristles are bent by twice what they can bear, so that the step is too long for them
     """
 
     level: Real
     torque: Real
     bending: dict[str, Real]
+    astray: Truth = False
 
 
-def friction(p: Any, w: Real, states: Any, transmitted: Real | None = None) -> Friction:
-    """Friction at the shaft's rate w (rad/s). transmitted: torque on the shaft of a gear that has a loss, N m."""
-    level = p.f_c
-    if transmitted is not None:
-        level = level + where(p.loss > 0.0, p.loss * absolute(transmitted), 0.0)
-    if p.friction != "coulomb":
-        share = w / p.rate_s
-        level = level + (p.f_s - p.f_c) * exp(-(share * share))
+def friction(p: Any, w: Real, states: Any, transmitted: Real | None = None, strongest: Real = 0.0) -> Friction:
+    """Friction at the shaft's rate w (rad/s).
+
+    transmitted  torque on the shaft of a gear that has a loss, N m;  strongest: what its motor gives at most
+    """
+    level = _level(p, w, transmitted)
     viscous = p.f_v * w
     if p.friction != "lugre":
         return Friction(level, viscous, {})
     slips = level > 0.0
     z = states.bristle
     bending = where(slips, w - p.sigma_0 * absolute(w) * z / where(slips, level, 1.0), 0.0)
-    return Friction(0.0, viscous + p.sigma_0 * z + p.sigma_1 * bending, {"bristle": bending})
+    bears = maximum(p.f_s, p.f_c)
+    if transmitted is not None:  # a blow through the gear, now past, may have bent them further
+        bears = bears + where(p.loss > 0.0, p.loss * maximum(absolute(transmitted), BLOW * strongest), 0.0)
+    astray = p.sigma_0 * absolute(z) > 2.0 * bears
+    return Friction(0.0, viscous + p.sigma_0 * z + p.sigma_1 * bending, {"bristle": bending}, astray)
+
+
+def steady(p: Any, w: Real, transmitted: Real | None = None) -> tuple[Real, dict[str, Real]]:
+    """At a shaft's rate w that lasts: all of the friction's torque against the motion, none at rest, and its states."""
+    level = _level(p, w, transmitted)
+    bent = {"bristle": sign(w) * level / p.sigma_0} if p.friction == "lugre" else {}
+    return p.f_v * w + sign(w) * level, bent
+
+
+def _level(p: Any, w: Real, transmitted: Real | None) -> Real:
+    """What dry friction is at this rate, N m."""
+    level = p.f_c
+    if transmitted is not None:
+        level = level + where(p.loss > 0.0, p.loss * absolute(transmitted), 0.0)
+    if p.friction != "coulomb":
+        share = w / p.rate_s
+        level = level + (p.f_s - p.f_c) * exp(-(share * share))
+    return level

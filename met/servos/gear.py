@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import Any
 
 from met.parameter import Only, Parameter, State
-from met.trace import Real, absolute, clip, where
+from met.trace import Real, absolute, both, clip, exp, log, minimum, sign, where
 
 
 def parameters(only: Only | None = None) -> tuple[Parameter, ...]:
@@ -36,13 +36,41 @@ def parameters(only: Only | None = None) -> tuple[Parameter, ...]:
 
 def deflection(only: Only | None = None) -> State:
     """The state that winds the gear up."""
-    return State(name="deflection", unit="joint", only=only, doc="motor's angle over the ratio, less the joint's")
+    doc = "motor's angle over the ratio, less the joint's"
+    return State(name="deflection", unit="joint", between=True, only=only, doc=doc)
 
 
 def torque(p: Any, d: Real, rate: Real) -> Real:
     """Torque of the gear on the joint, N m (N), wound up by d (rad; m) which grows at this rate."""
-    half, play = 0.5 * p.backlash, p.backlash > 0.0
-    beyond = where(play, d - clip(d, -half, half), d)
+    beyond, play = _beyond(p, d), p.backlash > 0.0
     spring = p.stiffness * beyond + p.hardening * (beyond * beyond * beyond)
     most = absolute(spring)
     return spring + where(play, clip(p.damping * rate, -most, most), p.damping * rate)
+
+
+def energy(p: Any, d: Real) -> Real:
+    """What the spring has in it, J, wound up by d (rad; m)."""
+    square = _beyond(p, d) * _beyond(p, d)
+    return 0.5 * p.stiffness * square + 0.25 * p.hardening * (square * square)
+
+
+def _beyond(p: Any, d: Real) -> Real:
+    """How far d is beyond the play."""
+    half = 0.5 * p.backlash
+    return where(p.backlash > 0.0, d - clip(d, -half, half), d)
+
+
+def wound(p: Any, transmitted: Real) -> Real:
+    """What the gear is wound up by, rad (m), where this is the torque that it transmits, N m (N), and keeps to it.
+
+    The root of the spring's cubic: from no more than twice of it, five of Newton's steps leave rounding.
+    """
+    size, hardens = absolute(transmitted), p.hardening > 0.0
+    k3 = where(hardens, p.hardening, 1.0)
+    cubic = exp(log(where(size > 0.0, size / k3, 1.0)) / 3.0)
+    x = size / p.stiffness
+    x = where(both(hardens, size > 0.0), minimum(x, cubic), x)
+    for _ in range(5):
+        beyond = p.stiffness * x + k3 * (x * x * x) - size
+        x = where(hardens, x - beyond / (p.stiffness + 3.0 * k3 * (x * x)), x)
+    return sign(transmitted) * (x + 0.5 * p.backlash)

@@ -14,13 +14,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from met.instants import has_come
 from met.parameter import Parameter
 from met.servos.servo import Drive, JointMotion, Servo
-from met.trace import Truth
+from met.trace import Truth, not_
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
-    return Drive(given=joint.begin < p.release, qdd=0.0)
+    return Drive(given=not_(has_come(joint.begin, p.release)), qdd=0.0)
 
 
 def at_rest(p: Any) -> Truth:

@@ -15,7 +15,7 @@ from typing import Any
 from met.parameter import Memory, Parameter, State
 from met.servos.motor import TABLE_1, damping
 from met.servos.servo import Asked, Control
-from met.trace import Real, both, clip, either, where
+from met.trace import Real, both, clip, either, maximum, sqrt, where
 
 COMMANDS = ("rate", "position", "torque")
 
@@ -46,9 +46,28 @@ def rate_loop(p: Any, integral: Real, asked: Asked, *, q: Real, qd: Real) -> Con
     return Control({"voltage": clip(wanted, -p.v_max, p.v_max)}, {"integral": where(winding_up, 0.0, error)})
 
 
+def balanced(p: Any, tau_m: Real, asked: Asked, *, q: Real, qd: Real) -> dict[str, Real]:
+    """The integral with which the loop sets the voltage that drives its motor with this torque, N m."""
+    if asked.kind == "torque":
+        return {"integral": 0.0}
+    tau_m = clip(tau_m, -p.tau_max, p.tau_max)
+    voltage = clip(p.resistance / p.kt * tau_m + p.kt * p.ratio * qd, -p.v_max, p.v_max)
+    return {"integral": wound(p, voltage, p.ratio * (_rate_asked(p, q, asked) - qd))}
+
+
+def wound(p: Any, wanted: Real, error: Real) -> Real:
+    """The integral with which a loop of gains `kp` and `ki` wants this at this error; 0 of one that has none."""
+    integrates = p.ki > 0.0
+    return where(integrates, (wanted - p.kp * error) / where(integrates, p.ki, 1.0), 0.0)
+
+
 def fastest(p: Any) -> Real:
-    """The rate loop on a motor by itself, of a continuous law: (Kt^2/R + F_v + Kt Kp/R)/J_m, 1/s."""
-    return (damping(p.kt, p.resistance, p.f_v) + p.kt * p.kp / p.resistance) / p.j_m
+    """The rate loop on a motor by itself, of a continuous law, 1/s: no root of s^2 + b s + c is larger in size,
+
+    b = (Kt^2/R + F_v + Kt Kp/R)/J_m,  c = Kt Ki/(R J_m)
+    """
+    damped = (damping(p.kt, p.resistance, p.f_v) + p.kt * p.kp / p.resistance) / p.j_m
+    return maximum(damped, sqrt(p.kt * p.ki / (p.resistance * p.j_m)))
 
 
 def full(p: Any) -> dict[str, Real]:

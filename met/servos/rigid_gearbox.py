@@ -18,13 +18,14 @@ command sets the voltage that gives this torque at the rate seen, without fricti
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from met.parameter import Signal
 from met.servos import rate_loop
-from met.servos.friction import BRISTLE, friction
+from met.servos.friction import BRISTLE, SHAFT, friction, steady
 from met.servos.friction import PARAMETERS as FRICTION
-from met.servos.motor import ARMATURE, RATIO, SHAFT, TAU_MAX, Motor, torque
+from met.servos.motor import ARMATURE, RATIO, TAU_MAX, Motor, torque
 from met.servos.servo import Control, Drive, JointMotion, Seen, Servo
 from met.trace import Real
 
@@ -45,7 +46,14 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
         rotor=p.ratio * p.ratio * p.j_m,
         slopes=rubs.bending,
         signals={"motor_rate": w_m, "motor_torque": tau_m},
+        astray=rubs.astray,
     )
+
+
+def balance(p: Any, torque: Real, seen: Seen) -> Mapping[str, Real]:
+    """The motor gives what the joint and friction take; the loop's integral is what that wants."""
+    rubs, bent = steady(p, p.ratio * seen.qd)
+    return {**bent, **rate_loop.balanced(p, torque / p.ratio + rubs, seen.asked, q=seen.q, qd=seen.qd)}
 
 
 def fastest(p: Any) -> Real:
@@ -74,6 +82,7 @@ SERVO = Servo(
     ),
     control=control,
     drive=drive,
+    balance=balance,
     fastest=fastest,
     fastest_law=rate_loop.fastest,
     full=rate_loop.full,

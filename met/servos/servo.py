@@ -41,7 +41,7 @@ class Asked:
 class Seen:
     """What the servo's control law sees, at a tick or a stage.
 
-    q, qd   joint position and rate
+    q, qd   position and rate as the servo's encoder and tachometer measure them (`Servo.measured`), through sensors
     asked   the command
     period  time from this tick to the next, s; 0 of a continuous law
     time    of the tick or stage, s
@@ -99,6 +99,8 @@ class Drive:
                what it takes off the state's slope (a motor's F_c/J_m, rad/s^2). It sticks as the joint's does: a rate
                that comes to zero stays there while the slope is no larger than the level
     signals    value of each `Signal` of the servo, by name
+    kinetic    energy of what turns in the servo otherwise than with the joint, J;  potential: of what is wound up in it
+    astray     whether a state is where it can never be, so that the step was too long for it: the case then fails
     """
 
     torque: Real = 0.0
@@ -109,6 +111,9 @@ class Drive:
     slopes: Mapping[str, Real] = field(default_factory=dict)
     friction: Mapping[str, Real] = field(default_factory=dict)
     signals: Mapping[str, Real] = field(default_factory=dict)
+    kinetic: Real = 0.0
+    potential: Real = 0.0
+    astray: Truth = False
 
 
 @frozen(kw_only=True)
@@ -122,15 +127,22 @@ class Servo:
                parameters by name. None: no law
     clocked    whether the law needs a clock, for it reads outputs of its last tick or the period: never continuous
     states     what nature integrates for it
+    measured   (p, q, qd, states) -> position and rate that the law sees, on the joint's side, where encoder and
+               tachometer sit elsewhere than at the joint. None: at the joint
     drive      (p, held, states, joint) -> Drive. held: outputs of the law, and its integrals
     begin      (p, q, qd) -> states where a run begins, by name, from the joint's position and rate there. None: as
                declared
+    balance    (p, torque, seen) -> states and integrals, by name, with which the joint gets this torque at the start
+               and the law asks for just that. seen: at time 0, with the states that `begin` gives, and a command that
+               the joint be as it is. None: it is not balanced
     fastest    (p) -> upper bound of the fastest rate constant of the joint's motion under this servo, 1/s, whatever
                arm it carries; for the plan's stability figure. None: no such bound
     motor      (p) -> the motor that a bed may take the place of (met/substitution): the servo's computer then sets
                `voltage`, one of its outputs, on the bed. None: there is none to substitute
     motor_only word and value of it under which that is so; None: under all
     fastest_law  (p) -> the same under a law that is continuous, whose gains then count. None: `fastest`
+    swings     (p, kind) -> what of the servo swings by itself, in words, and a and b of x'' = -a x - b x' (1/s^2, 1/s),
+               the joint held; kind is that of the command. None: nothing, or it is not known
     full       (p) -> outputs of the law at full drive, by name, for what makes a drive run away. None: there is no such
     follows    whether the joint goes with its command whatever the arm, so that a position command that begins
                elsewhere than the joint makes it jump, which is told (D169)
@@ -147,10 +159,13 @@ class Servo:
     signals: tuple[Signal, ...] = ()
     control: Callable[[Any, Any, Seen], Control] | None = None
     clocked: bool = False
+    measured: Callable[[Any, Real, Real, Any], tuple[Real, Real]] | None = None
     drive: Callable[[Any, Any, Any, JointMotion], Drive]
     begin: Callable[[Any, Real, Real], Mapping[str, Real]] | None = None
+    balance: Callable[[Any, Real, Seen], Mapping[str, Real]] | None = None
     fastest: Callable[[Any], Real] | None = None
     fastest_law: Callable[[Any], Real] | None = None
+    swings: Callable[[Any, str], Mapping[str, tuple[Real, Real]]] | None = None
     full: Callable[[Any], Mapping[str, Real]] | None = None
     follows: bool = False
     motor: Callable[[Any], Motor] | None = None

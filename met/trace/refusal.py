@@ -15,6 +15,7 @@ from met.diagnostic import Label, Place, Problem, error
 _HERE = os.path.dirname(os.path.abspath(__file__)) + os.sep
 
 _CHOOSE = "where(condition, a, b) computes both and keeps one"
+RECORDS = "`math`, numpy and `float()` need plain numbers: met.trace has sin, sqrt, atan2 and others, which record"
 
 _OURS = {"sin": "sin", "cos": "cos", "tan": "tan", "exp": "exp", "log": "log", "tanh": "tanh", "atan2": "atan2",
          "arctan2": "atan2", "asin": "asin", "arcsin": "asin", "acos": "acos", "arccos": "acos", "atan": "atan",
@@ -53,6 +54,9 @@ def refuse(what: str, help: str = _CHOOSE, *, truth: bool = False, function: str
     line = linecache.getline(place.file, place.line)
     call = re.match(r"(?:[A-Za-z_]\w*\.)*([A-Za-z_]\w*)\s*\(", piece)
     name = function or (call.group(1) if call else "")
+    foreign = set(re.findall(r"\b(?:math|numpy|np)\.(\w+)\s*\(", piece))
+    if name not in _OURS and not truth and len(foreign) == 1:  # the piece is more than the call
+        name = foreign.pop()
     if truth and name not in _OURS:
         head = re.match(r"\s*(if|elif|while|assert)\b", line) or re.search(r"\b(if|while|and|or|not)\b", line)
         word = head.group(1) if head else ""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from met.trace.refusal import refuse
+from met.trace.refusal import RECORDS, refuse
 
 if TYPE_CHECKING:
     from met.trace.graph import Graph
@@ -140,7 +140,7 @@ class Scalar:
         refuse("the truth of a recorded number", truth=True)
 
     def __float__(self) -> NoReturn:
-        refuse("a plain number from a recorded one")
+        refuse("a plain number from a recorded one", RECORDS)
 
     def __int__(self) -> NoReturn:
         refuse("a whole number from a recorded one", "met.trace.floor or rint, which record")

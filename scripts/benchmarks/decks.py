@@ -39,6 +39,7 @@ class Variant:
     like         whether these are besides the gearbox's
     command      what each joint is told, "" for a servo that takes no command
     environment  entries besides gravity;  base: of a run;  body: mass and inertia of the base's link
+    payload      keys of a payload that the run has, "" for none;  sensor: a sensor of a link, likewise
     rate         of dynamics and servos
     """
 
@@ -47,6 +48,8 @@ class Variant:
     command: str | None = None
     environment: str = ""
     base: str = "fixed"
+    payload: str = ""
+    sensor: str = ""
     rate: str = "1 kHz"
     body: str = "mass = 1000 kg; inertia = [900, 1000, 1100] kg*m^2;"
 
@@ -88,6 +91,8 @@ def experiment(arm: Arm, command: str, record: bool = False, variant: Variant | 
         f"    initial {{ {' '.join(states)} }}",
         f"    environment {{ gravity = [{', '.join(map(str, GRAVITY))}] m/s^2; {of.environment} }}",
         *([f"    base = {of.base}"] if of.base != "fixed" else []),
+        *([f"    payload weight {{ {of.payload} }}"] if of.payload else []),
+        *([f"    sensor reads = {of.sensor}"] if of.sensor else []),
         f"    rates {{ dynamics = {of.rate}; servos = {of.rate}; record = 1 kHz; }}",
         "    duration = 2 s;",
         "    record = [q, qd];" if record else f"    record = [{arm.joints[0]}.q];",

@@ -46,12 +46,19 @@ SERVOS: Mapping[str, Variant] = {
 
 _LINK = SEVEN.bodies()[-1].name
 _JOINT = SEVEN.joints[3]
+_LOAD = f"mass = 3 kg;  shape = box(size = [0.1, 0.2, 0.1] m);  on = {_LINK};"
+_FLYING = "grapple = 0.01 s;  position = [0.5, 0, 0.6] m;"
 _WINDOW = "from = 0.01 s;  until = 0.02 s;"
 
 OTHERS: Mapping[str, Variant] = {
     "tachometer on all": Variant("sensor qd = tachometer { resolution = 1e-3 rad/s; }"),
     "tachometer with a filter": Variant("sensor qd = tachometer { filter = butterworth;  cutoff = 2 kHz; }"),
     "tachometer with noise": Variant("sensor qd = tachometer { noise = 1e-4 rad/s; }"),
+    "accelerometer": Variant(sensor=f"accelerometer {{ link = {_LINK};  at = [0, 0, 0.1] m;  along = [1, 0, 0];  "
+                             "cutoff = 200 Hz; }"),
+    "gyroscope": Variant(sensor=f"gyroscope {{ link = {_LINK};  along = [0, 0, 1]; }}"),
+    "gyroscope with a filter": Variant(sensor=f"gyroscope {{ link = {_LINK};  along = [0, 0, 1];  "
+                                       "filter = butterworth;  cutoff = 200 Hz; }"),
     "base prescribed": Variant(base="prescribed { x = sine(amplitude = 1 cm, frequency = 1 Hz); }"),
     "base free": Variant(base="free;"),
     "wrench": Variant(environment=f"used = wrench {{ link = {_LINK};  force = [1, 2, 3] N; }}"),
@@ -62,7 +69,7 @@ OTHERS: Mapping[str, Variant] = {
                        "turning = [1, 1, 1] N*m/rad; }"),
     "plume, 1 cell": Variant(environment=f"used = plume {{ link = {_LINK};  width = 1 m;  height = 1 m;  cells = 1;  "
                              "thrust = 10 N;  exponent = 6;  nozzle = [3, 0, 1] m;  axis = [-1, 0, 0]; }"),
-    "plume, 16 cells": Variant(environment=f"used = plume {{ link = {_LINK};  width = 1 m;  height = 1 m;  cells = 4;  "
+    "plume, 36 cells": Variant(environment=f"used = plume {{ link = {_LINK};  width = 1 m;  height = 1 m;  cells = 6;  "
                                "thrust = 10 N;  exponent = 6;  nozzle = [3, 0, 1] m;  axis = [-1, 0, 0]; }"),
     "gravity_gradient": Variant(environment="used = gravity_gradient { radius = 6.8e6 m;  frame = inertial; }"),
     "joint_stop": Variant(
@@ -72,7 +79,10 @@ OTHERS: Mapping[str, Variant] = {
     "free_swinging": Variant(environment=f"used = free_swinging {{ joint = {_JOINT};  {_WINDOW} }}"),
     "runaway": Variant(environment=f"used = runaway {{ joint = {_JOINT};  {_WINDOW} }}"),
     "dead_sensor": Variant(environment=f"used = dead_sensor {{ joint = {_JOINT};  of = qd;  {_WINDOW} }}"),
-    "space": Variant(_ELASTIC, base="free;"),
+    "payload held": Variant(payload=_LOAD),
+    "payload grappled": Variant(payload=f"{_LOAD}  {_FLYING}"),
+    "payload grappled, base free": Variant(base="free;", payload=f"{_LOAD}  {_FLYING}"),
+    "space": Variant(_ELASTIC, base="free;", payload=_LOAD),
 }
 """What else there is, over rigid gearboxes on a fixed base. space: elastic gears on a free base, with a load."""
 

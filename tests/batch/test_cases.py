@@ -85,7 +85,18 @@ def test_the_table_is_in_the_decks_units_and_marks_what_is_missed(here: Path) ->
         f"  #2  {ids[2][:8]}        0.03             20200    3333    5.334  met",
         f"  #3  {ids[3][:8]}        0.04             20000    2500    5.156  met",
     ]
-    assert "  settle   2500    4167   5000 ms  settling_time of shoulder.qd; infinite in 1" in lines
+    assert "  settle   2500    3333   5000 ms  settling_time of shoulder.qd; infinite in 1" in lines
+
+
+def test_smallest_median_and_largest_are_of_the_finite_values_everywhere() -> None:
+    from batch.summary import Spread, median_text, spread
+
+    values = np.array([3.0, np.inf, 1.0, np.nan, 2.5, np.inf, np.inf])
+    assert spread(values) == Spread(minimum=1.0, median=2.5, maximum=3.0, infinite=3, unknown=1)
+    assert spread(values[:3]).median == 2.0
+    assert np.isnan(spread(values[1::4]).median)
+    texts = [median_text(each) for each in (values, values[[0, 2]], values[[1, 3]], values[[3]])]
+    assert texts == ["2.5, 3 inf", "2", "inf", "-"]
 
 
 def test_a_pure_number_has_no_unit_and_may_be_in_per_cent(here: Path) -> None:

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -384,7 +385,7 @@ class TestWhatIsSaid:
     def test_a_sweep_that_misses_says_why_it_ends_with_1(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert not run_and_tell(self.plan(here, plans.gains(20)), no_picture=True)
         said = capsys.readouterr().out.splitlines()
-        assert "  settle    2.5   4.004  8.636 s  settling_time of shoulder.qd; infinite in 1" in said
+        assert "  settle    2.5   3.878  8.636 s  settling_time of shoulder.qd; infinite in 1" in said
         assert "  require settle < 10 s  met by 19 of 20 (95 %)" in said
         assert said[-1] == "exit 1: not met everywhere: settle < 10 s, volts < 5 V"
 
@@ -410,6 +411,13 @@ class TestWhatIsSaid:
         run_and_tell(self.plan(here, plans.nominal()))
         assert "picture  two_link.png\n" in capsys.readouterr().out
         assert (here / "two_link.png").read_bytes().startswith(b"\x89PNG")
+
+    def test_a_picture_of_one_of_several_runs_says_of_which(
+        self, here: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        run_and_tell(self.plan(here, plans.nominal(), replace(plans.nominal(), name="other")))
+        told = "picture  two_link.png, of nominal alone: `met plot two_link.h5 --run other` draws another\n"
+        assert told in capsys.readouterr().out
 
     def test_a_picture_of_somebody_elses_is_left_alone(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (here / "two_link.png").write_bytes(b"\x89PNG mine")

@@ -53,7 +53,7 @@ def test_the_numbers_of_a_sweep(sweep: ArchiveFile) -> None:
         "",
         "20 of 20 cases reached their end",
         "            min  median    max",
-        "  settle    2.5   4.004  8.636 s  settling_time of shoulder.qd; infinite in 1",
+        "  settle    2.5   3.878  8.636 s  settling_time of shoulder.qd; infinite in 1",
         "  volts   5.156     5.5  6.849 V  max of shoulder.servo.voltage",
         "  require settle < 10 s  met by 19 of 20 (95 %)",
         "  require volts < 5 V    met by 0 of 20 (0 %)",

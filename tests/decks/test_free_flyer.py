@@ -23,6 +23,18 @@ def test_the_arm_turns_the_satellite_the_other_way_and_no_momentum_comes_of_it()
     np.testing.assert_allclose(np.linalg.norm(run.signals["links.base.rate"][0, -1]), 0.0, atol=1e-4)
 
 
+def test_on_board_it_feels_that_it_turns_and_shakes_and_not_that_it_falls() -> None:
+    (made,) = ic.compile("free_flyer.ic", select=["flyer_felt"]).experiments
+    run = engine.run(made)
+    w, x, y, z = run.signals["links.base.orientation"][0].T
+    axis = np.column_stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
+    off = run.signals["sensors.drift"][0].ravel() - np.einsum("ij,ij->i", axis, run.signals["links.base.rate"][0])
+    # noise of 0.005 deg/s and steps of 0.002: of 401 draws none beyond five of the one and half of the other
+    assert 0.0 < np.max(np.abs(off)) < np.radians(5 * 0.005 + 0.001)
+    shake = run.signals["sensors.shake"][0].ravel()
+    assert np.max(np.abs(shake[run.time < 1.0])) < 5e-3 < 0.1 < np.max(np.abs(shake))
+
+
 def test_held_it_keeps_its_attitude_and_takes_momentum_from_outside() -> None:
     (made,) = ic.compile("free_flyer.ic", select=["flyer_held"]).experiments
     run = engine.run(made)

@@ -21,10 +21,10 @@ from met.parameter import Memory, Parameter, State, there, under
 from met.plan import JointKind
 from met.servos.servo import Parts, parts
 from met.units import PURE, Dimension, parse_unit
+from tests.met import small_guides
 
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
-EVERY = [(kind, name) for kind in KINDS if kind != "guide" for name in models.find_own(kind)]
-"""All but guides, which are about several joints: tests/met/guides."""
+EVERY = [(kind, name) for kind in KINDS for name in models.find_own(kind)]
 
 JOINTS: dict[str, JointKind] = {"hinge": "revolute", "slide": "prismatic"}
 """The joints of the deck's arm, and their kinds."""
@@ -42,8 +42,8 @@ arm small {{
     link bar {{ mass = 2 kg; shape = rod(length = 1 m, along = x); }}
     link tip {{ mass = 1 kg; shape = sphere(radius = 0.1 m); com = [0.2, 0.1, 0] m; }}
     {base}
-    joint hinge revolute  {{ parent = base; child = bar; axis = y; }}
-    joint slide prismatic {{ parent = bar;  child = tip; axis = x; at = [1, 0, 0] m; }}
+    joint hinge {hinge} {{ parent = {root}; child = bar; axis = y; }}
+    joint slide {slide} {{ parent = bar; child = tip; axis = x; at = [1, 0, 0] m; }}
 }}
 {more}
 run it {{
@@ -60,10 +60,13 @@ run it {{
 sweep cases of it {{ {cases} }}
 """
 PLAIN = {
-    "base": "", "more": "", "servos": "", "gravity": "gravity = [0, 0, -9.81] m/s^2;", "environment": "",
-    "integrator": "modified_euler", "metric": "final { of = slide.q; }", "run": "", "cases": CASES,
+    "base": "", "root": "base", **JOINTS, "more": "", "servos": "", "gravity": "gravity = [0, 0, -9.81] m/s^2;",
+    "environment": "", "integrator": "modified_euler", "metric": "final { of = slide.q; }", "run": "", "cases": CASES,
 }  # fmt: skip
 """The parts of the deck, where no model writes them."""
+
+WORDS_OF_DECK = ("root", *JOINTS, "integrator", "metric")
+"""Parts that a model writes in the stead of what is there; to the others it adds."""
 
 FREE = {"base": "link base { mass = 5 kg; inertia = [3, 4, 5] kg*m^2; }", "run": "base = free;"}
 """The parts of a deck whose base moves freely."""
@@ -116,9 +119,17 @@ SMALLEST: dict[tuple[str, str], Small] = {
     ("servo", "ideal"): Small({"bandwidth": 30.0}),
     ("servo", "passive"): Small({"friction": 1.0}),
     ("servo", "locked"): Small({"release": 0.1}),
-    ("sensor", "tachometer"): Small({"cutoff": 20.0, "noise": 0.01, "resolution": 1e-3, "delay": 1.0}),
+    ("sensor", "tachometer"): Small({"cutoff": 15.0, "noise": 0.01, "resolution": 1e-3, "delay": 1.0}),
     ("sensor", "encoder"): Small({"step": 1e-3, "delay": 1.0}, command="position", of="q"),
-    ("sensor", "low_pass"): Small({"cutoff": 20.0}),
+    ("sensor", "low_pass"): Small({"cutoff": 15.0}),
+    ("sensor", "accelerometer"): Small({
+        "link": "tip", "at": (0.1, 0.2, 0.3), "along": (1.0, 2.0, -2.0), "cutoff": 15.0, "noise": 0.01,
+        "resolution": 1e-3, "delay": 1.0, "scale": 1.01, "bias": 0.1,
+    }),
+    ("sensor", "gyroscope"): Small({
+        "link": "tip", "along": (1.0, 2.0, -2.0), "cutoff": 15.0, "noise": 0.01, "resolution": 1e-3, "delay": 1.0,
+        "scale": 1.01, "bias": 0.1,
+    }),
     ("environment", "attitude_hold"): Small({
         "rpy": (0.1, -0.2, 0.3), "stiffness": (3.0, 4.0, 5.0), "damping": (0.1, 0.2, 0.3), "limit": (0.4, 0.5, 0.6),
     }, beside=FREE),
@@ -145,6 +156,11 @@ SMALLEST: dict[tuple[str, str], Small] = {
     ("environment", "wrench_table"): Small({
         "link": "tip", "times": (0.0, 0.1, 0.15), "force_z": (0.0, 9.0, 2.0), "moment_x": (1.0, -1.0, 0.5),
     }),
+    ("guide", "resolved_rate"): Small({
+        "link": "tip", "point": (0.3, 0.2, 0.1), "max_damping": 0.1, "threshold": 0.2, "gain": 2.0,
+        "max_rate": 0.4,
+    }),
+    ("guide", "together"): Small({"to": 0.3, "max_rate": 2.0, "max_acceleration": 50.0}),
     ("command", "constant"): Small({"value": 0.5}),
     ("command", "step"): Small({"to": 0.5, "at": 0.1}),
     ("command", "ramp"): Small({"to": 0.5, "over": 0.1}),
@@ -157,6 +173,7 @@ SMALLEST: dict[tuple[str, str], Small] = {
     ("metric", "max"): Small(),
     ("metric", "min"): Small(of="qdd"),
     ("metric", "overshoot"): Small({"target": 0.1}, of="q"),
+    ("metric", "peak"): Small(of="qdd"),
     ("metric", "rms"): Small(),
     ("metric", "settling_time"): Small({"target": 0.1, "within": 0.05}, of="q"),
     **{("integrator", name): Small() for name in models.find_own("integrator")},
@@ -168,12 +185,14 @@ SMALLEST: dict[tuple[str, str], Small] = {
 class Use:
     """A model in the small deck.
 
-    joint    the joint that it is on, or whose channel a metric watches
-    command  kind of the joint's command; "" where the model has to do with none
+    joint    the joint that it is on, or whose channel a metric watches; of a guide, which moves others too, the one
+             whose parameters a deck is to write
+    command  kind of the joint's command, or of all joints that follow a guide; "" where the model has to do with none
     carrier  of a command, sensor, bed or law: the servo that it stands in; "" for the first that takes it
     words    words that it writes, by parameter, in the stead of the smallest deck's
     analog   whether the law of the servo is continuous, its own or that in which it stands
     file     whether the lists that a deck could write are columns of a file, in their stead
+    for_all  of a guide: whether what each joint has is written once for all of them, which are then of one kind
     """
 
     kind: models.Kind
@@ -184,6 +203,7 @@ class Use:
     words: Mapping[str, str] = field(default_factory=dict)
     analog: bool = False
     file: bool = False
+    for_all: bool = False
 
     @property
     def model(self) -> Any:
@@ -194,11 +214,17 @@ class Use:
         return SMALLEST[self.kind, self.name]
 
     @property
+    def on_link(self) -> bool:
+        """Whether it is a sensor of a link, which stands in the run."""
+        return self.kind == "sensor" and self.model.measures is not None
+
+    @property
     def head(self) -> str:
         """What the paths of its parameters begin with."""
+        of_joint = f"{self.joint}.servo.sensor.{self.small.of}"
         return {
-            "servo": f"{self.joint}.servo", "sensor": f"{self.joint}.servo.sensor.{self.small.of}",
-            "command": f"{self.joint}.servo.command", "environment": "environment.used",
+            "servo": f"{self.joint}.servo", "sensor": "sensors.used" if self.on_link else of_joint,
+            "command": f"{self.joint}.servo.command", "environment": "environment.used", "guide": "guides.used",
             "metric": "metrics.m", "bed": f"{self.joint}.bed", "law": f"{self.joint}.law", "integrator": "integrator",
         }[self.kind]  # fmt: skip
 
@@ -206,11 +232,40 @@ class Use:
     def label(self) -> str:
         """What messages call it."""
         return {
-            "servo": "servo `used`", "sensor": f"sensor `{self.small.of}` of servo `used`",
-            "command": f"`{self.name}`", "environment": "environment `used`",
+            "servo": "servo `used`",
+            "sensor": "sensor `used`" if self.on_link else f"sensor `{self.small.of}` of servo `used`",
+            "command": f"`{self.name}`", "environment": "environment `used`", "guide": "guide `used`",
             "metric": "metric `m`", "bed": f"bed `{self.name}` of joint `{self.joint}`",
             "law": f"law `{self.name}` of joint `{self.joint}`", "integrator": "",
         }[self.kind]  # fmt: skip
+
+    @property
+    def of_joint(self) -> tuple[Parameter, ...]:
+        """What each joint has of its own that follows a guide."""
+        return getattr(self.model, "of_joint", ())
+
+    def owner(self, parameter: Parameter) -> str:
+        """What messages call whatever has the parameter; the first joint, where it is written for all."""
+        joint = next(iter(self.kinds)) if self.for_all else self.joint
+        return f"joint `{joint}` of {self.label}" if parameter in self.of_joint else self.label
+
+    def key(self, parameter: Parameter) -> str:
+        """What a deck writes it under."""
+        own = parameter in self.of_joint and not self.for_all
+        return f"{self.joint}.{parameter.name}" if own else parameter.name
+
+    def path(self, parameter: Parameter) -> str:
+        """What its path in a plan is, or begins with."""
+        head = f"{self.head}.{self.joint}" if parameter in self.of_joint else self.head
+        return f"{head}.{parameter.name}"
+
+    @property
+    def kinds(self) -> dict[str, JointKind]:
+        """The joints that follow the guide, and their kinds."""
+        link = str(self.values.get("link", ""))
+        kinds = {**{joint: kind for joint, (kind, _) in small_guides.INBOARD.items()}, **JOINTS}
+        found = small_guides.followers(self.model, self.chosen, link)
+        return {joint: JOINTS[self.joint] if self.for_all else kinds[joint] for joint in found}
 
     @property
     def values(self) -> dict[str, Value]:
@@ -229,15 +284,19 @@ class Use:
 
     def parameters(self) -> tuple[Parameter, ...]:
         """The parameters that a deck may write here, with the bounds that hold here."""
-        return self._here(models.written(self.model), lists=not self.file)
+        declared = {parameter.name: parameter for parameter in self.of_joint}
+        written = (declared.get(parameter.name, parameter) for parameter in models.written(self.model))
+        return self._here(written, lists=not self.file)
 
     def absent(self) -> tuple[Parameter, ...]:
         """Those that are there under other words alone."""
-        return tuple(parameter for parameter in models.written(self.model) if not there(parameter, self.chosen))
+        written = models.written(self.model)
+        here = [parameter.name for parameter in written if there(parameter, self.chosen)]
+        return tuple(parameter for parameter in written if parameter.name not in here)
 
     def in_plan(self) -> tuple[Parameter, ...]:
         """The parameters that a plan holds of it, which the model's functions read."""
-        declared = getattr(self.model, "parameters", ())
+        declared = (*getattr(self.model, "parameters", ()), *self.of_joint)
         return self._here([parameter for parameter in declared if parameter.shape != "text"])
 
     def _here(self, declared: Iterable[Parameter], *, lists: bool = True) -> tuple[Parameter, ...]:
@@ -294,8 +353,8 @@ class Use:
         entries |= written or {}
         parts = {**PLAIN, **self.small.beside, "cases": cases}
         own = self._parts({name: text for name, text in entries.items() if name not in without})
-        return before + DECK.format(**parts | {name: f"{parts[name]} {text}" if name not in ("integrator", "metric")
-                                               else text for name, text in own.items()})  # fmt: skip
+        return before + DECK.format(**parts | {name: text if name in WORDS_OF_DECK else f"{parts[name]} {text}"
+                                               for name, text in own.items()})  # fmt: skip
 
     def _parts(self, entries: Mapping[str, str]) -> dict[str, str]:
         """The parts of the deck in which it stands, with its entries."""
@@ -306,6 +365,8 @@ class Use:
             rate = "rate = continuous;" if self.analog else ""
             definition = f"servo used {{ model = {self.name}; {block[2:-2]} {asked} {rate} }}"
             return {"more": definition, "servos": f"{self.joint} = used;"}
+        if self.on_link:
+            return {"run": f"sensor used = {self.name} {{ rate = 125 Hz; {block[2:]}"}
         if self.kind == "sensor":
             servo = replace(self, kind="servo", name=self.carrier or carrier(self.kind, self.command), words={})
             taken = servo._parts({name: servo.text(servo.parameter(name), value)
@@ -320,11 +381,37 @@ class Use:
             taken["servos"] = f"{self.joint} = used {{ command = {self.command}({asked}); }};"
             put = f"substitute {self.joint} {{ {self.kind} = {self.name}{call}; }}"
             return taken if self.kind == "command" else {**taken, "run": put}
+        if self.kind == "guide":
+            return self._guide(entries)
         if self.kind == "environment":
             return {"environment": f"used = {self.name} {block};"}
         if self.kind == "metric":
             return {"metric": f"{self.name} {{ of = {self.joint}.{self.small.of}; {block[2:-2]} }}"}
         return {"integrator": self.name}
+
+    def _guide(self, entries: Mapping[str, str]) -> dict[str, str]:
+        """The parts of the deck with a guide, whose joints have servos of their kinds."""
+        kinds, alike = self.kinds, {kind: joint for joint, kind in JOINTS.items()}
+        servos = {kind: replace(self, kind="servo", name=carrier("servo", self.command), joint=alike[kind], words={},
+                                for_all=False) for kind in kinds.values()}  # fmt: skip
+        definitions = [
+            f"servo of_{kind} {{ model = {servo.name}; "
+            + " ".join(f"{name} = {servo.text(servo.parameter(name), x)};" for name, x in servo.values.items())
+            + f" command = {self.command}(used); }}"
+            for kind, servo in servos.items()
+        ]
+        written = [f"{self.key(self.parameter(name))} = {text};" for name, text in entries.items()]
+        others = {} if self.for_all else {joint: kind for joint, kind in kinds.items() if joint != self.joint}
+        for wanted in self.of_joint:
+            written += [f"{joint}.{wanted.name} = {replace(self, joint=alike[kind]).text(wanted, value)};"
+                        for joint, kind in others.items() if (value := self.small.values.get(wanted.name)) is not None]
+        body = small_guides.body(self.model, small_guides.components(self.model, self.chosen), written)
+        own = dict.fromkeys(JOINTS, JOINTS[self.joint]) if self.for_all else {}
+        return {
+            **small_guides.inboard(kinds), **own, "more": "\n".join(definitions),
+            "servos": " ".join(f"{joint} = of_{kind};" for joint, kind in kinds.items()),
+            "run": f"guide used = {self.name} {{ {body} }}",
+        }  # fmt: skip
 
     def put(self, folder: Path) -> Use:
         """Writes the file that a course from a file reads, beside the deck; gives itself."""
@@ -375,11 +462,11 @@ def carrier(kind: str, command: str) -> str:
 
 def commands(kind: str, model: Any) -> tuple[str, ...]:
     """The kinds of command under which a model is used, the smallest deck's first; ("",) where it has none."""
-    if kind == "servo":
+    if kind in ("servo", "guide"):
         return model.commands or ("",)
     if kind == "command":
         return tuple(ASKED)
-    if kind == "sensor":
+    if kind == "sensor" and model.measures is None:
         return (SMALLEST[kind, model.name].command or "rate",)
     return ("rate",) if kind in ("bed", "law") else ("",)
 
@@ -388,7 +475,8 @@ def uses(kind: models.Kind, name: str, joint: str = "hinge") -> Iterator[Use]:
     """Every way to use a model, the smallest deck's first.
 
     Under each kind of command: each choice of its words; then each other link of the arm that one of them may name;
-    then with its lists in a file, where it takes one for them; then with its law continuous, where it may be.
+    then with its lists in a file, where it takes one for them; then with its law continuous, where it may be; then
+    with what each joint has written for all.
     """
     model, small = models.find(kind, name), SMALLEST[kind, name]
     kinds = sorted(commands(kind, model), key=lambda command: command != small.command)
@@ -411,14 +499,16 @@ def uses(kind: models.Kind, name: str, joint: str = "hinge") -> Iterator[Use]:
             yield replace(plain, file=True)
         if not getattr(model, "clocked", True) and not (kind == "servo" and model.control is None):
             yield replace(plain, analog=True)
+        if getattr(model, "of_joint", ()):
+            yield replace(plain, for_all=True)
 
 
 def first_uses(kind: models.Kind, name: str, joint: str = "hinge") -> Iterator[tuple[Use, list[Parameter]]]:
-    """The uses, under each kind of command, in which parameters are there that were in none before; and these."""
+    """The uses, under each kind of command, in which parameters are written that were in none before; and these."""
     seen: set[tuple[str, str]] = set()
     for use in uses(kind, name, joint):
-        new = [parameter for parameter in use.parameters() if (use.command, parameter.name) not in seen]
-        seen |= {(use.command, parameter.name) for parameter in new}
+        new = [parameter for parameter in use.parameters() if (use.command, use.key(parameter)) not in seen]
+        seen |= {(use.command, use.key(parameter)) for parameter in new}
         if new and not use.file:
             yield use, new
 

@@ -87,3 +87,13 @@ def test_every_servo_takes_every_course_of_every_command_that_it_knows(
         deck = experiment(tmp_path, use.deck(), select=["it"])
         rows, _ = execute(build(deck), {}, deck.structure.schedule.ticks)
         assert np.isfinite(rows).all() and np.ptp(rows[:, 0]) > 0.0, command
+
+
+def test_a_parameter_may_be_declared_for_each_of_several_words() -> None:
+    """Never twice for one word, nor beside one that is there under all."""
+    def names(*only: tuple[str, tuple[str, ...]] | None) -> list[str]:
+        return models.there_together([Parameter(name="x", doc="a number", only=each) for each in only])
+
+    assert names(("w", ("a",)), ("w", ("b", "c"))) == ["x"]
+    assert names(("w", ("a", "b")), ("w", ("b", "c"))) == names(("w", ("a",)), None) == ["x", "x"]
+    assert names(("w", ("a",)), ("v", ("b",))) == ["x", "x"]

@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from met.dynamics.tree import Body
-from tests.oracles.pinocchio_tree import on_joints
+from tests.oracles.pinocchio_tree import classical, on_joints
 
 Array = np.ndarray
 
@@ -87,6 +87,13 @@ class FloatingPinocchio:
         forces = self.velocity(np.zeros(3), np.zeros(3), tau)
         a = pin.aba(self.model, self.data, self.configuration(base, q), v, forces, on_joints(self, wrenches))
         return a[3:6], a[:3] + np.cross(base.w, base.v), a[self.at]
+
+    def link_acceleration(self, base, q, qd, wd, a, qdd, name: str, point: Sequence[float]) -> Array:
+        """Acceleration of a point of a link, in link axes. wd, a: of the base frame, base axes."""
+        v = self.velocity(base.w, base.v, qd)
+        given = self.velocity(wd, np.array(a) - np.cross(base.w, base.v), qdd)
+        pin.forwardKinematics(self.model, self.data, self.configuration(base, q), v, given)
+        return classical(self, name, point)
 
     def forces(self, base, q, qd, wd, a, qdd, wrenches) -> tuple[Array, Array]:
         """Inverse dynamics: the wrench that the base would need (moment over force), and the joints' torques."""

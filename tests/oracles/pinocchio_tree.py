@@ -25,6 +25,17 @@ def on_joints(arm: Any, wrenches: Mapping[str, tuple[Sequence[float], Sequence[f
     return result
 
 
+def classical(arm: Any, name: str, point: Sequence[float]) -> np.ndarray:
+    """Acceleration of a point of a link, link axes, of the motion that Pinocchio's `forwardKinematics` was given.
+
+    Pinocchio's accelerations are spatial: that of a point lacks w x v.
+    """
+    b = arm.link[name]
+    there = arm.placed[b] * pin.SE3(np.eye(3), np.array(point, float))
+    v, a = (there.actInv(each[arm.joint_of[b]]) for each in (arm.data.v, arm.data.a))
+    return np.array(a.linear + np.cross(v.angular, v.linear))
+
+
 class PinocchioTree:
     """Pinocchio's model of some bodies (parents before children)."""
 
@@ -87,6 +98,11 @@ class PinocchioTree:
         twist = self.placed[b].actInv(self.data.v[self.joint_of[b]])
         R = (self.data.oMi[self.joint_of[b]] * self.placed[b]).rotation
         return R @ twist.angular, R @ twist.linear
+
+    def link_acceleration(self, q, qd, qdd, name: str, point: Sequence[float]) -> np.ndarray:
+        """Acceleration of a point of a link, in link axes."""
+        pin.forwardKinematics(self.model, self.data, *(self.vector(x) for x in (q, qd, qdd)))
+        return classical(self, name, point)
 
     def reactions(self, q, qd, qdd, wrenches) -> list[tuple[np.ndarray, np.ndarray]]:
         """Moment about the child link's origin and force that each moving joint transmits, in link axes."""

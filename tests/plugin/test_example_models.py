@@ -6,6 +6,7 @@ import importlib
 import re
 import tomllib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,9 +14,11 @@ import numpy as np
 import pytest
 
 from met import models
+from met import run as engine
 from met.diagnostic import Problem
 from met.servos.servo import Asked, JointMotion, Seen
 from met.trace import Formulas, Graph
+from tests.ic.small_decks import check, experiment, told
 
 HERE = Path(__file__).parent
 PAGE = (HERE.parents[1] / "docs" / "models.md").read_text(encoding="utf-8")
@@ -147,10 +150,72 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
 
 @pytest.mark.parametrize(
     ("kind", "name"),
-    [("servo", "velocity_servo"), ("environment", "wind"), ("command", "approach"), ("metric", "mean")],
-)
+    [
+        ("servo", "velocity_servo"), ("servo", "belt_drive"), ("environment", "wind"), ("command", "approach"),
+        ("metric", "mean"),
+    ],
+)  # fmt: skip
 def test_an_installed_package_offers_its_models_by_name(installed: None, kind: models.Kind, name: str) -> None:
     assert models.find(kind, name).name == name
+
+
+BELT = """\
+arm crane {
+    link boom { mass = 2 kg; shape = rod(length = 1 m, along = x); }
+    joint hinge revolute { parent = base; child = boom; axis = z; }
+}
+servo winch {
+    model = belt_drive; kp = 4 N*m*s/rad; ki = 8 N*m/rad; limit = 3 N*m; rotor = 0.5 kg*m^2; stiffness = 900 N*m/rad;
+    damping = 9 N*m*s/rad; command = rate(0.5 rad/s);
+}
+run lift {
+    arm = crane; servos { hinge = winch; } environment {} initial { hinge.q = 1 rad; hinge.qd = 0.2 rad/s; }
+    rates { dynamics = 2 kHz; servos = 500 Hz; record = 500 Hz; } duration = 6 s;
+    record = [q, qd, servo.angle, servo.torque_cmd, servo.integral];
+}
+run smooth like lift { rates { servos = continuous; } }
+run away like lift { environment { fault = runaway { joint = hinge; from = 5 s; } } }
+"""
+
+
+@pytest.mark.parametrize("name", ["lift", "smooth", "away"])
+def test_the_belt_drives_integral_begin_and_full_do_what_the_page_says(
+    installed: None, name: str, tmp_path: Path
+) -> None:
+    signals = engine.run(experiment(tmp_path, BELT, select=[name])).signals
+    q, qd, angle = (signals[each][0, :, 0] for each in ("q", "qd", "servo.angle"))
+    torque = signals["servo.torque_cmd"][0, :, 0]
+    assert angle[0] == q[0] == 1.0, "`begin`: the belt is slack"
+    if name == "away":
+        assert (torque[2510:] == 3.0).all(), "`full`"
+        return
+    # the slow pole of 1.17 s^2 + 4 s + 8 decays by exp(-1.7 t): to 4e-5 of the step of 0.3 rad/s in 6 s
+    assert abs(qd[-1] - 0.5) < 1e-4
+    assert abs(torque[-1]) < 1e-3 and abs(signals["servo.integral"][0, -1, 0]) < 1e-3
+
+
+def test_a_servo_of_ones_own_without_full_is_told_what_to_declare(
+    installed: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bare = replace(models.find("servo", "belt_drive"), full=None)
+    monkeypatch.setitem(models.available("servo"), "belt_drive", bare)
+    said = told(check(tmp_path, BELT, select=["away"]))
+    assert "D247" in said
+    assert "= help: declare `full` in the model `belt_drive`: the law's outputs at full drive" in said
+
+
+def test_a_misspelt_state_with_friction_is_told_with_those_there_are(
+    installed: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = models.find("servo", "belt_drive")
+    rubbing = replace(model, drive=lambda *given: replace(model.drive(*given), friction={"rat": 0.1}))
+    monkeypatch.setitem(models.available("servo"), "belt_drive", rubbing)
+    with pytest.raises(Problem) as caught:
+        engine.run(experiment(tmp_path, BELT, select=["lift"]))
+    (diagnostic,) = caught.value.diagnostics
+    assert diagnostic.code == "E212"
+    assert diagnostic.message.endswith("friction gave back rat; declared are angle, rate")
+    assert diagnostic.help == ("did you mean `rate`?", "give back declared names alone")
 
 
 def test_without_the_package_the_name_is_unknown() -> None:
@@ -172,7 +237,7 @@ def test_a_branch_on_a_recorded_value_is_refused_at_its_line() -> None:
     assert "where(condition, a, b)" in " ".join(diagnostic.help)
 
 
-@pytest.mark.parametrize("name", ["velocity_servo", "wind", "approach", "mean"])
+@pytest.mark.parametrize("name", ["velocity_servo", "belt_drive", "wind", "approach", "mean"])
 def test_the_page_shows_the_file_as_it_is(name: str) -> None:
     blocks = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
     assert (HERE / "met_example_models" / f"{name}.py").read_text(encoding="utf-8") in blocks

@@ -10,7 +10,7 @@ import batch
 from batch.archive.read import ArchiveFile
 from batch.plotting import draw
 from batch.plotting.layout import FLAT
-from batch.plotting.sheet import COLOURS
+from batch.plotting.sheet import COLOURS, Sheet
 from tests.batch import plans
 from tests.batch.plotting.pictures import archive, shown
 
@@ -43,6 +43,17 @@ def test_few_cases_are_overlaid_and_named_by_what_varies(here: Path, figures: li
     words = [text.get_text() for text in figures[0].legends[0].get_texts()]
     assert figures[0].legends[0].get_title().get_text() == "gearbox.kp  (V·s/rad) ·\nlinks.lower.mass  (g)"
     assert words == ["0.01 · 20000", "0.025 · 20100", "0.04 · 20200"]
+
+
+def test_cases_that_are_told_apart_by_how_faint_they_are_have_a_key(here: Path, figures: list[Any]) -> None:
+    with archive(3) as file:
+        draw(file, "a.png", ["qd", "shoulder.servo.voltage"], sheet=Sheet(width=2.9))
+    [legend] = figures[0].legends
+    keys = dict(zip([text.get_text() for text in legend.get_texts()], legend.get_lines(), strict=True))
+    cases = [text for text in keys if text.startswith("gearbox.kp = ")]
+    assert len(cases) == 3 and cases[0] == "gearbox.kp = 0.01 V·s/rad, links.lower.mass = 20000 g"
+    drawn = [line.get_alpha() for line in figures[0].axes[-1].lines if line.get_alpha() is not None]
+    assert [keys[text].get_alpha() for text in cases] == drawn == [1.0, 0.625, 0.25]
 
 
 def test_joints_of_unlike_unit_stand_beside_one_another(here: Path, figures: list[Any]) -> None:

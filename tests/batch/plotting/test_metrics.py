@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +88,32 @@ class TestPoints:
         assert _apart(x[:100], y[:100]).tolist() == list(range(100))
 
 
+class TestLogarithmicAxes:
+    @pytest.mark.parametrize(
+        ("kps", "expected"),
+        [
+            ([0.5, 1.0, 2.0, 4.0], ["0.5", "1", "2", "4"]),
+            (np.geomspace(0.005, 0.05, 5).tolist(), ["0.005", "0.01", "0.02", "0.05"]),
+            (np.geomspace(2000.0, 8000.0, 3).tolist(), ["2000", "4000", "8000"]),
+            (np.geomspace(1e-7, 0.5, 9).tolist(), None),
+            (np.geomspace(0.02, 0.025, 4).tolist(), None),
+        ],
+    )
+    @pytest.mark.parametrize("size", ["", "8.5cm"])
+    def test_have_plain_numbers_that_stand_apart(
+        self, size: str, kps: list[float], expected: list[str] | None, here: Path, figures: list[Any]
+    ) -> None:
+        made(kps, MASS[:3])
+        plot("a.h5", names=["settle"], over=["gearbox.kp"], size=size)
+        ax = shown(figures[0])[0]
+        assert ax.get_xscale() == "log"
+        texts = [text.get_text() for text in (*ax.get_xticklabels(), *ax.get_xticklabels(minor=True))]
+        assert texts == expected or (expected is None and len(texts) > 1)
+        assert all(float(text) > 0.0 for text in texts), "no TeX"
+        boxes = sorted((t.get_window_extent() for t in ax.get_xticklabels()), key=lambda box: box.x0)
+        assert all(one.x1 < other.x0 for one, other in pairwise(boxes))
+
+
 class TestMaps:
     def test_are_drawn_where_two_parameters_make_a_grid(self, here: Path, figures: list[Any]) -> None:
         made()
@@ -144,6 +171,22 @@ class TestMaps:
         points = ax.collections[0]
         assert isinstance(points, PathCollection) and len(points.get_offsets()) == 40
         assert said(figures[0]) == "40 cases: a point a case"
+
+    def test_of_cases_that_fill_no_grid_lie_by_their_values_with_room_around(
+        self, here: Path, figures: list[Any]
+    ) -> None:
+        kps = [0.010, 0.011, 0.012, 0.040, 0.041]
+        sweep = archives.grid(kps, [20.0])
+        first, second = sweep.cases.coordinates
+        second = replace(second, values=np.array([20.0, 21.0, 30.0, 22.0, 29.0]))
+        archives.made(Path("a.h5"), replace(sweep, cases=replace(sweep.cases, coordinates=(first, second))))
+        plot("a.h5", names=["volts"], over=["gearbox.kp", "links.lower.mass"])
+        [ax] = shown(figures[0])[:1]
+        np.testing.assert_allclose(sorted(ax.collections[0].get_offsets()[:, 0]), kps)
+        assert ax.get_xscale() == "linear"
+        (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+        assert left < 0.010 and right > 0.041 and low < 20e3 and high > 30e3
+        assert "0.020" in [text.get_text() for text in ax.get_xticklabels()]
 
     def test_have_axes_of_the_values_and_logarithmic_ones_of_factors(self, here: Path, figures: list[Any]) -> None:
         made(kps=[0.02, 0.04, 0.06, 0.08, 0.1], masses=[1.0, 10.0, 100.0, 1000.0, 10000.0])

@@ -181,7 +181,7 @@ def test_an_arm_that_no_run_uses_is_checked_too(tmp_path: Path) -> None:
 
 
 def test_several_mistakes_are_told_in_one_run(tmp_path: Path) -> None:
-    arm = changed(ARM, ("2 kg", "-2 kg"), ("axis = z", "axes = z"))
-    compiled = check(tmp_path, arm, changed(SERVO, ("kp", "kpp")), changed(RUN, ("[q]", "[qq]")))
+    arm = changed(ARM, ("2 kg", "-2 kg"), ("axis = z;", ""))
+    compiled = check(tmp_path, arm, changed(SERVO, ("kp", "strength")), changed(RUN, ("[q]", "[qq]")))
     assert {diagnostic.code for diagnostic in compiled.diagnostics} == {"D077", "D141", "D096", "D075", "D125"}, \
         told(compiled)

@@ -178,7 +178,7 @@ error[D251]: `x` of the base jumps, by `step`
 8 |     base = prescribed { x = step(to = 1 m); }
   |                             ^^^^^^^^^^^^^^
   = help: a body moves from place to place in time
-  = help: courses without a jump of the rate: constant, sine, trapezoid
+  = help: courses without a jump of the rate: constant, sine, trajectory(interpolation = cubic), trapezoid
 
 1 error
 """),
@@ -188,7 +188,7 @@ warning[D252]: the rate of `x` of the base jumps, by `ramp`: the blow that this 
   |
 8 |     base = prescribed { x = ramp(to = 1 m, over = 1 s); }
   |                             ^^^^^^^^^^^^^^^^^^^^^^^^^^
-  = help: courses without a jump of the rate: constant, sine, trapezoid
+  = help: courses without a jump of the rate: constant, sine, trajectory(interpolation = cubic), trapezoid
 
 1 warning
 """),
@@ -242,7 +242,7 @@ error[D114]: no initial `base.pos`
 9 |     initial { base.pos = [1, 0, 0] m; }
   |               ^^^^^^^^
   = help: did you mean `base.position`?
-  = help: there is: q, qd, hinge.q, hinge.qd, base.position, base.rpy, base.velocity, base.rate
+  = help: there is: q, qd, hinge.q, hinge.qd, servos, base.position, base.rpy, base.velocity, base.rate
 
 1 error
 """),
@@ -316,6 +316,40 @@ error[D122]: `base.x` cannot vary
 15 | sweep some of it { vary base.x = [1, 2] cm; }
    |                         ^^^^^^
    = help: it is a course in time: vary a parameter of it, `base.x.PARAMETER`
+
+1 error
+"""
+
+
+def test_a_spin_that_the_step_does_not_follow_is_warned_of(tmp_path: Path) -> None:
+    spun = changed(RUN, ("initial {}", "initial { base.rate = [150, 0, 200] rad/s; }"))
+    assert told(check(tmp_path, ARM, spun)) == """\
+warning[D300]: the base turns by 0.25 rad in a step of the dynamics
+ --> deck.ic:9:27
+  |
+9 |     initial { base.rate = [150, 0, 200] rad/s; }
+  |                           ^^^^^^^^^^^^^^^^^^^ h = 0.001 s
+  = help: below 0.2 rad a step a body that tumbles keeps its energy to 1% a turn with modified_euler: the slowest rate that fits is 2000 Hz
+  = help: a steady spin about a principal axis through the frame's origin needs less
+
+1 warning
+"""  # noqa: E501 - a message is as wide as it is
+    assert told(check(tmp_path, ARM, changed(spun, ("duration", "integrator = rk4; duration")))) == ""
+    sweep = "sweep some of it { vary initial.base.rate.x = [100, 300] rad/s; }"
+    found = check(tmp_path, ARM, changed(RUN, ("initial {}", "initial { base.rate = [0, 0, 10] rad/s; }")), sweep,
+                  select=["some"])
+    assert [d.message for d in found.diagnostics] == ["the base turns by 0.3 rad in a step of the dynamics"]
+
+
+def test_a_kind_of_command_is_no_course_of_a_base(tmp_path: Path) -> None:
+    text = changed(RUN, ("base = free;", "base = prescribed { yaw = rate(1 rad/s); }"))
+    assert told(check(tmp_path, ARM, text)) == """\
+error[D250]: `yaw` of the base is told its positions, and `rate` is a kind of command of servos
+ --> deck.ic:8:31
+  |
+8 |     base = prescribed { yaw = rate(1 rad/s); }
+  |                               ^^^^^^^^^^^^^
+  = help: write the course alone: `yaw = trapezoid(to = 10 deg, max_rate = 10 deg/s, max_acceleration = 10 deg/s^2);`
 
 1 error
 """

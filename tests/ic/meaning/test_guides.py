@@ -171,7 +171,7 @@ error[D108]: no `guides` in a run
 11 |     guides tip = resolved_rate {
    |     ^^^^^^^^^^
    = help: did you mean `guide`?
-   = help: a run has: arm, base, servos, initial, environment, rates, integrator, duration, record, tolerances, seed, metric NAME, guide NAME, payload NAME, substitute JOINT, require
+   = help: a run has: arm, base, servos, initial, environment, rates, integrator, duration, record, tolerances, seed, metric NAME, guide NAME, sensor NAME, payload NAME, substitute JOINT, require
 
 error[D125]: no channel `guides.tip.error`
   --> deck.ic:19:18
@@ -370,6 +370,23 @@ def test_a_mistake_is_told_with_its_place_and_a_remedy(tmp_path: Path, text: str
     assert told(check(tmp_path, ARM, changed(RUN, (text, instead)))) == expected
 
 
+def test_a_run_that_guides_less_is_told_what_to_remove(tmp_path: Path) -> None:
+    run = "run other like it { tip { guides = xz; } }\n"
+    y = changed(RUN, ("x = ramp", "y = ramp"))
+    assert told(check(tmp_path, ARM, y, run, select=["other"])) == """\
+error[D274]: `y` is not guided by guide `tip`
+  --> deck.ic:21:36
+   |
+21 | run other like it { tip { guides = xz; } }
+   |                                    ^^
+  ::: deck.ic:13:9  written here
+   = help: it guides x, z
+   = help: write `remove y;`, or guide more
+
+1 error
+"""
+
+
 def test_a_unit_and_a_course_are_no_names_of_guides(tmp_path: Path) -> None:
     for name, what in (("m", "a unit"), ("step", "a course in time")):
         text = told(check(tmp_path, ARM, changed(RUN, ("guide tip", f"guide {name}"))))
@@ -386,7 +403,12 @@ def test_at_a_singularity_a_damped_guide_stays_and_another_fails(tmp_path: Path)
     np.testing.assert_array_equal(run.signals["q"][0], 0.0)
     assert run.signals["guides.tip.error"][0, -1] == pytest.approx(0.2, rel=1e-12)
     bare = engine.run(experiment(tmp_path, ARM, changed(stretched, ("max_damping = 0.1 m", "max_damping = 0 m"))))
-    assert "position, rate or acceleration is no longer a finite number" in bare.cause[0]
+    assert bare.cause[0].replace(str(tmp_path), "") == (
+        "t = 0 s: joint low: position, rate or acceleration is no longer a finite number (/deck.ic:4). Usual reasons: "
+        "guide `tip` (/deck.ic:11), which it follows, at a singularity where its `max_damping` is 0 m; a step too long "
+        "for the servo or the arm (see the stability figures of `met plan`; try a faster rate for the dynamics), or a "
+        "model that divides by zero."
+    )
 
 
 def test_a_joint_is_not_called_as_a_component_of_the_path(tmp_path: Path) -> None:
@@ -427,3 +449,33 @@ def test_what_of_a_guide_does_not_vary(vary: str, message: str, remedy: str, tmp
     text = told(check(tmp_path, ARM, RUN, f"sweep s of it {{ vary {vary}; }}", select=["s"]))
     assert text.startswith(f"error[D122]: `{path}` {message}\n")
     assert f"= help: {remedy}\n" in text
+
+
+def test_a_guide_that_does_nothing_or_in_part_is_told(tmp_path: Path) -> None:
+    assert told(check(tmp_path, ARM, changed(RUN, ("threshold = 0.2 m", "threshold = 0 m")))) == """\
+warning[D301]: guide `tip` is never damped: no singular value is below a `threshold` of 0 m
+  --> deck.ic:12:69
+   |
+12 |         link = two; point = [1, 0, 0] m; guides = xy; max_damping = 0.1 m; threshold = 0 m;
+   |                                                                     ^^^^^
+   = help: change that, or leave it out
+
+1 warning
+"""
+    bare = changed(RUN, ("threshold = 0.2 m", "threshold = 0 m"), ("max_damping = 0.1 m", "max_damping = 0 m"))
+    assert told(check(tmp_path, ARM, bare)) == ""
+    together = changed(RUN, ("""\
+        link = two; point = [1, 0, 0] m; guides = xy; max_damping = 0.1 m; threshold = 0.2 m;
+        x = ramp(to = -20 cm, over = 1 s); max_rate = 1 rad/s;
+""", "        to = 1 rad; max_rate = 1 rad/s; max_acceleration = 1 rad/s^2; begin = 1 s;\n"),
+                       ("resolved_rate", "together"), (", guides.tip.error", ""))
+    (found,) = check(tmp_path, changed(ARM, ("rate(tip)", "position(tip)")), together).diagnostics
+    assert (found.code, found.message) == (
+        "D301", "guide `tip` moves nothing: it would begin at 1 s, and the run ends at 1 s")
+
+
+def test_words_of_a_guide_vary(tmp_path: Path) -> None:
+    sweep = "sweep some of it { vary guides.tip.loop = [closed, open]; }"
+    compiled = check(tmp_path, ARM, RUN, sweep, select=["some"])
+    assert compiled.plan is not None, told(compiled)
+    assert [each.parameters["guides.tip.loop"].value for each in compiled.plan.experiments] == ["closed", "open"]

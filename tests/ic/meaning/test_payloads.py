@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from met import run as engine
 from tests.ic.small_decks import changed, check, experiment, told
 
 ARM = """\
@@ -84,6 +86,20 @@ error[D262]: `hand` is a link of arm `crane`, so no payload may be called so
     ),
     "the ground's name": (
         (("payload box {", "payload world {"),),
+        """\
+error[D262]: `world` is the ground, so no payload may be called so
+ --> deck.ic:9:5
+  |
+9 |     payload world {
+  |     ^^^^^^^^^^^^^
+  = help: give the payload another name
+
+1 error
+""",
+    ),
+    "the ground's name, beside who means the ground": (
+        (("payload box {", "payload world {"),
+         ("environment {}", "environment { line = spring { link = bar; to = world; stiffness = 1 N/m; } }")),
         """\
 error[D262]: `world` is the ground, so no payload may be called so
  --> deck.ic:9:5
@@ -474,4 +490,93 @@ warning[D256]: environment `w` changes nothing: link `base` is part of the groun
    = help: write `base = free;` in the run, or name a link that a joint moves
 
 1 warning
+"""
+
+
+def test_a_run_that_removes_where_a_payload_begins_is_told_so(tmp_path: Path) -> None:
+    run = "run other like it { box { remove position; } }\n"
+    assert told(check(tmp_path, ARM, changed(RUN, FLIES), run, select=["other"])) == """\
+error[D075]: payload `box` has no `position`
+  --> deck.ic:23:27
+   |
+23 | run other like it { box { remove position; } }
+   |                           ^^^^^^ removed here
+  ::: deck.ic:9:5  payload `box` stands here
+   = help: write `position = [...] m;` (the payload's frame at the start, world axes)
+
+1 error
+"""
+
+
+BARE = changed(ARM, ("link hand { mass = 1 kg; shape = sphere(radius = 0.1 m); }", "link hand { mass = 0 kg; }"))
+
+
+def test_a_payload_that_is_carried_throughout_is_mass_to_its_joint_and_one_that_goes_is_named(tmp_path: Path) -> None:
+    """And its motion is that of a link behind a fixed joint."""
+    merged = changed(BARE, ("    joint hinge", "    link box { mass = 5 kg; shape = box(size = [0.2, 0.3, 0.4] m); }\n"
+                            "    joint grip fixed { parent = hand; child = box; }\n    joint hinge"))
+    falls = ("environment {}", "initial { wrist.q = 1 rad; } environment { gravity = [1, -9, 0] m/s^2; }")
+    found, wanted = (engine.run(experiment(tmp_path, arm, changed(run, falls, ("duration = 10 s", "duration = 1 s"))))
+                     for arm, run in ((BARE, RUN), (merged, RUN.replace(BOX, ""))))
+    assert found.cause == wanted.cause == [""]
+    np.testing.assert_allclose(found.signals["q"], wanted.signals["q"], rtol=0, atol=1e-12)
+    goes = changed(RUN, ("    }\n    env", "        release = 3 s;\n    }\n    env"))
+    assert told(check(tmp_path, BARE, goes)) == """\
+error[D217]: joint `wrist` moves nothing that has mass
+ --> deck.ic:5:5
+  |
+5 |     joint wrist revolute { parent = bar;  child = hand; axis = z; at = [1, 0, 0] m; }
+  |     ^^^^^^^^^^^^^^^^^^^^
+  = help: write the mass of link `hand`, or of one that it carries
+  = help: or make the joint fixed
+  = help: payload `box` is not always there: one without `release` would count
+
+1 error
+"""
+    sweep = "sweep light of it { vary payloads.box.mass = [5, 0] kg; }"
+    run = changed(RUN, ("shape = box(size = [0.2, 0.3, 0.4] m);", "inertia = [0, 0, 0] kg*m^2;"))
+    assert [each.code for each in check(tmp_path, BARE, run, sweep, select=["light"]).diagnostics] == ["D217"]
+
+
+def test_a_payload_that_a_free_base_carries_throughout_is_its_mass(tmp_path: Path) -> None:
+    run = changed(RUN, ("    arm = crane;\n", "    arm = crane;\n    base = free;\n"),
+                  ("on    = hand;", "on    = base;"))
+    assert told(check(tmp_path, ARM, run)) == ""
+    goes = changed(run, ("on    = base;\n", "on    = base;\n        release = 3 s;\n"))
+    assert told(check(tmp_path, ARM, goes)) == """\
+error[D254]: the base moves freely and has no mass
+ --> deck.ic:9:5
+  |
+9 |     base = free;
+  |     ^^^^
+  = help: give the arm the base's body: `link base { mass = 400 kg; shape = sphere(radius = 0.5 m); }`
+  = help: or write the mass of a link that is fixed to the base
+  = help: payload `box` is not always there: one without `release` would count
+
+1 error
+"""
+
+
+def test_a_payload_that_spins_too_fast_for_the_step_is_warned_of(tmp_path: Path) -> None:
+    spun = changed(RUN, FLIES, ("velocity = [0, -1, 0] m/s;", "rate = [0, 9, 250] rad/s;"))
+    assert told(check(tmp_path, ARM, spun)).startswith("""\
+warning[D300]: payload `box` turns by 0.25 rad in a step of the dynamics
+  --> deck.ic:16:16
+   |
+16 |         rate = [0, 9, 250] rad/s;
+   |                ^^^^^^^^^^^^^^^^^ h = 0.001 s
+""")
+
+
+def test_a_time_that_is_not_written_does_not_vary_and_the_remedy_says_why(tmp_path: Path) -> None:
+    sweep = "sweep late of it { vary payloads.box.release = [1, 2] s; }"
+    assert told(check(tmp_path, ARM, RUN, sweep, select=["late"])) == """\
+error[D122]: `payloads.box.release` cannot vary
+  --> deck.ic:19:25
+   |
+19 | sweep late of it { vary payloads.box.release = [1, 2] s; }
+   |                         ^^^^^^^^^^^^^^^^^^^^
+   = help: it is not written, and so decides the program: write `release = ...;` in the payload, and it varies
+
+1 error
 """

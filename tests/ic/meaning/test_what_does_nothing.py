@@ -127,3 +127,56 @@ def test_of_what_a_sweep_varies_and_of_a_real_servo_nothing_is_said(tmp_path: Pa
     gearbox = ("servo drive { model = rigid_gearbox; ratio = 100; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm;"
                " kt = 0.05 N*m/A; tau_max = 1 N*m; j_m = 1e-4 kg*m^2; k_position = 5 1/s; command = position(1 rad); }\n")
     assert codes(tmp_path, ARM, gearbox, RUN) == []
+
+
+FIXED = """\
+arm pair {
+    link mast { mass = 10 kg; inertia = [2, 2, 3] kg*m^2; }
+    link bar  { mass = 1 kg; shape = rod(length = 1 m, along = x); }
+    link tool { mass = 0 kg; }
+    joint stand fixed { parent = base; child = mast; }
+    joint hinge revolute { parent = base; child = bar; axis = z; }
+    joint grip fixed { parent = bar; child = tool; at = [1, 0, 0] m; }
+}
+run it {
+    arm = pair;
+    payload box { mass = 1 kg; shape = sphere(radius = 1 cm); on = bar; }
+    environment { it = MODEL; }
+    rates { dynamics = 500 Hz; }  duration = 1 s;  record = [q];
+}
+"""
+PLUME = "plume {{ link = {}; width = 1 m; height = 1 m; nozzle = [0, 0, 1] m; axis = [0, 0, -1]; thrust = 1 N; exponent = 1; {} }}"
+TABLE = "wrench_table {{ link = {}; times = [0, 1, 2] s; force_x = {} N; {} }}"
+STILL = "D256 environment `it` changes nothing: link `mast`, which is fixed to the base, is part of the ground"
+
+
+@pytest.mark.parametrize(("model", "expected"), [
+    (TABLE.format("bar", "[1, 0, 0]", ""), []),
+    (TABLE.format("mast", "[1, 0, 0]", ""), [STILL]),
+    (TABLE.format("bar", "[0, 0, 1]", ""), ["D168 environment `it` never acts: it would begin at 1 s, and the run ends at 1 s"]),
+    (TABLE.format("bar", "[0, 1, 0]", "begin = 5 s;"), ["D168 environment `it` never acts: it would begin at 5 s, and the run ends at 1 s"]),
+    (TABLE.format("bar", "[1, 1, 0]", "begin = -2 s;"), ["D168 environment `it` never acts: it would end at 0 s, and the run begins at 0 s"]),
+    (TABLE.format("bar", "[1, 1, 0]", "begin = -1.9 s;"), []),
+    (TABLE.format("bar", "[1, 0]", ""), ["D154 `force_x` of environment `it` has 2 numbers, and `times` 3"]),
+    (PLUME.format("bar", ""), []),
+    (PLUME.format("mast", ""), [STILL]),
+    (PLUME.format("mast", "nozzle_link = bar;"), [STILL]),
+    (PLUME.format("mast", "nozzle_link = bar; reaction = on;"), []),
+    (PLUME.format("bar", "share = 0;"), ["D168 environment `it` never acts: its gas has no momentum"]),
+    (PLUME.format("bar", "share = 0; nozzle_link = box; reaction = on;"), []),
+    ("spring { link = bar; to_point = [1, 0, 0] m; stiffness = 1 N/m; }", []),
+    ("spring { link = mast; to_point = [1, 0, 0] m; stiffness = 1 N/m; }", [STILL]),
+    ("spring { link = bar; to = mast; stiffness = 1 N/m; }", []),
+    ("spring { link = box; to = bar; stiffness = 1 N/m; }", ["D168 environment `it` never acts: both its points are fixed to link `bar`"]),
+    ("spring { link = tool; to = box; stiffness = 1 N/m; }", ["D168 environment `it` never acts: both its points are fixed to link `bar`"]),
+    ("bushing { link = mast; stiffness = [1, 1, 1] N/m; }", [STILL]),
+    ("bushing { link = tool; to = bar; stiffness = [1, 1, 1] N/m; }", ["D168 environment `it` never acts: both its frames are fixed to link `bar`"]),
+])  # fmt: skip
+def test_a_load_that_does_nothing_is_told(tmp_path: Path, model: str, expected: list[str]) -> None:
+    found = check(tmp_path, FIXED.replace("MODEL", model)).diagnostics
+    assert [f"{each.code} {each.message}" for each in found] == expected
+
+
+def test_a_load_between_payloads_that_fly_acts(tmp_path: Path) -> None:
+    flies = FIXED.replace("on = bar;", "on = bar; release = 0.5 s;")
+    assert codes(tmp_path, flies.replace("MODEL", "spring { link = box; to = bar; stiffness = 1 N/m; }")) == []

@@ -478,6 +478,30 @@ error[D020]: a file is named by what it is
   |              ^^^^^^^^^^
   = help: write `from urdf("two.urdf")`
 """)
+naming("a file without quotes", 'arm two from two.urdf { }', says="""\
+error[D020]: the name of a file stands in quotes
+ --> deck.ic:1:14
+  |
+1 | arm two from two.urdf { }
+  |              ^^^^^^^^
+  = help: write `from urdf("two.urdf")`
+""")
+naming("a path without quotes", 'arm two from ../my_arms/two-link.urdf;', says="""\
+error[D020]: the name of a file stands in quotes
+ --> deck.ic:1:14
+  |
+1 | arm two from ../my_arms/two-link.urdf;
+  |              ^^^^^^^^^^^^^^^^^^^^^^^^
+  = help: write `from urdf("../my_arms/two-link.urdf")`
+""")
+naming("a file without brackets and quotes", 'arm two from urdf robots/two.urdf { }', says="""\
+error[D020]: the name of a file stands in quotes
+ --> deck.ic:1:19
+  |
+1 | arm two from urdf robots/two.urdf { }
+  |                   ^^^^^^^^^^^^^^^
+  = help: write `from urdf("robots/two.urdf")`
+""")
 naming("no block", 'arm two from urdf("two.urdf")', says="""\
 error[D020]: expected `{` or `;`, found `run`
  --> deck.ic:2:1

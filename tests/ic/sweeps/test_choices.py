@@ -54,6 +54,15 @@ def test_one_joints_servo_may_vary(tmp_path: Path) -> None:
     assert choices(found) == [{"hinge.servo": "drive"}, {"hinge.servo": "plain"}]
 
 
+def test_choices_of_one_model_with_other_numbers_are_apart(tmp_path: Path) -> None:
+    servos = "[drive, drive { kp = 0.2 V*s/rad; }, drive { remove ki;  ki = 2 V/rad; }]"
+    found = groups(tmp_path, f"vary hinge.servo = {servos};")
+    assert [each.name for each in found] == ["it.drive-1", "it.drive-2", "it.drive-3"]
+    assert [each["hinge.servo"] for each in choices(found)] == [
+        "drive", "drive { kp = 0.2 V*s/rad; }", "drive { remove ki; ki = 2 V/rad; }",
+    ]  # fmt: skip
+
+
 def test_rates_and_the_duration_may_vary(tmp_path: Path) -> None:
     body = "vary rates.dynamics = [1, 2] kHz; vary duration = (1 .. 3 by 1) s;"
     found = groups(tmp_path, body)

@@ -212,7 +212,8 @@ error[D230]: there is no noise in this run, so a repeat is the same case again
 18 | sweep it of hold { repeat 3; }
    |                    ^^^^^^
    = help: leave `repeat` out
-   = help: the tachometer of a bed is noisy: `substitute JOINT { bed = emulated(faults = typical); }`
+   = help: a sensor may be noisy: `sensor qd = tachometer { noise = 0.1 rad/s; }` in a servo
+   = help: and so may a bed: `substitute JOINT { bed = emulated(faults = typical); }`
 
 1 error
 """

@@ -10,7 +10,8 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, get_type_hints
 
@@ -19,20 +20,22 @@ import pytest
 
 from met import trace
 from met.environments.environment import World
+from met.guides.guide import Sight, Stance
 from met.integrators.integrator import Motion, Slope
 from met.parameter import Parameter
 from met.plan import Experiment
 from met.program.base import base_of, free_base
 from met.program.bodies import coordinates
+from met.program.link_sensors import Aboard, Accelerations
 from met.program.machine import Machine
-from met.program.world import ArmWorld
-from met.sensors.sensor import Sensed
+from met.sensors.sensor import Felt, Sensed
 from met.servos.servo import Asked, JointMotion, Seen, Servo
 from met.substitution.balance import Balanced
 from met.substitution.bed import Wire
 from met.substitution.law import Told
 from met.trace import Formulas, Graph, Mask, Real, Scalar
-from tests.met.declarations.values import holds
+from met.vectors import ZERO, Matrix, Vector
+from tests.met.declarations.values import holds, paths
 from tests.met.small_models import Use
 
 Draw = Callable[[], float]
@@ -158,14 +161,14 @@ def calls(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any
     """Every function that the model declares, by name, as a call on numbers alone."""
     model = use.model
     kinds = {
-        "servo": _servo, "sensor": _sensor, "environment": _environment, "command": _command, "metric": _metric,
-        "integrator": _integrator, "bed": _bed, "law": _law,
+        "servo": _servo, "sensor": _sensor, "environment": _environment, "command": _command, "guide": _guide,
+        "metric": _metric, "integrator": _integrator, "bed": _bed, "law": _law,
     }  # fmt: skip
     known = kinds[use.kind](use, experiment)
     return {name: call for name, call in known.items() if getattr(model, name) is not None}
 
 
-NOT_TRACED = {("environment", "idle"), ("command", "jumps")}
+NOT_TRACED = {("environment", "idle"), ("environment", "pushes"), ("guide", "idle"), ("command", "jumps")}
 """Functions that are asked only where all numbers are constants, or about words alone."""
 
 
@@ -178,14 +181,21 @@ def functions(kind: str, model: Any) -> set[str]:
 def parameters(numbers: Numbers, use: Use, experiment: Experiment, of: str = "") -> SimpleNamespace:
     """The plan's parameters of the model: numbers drawn within their ranges; words, lists and what decides the program
     as the deck has them."""
+    declared = [parameter for parameter in use.in_plan() if parameter not in use.of_joint]
+    return _drawn(numbers, declared, use, experiment, of)
+
+
+def _drawn(numbers: Numbers, declared: Iterable[Parameter], use: Use, experiment: Experiment, of: str,
+           joint: str = "") -> SimpleNamespace:  # fmt: skip
+    """These parameters; joint: whose they are, of what each joint has."""
     values: dict[str, Any] = {}
-    for parameter in use.in_plan():
-        path = f"{use.head}.{parameter.name}"
-        paths = [f"{path}.{axis}" for axis in "xyz"] if parameter.shape == "vector" else [path]
-        found = [experiment.parameters[each].value for each in paths]
+    use = replace(use, joint=joint or use.joint)
+    for parameter in declared:
+        places = paths(use, parameter)
+        found = [experiment.parameters[each].value for each in places]
         if parameter.shape in ("number", "vector") and not parameter.decides:
             found = [numbers.number(f"{of}{each}", lambda near=near, p=parameter: numbers.within(p, near))
-                     for each, near in zip(paths, found, strict=True)]  # fmt: skip
+                     for each, near in zip(places, found, strict=True)]  # fmt: skip
         values[parameter.name] = tuple(found) if parameter.shape == "vector" else found[0]
     return SimpleNamespace(**values)
 
@@ -211,9 +221,30 @@ def filled(numbers: Numbers, made: type, name: str = "", **known: Any) -> Any:
             values[field] = filled(numbers, hint, f"{name}.{field}")  # type: ignore[arg-type]
         elif hint == Real:
             values[field] = numbers.number(f"{name}.{field}", numbers.any)
+        elif hint == Vector:
+            values[field] = vector(numbers, f"{name}.{field}")
+        elif hint == Matrix:
+            values[field] = rotation(numbers, f"{name}.{field}")
         else:
             raise TypeError(f"{made.__name__}.{field}: say what it is in tests/met/declarations/both_ways.py")
     return made(**values)
+
+
+def vector(numbers: Numbers, name: str) -> Vector:
+    x, y, z = (numbers.number(f"{name}.{axis}", numbers.any) for axis in "xyz")
+    return x, y, z
+
+
+def rotation(numbers: Numbers, name: str) -> Matrix:
+    """Any rotation; now and then none."""
+    quaternion = np.array([numbers.known(f"{name} {part}", numbers.rng.normal) for part in "wxyz"])
+    still = numbers.known(f"{name} still", numbers.rng.random) < 0.1
+    w, *v = np.array([1.0, 0.0, 0.0, 0.0]) if still else quaternion / np.linalg.norm(quaternion)
+    x, y, z = v
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    R = np.eye(3) + 2.0 * w * across + 2.0 * across @ across
+    return tuple(tuple(numbers.number(f"{name}[{i}][{j}]", lambda i=i, j=j: R[i, j]) for j in range(3))
+                 for i in range(3))  # type: ignore[return-value]  # three rows of three
 
 
 def _servo(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]]:
@@ -244,8 +275,14 @@ def servo_calls(servo: Servo, use: Use, experiment: Experiment) -> dict[str, Cal
             filled(n, JointMotion, "joint", command=command),
         ),
         "begin": lambda n: servo.begin(p(n), n.number("q", n.any), n.number("qd", n.any)),
+        "measured": lambda n: servo.measured(p(n), n.number("q", n.any), n.number("qd", n.any), states(n)),
+        "balance": lambda n: servo.balance(
+            p(n), n.number("torque", n.any), filled(n, Seen, "seen", asked=filled(n, Asked, "asked", kind=command),
+                                                    states=states(n), **known),
+        ),
         "fastest": lambda n: servo.fastest(p(n)),
         "fastest_law": lambda n: servo.fastest_law(p(n)),
+        "swings": lambda n: servo.swings(p(n), command),
         "full": lambda n: servo.full(p(n)),
         "motor": lambda n: servo.motor(p(n)),
         "at_rest": lambda n: servo.at_rest(p(n)),
@@ -266,9 +303,15 @@ def _sensor(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], A
 
     def sensed(n: Numbers) -> Sensed:
         period = 0.0 if use.analog else n.known("period", lambda: n.rng.uniform(1e-4, 2e-3))
-        return Sensed(value(n), period, lambda: n.number("draw", n.rng.normal))
+        return Sensed(lambda: value(n), period, lambda: n.number("draw", n.rng.normal))
+
+    def measures(n: Numbers, world: Any) -> Any:
+        return sensor.measures(parameters(n, use, experiment), world)
 
     return {
+        "measures": _asking(use, experiment, measures),
+        "fastest": lambda n: sensor.fastest(p(n)),
+        "swing": lambda n: sensor.swing(p(n)),
         "follow": lambda n: sensor.follow(p(n), states(n), value(n)),
         "begin": lambda n: sensor.begin(p(n), value(n)),
         "read": lambda n: sensor.read(p(n), held(n, use.held("memory")), states(n), sensed(n)),
@@ -286,9 +329,9 @@ class Answers:
         self._asked: list[Any] = []
 
     def __getattr__(self, name: str) -> Any:
-        if get_type_hints(World).get(name) is float or name in ("joints", "links"):
+        if get_type_hints(Felt).get(name) is float or name in ("joints", "links"):
             return getattr(self._world, name)
-        if name in get_type_hints(World):
+        if name in get_type_hints(Felt):
             return self._answer(lambda: getattr(self._world, name))
         return lambda *asked: self._answer(lambda: getattr(self._world, name)(*asked), name, *asked)
 
@@ -305,12 +348,15 @@ class Answers:
         return given if isinstance(given, bool) else self._numbers.number(name, lambda: given)
 
 
-def _environment(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]]:
+def _asking(
+    use: Use, experiment: Experiment, ask: Callable[[Numbers, Any], Any]
+) -> Callable[[Numbers], Any]:
+    """A call of a function that asks a world: its answer, and what was asked. The arm is anywhere, and moves."""
     machine = Machine(experiment)
     tree = machine.tree(lambda path: math.nan)  # no case varies it
     given: list[Any] = []
 
-    def loads(numbers: Numbers) -> Any:
+    def call(numbers: Numbers) -> Any:
         if numbers.graph is None:
             given.clear()
         rng = np.random.default_rng(numbers.rng.integers(2**32))
@@ -323,9 +369,25 @@ def _environment(use: Use, experiment: Experiment) -> dict[str, Callable[[Number
         time = begin + rng.uniform() * experiment.structure.schedule.step
         y = Motion(q, qd, ())
         base = base_of(machine, cells.__getitem__, y, time)
-        world = Answers(ArmWorld(machine, cells.__getitem__, tree, y, base, time, begin), numbers, given)
-        found = use.model.loads(parameters(numbers, use, experiment), world)
-        return {"loads": found, "asked": world._asked}
+        moved = Accelerations(tuple(map(np.float64, rng.normal(size=len(q)))), (ZERO, ZERO), (0.0, 0.0, -9.81))
+        world = Answers(Aboard(machine, cells.__getitem__, tree, y, base, time, begin, moved), numbers, given)
+        return {"found": ask(numbers, world), "asked": world._asked}
+
+    return call
+
+
+def _environment(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]]:
+    def vector(n: Numbers, name: str) -> Any:
+        return tuple(n.number(f"{name}.{axis}", n.any) for axis in "xyz")
+
+    def loads(n: Numbers, world: Any) -> Any:
+        return use.model.loads(p(n), world)
+
+    def falls(n: Numbers, world: Any) -> Any:
+        return use.model.falls(p(n), world, vector(n, "position"), vector(n, "velocity"))
+
+    def turns(n: Numbers, world: Any) -> Any:
+        return use.model.turns(p(n), world)
 
     def p(n: Numbers) -> SimpleNamespace:
         return parameters(n, use, experiment)
@@ -338,7 +400,9 @@ def _environment(use: Use, experiment: Experiment) -> dict[str, Callable[[Number
 
     step = experiment.structure.schedule.step
     return {
-        "loads": loads,
+        "loads": _asking(use, experiment, loads),
+        "falls": _asking(use, experiment, falls),
+        "turns": _asking(use, experiment, turns),
         "loose": lambda n: use.model.loose(p(n), SimpleNamespace(begin=time(n), step=step)),
         "gives": lambda n: use.model.gives(p(n), time(n), outputs(n, "outputs"), outputs(n, "full")),
         "sees": lambda n: [
@@ -352,6 +416,46 @@ def _command(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], 
         return use.model.course(parameters(n, use, experiment), n.number("t", lambda: n.rng.uniform(0.0, 0.4)))
 
     return {"course": course}
+
+
+class Poses:
+    """An arm that answers a guide's computer with any numbers, with others where a free base answers."""
+
+    def __init__(self, numbers: Numbers, name: str, joints: Sequence[str]) -> None:
+        self._numbers, self._name, self._joints = numbers, name, joints
+
+    def stance(self, *, answers: bool) -> Stance:
+        return filled(self._numbers, Stance, f"{self._name}.{answers}")  # type: ignore[no-any-return]
+
+    def columns(self, *, answers: bool) -> list[tuple[Vector, Vector]]:
+        heads = [f"{self._name}.{answers}.{joint}" for joint in self._joints]
+        return [(vector(self._numbers, f"{head}.w"), vector(self._numbers, f"{head}.v")) for head in heads]
+
+
+def _guide(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]]:
+    guide, kinds = use.model, use.kinds
+
+    def p(n: Numbers) -> SimpleNamespace:
+        return parameters(n, use, experiment)
+
+    def joints(n: Numbers) -> list[SimpleNamespace]:
+        return [_drawn(n, use.of_joint, use, experiment, "", joint) for joint in kinds]
+
+    def steer(n: Numbers) -> Any:
+        arms = {name: Poses(n, name, list(kinds)) for name in ("arm", "asked")}
+        slides = tuple(kind == "prismatic" for kind in kinds.values())
+        return guide.steer(p(n), joints(n), filled(n, Sight, "sight", slides=slides, **arms))
+
+    def course(n: Numbers) -> Any:
+        begins = [n.number(f"begins.{joint}", n.any) for joint in kinds]
+        return guide.course(p(n), joints(n), begins, n.number("t", lambda: n.rng.uniform(0.0, 0.4)))
+
+    return {
+        "components": lambda n: guide.components(p(n)),
+        "fastest": lambda n: guide.fastest(p(n)),
+        "steer": steer,
+        "course": course,
+    }
 
 
 def _metric(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]]:

@@ -13,7 +13,7 @@ from met import run as engine
 from met.parameter import Parameter
 from met.plan import Experiment
 from tests.ic.small_decks import check, experiment, told
-from tests.met.declarations.values import errors, inner, paths
+from tests.met.declarations.values import errors, inner, paths, varied
 from tests.met.small_models import EVERY, Use, finite, first_uses, uses
 
 WITH_PARAMETERS = [(kind, name) for kind, name in EVERY if models.written(models.find(kind, name))]
@@ -86,13 +86,28 @@ def test_what_must_be_written_is_missed_by_its_name(kind: models.Kind, name: str
             if not use.needed(parameter):
                 assert not errors(found), (parameter.name, told(found))
                 continue
-            message = f"{use.label} has no `{parameter.name}`"
+            message = f"{use.owner(parameter)} has no `{parameter.name}`"
             if use.command in parameter.needed_for:
-                message = f"{use.label} needs `{parameter.name}` under a {use.command} command"
+                message = f"{use.owner(parameter)} needs `{parameter.name}` under a {use.command} command"
             assert [each.message for each in errors(found)] == [message], (parameter.name, told(found))
             (missed,) = errors(found)
             assert missed.at is not None and missed.help[0].startswith(f"write `{parameter.name} = "), told(found)
             assert parameter.doc in missed.help[0] or parameter.shape == "text", "and what it is is said"
+
+
+@pytest.mark.parametrize(("kind", "name"), WITH_PARAMETERS)
+def test_what_must_be_written_and_is_misspelt_is_told_once(kind: models.Kind, name: str, tmp_path: Path) -> None:
+    for use, new in first_uses(kind, name):
+        for parameter in new:
+            if not use.needed(parameter):
+                continue
+            key, deck = use.key(parameter), use.put(tmp_path).deck()
+            written = f"{key} = {use.text(parameter, use.values[parameter.name])}"
+            assert deck.count(f" {written}") + deck.count(f"({written}") == 1, written
+            misspelt = deck.replace(written, f"{key}{key[-1]}{written[len(key):]}")
+            (found,) = errors(check(tmp_path, misspelt, select=["it"]))
+            assert found.code == "D141" and found.message == f"{use.label} has no `{key}{key[-1]}`"
+            assert found.help[0] == f"did you mean `{key}`?"
 
 
 @pytest.mark.parametrize(("kind", "name"), WITH_PARAMETERS)
@@ -105,7 +120,7 @@ def test_what_must_be_written_may_come_from_a_sweep_or_the_command_line(
             if not use.needed(parameter) or parameter.shape != "number":
                 continue
             value = use.values.get(parameter.name, inner(parameter))
-            path, text = paths(use, parameter)[0], use.text(parameter, value)
+            path, text = varied(use, parameter)[0], use.text(parameter, value)
             deck = use.put(tmp_path).deck(without=[parameter.name], cases=f"vary {path} = [{text}];")
             swept = check(tmp_path, deck, select=["cases"])
             given = check(tmp_path, deck, select=["it"], set=[f"{path}={text}"])

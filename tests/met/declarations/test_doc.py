@@ -90,8 +90,10 @@ def test_a_program_is_told_all_that_is_declared_of_a_parameter(
 def test_the_page_of_docs_says_the_same(kind: models.Kind, name: str) -> None:
     section = re.search(rf"^### {kind} {name}\n(.*?)(?=^##)", PAGE, re.DOTALL | re.MULTILINE)
     assert section is not None
-    for parameter in models.written(models.find(kind, name)):
-        row = next(line for line in section[1].splitlines() if line.startswith(f"| `{parameter.name}` |"))
+    declared = models.written(models.find(kind, name))
+    names = "|".join(dict.fromkeys(re.escape(parameter.name) for parameter in declared)) or "-"
+    rows = [line for line in section[1].splitlines() if re.match(rf"\| `({names})` \|", line)]
+    for parameter, row in zip(declared, rows[:len(declared)], strict=True):
         shown = re.split(r"(?<!\\)\|", row.strip("| "))
         plain = [re.sub(r"\\(.)", r"\1", cell).strip() for cell in shown]
         assert [cell for cell in plain if cell] == [f"`{parameter.name}`", *cells(parameter)[1:]]

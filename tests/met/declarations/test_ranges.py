@@ -22,7 +22,7 @@ from met.parameter import Parameter
 from met.plan import Experiment
 from met.plan_codec import Damaged
 from tests.ic.small_decks import check, experiment, told
-from tests.met.declarations.values import NUMBERS, bounds, constant, errors, inner, paths, several, shaped
+from tests.met.declarations.values import NUMBERS, bounds, constant, errors, inner, paths, several, shaped, varied
 from tests.met.small_models import EVERY, SMALLEST, Small, Use, smallest, uses
 
 UNSTABLE = {"D104"}
@@ -34,8 +34,8 @@ def ranged(kind: models.Kind, name: str) -> Iterator[tuple[Use, Parameter]]:
     seen = set()
     for use in uses(kind, name):
         for parameter in use.parameters():
-            if parameter.shape in NUMBERS and parameter not in seen:
-                seen.add(parameter)
+            if parameter.shape in NUMBERS and (use.key(parameter), parameter) not in seen:
+                seen.add((use.key(parameter), parameter))
                 yield use, parameter
 
 
@@ -46,7 +46,7 @@ def refused(folder: Path, use: Use, parameter: Parameter, deck: str, written: st
     refusals = [each for each in errors(found) if each.code not in UNSTABLE]
     assert [each.code for each in refusals] == ["D077"], (parameter.name, written, told(found))
     message, at = refusals[0].message, refusals[0].at
-    assert message.startswith(f"`{parameter.name}` of {use.label} must be "), message
+    assert message.startswith(f"`{parameter.name}` of {use.owner(parameter)} must be "), message
     assert words in message and message.endswith(ends), (words, message)
     assert at is not None
     line = found.sources[at.place.file].splitlines()[at.place.line - 1]
@@ -83,7 +83,7 @@ def test_so_it_is_in_a_case_of_a_sweep(kind: models.Kind, name: str, tmp_path: P
         if constant(parameter):
             continue  # which no case varies
         for _, outside, words in bounds(parameter):
-            path, unit = paths(use, parameter)[-1], use.unit(parameter)
+            path, unit = varied(use, parameter)[-1], use.unit(parameter)
             cases = f"vary {path} = [{inner(parameter)!r}, {outside!r}] {unit};"
             deck = use.put(tmp_path).deck(cases=cases)
             refused(tmp_path, use, parameter, deck, path, words, ends="; case #1 breaks it", select="cases")
@@ -96,7 +96,7 @@ def test_so_it_is_on_the_command_line(kind: models.Kind, name: str, tmp_path: Pa
             continue
         for _, outside, words in bounds(parameter):
             text = f"{outside!r} {use.unit(parameter)}".rstrip()
-            settings = (f"{paths(use, parameter)[-1]}={text}",)
+            settings = (f"{varied(use, parameter)[-1]}={text}",)
             refused(tmp_path, use, parameter, use.put(tmp_path).deck(), text, words, settings=settings)
 
 
@@ -119,7 +119,7 @@ def test_what_comes_out_as_no_number_or_infinite_is_refused(
         refusals = [each for each in errors(found) if each.code not in UNSTABLE]
         assert [each.code for each in refusals] == ["D077"], (parameter.name, told(found))
         assert refusals[0].at is not None and refusals[0].at.text.startswith(f"this is {shown}"), refusals[0]
-        assert refusals[0].message.startswith(f"`{parameter.name}` of {use.label} must be "), refusals[0]
+        assert refusals[0].message.startswith(f"`{parameter.name}` of {use.owner(parameter)} must be "), refusals[0]
 
 
 def changed(deck: Experiment, path: str, value: object) -> Experiment:

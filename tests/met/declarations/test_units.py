@@ -81,7 +81,8 @@ def refused(folder: Path, use: Use, texts: Mapping[str, str], code: str) -> dict
     by_name = {each.message.split("`")[1]: each for each in found.diagnostics}
     assert by_name.keys() == texts.keys(), told(found)
     for name, each in by_name.items():
-        assert each.message.startswith(f"`{name}` of {use.label} is ") and each.help and each.at is not None
+        assert each.message.startswith(f"`{name}` of {use.owner(use.parameter(name))} is "), each.message
+        assert each.help and each.at is not None
         line = found.sources[each.at.place.file].splitlines()[each.at.place.line - 1]
         shown = line[each.at.place.column - 1:][:each.at.place.length]
         assert shown in texts[name] and shown.strip("[]"), (shown, texts[name])

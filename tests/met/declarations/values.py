@@ -73,8 +73,14 @@ def several(value: Value | None) -> tuple[float | str | None, ...]:
 
 def paths(use: Use, parameter: Parameter) -> list[str]:
     """Where the parameter's numbers stand in a plan."""
-    path = f"{use.head}.{parameter.name}"
+    path = use.path(parameter)
     return [f"{path}.{axis}" for axis in "xyz"] if parameter.shape == "vector" else [path]
+
+
+def varied(use: Use, parameter: Parameter) -> list[str]:
+    """What a sweep or the command line calls its numbers: of all joints at once, where the deck writes them so."""
+    head = f"{use.head}.{use.key(parameter)}"
+    return [head + path.removeprefix(use.path(parameter)) for path in paths(use, parameter)]
 
 
 def errors(found: Compiled) -> list[Diagnostic]:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
-from met.dynamics.kinematics import jacobian, link_motions
+from met.dynamics.kinematics import jacobian, link_acceleration, link_motions
 from met.dynamics.spatial import Pose, rotation_about, rotation_quaternion, rotation_rpy
 from met.dynamics.tree import Tree
 from met.trace import Formulas, Graph
 from met.vectors import quaternion
+from tests.oracles.pinocchio_floating import Flight, FloatingPinocchio
 from tests.oracles.pinocchio_tree import PinocchioTree
 from tests.oracles.random_tree import random_tree
 
@@ -129,3 +131,35 @@ def test_a_rotations_quaternion_turns_back_into_it() -> None:
 def test_a_rotation_that_is_not_a_number_has_no_quaternion() -> None:
     nan = float("nan")
     assert np.isnan(quaternion(((nan, nan, nan),) * 3)).all()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_point_of_a_link_accelerates_as_in_pinocchio(seed: int) -> None:
+    arm = random_tree(seed)
+    theirs = PinocchioTree(arm.bodies, arm.gravity, arm.rotor)
+    tree, point = Tree.build(arm.bodies), (0.3, -0.2, 0.5)
+    for name, motion in link_motions(tree, arm.q, arm.qd).items():
+        wd, a = link_acceleration(tree, arm.q, arm.qd, arm.qdd, name)
+        found = np.add(a, np.cross(wd, point) + np.cross(motion.w, np.cross(motion.w, point)))
+        expected = theirs.link_acceleration(arm.q, arm.qd, arm.qdd, name, point)
+        # products of rates of some ten rad/s along a dozen joints
+        assert np.allclose(found, expected, rtol=0.0, atol=1e-13 * (1.0 + np.max(np.abs(expected)))), f"seed {seed}"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_on_a_base_that_moves_too(seed: int) -> None:
+    arm, rng = random_tree(seed), np.random.default_rng(seed)
+    theirs = FloatingPinocchio(arm.bodies, arm.gravity, arm.rotor)
+    w, v, base_wd, base_a = rng.normal(size=(4, 3))
+    flight = Flight(np.array(rotation_rpy(*rng.normal(size=3))), rng.normal(size=3), w, v)
+    tree, point = Tree.build(arm.bodies), (0.3, -0.2, 0.5)
+    moved = link_motions(tree, arm.q, arm.qd, Pose(*map(_rows, (flight.R, flight.p))), (tuple(w), tuple(v)))
+    for name, motion in moved.items():
+        wd, a = link_acceleration(tree, arm.q, arm.qd, arm.qdd, name, tuple(w), (tuple(base_wd), tuple(base_a)))
+        found = np.add(a, np.cross(wd, point) + np.cross(motion.w, np.cross(motion.w, point)))
+        expected = theirs.link_acceleration(flight, arm.q, arm.qd, base_wd, base_a, arm.qdd, name, point)
+        assert np.allclose(found, expected, rtol=0.0, atol=1e-13 * (1.0 + np.max(np.abs(expected)))), f"seed {seed}"
+
+
+def _rows(x: np.ndarray) -> Any:
+    return tuple(tuple(row) for row in x) if x.ndim > 1 else tuple(x)

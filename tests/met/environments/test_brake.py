@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from met import run as engine
-from met.diagnostic import Problem
 from met.run import Run
 from tests.ic.small_decks import ARM, SERVO, changed, check, experiment, told
 
@@ -67,6 +65,17 @@ def test_it_adds_to_the_friction_of_the_joints_servo(tmp_path: Path) -> None:
     np.testing.assert_allclose(of(run, "qdd")[t > 1.0], 5.0 / INERTIA, rtol=1e-12)
 
 
+def test_what_a_brake_bears_is_no_torque_of_the_servo(tmp_path: Path) -> None:
+    """Held or sliding, the servo has its share of the level alone; a joint without one has none."""
+    assert (of(ran(tmp_path), "tau") == 0.0).all()
+    rub = "servo rub { model = passive;  friction = 2 N*m; }\n"
+    run = ran(tmp_path, ("servos { }", "servos { hinge = rub; }"), ("from = 0.2 s;  until = 1 s;", "until = 0.5 s;"),
+              before=rub)  # fmt: skip
+    t = run.time
+    np.testing.assert_allclose(of(run, "tau")[t < 0.5], -3.0 * 2.0 / 6.0, rtol=1e-12)
+    np.testing.assert_allclose(of(run, "tau")[t > 0.5], -2.0, rtol=1e-12)
+
+
 def test_two_brakes_on_a_joint_add_up(tmp_path: Path) -> None:
     run = ran(tmp_path, ("from = 0.2 s;", ""), ("[0, 0, 3]", "[0, 0, 7]"),
               ("push =", "more = brake { joint = hinge;  torque = 2 N*m; }\n        push ="))  # fmt: skip
@@ -75,12 +84,8 @@ def test_two_brakes_on_a_joint_add_up(tmp_path: Path) -> None:
 
 def test_what_is_told_its_acceleration_has_no_brake(tmp_path: Path) -> None:
     ideal = "servo go { model = ideal;  bandwidth = 5 s^-1;  command = rate(0.1 rad/s); }\n"
-    with pytest.raises(Problem) as problem:
-        ran(tmp_path, ("servos { }", "servos { hinge = go; }"), before=ideal)
-    (diagnostic,) = problem.value.diagnostics
-    assert diagnostic.message == (
-        "servo `go` of joint `hinge` (model ideal) gives an acceleration, and a brake is on the joint"
-    )
+    run = changed(RUN, ("servos { }", "servos { hinge = go; }"))
+    assert [each.code for each in check(tmp_path, ARM, ideal, run).diagnostics] == ["D291"]
 
 
 def test_a_joint_whose_motor_is_on_a_bed_has_no_brake(tmp_path: Path) -> None:

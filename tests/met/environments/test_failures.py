@@ -75,6 +75,22 @@ def test_behind_an_elastic_gear_the_motor_is_let_go_as_well(tmp_path: Path) -> N
     np.testing.assert_allclose(both[run.time >= 0.2], 2.0 * 0.2, rtol=1e-12)
 
 
+def test_a_gear_that_was_let_go_takes_hold_with_nothing_wound_up(tmp_path: Path) -> None:
+    """While it is let go motor and joint move apart by radians; the gear has let that slip."""
+    geared = changed(SERVO, ("rigid_gearbox", "compliant_gearbox"),
+                     ("command", "stiffness = 400 N*m/rad;  damping = 5 N*m*s/rad;  command"))  # fmt: skip
+    run = ran(tmp_path, f"free_swinging {{ {WINDOW} }}", geared,
+              ("servo.voltage", "servo.deflection, servo.gear_torque, servo.motor_rate"))  # fmt: skip
+    t, wound = run.time, of(run, "servo.deflection")
+    assert abs(wound[t < 0.3][-1]) > 1e-4
+    inside, slips = (t >= 0.32) & (t < 0.6), of(run, "servo.motor_rate") / 100.0 - of(run, "qd")
+    assert np.abs(slips[inside]).sum() * 1e-3 > 0.05 and np.abs(wound[inside]).max() < 1e-6
+    assert (of(run, "servo.gear_torque")[inside] == 0.0).all()
+    after = t >= 0.6
+    rate = np.abs(slips[inside][-1])  # the blow that catches a motor of another rate, and no more
+    assert np.abs(wound[after]).max() < 1.1 * rate / np.sqrt(400.0 / ROTOR + 400.0 / INERTIA) + 2.5 / 400.0
+
+
 def test_a_drive_that_runs_away_gives_all_it_can(tmp_path: Path) -> None:
     run = ran(tmp_path, f"runaway {{ {WINDOW}  level = -0.5; }}")
     inside = (run.time >= 0.3) & (run.time < 0.6)
@@ -90,6 +106,10 @@ def test_a_law_that_does_not_see_goes_by_nothing_or_by_what_it_saw_last(
     run = ran(tmp_path, f"dead_sensor {{ {WINDOW}  of = qd;  reads = {reads}; }}", changed(SERVO, ("ki = 1", "ki = 0")))
     inside = (run.time >= 0.3) & (run.time < 0.6)
     last = of(run, "qd")[run.time < 0.3][-1] if seen is None else seen
+    through = changed(SERVO, ("ki = 1", "ki = 0"), ("command", "sensor qd = tachometer { }  command"))
+    noted = ran(tmp_path, f"dead_sensor {{ {WINDOW}  of = qd;  reads = {reads}; }}", through,
+                ("servo.voltage", "servo.sensor.qd"))  # fmt: skip
+    assert (of(noted, "servo.sensor.qd")[inside] == last).all(), "what the law saw"
     np.testing.assert_allclose(of(run, "servo.voltage")[inside], 0.1 * 100.0 * (0.1 - last), rtol=1e-12)
     assert np.ptp(of(run, "servo.voltage")[~inside]) > 0.0
 
@@ -111,6 +131,8 @@ IDEAL = "servo drive { model = ideal;  bandwidth = 30 s^-1;  command = rate(0.1 
     ("free_swinging { joint = hinge; }", "", "joint `hinge` has no servo to which `fault` could do anything"),
     ("runaway { joint = hinge; }", PASSIVE, "servo `drive` (passive) of joint `hinge` has no law that `fault`"),
     ("runaway { joint = hinge; }", IDEAL, "servo `drive` (ideal) of joint `hinge` has no drive that could run away"),
+    ("free_swinging { joint = hinge;  until = 0.5 s; }", "servo drive { model = locked; }\n",
+     "servo `drive` (locked) of joint `hinge` holds a joint that is at rest, and `fault` would give it one that moves"),
     ("dead_sensor { joint = hinge;  of = motor_rate; }", SERVO, "joint `hinge` does not see `motor_rate`"),
 ])  # fmt: skip
 def test_a_failure_of_what_is_not_there_is_told(failure: str, servo: str, said: str, tmp_path: Path) -> None:

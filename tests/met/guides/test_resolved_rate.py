@@ -183,6 +183,27 @@ def test_the_generalized_jacobian_knows_what_a_free_base_does(initial: str, tmp_
     assert errors["arm"] > 5 * errors["generalized"]
 
 
+def test_the_generalized_jacobian_knows_the_payloads_that_are_held_for_a_time(tmp_path: Path) -> None:
+    """Held for good, released as the run ends, grappled as it begins: one motion, and so one course of the error."""
+    text = f"{path()} max_damping = 0 m; threshold = 0 m; gain = 3 1/s; jacobian = generalized;"
+    body = "payload box { mass = 15 kg; shape = sphere(radius = 0.2 m); on = link6; at = [0.1, -0.2, 0.05] m;"
+    deck = chain(3, 7, text, base=FLYING, bandwidth=400.0,
+                 rates="dynamics = 2 kHz; servos = 200 Hz; record = 100 Hz;").replace(
+        "arm chain {\n", "arm chain {\n    link base { mass = 30 kg; inertia = [3, 4, 5] kg*m^2; }\n").replace(
+        "record = [", "record = [payloads.box.position, ")
+
+    def carried(more: str) -> engine.Run:
+        return engine.run(experiment(tmp_path, deck.replace("    guide tip", f"    {body} {more} }}\n    guide tip")))
+
+    wanted, released = carried(""), carried("release = 0.5 s;")
+    at = ", ".join(repr(float(x)) for x in wanted.signals["payloads.box.position"][0, 0])
+    grappled = carried(f"grapple = 0 s; position = [{at}] m;")
+    for found, rows in ((released, -1), (grappled, None)):
+        for name in ("q", "guides.tip.error", "guides.tip.turn_error"):
+            np.testing.assert_allclose(found.signals[name][0, :rows], wanted.signals[name][0, :rows], rtol=0, atol=1e-9,
+                                       err_msg=name)
+
+
 def test_the_generalized_jacobian_of_a_base_that_is_held_is_the_arms(tmp_path: Path) -> None:
     one, other = (engine.run(experiment(tmp_path, chain(3, 7, f"{LAW} jacobian = {word};"))).signals["q"].tobytes()
                   for word in ("arm", "generalized"))

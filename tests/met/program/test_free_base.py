@@ -195,6 +195,78 @@ def test_a_base_that_runs_away_fails_and_says_so(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize(("integrator", "limit"), [
+    ("modified_euler", 0.199), ("midpoint", 0.199), ("semi_implicit_euler", 0.00254), ("rk4", 0.999),
+])
+def test_below_the_spin_that_is_warned_of_a_turn_keeps_the_energy_to_a_hundredth(
+    integrator: str, limit: float, tmp_path: Path
+) -> None:
+    """Of three bodies, about 24 axes: what D300 says (ic/meaning/spin.py), and well above it no more."""
+    axes = np.random.default_rng(0).normal(size=(24, 3))
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    lost = []
+    for share in (1.0, 4.0):
+        turn = limit * share  # rad a step of 10 ms
+        rates = (axes * turn * 100.0).T.tolist()
+        worst = 0.0
+        for inertia, com in (("[1.5, 2, 3]", "[0, 0, 0]"), ("[1.5, 2, 3, 0.1, 0.2, -0.15]", "[0.1, 0.2, -0.3]"),
+                             ("[0.2, 2, 2.1]", "[0.5, 0, 0]")):
+            varied = " ".join(f"initial.base.rate.{axis} = {rate} rad/s;"
+                              for axis, rate in zip("xyz", rates, strict=True))
+            deck = f"""\
+arm a {{
+    link base {{ mass = 10 kg; inertia = {inertia} kg*m^2; com = {com} m; }}
+    link u {{ mass = 1 g; shape = sphere(radius = 1 cm); }}
+    joint j revolute {{ parent = base; child = u; axis = z; }}
+}}
+servo still {{ model = locked; }}
+run r {{
+    arm = a; base = free; servos {{ j = still; }} integrator = {integrator};
+    rates {{ dynamics = 100 Hz; servos = 100 Hz; record = 10 Hz; }}  duration = 1 s;  record = [energy];
+}}
+sweep s of r {{ zip {{ {varied} }} }}
+"""
+            kinetic = engine.run(experiment(tmp_path, deck, select=["s"])).signals["energy.kinetic"]
+            drift = np.abs(np.log(kinetic[:, -1] / kinetic[:, 0])) / (100.0 * turn) * 2.0 * np.pi
+            worst = max(worst, float(np.max(np.where(np.isnan(drift), np.inf, drift))))
+        lost.append(worst)
+    print(lost)
+    assert lost[0] < 0.01 and lost[1] > 0.02
+
+
+STIFF = """\
+arm a {
+    link base { mass = 10 kg; inertia = [2, 2, 3] kg*m^2; }
+    link u { mass = 1 kg; shape = rod(length = 1 m, along = x); }
+    joint j revolute { parent = base; child = u; axis = z; }
+}
+servo still { model = ideal; bandwidth = 10 1/s; command = rate(0 rad/s); }
+run hard {
+    arm = a; base = free; initial { base.rate = [0.1, 0.2, 0.3] rad/s; }
+    environment { hold = attitude_hold { damping = [1e4, 1e4, 1e4] N*m*s/rad; } }
+    rates { dynamics = 500 Hz; servos = 500 Hz; }  duration = 1 s;  record = [q];
+}
+"""
+
+
+def test_a_base_that_diverges_is_not_said_to_have_no_inertia(tmp_path: Path) -> None:
+    run = engine.run(experiment(tmp_path, STIFF))
+    assert run.cause[0].replace(str(tmp_path), "") == (
+        "t = 0.012 s: the base: it moves freely and has no inertia in some direction any more, so its acceleration is "
+        "undefined (/deck.ic:8). At the start it had: usually the motion has diverged, and a step is too long for what "
+        "acts on the base or for a servo (try a faster rate for the dynamics)."
+    )
+
+
+def test_a_joint_that_is_driven_is_not_blamed_for_its_base(tmp_path: Path) -> None:
+    run = engine.run(experiment(tmp_path, STIFF.replace("arm = a;", "arm = a; servos { j = still; }")))
+    assert run.cause[0].replace(str(tmp_path), "") == (
+        "t = 0.014 s: the base: position, rate or acceleration is no longer a finite number (/deck.ic:8). Usual "
+        "reasons: a step too long for what acts on it (try a faster rate for the dynamics), or a model that divides by "
+        "zero."
+    )
+
+
 def test_a_motor_on_a_bed_feels_an_arm_on_a_free_base(tmp_path: Path) -> None:
     # what the bed is told of the arm is what the record says of it, which linear algebra has shown (test_free_base.py
     # of the dynamics)

@@ -141,7 +141,7 @@ error[D140]: no sensor model `tacho`
 9 |     sensor qd = tacho { } command = rate(0.1 rad/s);
   |                 ^^^^^
   = help: did you mean `tachometer`?
-  = help: sensor models: encoder, low_pass, tachometer
+  = help: sensor models: accelerometer, encoder, gyroscope, low_pass, tachometer
 
 1 error
 """),

@@ -56,15 +56,17 @@ def test_two_inertias_swing_at_the_frequency_of_the_formula(tmp_path: Path) -> N
 
 
 def test_a_hardening_gear_keeps_its_energy(tmp_path: Path) -> None:
-    """k1 d^2/2 + k3 d^4/4 and both kinetic energies: what the push has put in."""
+    """k1 d^2/2 + k3 d^4/4 and both kinetic energies: what the push has put in, and what is recorded as energy."""
     errors = []
     for rate in ("1 kHz", "2 kHz"):
         run = ran(tmp_path, ("stiffness = 500 N*m/rad;", "stiffness = 500 N*m/rad;  hardening = 2e7 N*m/rad^3;"),
-                  ("dynamics = 5 kHz", f"dynamics = {rate}"))  # fmt: skip
+                  ("dynamics = 5 kHz", f"dynamics = {rate}"), ("[q, qd, qdd,", "[q, qd, energy,"))  # fmt: skip
         d, q, qd, w = (of(run, name) for name in ("servo.deflection", "q", "qd", "servo.motor_rate"))
         energy = 500.0 * d**2 / 2.0 + 2e7 * d**4 / 4.0 + ARM_INERTIA * qd**2 / 2.0 + 1e-4 * w**2 / 2.0
         assert (2e7 * d**2).max() > 500.0, "the cubic part is the larger one"
         errors.append(np.abs(energy - 6.0 * q).max())
+        stored = run.signals["energy.kinetic"][0] + run.signals["energy.potential"][0]
+        np.testing.assert_allclose(stored, energy, rtol=1e-13)
     assert errors[1] < 1e-7 * (6.0 * 0.5)
     assert 12.0 < errors[0] / errors[1] < 40.0, "as the integrator's order, 4, and the next"
 

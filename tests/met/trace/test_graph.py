@@ -231,6 +231,13 @@ def test_a_foreign_function_is_named_with_ours(tmp_path, graph):
     assert diagnostic.help == ("use met.trace.tanh",)
 
 
+@pytest.mark.parametrize("text", ["math.hypot(x, 1.0)", "float(x)", "s(x)"])
+def test_a_function_that_has_no_counterpart_is_told_of_those_that_there_are(graph, text):
+    from met.trace.refusal import RECORDS
+
+    assert refused(graph, text, s=math.sin).help == (RECORDS,)
+
+
 def test_two_graphs_do_not_meet(graph):
     with pytest.raises(ValueError, match="two graphs"):
         graph.input("x") + Graph().input("x")

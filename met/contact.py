@@ -1,0 +1,57 @@
+"""How many steps of the dynamics a joint's contact with a stop takes: half a swing of the arm on the stop's spring."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from met.frozen import frozen
+from met.plan import Experiment
+from met.program.build import Builder
+from met.program.machine import Machine
+from met.program.world import environment_values
+from met.run import inputs
+from met.trace.reference import PlainTape, follow
+
+
+@frozen
+class Contact:
+    """A stop of one case, by its name in the environment: the joint, what is behind that at the start (kg m^2; kg), and
+    the steps that a contact takes there."""
+
+    stop: str
+    joint: str
+    inertia: float
+    steps: float
+
+
+def contacts(experiment: Experiment, case: int = 0) -> tuple[Contact, ...]:
+    """Of every stop that may push its joint, for the arm as it begins in this case: the inertia that the joint feels
+    where all others keep their modes, and its rotor's."""
+    machine = Machine(experiment)
+    stops = [(name, model) for name, model in machine.environment if model.springs]
+    if not stops:
+        return ()
+    builder = Builder(machine)
+    program = builder.program()
+    values = inputs(experiment, np.array([case]))[0]
+    tape = PlainTape(program, dict(zip(program.inputs, values, strict=True)), 1)
+    found = []
+    with np.errstate(all="ignore"):
+        follow(tape, program.start)
+        follow(tape, program.tick)
+        arm = builder.step.observed(tape)
+        for name, model in stops:
+            _, p = environment_values(machine, name, model, tape.read)
+            if model.idle is not None and model.idle(p, experiment.structure.schedule.duration) is not None:
+                continue
+            joint, stiffness = (machine.value(f"environment.{name}.{part}", tape.read) for part in model.springs)
+            number = next(i for i, each in enumerate(machine.joints) if each.name == joint)
+            actuator = machine.actuators[number]
+            if actuator is not None and actuator.gives:
+                continue
+            inertia = float(arm.effective[number][0] + arm.derivative.solved.rotor[number])
+            lasts = math.pi * math.sqrt(inertia / stiffness) if stiffness > 0.0 else math.inf
+            found.append(Contact(name, str(joint), inertia, lasts / experiment.structure.schedule.step))
+    return tuple(found)

@@ -1,0 +1,17 @@
+"""Whether a time has come: written times are computed and rounded, and so are instants, and both mean round numbers.
+
+`(0.1 + 0.2) s` is 4e-17 s after the instant at 0.3 s, and means it. Without this, what is to happen then would wait for
+the next step or tick.
+"""
+
+from __future__ import annotations
+
+from met.trace import Real, Truth
+
+ROUNDING = 1e-12
+"""Share of itself by which a time may be late: thousands of roundings, and a millisecond in thirty years."""
+
+
+def has_come(now: Real, time: Real) -> Truth:
+    """Whether it is this time, or later: s, from the start of the run."""
+    return now >= time * (1.0 - ROUNDING)

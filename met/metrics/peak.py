@@ -1,0 +1,30 @@
+"""The largest size, whatever its sign."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from met.metrics.metric import Metric
+from met.parameter import Memory
+from met.trace import Real, absolute, maximum
+
+
+def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
+    return {"most": maximum(held.most, absolute(x))}
+
+
+def result(p: Any, held: Any, t: Real) -> Real:
+    return held.most
+
+
+METRIC = Metric(
+    name="peak",
+    doc=__doc__,
+    unit="of",
+    memory=(
+        Memory(name="most", unit="of", doc="largest size so far"),
+    ),
+    update=update,
+    result=result,
+)

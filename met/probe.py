@@ -1,0 +1,78 @@
+"""What a servo's functions use in one use of it, found by recording them once, with names for numbers: no engine.
+
+For what a compiler says before any program is built. A model that cannot be recorded so says nothing here: what is
+wrong with it is told where its program is built.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from types import SimpleNamespace
+from typing import Any, TypeVar
+
+from met import models
+from met.plan import ServoUse
+from met.servos.servo import Asked, JointMotion, Seen
+from met.trace import Graph, Real, Scalar
+
+T = TypeVar("T")
+
+
+def reads(use: ServoUse, values: Mapping[str, Any]) -> frozenset[str] | None:
+    """Of what the law of this use could see (`met.models.quantities`), what its outputs and integrals are made of.
+
+    values  of the servo's parameters, for its words and lists;  None: the law could not be recorded
+    """
+    servo, parts, graph = models.find("servo", use.model, use.place), models.servo_parts(use), Graph()
+    if servo.control is None:
+        return frozenset()
+    of_law = parts.integrals if parts.continuous else (*parts.outputs, *parts.integrals)
+    seen = Seen(
+        graph.input("q"), graph.input("qd"),
+        Asked(use.command.kind if use.command is not None else "none", graph.input(":asked"), graph.input(":slope")),
+        0.0 if parts.continuous else 1.0, graph.input(":time"),
+        SimpleNamespace(**{state.name: graph.input(state.name) for state in parts.natural}),
+    )  # fmt: skip
+    found = _tried(servo.control, _parameters(graph, parts.parameters, values), _named(graph, of_law), seen)
+    if found is None:
+        return None
+    roots = [x.ref for x in (*found.outputs.values(), *found.slopes.values()) if isinstance(x, Scalar)]
+    inputs = {graph.nodes[position][1] for position in graph.live(roots) if graph.nodes[position][0] == "input"}
+    return frozenset(inputs & set(models.quantities(use)))
+
+
+def accelerates(use: ServoUse, values: Mapping[str, Any]) -> bool | None:
+    """Whether the servo gives its joint's acceleration, at least at times. None: it could not be recorded."""
+    servo, parts, graph = models.find("servo", use.model, use.place), models.servo_parts(use), Graph()
+    q, qd, time, begin = (graph.input(name) for name in ("q", "qd", ":time", ":begin"))
+    joint = JointMotion(q, qd, time, begin, use.command.kind if use.command is not None else "none")
+    held, states = _named(graph, (*parts.outputs, *parts.integrals)), _named(graph, parts.natural)
+    drive = _tried(servo.drive, _parameters(graph, parts.parameters, values), held, states, joint)
+    return None if drive is None else drive.given is not None
+
+
+def _parameters(graph: Graph, declared: Iterable[Any], values: Mapping[str, Any]) -> SimpleNamespace:
+    """Names for numbers; words, lists and numbers that decide the program as they are."""
+    made: dict[str, Any] = {}
+    for each in declared:
+        path = f":{each.name}"
+        if each.shape == "number" and not each.decides:
+            made[each.name] = graph.input(path)
+        elif each.shape == "vector":
+            made[each.name] = tuple(graph.input(f"{path}.{axis}") for axis in "xyz")
+        else:
+            made[each.name] = values[each.name]
+    return SimpleNamespace(**made)
+
+
+def _named(graph: Graph, parts: Iterable[Any]) -> SimpleNamespace:
+    numbers: dict[str, Real] = {part.name: graph.input(f":held {part.name}") for part in parts}
+    return SimpleNamespace(**numbers)
+
+
+def _tried(function: Callable[..., T], *arguments: Any) -> T | None:
+    """What a model gives back; None of one that raises anything, for it is its author's code."""
+    try:
+        return function(*arguments)
+    except Exception:
+        return None

@@ -1,0 +1,187 @@
+"""Sensors of links: what they feel at a stage, where a run begins, and what they read at their ticks.
+
+An acceleration follows from the derivative, so it is there for circuits, at stages. A tick is an instant before the
+servos, whose answers are not yet known: what is read there is of the state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from met.diagnostic import Place, Problem, error
+from met.dynamics.kinematics import LinkMotion, fixed_acceleration, link_acceleration
+from met.dynamics.spatial import choose
+from met.dynamics.tree import Tree
+from met.environments.environment import World
+from met.frozen import frozen
+from met.integrators.integrator import Motion
+from met.plan import BASE
+from met.program import bodies, cells, payloads, sensing
+from met.program.base import Base, base_of
+from met.program.machine import Fitted, Machine, ReadCell
+from met.program.values import answer
+from met.program.world import ArmWorld, environment_values
+from met.trace import Real
+from met.trace.program import Tape
+from met.vectors import ZERO, Vector, add, cross, sub, turn_vector_back
+
+
+@frozen
+class Accelerations:
+    """What a derivative tells.
+
+    qdd      slopes of all rates, those of bodies too, as in `Slope`
+    base     angular acceleration of the base frame, and that of its origin, base axes, rad/s^2, m/s^2
+    gravity  uniform, of all environment models, world axes, m/s^2
+    """
+
+    qdd: tuple[Real, ...]
+    base: tuple[Vector, Vector]
+    gravity: Vector
+
+
+class Aboard(ArmWorld):
+    """A `met.sensors.sensor.Felt`.
+
+    moved  None: at a tick, where no acceleration is known
+    place  of the sensor that asks at a tick
+    """
+
+    def __init__(
+        self, machine: Machine, read: ReadCell, tree: Tree, y: Motion, base: Base, time: Real, begin: Real,
+        moved: Accelerations | None, place: Place | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(machine, read, tree, y, base, time, begin)
+        self._moved, self._place = moved, place
+
+    def link(self, link: str) -> LinkMotion:
+        if link == BASE and BASE not in self.links:
+            return LinkMotion(self._base.pose, self._base.w, self._base.v)
+        return super().link(link)
+
+    def acceleration(self, link: str, point: Vector = ZERO) -> Vector:
+        return self.link(link).to_world(self._acceleration(link, point))
+
+    def specific_force(self, link: str, point: Vector = ZERO) -> Vector:
+        own, motion = self._acceleration(link, point), self.link(link)
+        falling = free_fall(self._machine, self._read, self, self._known(link).gravity, motion, point)
+        return sub(own, motion.to_link(falling))
+
+    def spin(self, link: str) -> Vector:
+        motion = self.link(link)
+        found = motion.w
+        for name, model in self._machine.environment:
+            if model.turns is not None:
+                owner, p = environment_values(self._machine, name, model, self._read)
+                found = add(found, motion.to_link(answer(owner, model.turns, p, self)))
+        return found
+
+    def _acceleration(self, link: str, point: Vector) -> Vector:
+        """Of a point given in the link's frame, in its axes."""
+        wd, a = self._of_frame(link)
+        w = self.link(link).w
+        return add(a, add(cross(wd, point), cross(w, cross(w, point))))
+
+    def _of_frame(self, link: str) -> tuple[Vector, Vector]:
+        """Angular acceleration of a link or payload and acceleration of its frame's origin, in its axes."""
+        moved = self._known(link)
+        if link in self._flying:
+            return self._of_payload(link, moved)
+        if link not in self._tree.frames:
+            return moved.base
+        n = len(self.joints)
+        return link_acceleration(self._tree, self._q, self._qd, moved.qdd[:n], link, self._base.w, moved.base)
+
+    def _of_payload(self, name: str, moved: Accelerations) -> tuple[Vector, Vector]:
+        payload, read = self._flying[name], self._read
+        body = payloads.free_body(self._machine, payload)
+        own = body.qdd(moved.qdd)
+        flown = payloads.flown(self._machine, payload, read, self._y)
+        free = own[3:], turn_vector_back(flown.pose.R, own[:3])  # type: ignore[arg-type]
+        carrier = self.link(payload.link)
+        held = fixed_acceleration(carrier.w, self._of_frame(payload.link), payloads.held(payload, read))
+        on = payloads.carried(payload, read)
+        wd, a = (
+            (choose(on, x[0], y[0]), choose(on, x[1], y[1]), choose(on, x[2], y[2]))
+            for x, y in zip(held, free, strict=True)
+        )
+        return wd, a
+
+    def _known(self, link: str) -> Accelerations:
+        if self._moved is None:
+            message = f"a sensor asks at its tick for an acceleration, of link `{link}`, which is not known yet"
+            help = "keep what a circuit makes of it: a state, whose slope `follow` gives"
+            raise Problem(error("E216", message, self._place, help=help))
+        return self._moved
+
+
+def free_fall(
+    machine: Machine, read: ReadCell, world: World, gravity: Vector, motion: LinkMotion, point: Vector = ZERO
+) -> Vector:
+    """Acceleration of a body that falls freely where a point of a frame is, and moves so; world axes, m/s^2."""
+    found = gravity
+    for name, model in machine.environment:
+        if model.falls is not None:
+            owner, p = environment_values(machine, name, model, read)
+            there = motion.position(point), motion.velocity(point)
+            found = add(found, answer(owner, model.falls, p, world, *there))
+    return found
+
+
+def start(machine: Machine, tape: Tape, gravity: Callable[[Motion], Vector]) -> None:
+    """Where sensors begin: settled on joints that do not accelerate, and bodies that fall freely.
+
+    gravity  at a state where a run begins, as in `Accelerations`
+    """
+    if not machine.sensors:
+        return
+    y, stands = _state(machine, tape, 0.0)
+    at_once = Aboard(machine, tape.read, machine.tree(tape.read), y, stands, 0.0, 0.0, None)
+    g = gravity(y)
+    qdd: list[Real] = [0.0 for _ in machine.joints]
+    base = stands.wd, stands.a
+    for body in bodies.bodies(machine):
+        own = bodies.flight(body, tape.read, y)
+        fall = free_fall(machine, tape.read, at_once, g, LinkMotion(own.pose, own.w, own.v))
+        qdd += [*fall, 0.0, 0.0, 0.0]
+        if body.name == BASE:
+            base = ZERO, turn_vector_back(own.pose.R, fall)
+    moved = Accelerations(tuple(qdd), base, g)
+    felt = Aboard(machine, tape.read, machine.tree(tape.read), y, stands, 0.0, 0.0, moved)
+    for fitted in machine.sensors:
+        sensing.begin(machine, tape, fitted, measured(machine, fitted, tape.read, felt))
+
+
+def slopes(
+    machine: Machine, read: ReadCell, felt: Aboard, own: Mapping[str, Real]
+) -> tuple[Real, ...]:
+    """Slopes of the sensors' states at a stage, in their order. own: the states, by channel."""
+    found: dict[str, Real] = {}
+    for fitted in machine.sensors:
+        if fitted.sensor.follow is not None:
+            found.update(sensing.followed(machine, fitted, read, own, measured(machine, fitted, read, felt)))
+    return tuple(found[name] for fitted in machine.sensors for name in fitted.channels)
+
+
+def tick(machine: Machine, tape: Tape, divisor: int) -> None:
+    """A tick of the sensors of this divisor, on the state at this time."""
+    y, stands = _state(machine, tape, tape.time)
+    tree, period = machine.tree(tape.read), divisor / machine.structure.schedule.base_hz
+    for fitted, use in zip(machine.sensors, machine.structure.sensors, strict=True):
+        if use.divisor == divisor:
+            felt = Aboard(machine, tape.read, tree, y, stands, tape.time, tape.time, None, use.place)
+            find = partial(measured, machine, fitted, tape.read, felt)
+            sensing.tick(machine, tape, fitted, find, divisor, period, tape.read)
+
+
+def measured(machine: Machine, fitted: Fitted, read: ReadCell, felt: Aboard) -> Real:
+    """The quantity that a sensor is of."""
+    assert fitted.sensor.measures is not None
+    return answer(fitted.owner, fitted.sensor.measures, sensing.values(machine, fitted, read), felt)
+
+
+def _state(machine: Machine, tape: Tape, time: Real) -> tuple[Motion, Base]:
+    """The arm at an instant, and its base."""
+    y = bodies.begun(machine, cells.state(tape, bodies.coordinates(machine), machine.states))
+    return y, base_of(machine, tape.read, y, time)

@@ -1,0 +1,69 @@
+"""Accelerometer: the specific force at a point of a link along one direction, through a filter, digitized.
+
+    x        along . (a - g)         a: acceleration of the point `at`;  g: that of a body which falls freely there
+    y''      = w^2 (x - y) - sqrt(2) w y',  w = 2 pi cutoff                 of order 2, integrated with the arm
+    reading  scale y + bias + noise n_k, to the nearest step of the converter, `delay` ticks late
+
+So at rest under gravity it reads +9.81 m/s^2 upwards, and in free fall nothing. g is all of gravitation: uniform
+`gravity`, and what a `gravity_gradient` makes of it at that point: on board of what is in orbit, an accelerometer away
+from the centre of mass does feel the difference. The filter is always there: a real one has a bandwidth, and the
+acceleration at a tick is not known before what acts from that tick on.
+
+A run begins with the filter settled on joints that do not accelerate, and a free base that falls freely. The noise is
+white from tick to tick. Rates that jump, as where a payload is grappled, are no acceleration here: a real one rings.
+Not a triad: for three axes write three. It has no range, and its axis is as written: there is no misalignment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from met.parameter import ZEROS, Parameter
+from met.sensors import butterworth
+from met.sensors.digital import DELAY, NOISE, PAST, RESOLUTION, filled
+from met.sensors.on_link import ALONG, BIAS, LINK, SCALE, at_rest, component, reading
+from met.sensors.sensor import Felt, Reading, Sensed, Sensor
+from met.trace import Real
+
+
+def measures(p: Any, felt: Felt) -> Real:
+    return component(p.along, felt.specific_force(p.link, p.at))
+
+
+def follow(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
+    return butterworth.slopes(p, states, value)
+
+
+def begin(p: Any, value: Real) -> Mapping[str, Real]:
+    return {**butterworth.settled(value), **filled(at_rest(p, value))}
+
+
+def read(p: Any, held: Any, states: Any, sensed: Sensed) -> Reading:
+    return reading(p, held, states.filtered, sensed)
+
+
+SENSOR = Sensor(
+    name="accelerometer",
+    doc=__doc__,
+    parameters=(
+        LINK,
+        Parameter(name="at", unit="m", shape="vector", default=ZEROS, doc="where it is, in the link's frame"),
+        ALONG,
+        butterworth.cutoff(),
+        SCALE,
+        BIAS,
+        NOISE,
+        RESOLUTION,
+        DELAY,
+    ),
+    states=butterworth.states(),
+    memory=PAST,
+    measures=measures,
+    unit="m/s^2",
+    fastest=butterworth.fastest,
+    swing=butterworth.swing,
+    follow=follow,
+    begin=begin,
+    read=read,
+)

@@ -1,0 +1,47 @@
+"""A sensor's analog filter of order 2: y'' = w^2 (x - y) - sqrt(2) w y', w = 2 pi cutoff; integrated with the arm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from met.parameter import Only, Parameter, State
+from met.trace import Real
+
+
+def cutoff(only: Only | None = None) -> Parameter:
+    """Its parameter."""
+    return Parameter(name="cutoff", unit="Hz", above=0.0, only=only, doc="cut-off of the filter")
+
+
+def states(only: Only | None = None) -> tuple[State, ...]:
+    """Its output, and the slope of that."""
+    return (
+        State(name="filtered", unit="of", only=only, doc="what is behind the filter"),
+        State(name="filtered_slope", unit="of/s", only=only, doc="its slope"),
+    )
+
+
+def slopes(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
+    """Of its states, with this value before it."""
+    w = 2.0 * math.pi * p.cutoff
+    bend = w * w * (value - states.filtered) - math.sqrt(2.0) * w * states.filtered_slope
+    return {"filtered": states.filtered_slope, "filtered_slope": bend}
+
+
+def fastest(p: Any) -> Real:
+    """The size of its poles, 1/s."""
+    found: Real = 2.0 * math.pi * p.cutoff
+    return found
+
+
+def swing(p: Any) -> tuple[Real, Real]:
+    """The a and b of its y'' = -a y - b y'."""
+    w = fastest(p)
+    return w * w, math.sqrt(2.0) * w
+
+
+def settled(value: Real) -> Mapping[str, Real]:
+    """Its states, the value having been this for long."""
+    return {"filtered": value, "filtered_slope": 0.0}

@@ -1,0 +1,77 @@
+"""Rate gyroscope: the angular velocity of a link about one direction, through a filter or none, digitized.
+
+    x        along . w               w: angular velocity against directions that do not turn
+    filter = none          y = x
+    filter = butterworth   y'' = w_c^2 (x - y) - sqrt(2) w_c y',  w_c = 2 pi cutoff  of order 2, integrated with the arm
+    reading  scale y + bias + noise n_k, to the nearest step of the converter, `delay` ticks late
+
+Where the world itself turns, as with a `gravity_gradient` whose frame is orbital, its turning is in the reading. A run
+begins with the filter settled. The noise is white from tick to tick; the bias stays what it is: there is no drift.
+Not an angle: it does not integrate. It does not feel accelerations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from met.parameter import Parameter
+from met.sensors import butterworth
+from met.sensors.digital import DELAY, NOISE, PAST, RESOLUTION, filled
+from met.sensors.on_link import ALONG, BIAS, LINK, SCALE, at_rest, component, reading
+from met.sensors.sensor import Felt, Reading, Sensed, Sensor
+from met.trace import Real
+
+FILTERED = ("filter", ("butterworth",))
+
+
+def measures(p: Any, felt: Felt) -> Real:
+    return component(p.along, felt.spin(p.link))
+
+
+def follow(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
+    return {} if p.filter == "none" else butterworth.slopes(p, states, value)
+
+
+def begin(p: Any, value: Real) -> Mapping[str, Real]:
+    return {**({} if p.filter == "none" else butterworth.settled(value)), **filled(at_rest(p, value))}
+
+
+def read(p: Any, held: Any, states: Any, sensed: Sensed) -> Reading:
+    return reading(p, held, sensed.value if p.filter == "none" else states.filtered, sensed)
+
+
+def fastest(p: Any) -> Real | None:
+    return None if p.filter == "none" else butterworth.fastest(p)
+
+
+def swing(p: Any) -> tuple[Real, Real] | None:
+    return None if p.filter == "none" else butterworth.swing(p)
+
+
+SENSOR = Sensor(
+    name="gyroscope",
+    doc=__doc__,
+    parameters=(
+        LINK,
+        ALONG,
+        Parameter(
+            name="filter", shape="word", words=("none", "butterworth"), default="none", doc="the filter behind it"
+        ),
+        butterworth.cutoff(FILTERED),
+        SCALE,
+        BIAS,
+        NOISE,
+        RESOLUTION,
+        DELAY,
+    ),
+    states=butterworth.states(FILTERED),
+    memory=PAST,
+    measures=measures,
+    unit="rad/s",
+    fastest=fastest,
+    swing=swing,
+    follow=follow,
+    begin=begin,
+    read=read,
+)

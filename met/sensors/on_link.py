@@ -1,0 +1,34 @@
+"""What sensors of links have in common: the link, a direction on it, a scale and a bias."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from met.parameter import Parameter
+from met.plan import BASE
+from met.sensors.digital import converted, delayed, noisy
+from met.sensors.sensor import Reading, Sensed
+from met.trace import Real, sqrt
+from met.vectors import Vector, dot, scale
+
+LINK = Parameter(name="link", shape="word", names="link", words=(BASE,), doc="link that it is fixed to")
+ALONG = Parameter(
+    name="along", shape="vector", direction=True, doc="direction in the link's frame; its length does not count"
+)
+SCALE = Parameter(name="scale", default=1.0, doc="reading for each unit of what there is: 1.01 reads one percent more")
+BIAS = Parameter(name="bias", unit="of", default=0.0, doc="reading where there is nothing")
+
+
+def component(along: Vector, vector: Vector) -> Real:
+    """Of a vector, along a direction of any length."""
+    return dot(scale(1.0 / sqrt(dot(along, along)), along), vector)
+
+
+def reading(p: Any, held: Any, value: Real, sensed: Sensed) -> Reading:
+    """A value with scale, bias and the tick's noise, to the nearest step of the converter, `delay` ticks late."""
+    return delayed(p, held, converted(noisy(p, p.scale * value + p.bias, sensed), p.resolution))
+
+
+def at_rest(p: Any, value: Real) -> Real:
+    """What a reading is where a run begins: without noise."""
+    return converted(p.scale * value + p.bias, p.resolution)
