@@ -28,7 +28,7 @@ class Contact:
 
 def contacts(experiment: Experiment, case: int = 0) -> tuple[Contact, ...]:
     """Of every stop that may push its joint, for the arm as it begins in this case: the inertia that the joint feels
-    where all others keep their modes, and its rotor's."""
+    where all others keep their modes, and its rotor's. Not of a joint that feels none."""
     machine = Machine(experiment)
     stops = [(name, model) for name, model in machine.environment if model.springs]
     if not stops:
@@ -52,6 +52,8 @@ def contacts(experiment: Experiment, case: int = 0) -> tuple[Contact, ...]:
             if actuator is not None and actuator.gives:
                 continue
             inertia = float(arm.effective[number][0] + arm.derivative.solved.rotor[number])
+            if not inertia > 0.0:  # masses so small that the arithmetic has no more of them
+                continue
             lasts = math.pi * math.sqrt(inertia / stiffness) if stiffness > 0.0 else math.inf
             found.append(Contact(name, str(joint), inertia, lasts / experiment.structure.schedule.step))
     return tuple(found)

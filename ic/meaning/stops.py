@@ -39,14 +39,15 @@ def check_stops(complaints: Complaints, experiment: Experiment) -> None:
                 continue
             unit = _unit(experiment, each.joint)
             place = stiffness[each.stop].origin.place or uses[each.stop].place
-            rate = math.ceil(enough / each.steps * structure.schedule.base_hz / structure.schedule.dynamics)
+            times = enough / each.steps if each.steps > 0.0 else math.inf
+            rate = times * structure.schedule.base_hz / structure.schedule.dynamics
+            fits = f"that is {hz(float(math.ceil(rate)))} Hz or more" if math.isfinite(rate) else "no rate is so high"
             complaints.remark(
                 "D295", f"`{each.stop}` is stiff for the dynamics' step: joint `{each.joint}` touches it for "
                 f"{each.steps:.2g} steps", Label(place, f"h = {structure.schedule.step:g} s") if place else place,
                 help=[f"with {integrator.name} a contact of fewer than {enough:g} steps gives energy that nobody put "
                       "in",
-                      f"that is {hz(float(rate))} Hz or more, or a softer stop: the joint feels {each.inertia:.3g} "
-                      f"{unit} at the start"])
+                      f"{fits}, or a softer stop: the joint feels {each.inertia:.3g} {unit} at the start"])
 
 
 def _stiffest(experiment: Experiment, stiffness: Quantity) -> int:

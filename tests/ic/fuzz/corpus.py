@@ -7,13 +7,14 @@ import re
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import get_args
 
 import ic
 from ic.text.preprocess import DIRECTIVES
 from met import models, units
 
 ROOT = Path(__file__).parents[3]
-KINDS: tuple[models.Kind, ...] = ("servo", "environment", "command", "metric", "integrator", "bed", "law")
+KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
 LIBRARY = tuple(str(path.relative_to(ROOT / "ic" / "decks")) for path in sorted(ROOT.glob("ic/decks/**/*.ic")))
 LARGEST = 20_000  # characters of a deck to start from
 COMPANIONS = ("*.csv", "*.urdf", "*.xacro")

@@ -59,6 +59,16 @@ def test_a_joint_that_is_told_its_acceleration_is_not_pushed(tmp_path: Path) -> 
     assert contacts(experiment(tmp_path, ARM, ideal, deck(1e9))) == ()
 
 
+def test_with_numbers_at_their_ends_it_is_no_fault(tmp_path: Path) -> None:
+    """A mass whose inverse is infinite leaves nothing to feel; such a rotor is sent back in no step of any rate."""
+    nothing = changed(ARM, ("mass = 2 kg", "mass = 1e-308 kg"))
+    assert contacts(experiment(tmp_path, nothing, deck(500.0, ("servos { hinge = drive; }", "servos { }")))) == ()
+    rotor = changed(SERVO, ("ratio = 100", "ratio = 1"), ("j_m = 1e-4", "j_m = 1e-308"),
+                    ("kt = 0.05", "kt = 1e-308"))  # fmt: skip
+    text = told(check(tmp_path, nothing, rotor, deck(1e308)))
+    assert "touches it for 0 steps" in text and "no rate is so high, or a softer stop" in text
+
+
 @pytest.mark.parametrize(("steps", "least", "most"), [(2.0, 1.0, 6.0), (10.0, 0.005, 0.04)])
 def test_what_is_warned_of_is_true(steps: float, least: float, most: float, tmp_path: Path) -> None:
     """The energy that a bounce gains, at the worst of twenty places of the first step in it."""
