@@ -250,7 +250,7 @@ class Folder:
         return total
 
     def sweep(self) -> None:
-        """Remove what workers that were killed had begun to write."""
+        """Remove what workers that were killed had begun to write; there are none at work."""
         for path in self.shards.glob(".*.tmp"):
             path.unlink(missing_ok=True)
 

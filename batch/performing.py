@@ -185,6 +185,7 @@ class _Work:
         """Give up, for now. What is worth keeping stays; in words how much and where, else "" and nothing stays."""
         if not self.ours:
             return ""
+        self.folder.sweep()
         worth = self.resumed or self.folder.submitted or self.folder.recorded
         worth = worth or self.folder.seconds(WORTH_SECONDS) >= WORTH_SECONDS
         if not worth:

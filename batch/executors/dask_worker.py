@@ -17,6 +17,7 @@ from typing import Any
 
 from distributed import Reschedule, Worker, WorkerPlugin, get_worker
 from distributed.utils import sync
+from distributed.worker import WORKER_ANY_RUNNING
 
 from batch import shard
 from batch.child import Crew
@@ -84,7 +85,9 @@ class Kept(WorkerPlugin):
 
     @staticmethod
     async def on(worker: Worker, order: Mapping[str, Any]) -> Kept:
-        """Those of a worker, for one more task."""
+        """Those of a worker, for one more task. Raises Reschedule where it is closing: it would not let go of them."""
+        if worker.status not in WORKER_ANY_RUNNING:
+            raise Reschedule
         name = order["campaign"]
         kept = worker.plugins.get(name)
         if not isinstance(kept, Kept):

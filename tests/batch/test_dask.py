@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 import os
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from distributed import Client, LocalCluster
+from distributed import Client, LocalCluster, Reschedule
 
 import batch
 from batch.campaign import prepare, values_sections
@@ -284,8 +285,8 @@ class TestInThisProcess:
             dask.submit(Task(0, 40, 41))
             whole.until(lambda: len(set(whole.children(os.getpid())) - before) == 1)
             dask.close()
-            assert set(whole.children(os.getpid())) == before
-            assert not [name for worker in started.workers.values() for name in worker.plugins if "met" in name]
+            whole.until(lambda: set(whole.children(os.getpid())) == before)
+            whole.until(lambda: not [n for worker in started.workers.values() for n in worker.plugins if "met" in n])
 
     @pytest.mark.usefixtures("poisoned")
     def test_a_driver_that_is_gone_leaves_no_child(
@@ -300,6 +301,14 @@ class TestInThisProcess:
             whole.until(lambda: len(set(whole.children(os.getpid())) - before) == 1)
             dask.close()
             whole.until(lambda: set(whole.children(os.getpid())) == before)
+
+    def test_a_worker_that_is_closing_takes_on_no_children(self, many: Any, tmp_path: Path) -> None:
+        order = {"folder": str(many[0].path), "campaign": "met-late", "key": "late", "threads": 1, "timeout": None}
+        with cluster(tmp_path) as started:
+            (worker,) = started.workers.values()
+        with pytest.raises(Reschedule):
+            asyncio.run(dask_worker.Kept.on(worker, order))
+        assert not [name for name in worker.plugins if "met" in name]
 
     def test_children_that_get_nothing_to_do_go_home(
         self, many: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
