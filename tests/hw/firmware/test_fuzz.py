@@ -19,7 +19,10 @@ from tests.hw.firmware.device import HERE, LOCK_STEP, PLAIN, SENSORS, SHAFT
 pytestmark = pytest.mark.slow
 
 SECONDS = int(os.environ.get("MET_FUZZ_SECONDS", "30"))
-"""For each of two beds: a minute together. An hour: MET_FUZZ_SECONDS=1800."""
+"""For each of two beds: a minute together. An hour: MET_FUZZ_SECONDS=1800, with `-o faulthandler_timeout=0`."""
+
+HANGS_SECONDS = 60
+"""After which an input is one that never ends."""
 
 FUZZED = ("-g", "-O1", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all")
 
@@ -64,8 +67,9 @@ def test_nothing_that_comes_over_the_line_breaks_a_bed(
     corpus.mkdir()
     for k, seed in enumerate(seeds()):
         (corpus / str(k)).write_bytes(seed)
-    words = [str(tmp_path / "fuzz"), f"-max_total_time={SECONDS}", "-max_len=600", "-print_final_stats=1", str(corpus)]
-    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
+    words = [str(tmp_path / "fuzz"), f"-max_total_time={SECONDS}", "-max_len=600", "-print_final_stats=1"]
+    words += [f"-timeout={HANGS_SECONDS}", str(corpus)]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, timeout=SECONDS + 4 * HANGS_SECONDS)
     assert done.returncode == 0, done.stderr[-4000:]
     runs = next(line.split()[-1] for line in done.stderr.splitlines() if "number_of_executed_units" in line)
     with capsys.disabled():

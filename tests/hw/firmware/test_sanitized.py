@@ -31,7 +31,8 @@ def test_the_core_s_tests_pass_with_the_address_and_undefined_behaviour_sanitize
     }
     words = [sys.executable, "-m", "pytest", "-q", "-p", "no:xdist", "-p", "no:cacheprovider"]
     words += [str(HERE / each) for each in TESTS]
-    done = subprocess.run(words, env=environment, capture_output=True, text=True, cwd=HERE.parents[2])
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, cwd=HERE.parents[2],
+                          timeout=300)  # fmt: skip
     assert done.returncode == 0, (done.stdout + done.stderr)[-4000:]
     assert " passed" in done.stdout and "skipped" not in done.stdout
 
