@@ -1,4 +1,4 @@
-"""The cases of an archive one by one: which failed, which missed a requirement and by how much, worst first."""
+"""The cases of an archive one by one: which failed, which missed a requirement and by how much."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from batch import requirements
+from batch import ordering, requirements
 from batch.archive.read import ArchiveFile, Group, Stored
 from batch.failures import STATUS
+from batch.ordering import By
+from batch.pool import ENDED, Pool
 from batch.signals import deck_unit, number_text, value_text
 from batch.summary import finite
 from met.diagnostic import Problem
@@ -20,23 +22,15 @@ SHOWN_CASES = 20
 MISSES = "\N{BALLOT X}"
 
 
-def worst_first(group: Group) -> np.ndarray:
-    """Positions of the cases: failed ones, then those that miss most requirements, then by how far they miss.
-
-    How far is relative to the limit (to the largest value where the limit is 0); a case that meets all requirements
-    stands by how close it comes to one. Without requirements the order is the case table's.
-    """
-    return requirements.worst_first(group.values("status"), requirements.outcomes(group), _far(group))
-
-
-def table(group: Group, most: int | None = SHOWN_CASES, *, hint: bool = True) -> list[str]:
-    """The cases as lines, worst first, in the deck's units; a metric that misses a requirement bears a cross.
+def table(group: Group, most: int | None = SHOWN_CASES, *, by: By | None = None, hint: bool = True) -> list[str]:
+    """The cases as lines, worst first or `by` what is asked for, in the deck's units; a metric that misses a
+    requirement bears a cross.
 
     most: how many, None for all; hint: whether to say how many are left out.
     """
     from ic.printing.columns import columns
 
-    positions = worst_first(group)
+    positions = ordering.positions(group, by)
     left = 0 if most is None else max(0, len(positions) - most)
     positions = positions[: len(positions) - left]
     outcomes = requirements.outcomes(group, positions)
@@ -64,8 +58,40 @@ def table(group: Group, most: int | None = SHOWN_CASES, *, hint: bool = True) ->
     return [*out, f"  ... {left:,} more; --all-cases prints them"] if left and hint else out
 
 
-def title(group: Group, most: int | None = None) -> str:
+def table_across(pool: Pool, by: By, most: int | None = SHOWN_CASES) -> list[str]:
+    """The cases of all structures of a sweep as lines, `by` what is asked for, with what tells the structures apart."""
+    from ic.printing.columns import columns
+
+    places = ordering.across(pool, by)
+    left = 0 if most is None else max(0, len(places) - most)
+    places = places[: len(places) - left]
+    cells = [["", "", *(f"#{case}" for case in pool.cases[places])]]
+    cells.append(["id", "", *(case_id[:8] for case_id in pool.texts("case_id", places))])
+    words = 0
+    for column in pool.columns:
+        values, name, unit = column.values[places], column.label, column.unit
+        if column.role == "choice":
+            words += 1
+            cells.append([name, "", *("" if np.isnan(value) else column.words[int(value)] for value in values)])
+            continue
+        texts = ["" if np.isnan(value) else number_text(value) for value in values]
+        if column.limits:
+            judged = [pool.requirements.index(limit.text) for limit in column.limits]
+            missed = (pool.outcomes[places][:, judged] == 0).any(axis=1)
+            texts = [f"{text} {MISSES if miss else ' '}" for text, miss in zip(texts, missed, strict=True)]
+            name, unit = f"{name}  ", f"{unit}  "
+        cells.append([name, unit, *texts])
+    ended = [ENDED[number] for number in pool.ended[places]]
+    cells.append(["", "", *("" if word == "done" else word for word in ended)])
+    rows = [list(row) for row in zip(*cells, strict=True)]
+    out = columns(rows, right=(0, *range(2 + words, len(cells) - 1)))
+    return [*out, f"  ... {left:,} more; --all-cases prints them"] if left else out
+
+
+def title(group: Group, most: int | None = None, *, by: By | None = None) -> str:
     """What the order of the table is, or of its beginning."""
+    if by is not None and ordering.has(group, by):
+        return by.title
     outcomes = requirements.outcomes(group)
     number = f"{min(most, group.count)} " if most is not None else ""
     if (group.values("status") != 0).any() or (outcomes != 1).any():
@@ -75,11 +101,12 @@ def title(group: Group, most: int | None = None) -> str:
 
 
 def rows_json(
-    group: Group, most: int | None = SHOWN_CASES, *, positions: Sequence[int] | np.ndarray | None = None
+    group: Group, most: int | None = SHOWN_CASES, *, by: By | None = None,
+    positions: Sequence[int] | np.ndarray | None = None,
 ) -> list[dict[str, Any]]:
     """The same for programs, in SI, of these cases or of the worst: what a case is, how it ended, its metrics (null
     where not finite), and whether it meets each requirement (null where that is not known)."""
-    positions = worst_first(group)[:most] if positions is None else np.asarray(positions)
+    positions = ordering.positions(group, by)[:most] if positions is None else np.asarray(positions)
     numbers = [variable.name for variable in (*group.role("coordinate"), *group.role("metric"))]
     repeats = {"repeat": group.at("repeat", positions)} if "repeat" in group.variables else {}
     values = {name: group.at(name, positions) for name in ("case", "case_id", "status", "cause", *numbers)}
@@ -153,11 +180,3 @@ def _marks(group: Group, outcomes: np.ndarray) -> dict[str, np.ndarray]:
         out[each.metric] = out.get(each.metric, False) | (outcomes[:, each.place] == 0)
     return out
 
-
-def _far(group: Group) -> np.ndarray:
-    """How far each case is beyond the limit that it misses most."""
-    worst = np.full(group.count, -np.inf)
-    for each in requirements.required(group):
-        far = requirements.beyond(group.values(each.metric), each.comparison, each.limit)
-        worst = np.maximum(worst, far)
-    return worst

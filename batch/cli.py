@@ -18,32 +18,40 @@ if TYPE_CHECKING:
 @click.argument("signals", nargs=-1, metavar="[SIGNAL]...")
 @click.option("--run", "experiments", multiple=True, metavar="NAME", help="Only this run or sweep of the archive.")
 @click.option("--case", metavar="ID", help="All about this case alone: the beginning of its id, or '#0'.")
-@click.option("--all-cases", is_flag=True, help="All rows of the table of cases, not the worst 20 alone.")
+@click.option("--all-cases", is_flag=True, help="All rows of the table of cases, not the first 20 alone.")
+@click.option("--sort", metavar="NAME", help="Cases by this metric or varied parameter, smallest first.")
+@click.option("--reverse", is_flag=True, help="Of --sort: largest first.")
 @click.option("--no-plots", is_flag=True, help="Numbers only.")
 @format_option
 def show(
     archive: str, signals: tuple[str, ...], experiments: tuple[str, ...], case: str | None, all_cases: bool,
-    no_plots: bool, form: str,
+    sort: str | None, reverse: bool, no_plots: bool, form: str,
 ) -> int:  # fmt: skip
     """Show what an archive holds: what was run, how it went, metrics, requirements, and SIGNALs (`qd`, `elbow.q`).
 
-    Of a sweep, also which cases failed or missed a requirement, worst first.
+    Of a sweep, also which cases failed or missed a requirement, worst first, or by what --sort names.
     """
     import shutil
     import sys
 
     from batch.archive.read import ArchiveFile
+    from batch.ordering import By
     from batch.show import as_json, show
     from met.render import wants_colour
 
+    if reverse and sort is None:
+        raise click.UsageError("--reverse is of --sort, and nothing is sorted: `--sort NAME`")
+    if case is not None and sort is not None:
+        raise click.UsageError("--sort is of many cases, and --case of one")
+    by = None if sort is None else By(sort, reverse)
     with ArchiveFile(archive) as file:
         if form == "json":
-            click.echo(as_json(file, experiments, case=case, all_cases=all_cases))
+            click.echo(as_json(file, experiments, case=case, all_cases=all_cases, by=by))
             return YES
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
         colour = wants_colour(sys.stdout)
         text = show(
-            file, signals, experiments=experiments, case=case, all_cases=all_cases, width=width, colour=colour,
+            file, signals, experiments=experiments, case=case, all_cases=all_cases, by=by, width=width, colour=colour,
             plots=not no_plots,
         )  # fmt: skip
         click.echo(text, nl=False, color=colour)

@@ -133,7 +133,7 @@ class Pool:
     @cached_property
     def worst_first(self) -> np.ndarray:
         """Places of the cases: failed ones, then those that miss most requirements, then by how far they miss, relative
-        to the limit; as `batch.cases.worst_first` has it of one group."""
+        to the limit; as `batch.ordering.worst_first` has it of one group."""
         return requirements.worst_first(self.status, self.outcomes, self._far())
 
     def _far(self) -> np.ndarray:

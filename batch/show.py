@@ -8,10 +8,12 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from batch import braille, cases
+from batch import braille, cases, ordering
 from batch.archive.read import ArchiveFile, Group
 from batch.failures import failure_lines
+from batch.ordering import By
 from batch.output import quoted
+from batch.pool import pools
 from batch.signals import case_text, history, number_text, panels, pretty_unit
 from batch.structures import structures
 from batch.summary import MetricSummary, Summary, summary_of
@@ -33,27 +35,37 @@ def show(
     experiments: Sequence[str] = (),
     case: str | None = None,
     all_cases: bool = False,
+    by: By | None = None,
     width: int = 100,
     colour: bool = False,
     plots: bool = True,
 ) -> str:
-    """The whole text: of all cases with their table, or all about one `case`.
+    """The whole text: of all cases with their table, worst first or `by` what is asked for, or all about one `case`.
+
+    By something, the cases of all structures of a sweep are in one table.
 
     A plot is of one case, the first recorded unless `case` names another; under the table of all cases there is none
     unless `signals` are asked for.
     """
     out = [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
     shown = picked(archive, experiments, case)
+    ordering.check([group for group, _ in shown], by)
     if not experiments and case is None and not signals:
         out += [line for table in structures(archive) for line in ("", *table)]
         counts = Counter(group.sweep for group, _ in shown if group.sweep)
         hidden = [group.name for group, _ in shown if counts[group.sweep] > MOST_GROUPS and not all_cases]
-        if hidden:
+        if hidden and by is None:
             remedy = f"`met show {quoted(archive.path)} --run {hidden[0]}`"
             out += ["", f"one structure in full: {remedy}; the cases of all: `--all-cases`"]
             shown = [each for each in shown if each[0].name not in hidden]
+    if by is not None:
+        for pool in pools([group for group, _ in shown]):
+            if len(pool.groups) > 1:
+                most = None if all_cases else cases.SHOWN_CASES
+                out += ["", f"{pool.name}, {by.title}", *cases.table_across(pool, by, most)]
+                shown = [each for each in shown if signals or each[0] not in pool.groups]
     for group, position in shown:
-        out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, width), ""]
+        out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, by, width), ""]
         if plots and (signals or position is not None or not all_cases):
             out += _plots(group, signals, position, width, colour)
         elif signals:
@@ -61,7 +73,9 @@ def show(
     return "\n".join(out).rstrip() + "\n"
 
 
-def _about(archive: ArchiveFile, group: Group, position: int | None, all_cases: bool, width: int) -> list[str]:
+def _about(
+    archive: ArchiveFile, group: Group, position: int | None, all_cases: bool, by: By | None, width: int
+) -> list[str]:
     """How the cases went, and which of them how; or one case: how it went, and what was varied in it."""
     if position is not None:
         varied = cases.varied_lines(archive, group, position)
@@ -69,16 +83,18 @@ def _about(archive: ArchiveFile, group: Group, position: int | None, all_cases: 
         return [*name, *verdict(summary_of(group, position), width), *([""] if varied else []), *varied]
     out = verdict(summary_of(group), width)
     if group.count > 1:
-        out += ["", cases.title(group), *cases.table(group, None if all_cases else cases.SHOWN_CASES)]
+        most = None if all_cases else cases.SHOWN_CASES
+        out += ["", cases.title(group, by=by), *cases.table(group, most, by=by)]
     return out
 
 
 def as_json(
-    archive: ArchiveFile, experiments: Sequence[str] = (), *, case: str | None = None, all_cases: bool = False
+    archive: ArchiveFile, experiments: Sequence[str] = (), *, case: str | None = None, all_cases: bool = False,
+    by: By | None = None,
 ) -> str:
     """The same for programs: outcome, cases, variables and attributes, without the signals' values.
 
-    `case_table` holds the cases as `show` lists them, the worst of many unless `all_cases`; where one `case` is asked
+    `case_table` holds the cases as `show` lists them, the first of many unless `all_cases`; where one `case` is asked
     for, the outcome is its own, and `case` holds it with all its parameters.
     """
     import json
@@ -86,9 +102,13 @@ def as_json(
     from batch import summary as outcomes
 
     groups = []
-    for group, position in picked(archive, experiments, case):
+    shown = picked(archive, experiments, case)
+    ordering.check([group for group, _ in shown], by)
+    for group, position in shown:
         if position is None:
-            said: dict[str, Any] = {"case_table": cases.rows_json(group, None if all_cases else cases.SHOWN_CASES)}
+            said: dict[str, Any] = {
+                "case_table": cases.rows_json(group, None if all_cases else cases.SHOWN_CASES, by=by)
+            }  # fmt: skip
         else:
             [about] = cases.rows_json(group, positions=[position])
             said = {"case": {**about, "parameters": outcomes.finite(cases.parameters(archive, group, position))}}

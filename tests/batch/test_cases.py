@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 import batch
-from batch import cases
+from batch import cases, ordering
 from batch.archive.read import ArchiveFile
+from batch.ordering import By
 from batch.running import run_and_tell
 from batch.show import as_json, show
 from met import keys, plan_file
+from met.cli import main
 from met.diagnostic import Problem
 from met.plan import Experiment, Requirement
 from tests.batch import plans
@@ -39,7 +41,7 @@ def test_failed_cases_stand_before_those_that_miss_more_and_by_more(
     monkeypatch.setattr(run, "run", partial(plans.answer, fails=frozenset({7, 12})))
     settle, volts = plans.gains(20).requirements
     with made(required(plans.gains(20), settle, replace(volts, text="volts < 6 V", limit=6.0))) as file:
-        order = cases.worst_first(file.groups[0]).tolist()
+        order = ordering.worst_first(file.groups[0]).tolist()
         group = file.groups[0]
         missed, value = (group.values("met") == 0).sum(axis=1), group.values("volts")
     assert order[:2] == [7, 12]
@@ -54,7 +56,7 @@ def test_failed_cases_stand_before_those_that_miss_more_and_by_more(
 def test_where_all_requirements_are_met_the_closest_to_a_limit_is_first(here: Path) -> None:
     with made(required(plans.gains(9), Requirement("volts > 1 V", "volts", ">", 1.0))) as file:
         group = file.groups[0]
-        order = cases.worst_first(group)
+        order = ordering.worst_first(group)
         assert order[0] == np.argmin(group.values("volts"))
         assert cases.title(group) == "cases, closest to a limit first:"
 
@@ -62,13 +64,60 @@ def test_where_all_requirements_are_met_the_closest_to_a_limit_is_first(here: Pa
 def test_a_limit_of_zero_has_an_order_too(here: Path) -> None:
     with made(required(plans.gains(9), Requirement("volts < 0 V", "volts", "<", 0.0))) as file:
         group = file.groups[0]
-        assert cases.worst_first(group)[0] == np.argmax(group.values("volts"))
+        assert ordering.worst_first(group)[0] == np.argmax(group.values("volts"))
 
 
 def test_without_requirements_the_order_is_the_tables(here: Path) -> None:
     with made(required(plans.gains(9))) as file:
-        assert cases.worst_first(file.groups[0]).tolist() == list(range(9))
+        assert ordering.worst_first(file.groups[0]).tolist() == list(range(9))
         assert cases.title(file.groups[0]) == "cases:"
+
+
+@pytest.mark.parametrize("largest", [False, True])
+@pytest.mark.parametrize("name", ["settle", "volts", "gearbox.kp"])
+def test_by_a_metric_or_what_is_varied_and_without_a_value_last(
+    here: Path, monkeypatch: pytest.MonkeyPatch, name: str, largest: bool
+) -> None:
+    from met import run
+
+    monkeypatch.setattr(run, "run", partial(plans.answer, fails=frozenset({7, 12})))
+    with made(plans.gains(20)) as file:
+        group = file.groups[0]
+        order = ordering.positions(group, By(name, largest)).tolist()
+        [variable] = [v for v in (*group.role("metric"), *group.role("coordinate")) if v.path == name]
+        values = group.values(variable.name)
+        said = json.loads(as_json(file, by=By(name, largest), all_cases=True))["experiments"][0]["case_table"]
+        lines = show(file, plots=False, by=By(name, largest)).splitlines()
+    assert sorted(order) == list(range(20)) == sorted(each["row"] for each in said)
+    assert [each["row"] for each in said] == order
+    known = [row for row in order if not np.isnan(values[row])]
+    sign = -1.0 if largest else 1.0
+    assert order[: len(known)] == known == sorted(known, key=lambda row: (sign * values[row], row))
+    assert order[len(known) :] == ([] if name == "gearbox.kp" else [7, 12])
+    title = lines.index(f"cases by {name}, {'largest' if largest else 'smallest'} first:")
+    assert [line.split()[0] for line in lines[title + 3 :]] == [f"#{row}" for row in order]
+
+
+def test_what_cases_cannot_be_listed_by_is_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def told(*words: str) -> str:
+        assert main(["show", "a.h5", *words]) == 2
+        return capsys.readouterr().err
+
+    batch.run(plans.plan(plans.gains(3)), output="a.h5")
+    assert told("--sort", "vlts") == (
+        "error[E329]: no metric or varied parameter `vlts`\n"
+        " = help: did you mean `volts`?\n"
+        " = help: here: settle, volts, gearbox.kp, links.lower.mass\n"
+        "\n1 error\n"
+    )
+    assert "--sort is of many cases, and --case of one" in told("--sort", "volts", "--case", "#0")
+    assert "--reverse is of --sort" in told("--reverse")
+    batch.run(plans.plan(plans.nominal()), output="a.h5", fresh=True)
+    assert told("--sort", "volts") == (
+        "error[E329]: `nominal` is one case: there is nothing to list by `volts`\n"
+        " = help: a sweep has several\n"
+        "\n1 error\n"
+    )
 
 
 def test_the_table_is_in_the_decks_units_and_marks_what_is_missed(here: Path) -> None:

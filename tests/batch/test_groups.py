@@ -215,3 +215,29 @@ def test_a_value_that_the_engine_did_not_use_fails_its_case(tmp_path: Path, monk
     found = engine.run(experiment)
     assert found.status.tolist() == [engine.DONE, engine.FAILED]
     assert "the engine used" in found.cause[1]
+
+
+def test_by_a_metric_the_cases_of_all_structures_are_in_one_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    compiled(tmp_path, TIMED, STRUCTURES)
+    monkeypatch.chdir(tmp_path)
+    main(["run", "deck.ic", "it", "-q", "--no-picture"])
+    with ArchiveFile("deck.it.h5") as file:
+        found = {
+            int(group.values("case")[i]): (float(group.values("end")[i]), str(group.values("case_id")[i])[:8])
+            for group in file.groups for i in range(group.count)
+        }  # fmt: skip
+    for more, sign in ((["--reverse"], -1.0), ([], 1.0)):
+        capsys.readouterr()
+        assert main(["show", "deck.it.h5", "--sort", "end", *more]) == 0
+        told = capsys.readouterr().out
+        rows = [line.split() for line in told.splitlines() if line.lstrip().startswith("#")]
+        order = sorted(found, key=lambda case: sign * found[case][0])
+        assert [(row[0], row[1]) for row in rows] == [(f"#{case}", found[case][1]) for case in order]
+        assert {row[2] for row in rows} == {"drive", "brisk"}
+        assert [row[-1] for row in rows] == ["met" if found[case][0] > 0.15 else "missed" for case in order]
+    assert "it, cases by end, smallest first:\n" in told and "velocity products" not in told
+    assert main(["show", "deck.it.h5", "hinge.q", "--sort", "end", "--run", "it.brisk"]) == 0
+    told = capsys.readouterr().out
+    assert "\ncases by end, smallest first:\n" in told and "hinge.q" in told

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import batch
-from batch import cases
+from batch import ordering
 from batch.archive.read import ArchiveFile
 from batch.pool import ENDED, Pool, pools
 from batch.report import histories, overview, stability
@@ -76,7 +76,7 @@ class TestWorstCases:
         archives.failing(monkeypatch, 3, 17)
         with ArchiveFile(archives.made(here / "a.h5", plans.gains(40))) as file:
             [pool] = pools(file.groups)
-            assert pool.worst_first.tolist() == cases.worst_first(file.groups[0]).tolist()
+            assert pool.worst_first.tolist() == ordering.worst_first(file.groups[0]).tolist()
 
     def test_have_the_command_that_runs_them_again(self, sweep: Path) -> None:
         worst = gathered(sweep).sections[0].worst
