@@ -179,4 +179,3 @@ def _marks(group: Group, outcomes: np.ndarray) -> dict[str, np.ndarray]:
     for each in requirements.required(group):
         out[each.metric] = out.get(each.metric, False) | (outcomes[:, each.place] == 0)
     return out
-
