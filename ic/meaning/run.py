@@ -22,7 +22,7 @@ from ic.meaning.guides import (
 from ic.meaning.idle import remark_beginnings, remark_idle, remark_kinds
 from ic.meaning.link_sensors import resolve_link_sensors
 from ic.meaning.merge import Block, Item
-from ic.meaning.models import find_bare_model, find_model, refuse_values, upon, use_model, word_of
+from ic.meaning.models import check_keys, find_bare_model, find_model, refuse_values, upon, use_model, word_of
 from ic.meaning.owner import Owner
 from ic.meaning.payloads import check_payloads, resolve_payloads
 from ic.meaning.reading import remark_unread
@@ -356,6 +356,7 @@ def _environment_use(
     if about is not None:  # what the unit words `joint` and `effort` mean
         kinds = {joint.name: joint.kind for joint in arm.moving}
         if about not in kinds:  # which was told: without its joint, nothing can be said of the model's units
+            check_keys(scope, body, [each.name for each in environment.written], owner)
             scope.checks.fail(owner.path)
             return EnvironmentUse(item.name, environment.name, None, item.place)
         owner = replace(owner, joint=kinds[about])

@@ -115,6 +115,30 @@ error[D141]: joint `hinge` has no `parnt`
 """
 
 
+def test_it_is_told_beside_a_joint_that_is_not_there(tmp_path: Path) -> None:
+    stop = "environment { wall = joint_stop { joint = hing; upper = 1 rad; stifness = 10 N*m/rad; } }"
+    run = changed(RUN, ("duration", f"{stop}\n    duration"))
+    assert told(check(tmp_path, ARM, SERVO, run)) == """\
+error[D159]: no joint `hing` in arm `swing`
+  --> deck.ic:15:47
+   |
+15 |     environment { wall = joint_stop { joint = hing; upper = 1 rad; stifness = 10 N*m/rad; } }
+   |                                               ^^^^
+   = help: did you mean `hinge`?
+   = help: joints: hinge
+
+error[D141]: environment `wall` has no `stifness`
+  --> deck.ic:15:68
+   |
+15 |     environment { wall = joint_stop { joint = hing; upper = 1 rad; stifness = 10 N*m/rad; } }
+   |                                                                    ^^^^^^^^
+   = help: did you mean `stiffness`?
+   = help: it has: joint, lower, upper, stiffness, dissipation
+
+2 errors
+"""
+
+
 def test_a_word_like_nothing_is_taken_for_nothing(tmp_path: Path) -> None:
     servo = changed(SERVO, ("tau_max =", "strength ="))
     assert told(check(tmp_path, ARM, servo, RUN)) == f"""\
