@@ -15,38 +15,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from met.parameter import Parameter
-from met.sensors import butterworth
 from met.sensors.digital import DELAY, NOISE, PAST, RESOLUTION, filled
 from met.sensors.on_link import ALONG, BIAS, LINK, SCALE, at_rest, component, reading
+from met.sensors.optional_filter import CUTOFF, FILTER, STATES, behind, fastest, follow, settled, swing
 from met.sensors.sensor import Felt, Reading, Sensed, Sensor
 from met.trace import Real
-
-FILTERED = ("filter", ("butterworth",))
 
 
 def measures(p: Any, felt: Felt) -> Real:
     return component(p.along, felt.spin(p.link))
 
 
-def follow(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
-    return {} if p.filter == "none" else butterworth.slopes(p, states, value)
-
-
 def begin(p: Any, value: Real) -> Mapping[str, Real]:
-    return {**({} if p.filter == "none" else butterworth.settled(value)), **filled(at_rest(p, value))}
+    return {**settled(p, value), **filled(at_rest(p, value))}
 
 
 def read(p: Any, held: Any, states: Any, sensed: Sensed) -> Reading:
-    return reading(p, held, sensed.value if p.filter == "none" else states.filtered, sensed)
-
-
-def fastest(p: Any) -> Real | None:
-    return None if p.filter == "none" else butterworth.fastest(p)
-
-
-def swing(p: Any) -> tuple[Real, Real] | None:
-    return None if p.filter == "none" else butterworth.swing(p)
+    return reading(p, held, behind(p, states, sensed), sensed)
 
 
 SENSOR = Sensor(
@@ -55,17 +40,15 @@ SENSOR = Sensor(
     parameters=(
         LINK,
         ALONG,
-        Parameter(
-            name="filter", shape="word", words=("none", "butterworth"), default="none", doc="the filter behind it"
-        ),
-        butterworth.cutoff(FILTERED),
+        FILTER,
+        CUTOFF,
         SCALE,
         BIAS,
         NOISE,
         RESOLUTION,
         DELAY,
     ),
-    states=butterworth.states(FILTERED),
+    states=STATES,
     memory=PAST,
     measures=measures,
     unit="rad/s",

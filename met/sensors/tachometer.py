@@ -13,49 +13,31 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from met.parameter import Parameter
-from met.sensors import butterworth
 from met.sensors.digital import DELAY, NOISE, PAST, RESOLUTION, converted, delayed, filled, noisy
+from met.sensors.optional_filter import CUTOFF, FILTER, STATES, behind, fastest, follow, settled, swing
 from met.sensors.sensor import Reading, Sensed, Sensor
 from met.trace import Real
 
-FILTERED = ("filter", ("butterworth",))
-
-
-def follow(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
-    return {} if p.filter == "none" else butterworth.slopes(p, states, value)
-
-
-def fastest(p: Any) -> Real | None:
-    return None if p.filter == "none" else butterworth.fastest(p)
-
-
-def swing(p: Any) -> tuple[Real, Real] | None:
-    return None if p.filter == "none" else butterworth.swing(p)
-
 
 def begin(p: Any, value: Real) -> Mapping[str, Real]:
-    return {**({} if p.filter == "none" else butterworth.settled(value)), **filled(value)}
+    return {**settled(p, value), **filled(value)}
 
 
 def read(p: Any, held: Any, states: Any, sensed: Sensed) -> Reading:
-    value = sensed.value if p.filter == "none" else states.filtered
-    return delayed(p, held, converted(noisy(p, value, sensed), p.resolution))
+    return delayed(p, held, converted(noisy(p, behind(p, states, sensed), sensed), p.resolution))
 
 
 SENSOR = Sensor(
     name="tachometer",
     doc=__doc__,
     parameters=(
-        Parameter(
-            name="filter", shape="word", words=("none", "butterworth"), default="none", doc="the filter behind it"
-        ),
-        butterworth.cutoff(FILTERED),
+        FILTER,
+        CUTOFF,
         NOISE,
         RESOLUTION,
         DELAY,
     ),
-    states=butterworth.states(FILTERED),
+    states=STATES,
     memory=PAST,
     fastest=fastest,
     swing=swing,

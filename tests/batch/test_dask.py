@@ -28,6 +28,7 @@ from batch.tasks import Section, Task
 from met.diagnostic import Problem
 from met.version import VERSION
 from tests.batch import plans, whole
+from tests.batch.refusals import refused
 
 HOST = os.uname().nodename
 
@@ -65,13 +66,6 @@ def outcome(dask: Dask, many: tuple[Folder, dict[int, Section]], meanwhile: Call
         return found
     finally:
         dask.close()
-
-
-def refused(caught: pytest.ExceptionInfo[Problem]) -> str:
-    """A message whole, as the user reads it."""
-    from met.render import render
-
-    return render(caught.value.diagnostics)
 
 
 class TestWhatItIsCalled:

@@ -151,7 +151,7 @@ def test_modified_euler_keeps_its_order_through_events_of_both_sides(tmp_path: P
         assert run.events["splits"][0] == 14 and run.events["clamped"][0] == 0
         found[rate] = np.stack([of(run, "q"), of(run, "servo.deflection")])
     errors = [np.sqrt(np.mean((found[rate] - found[256000]) ** 2)) for rate in rates]
-    # where in its step a joint breaks away differs from rate to rate, so errors fall unevenly: 1.93 on the whole
+    # where in its step a joint breaks away differs from rate to rate, so errors fall unevenly: 1.87 on the whole
     assert np.polyfit(np.log(rates), np.log(errors), 1)[0] < -1.8, errors
 
 

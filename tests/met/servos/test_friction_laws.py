@@ -56,11 +56,11 @@ def level(law: str, w: np.ndarray) -> np.ndarray:
 def test_the_torque_of_a_steady_rate_is_the_laws_curve(law: str, tmp_path: Path) -> None:
     run = ran(tmp_path, law, select="rates")
     asked = run.coordinates["drive.command.value"]
-    np.testing.assert_allclose(run.signals["qd"][:, -1, 0], asked, rtol=1e-8)
+    np.testing.assert_allclose(run.signals["qd"][:, -1, 0], asked, rtol=1e-11)
     w = 100.0 * asked
     curve = np.sign(w) * level(law, w) + F_V * w
     # an integral that has settled; of LuGre's bristles the slowest rate constant is sigma_0 w/g = 2 * 0.5/0.035 = 29/s
-    np.testing.assert_allclose(run.signals["servo.motor_torque"][:, -1, 0], curve, rtol=1e-8)
+    np.testing.assert_allclose(run.signals["servo.motor_torque"][:, -1, 0], curve, rtol=1e-11)
 
 
 TORQUE = (("command = rate(0.3 rad/s)", "command = torque(1 N*m)"),)

@@ -1,0 +1,42 @@
+"""The filter of a sensor that may have one: `filter = butterworth`, or `none`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from met.parameter import Parameter
+from met.sensors import butterworth
+from met.sensors.sensor import Sensed
+from met.trace import Real
+
+_THERE = ("filter", ("butterworth",))
+
+FILTER = Parameter(
+    name="filter", shape="word", words=("none", "butterworth"), default="none", doc="the filter behind it"
+)
+CUTOFF = butterworth.cutoff(_THERE)
+STATES = butterworth.states(_THERE)
+
+
+def follow(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
+    return {} if p.filter == "none" else butterworth.slopes(p, states, value)
+
+
+def fastest(p: Any) -> Real | None:
+    return None if p.filter == "none" else butterworth.fastest(p)
+
+
+def swing(p: Any) -> tuple[Real, Real] | None:
+    return None if p.filter == "none" else butterworth.swing(p)
+
+
+def settled(p: Any, value: Real) -> Mapping[str, Real]:
+    """Its states, the value having been this for long."""
+    return {} if p.filter == "none" else butterworth.settled(value)
+
+
+def behind(p: Any, states: Any, sensed: Sensed) -> Real:
+    """What is behind it at a tick."""
+    found: Real = sensed.value if p.filter == "none" else states.filtered
+    return found
