@@ -32,7 +32,8 @@ MOVES = {
     "manutec_r3.ic manutec_r3_move":
         (published.fixed_on(published.model(published.R3, EARTH), *published.R3_LOAD), published.R3_ROTORS),
     "manutec_r3.ic manutec_r3_library_move":
-        (published.fixed_on(published.model(published.R3_LIBRARY, EARTH), *published.R3_LOAD), published.R3_ROTORS),
+        (published.fixed_on(published.model(published.R3_LIBRARY, EARTH), *published.R3_LIBRARY_LOAD),
+         published.R3_ROTORS),
 }  # fmt: skip
 DRIVEN = ("shuttle_arm.ic shuttle_arm_driven", "station_arm.ic station_arm_driven")
 SPACE = {  # limits of the joints: N m, rad/s, deg

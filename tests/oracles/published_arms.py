@@ -58,9 +58,10 @@ def model(parts: Sequence[Part], gravity: Sequence[float] = (0.0, 0.0, 0.0), hel
     return made
 
 
-def fixed_on(made: pin.Model, mass: float, com: Sequence[float]) -> pin.Model:
-    """A point mass on the last link."""
-    made.appendBodyToJoint(made.njoints - 1, pin.Inertia(mass, np.array(com), np.zeros((3, 3))), pin.SE3.Identity())
+def fixed_on(made: pin.Model, mass: float, com: Sequence[float], every_way: float = 0.0) -> pin.Model:
+    """One more body on the last link: its inertia is the same about each axis, none for a point mass."""
+    body = pin.Inertia(mass, np.array(com), every_way * np.eye(3))
+    made.appendBodyToJoint(made.njoints - 1, body, pin.SE3.Identity())
     return made
 
 
@@ -165,10 +166,12 @@ _R3_LIBRARY = (
     (X, (0.0, 0.414, -0.155), 26.4, (0.064, -0.034, 0.0), (0.279, 0.245, 0.413, -0.070)),
     (Y, (0.0, 0.186, 0.0),    28.7, (0.0, 0.0, 0.0),      (1.67, 0.081, 1.67)),
     (X, (0.0, 0.125, 0.0),    5.2,  (0.0, 0.0, 0.0),      (1.25, 0.81, 1.53)),
-    (Y, (0.0, 0.0, 0.0),      0.5,  (0.05, 0.05, 0.05),   (0.0, 0.0, 0.0)),
+    (Y, (0.0, 0.0, 0.0),      0.5,  (0.05, 0.05, 0.05),   (1e-3, 1e-3, 1e-3)),  # not given: the library's default
 )
 # fmt: on
 R3_LOAD = (15.0, (0.1, 0.25, 0.1))
+R3_LIBRARY_LOAD = (*R3_LOAD, 1e-3)
+"""The library's default inertia, for its example gives none."""
 R3_ROTORS = np.array([105.0, 210.0, 60.0, 99.0, 79.2, 99.0]) ** 2 * np.array(
     [1.3e-3, 1.3e-3, 1.3e-3, 1.6e-4, 1.8e-4, 4.3e-5]
 )
