@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from tests.oracles.two_link_lagrange import Command, Motion, reference
 from tests.paper.figures import curves, draw
 from tests.paper.two_link import DRY, SLOW, run
 
+PAGE = (Path(__file__).parents[2] / "docs" / "paper.md").read_text(encoding="utf-8")
 HELD = Command("rate", lambda t: ((SLOW, 0.0), (SLOW, 0.0)))
 
 
@@ -47,6 +50,27 @@ def test_without_friction_modified_euler_falls_to_the_exact_motion_with_the_step
         falls = [coarse / fine for coarse, fine in itertools.pairwise(errors)]
         # 4 for order 2, and the next term of the error is of relative size h/T with T = 20 ms
         assert all(3.8 < fall < 4.4 for fall in falls), (signal, errors)
+
+
+@pytest.mark.slow
+def test_the_errors_of_the_page_are_those_after_every_step():
+    (row,) = re.findall(r"^\| no friction, dynamics 1 kHz \| (.*) \|$", PAGE, re.MULTILINE)
+    exact = reference(np.arange(5001) / 1000.0, command=HELD, servo_hz=100.0, friction=False)
+    found = run(dynamics_hz=1000, duration=5, friction=False)
+    assert row == " | ".join(f"{off(found, exact, signal):.1e}".replace("e-0", "e-") for signal in ("q", "qd", "tau"))
+
+
+@pytest.mark.slow
+def test_the_errors_with_friction_are_those_after_every_step_too():
+    """Every other one at 2 kHz."""
+    (row,) = re.findall(r"the error of qd is ([^,]*), ([^,\s]*)\s+and (\S*) at 500 Hz, 1 kHz and 2 kHz", PAGE)
+    exact = reference(np.arange(16001) / 1000.0, command=sine(SLOW, 0.5), servo_hz=100.0)
+    for hz, told in zip((500, 1000, 2000), row, strict=True):
+        command = "rate(sine(amplitude = slow, frequency = 0.5 Hz))"
+        rate = run(dynamics_hz=hz, record_hz=min(hz, 1000), duration=16, command=command).signals["qd"][0]
+        wanted = exact.qd[:: max(1000 // hz, 1)]
+        assert f"{(np.abs(rate - wanted).max(axis=0) / np.ptp(wanted, axis=0)).max():.1e}".replace("e-0", "e-") == told
+        np.testing.assert_array_equal(rate == 0.0, wanted == 0.0)
 
 
 def test_velocity_products_are_those_of_lagrange():
