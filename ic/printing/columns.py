@@ -25,6 +25,12 @@ def number(value: float) -> str:
     return f"{value + 0.0:.6g}"
 
 
+def exactly(value: float) -> str:
+    """A number in as few digits, six or more, as read back the same: `0.1`, `3.986004418e+14`."""
+    texts = (f"{value + 0.0:.{digits}g}" for digits in range(6, 17))
+    return next((text for text in texts if float(text) == value), f"{value + 0.0:.17g}")
+
+
 def quantity(value: float, unit: str) -> str:
     """A number and its unit, which a pure number has not."""
     return number(value) if unit in ("1", "") else f"{number(value)} {unit}"

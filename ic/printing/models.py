@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from typing import Any, get_args
 
-from ic.printing.columns import columns, number, vector
+from ic.printing.columns import columns, exactly
 from met import models
 from met.channel import of_bed, of_law, watched_unit
 from met.diagnostic import Problem, did_you_mean, error
@@ -156,7 +156,7 @@ def facts(kind: models.Kind, model: Any) -> Iterator[str]:
         value = getattr(model, words, None)
         if value:
             text = "Commands it gives" if kind == "guide" else text
-            yield f"{text}: {', '.join(value) if isinstance(value, tuple) else number(value)}"
+            yield f"{text}: {', '.join(value) if isinstance(value, tuple) else exactly(value)}"
     if kind == "sensor" and model.unit:
         yield f"Unit of what it reads: {model.unit}"
     if kind == "metric":
@@ -193,7 +193,7 @@ def default(parameter: Parameter) -> str:
     if value == ():
         return "none"
     needed = f"; needed under {', '.join(parameter.needed_for)}" if parameter.needed_for else ""
-    return vector(value, "1") if isinstance(value, tuple) else f"{number(value)}{needed}"
+    return f"[{', '.join(map(exactly, value))}]" if isinstance(value, tuple) else f"{exactly(value)}{needed}"
 
 
 def range_(parameter: Parameter) -> str:
@@ -204,9 +204,9 @@ def range_(parameter: Parameter) -> str:
         return " | ".join(parameter.words)
     whole = ["whole"] if parameter.whole else []
     bounds = (("> ", parameter.above), (">= ", parameter.at_least), ("< ", parameter.below), ("<= ", parameter.at_most))
-    told = ", ".join(whole + [f"{sign}{number(bound)}" for sign, bound in bounds if bound is not None])
+    told = ", ".join(whole + [f"{sign}{exactly(bound)}" for sign, bound in bounds if bound is not None])
     needed = parameter.above_where_needed
-    return told if needed is None else f"{told}; > {number(needed)} where needed".removeprefix("; ")
+    return told if needed is None else f"{told}; > {exactly(needed)} where needed".removeprefix("; ")
 
 
 def meaning(parameter: Parameter) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 from ic.meaning import dh, shapes
 from ic.meaning.substitution import DEFAULTS
-from ic.printing.columns import columns, number
+from ic.printing.columns import columns, exactly
 from ic.printing.models import FIELDS, WORDS, default, rows, summary, unit_in_words
 from ic.printing.sweeps import print_words, words_json
 from met import channel, models, units
@@ -142,7 +142,7 @@ def print_units() -> Iterator[str]:
 
 def in_si(unit: Mapping[str, Any]) -> str:
     """`0.001 m`; of a share `0.01`."""
-    return f"{number(unit['scale'])} {unit['si']}" if unit["si"] != "1" else number(unit["scale"])
+    return f"{exactly(unit['scale'])} {unit['si']}" if unit["si"] != "1" else exactly(unit["scale"])
 
 
 Subject = tuple[Callable[[], Iterator[str]], Callable[[], list[Any]]]

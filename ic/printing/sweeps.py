@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 
 from ic.meaning.values import CONSTANTS, FUNCTIONS, USAGE
-from ic.printing.columns import columns, number
+from ic.printing.columns import columns, exactly
 from ic.sweeps.axes import KNOWN
 from ic.sweeps.designs import DESIGNS, DIGITS, DISTRIBUTIONS
 from met.frozen import frozen
@@ -50,7 +50,7 @@ OF_DISTRIBUTIONS: Mapping[str, str] = MappingProxyType({
 
 def _functions() -> list[Row]:
     calls = [(name, f"{name}({', '.join(USAGE[name])})", OF_FUNCTIONS[name]) for name in FUNCTIONS]
-    return [*calls, *((name, name, number(value)) for name, value in CONSTANTS.items())]
+    return [*calls, *((name, name, exactly(value)) for name, value in CONSTANTS.items())]
 
 
 def _entries() -> list[Row]:

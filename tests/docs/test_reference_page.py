@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from ic.meaning.values import CONSTANTS
+from ic.printing.models import default
 from ic.printing.reference import page
 from met import channel, cli, models, units
 
@@ -32,6 +34,22 @@ def test_every_model_parameter_unit_and_channel_is_on_it() -> None:
                 assert f"\n| `{parameter.name}` |" in section[1], (name, parameter.name)
     assert all(f"\n| `{name}` |" in PAGE for name in units.UNITS)
     assert all(f"\n| `{name}` |" in PAGE for name, *_ in channel.OF_ARM)
+
+
+def test_every_default_unit_and_constant_reads_back_as_what_it_is() -> None:
+    for kind in models.GROUPS:
+        for name, model in models.find_own(kind).items():
+            for parameter in models.written(model):
+                if isinstance(parameter.default, float):
+                    assert float(default(parameter).split(";")[0]) == parameter.default, (name, parameter.name)
+    assert "\n| `mu` | m^3/s^2 | 3.986004418e+14 | > 0 |" in PAGE
+    table = PAGE.split("\n## Units\n")[1].split("\n## ")[0]
+    for name, unit in units.UNITS.items():
+        (told,) = re.findall(rf"^\| `{re.escape(name)}` \| [^|]* \| (\S+) ", table, re.MULTILINE)
+        assert float(told) == unit.measure.scale, name
+    for name, value in CONSTANTS.items():
+        (told,) = re.findall(rf"^\| `{name}` \| (\S+) \|", PAGE, re.MULTILINE)
+        assert float(told) == value, name
 
 
 def test_its_links_lead_somewhere() -> None:

@@ -22,6 +22,14 @@ def printed(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     return capsys.readouterr().out
 
 
+def in_full(value: float) -> str:
+    """Six digits where those are all, else the digits that Python prints."""
+    if float(f"{value:g}") == value:
+        return f"{value:g}"
+    digits = repr(value).split("e")[0].replace(".", "").replace("-", "").strip("0")
+    return f"{value:.{len(digits)}g}"
+
+
 def cells(parameter: Parameter) -> list[str]:
     """What a row says of a parameter, in words of this test's own."""
     unit = parameter.unit if parameter.unit != "1" else "-"
@@ -33,18 +41,18 @@ def cells(parameter: Parameter) -> list[str]:
     elif default == ():
         text = "none"
     elif isinstance(default, tuple):
-        text = f"[{', '.join(f'{x:g}' for x in default)}]"
+        text = f"[{', '.join(map(in_full, default))}]"
     else:
-        text = default if isinstance(default, str) else f"{default:g}"
+        text = default if isinstance(default, str) else in_full(default)
     text += f"; needed under {', '.join(parameter.needed_for)}" if parameter.needed_for else ""
     bounds = ["whole"] if parameter.whole else []
     signs = {"above": ">", "at_least": ">=", "below": "<", "at_most": "<="}
-    bounds += [f"{sign} {getattr(parameter, name):g}" for name, sign in signs.items()
+    bounds += [f"{sign} {in_full(getattr(parameter, name))}" for name, sign in signs.items()
                if getattr(parameter, name) is not None]  # fmt: skip
     words = ((f"a {parameter.names}",) if parameter.names else ()) + parameter.words
     range_ = " | ".join(words) if words else ", ".join(bounds)
     if parameter.above_where_needed is not None:
-        range_ += f"; > {parameter.above_where_needed:g} where needed"
+        range_ += f"; > {in_full(parameter.above_where_needed)} where needed"
     shape = {"vector": "three numbers; ", "list": "a list; ", "text": "in quotes; "}.get(parameter.shape, "")
     shape = "the same in all cases; " if parameter.decides else shape
     only = f"; with {parameter.only[0]} = {' or '.join(parameter.only[1])}" if parameter.only else ""
