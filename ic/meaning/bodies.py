@@ -1,7 +1,8 @@
 """Whether links could be bodies: their inertia, and whether what a joint moves has mass.
 
 A link of `mass = 0 kg` is a frame: it has no inertia. Fixed to a body it is a place on it, between two joints it is
-where they meet. An inertia of zeros is a point's; else every principal moment is above zero.
+where they meet. An inertia of zeros is a point's, one of 0 and two that are alike is a thin rod's, as the shape `rod`
+has it; else every principal moment is above zero.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def check_body(scope: Scope, owner: Owner, kind: str, name: str, item: Item | No
             helps.append(f"in the arm's block: `{name} {{ {entry} }}`")
     scope.checks.hold(
         (*inertia, 1.0 if mass is None else mass),
-        lambda values: _not_a_body(values, kind, item is not None),
+        lambda values: _not_a_body(values, kind),
         code="D087",
         needs=(f"{owner.path}.mass", f"{owner.path}.shape"),
         message=f"the inertia of {kind} `{name}` is no body's",
@@ -50,10 +51,11 @@ def written_elsewhere(scope: Scope, place: Place) -> bool:
     return any(source.name == place.file for source in scope.definitions.robot_files.sources)
 
 
-def _not_a_body(values: np.ndarray, kind: str, strict: bool) -> tuple[np.ndarray, list[str]]:
+def _not_a_body(values: np.ndarray, kind: str) -> tuple[np.ndarray, list[str]]:
     """Which rows [n, 7], moments and mass, are no rigid body's, and why, in words.
 
-    The tolerance, 1e-9 of the largest moment, is for rounding alone: published tables have ten digits at most.
+    The tolerance, 1e-9 of the largest moment, is for rounding alone: published tables have ten digits at most. With a
+    moment of 0 the other two are alike, for neither may be above the sum of 0 and the other.
     """
     xx, yy, zz, xy, xz, yz, mass = values.T
     matrices = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=-1).reshape(-1, 3, 3)
@@ -61,7 +63,7 @@ def _not_a_body(values: np.ndarray, kind: str, strict: bool) -> tuple[np.ndarray
     least, middle, most = np.linalg.eigvalsh(np.where(finite[:, None, None], matrices, np.eye(3))).T
     slack = 1e-9 * np.abs(most)
     point = ~matrices.any(axis=(1, 2))
-    negative = (least <= slack * 1e-3 if strict else least < -slack) & ~point
+    negative = least < -slack
     triangle = least + middle < most - slack
     weightless = (mass == 0.0) & ~point
     bad = ~finite | negative | triangle | weightless
@@ -73,7 +75,7 @@ def _not_a_body(values: np.ndarray, kind: str, strict: bool) -> tuple[np.ndarray
         elif weightless[row]:
             causes.append(f"the {kind} has no mass, and so no inertia")
         elif negative[row]:
-            causes.append(f"{shown}; none may be {'zero or negative' if strict else 'negative'}")
+            causes.append(f"{shown}; none may be negative")
         else:
             causes.append(f"{shown}; no body has one above the sum of the others")
     return bad, causes

@@ -93,6 +93,19 @@ def test_angles_of_a_frame_are_radians_in_the_plan(tmp_path: Path) -> None:
     assert numbers(run, "hinge.rpy", ("x", "y", "z")) == pytest.approx((math.pi / 2, 0.0, -math.pi), rel=1e-15)
 
 
+def test_a_thin_rod_may_be_written_as_its_inertia_too(tmp_path: Path) -> None:
+    """Its moment about its own length is zero: in any axes, and in any order."""
+    rod, rest = "shape = rod(length = 1 m, along = x);", "com = [0.5, 0, 0] m; inertia = [0, 2/12, 2/12] kg*m^2;"
+    shaped, written = (experiment(tmp_path, changed(ARM, (rod, text)), SERVO, RUN) for text in (rod, rest))
+    parts = ("mass", "com.x", "inertia.xx", "inertia.yy", "inertia.zz", "inertia.xy")
+    for part in parts:
+        assert written.parameters[f"links.bar.{part}"].value == pytest.approx(
+            shaped.parameters[f"links.bar.{part}"].value, rel=1e-15, abs=0.0)
+    aslant = "[1.333333333, 1.333333333, 1.333333333, -0.6666666667, -0.6666666667, -0.6666666667]"
+    for six in ("[2, 0, 2]", "[2, 2, 0]", "[1, 1, 2, -1, 0, 0]", aslant):
+        assert codes(tmp_path, changed(ARM, (rod, f"inertia = {six} kg*m^2;")), SERVO, RUN) == [], six
+
+
 @pytest.mark.parametrize(("link", "code"), [
     ("shape = rod(length = 1 m, along = x);", "D075"),                          # no mass
     ("mass = 0 kg; shape = rod(length = 1 m, along = x);", "D217"),             # and its joint moves nothing else
@@ -101,7 +114,9 @@ def test_angles_of_a_frame_are_radians_in_the_plan(tmp_path: Path) -> None:
     ("mass = 1 kg; shape = rod(length = 0 m, along = x);", "D077"),
     ("mass = 1 kg;", "D089"),
     ("mass = 1 kg; inertia = [1, 1, 3] kg*m^2;", "D087"),                       # 1 + 1 < 3
-    ("mass = 1 kg; inertia = [1, 1, 0] kg*m^2;", "D087"),                       # not positive; all zeros are a point's
+    ("mass = 1 kg; inertia = [1, 1.1, 0] kg*m^2;", "D087"),                     # two alike would be a thin rod's
+    ("mass = 1 kg; inertia = [0, 0, 1] kg*m^2;", "D087"),
+    ("mass = 1 kg; inertia = [-1e-3, 1, 1] kg*m^2;", "D087"),
     ("mass = 1 kg; inertia = [1, 1, 1, 2, 0, 0] kg*m^2;", "D087"),              # a negative principal moment
     ("mass = 1 kg; inertia = [1, 1] kg*m^2;", "D071"),
     ("mass = 1 kg; inertia = [1, 1, 1];", "D060"),
