@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -144,20 +145,38 @@ def test_on_a_plate_beside_the_plume_few_cells_come_near_many() -> None:
                     assert np.linalg.norm(one - other) < 0.02 * np.linalg.norm(other), (nozzle, axis, far, exponent)
 
 
-def test_on_plates_in_general_position_what_few_cells_leave_out_is_little_of_the_plumes_momentum() -> None:
-    rng = np.random.default_rng(3)
-    for _ in range(40):
+def left_out(plates: int) -> np.ndarray:
+    """What 4, 6 and 8 cells a side leave out on plates in general position: (plate, 3), shares of the plume's momentum.
+
+    Against 24 cells, whose own error was at most 2e-3 where it was looked at (with 100).
+    """
+    rng, found = np.random.default_rng(3), []
+    for _ in range(plates):
         exponent, (a, b), far = rng.uniform(1.5, 30.0), rng.uniform(0.2, 3.0, 2), 10 ** rng.uniform(-2.5, 0.7)
         axis = rng.normal(size=3)
         values = {**STEADY, "width": a, "height": b, "exponent": exponent, "sigma_n": 0.8, "sides": "both",
                   "closest": 1e-6}
         nozzle = (0.7 * a * rng.normal(), 0.7 * b * rng.normal(), far)
-        few, some, more, many = (
+        *few, many = (
             np.array(on_plate(given(ENVIRONMENT, **{**values, "cells": cells}), nozzle,
                               tuple(axis / np.linalg.norm(axis)))[0], float) * (exponent + 2.0) / (4.0 * math.pi)
             for cells in (4.0, 6.0, 8.0, 24.0))  # fmt: skip
-        for found, left_out in ((few, 0.07), (some, 0.03), (more, 0.005)):
-            assert np.linalg.norm(found - many) < left_out, (exponent, a, b, nozzle, axis)
+        found.append([np.linalg.norm(each - many) for each in few])
+    return np.array(found)
+
+
+def test_on_plates_in_general_position_what_few_cells_leave_out_is_little_of_the_plumes_momentum() -> None:
+    assert (left_out(40).max(axis=0) < (0.05, 0.006, 0.0045)).all()  # twice what was found
+
+
+@pytest.mark.slow
+def test_what_few_cells_leave_out_of_a_thousand_plates_is_what_the_page_says() -> None:
+    page = " ".join((Path(__file__).parents[3] / "docs" / "environments.md").read_text(encoding="utf-8").split())
+    (said,) = re.findall(r"Of 1,000 plates in general position, .* the worst is off by (\S+) % .* with 4 cells, "
+                         r"(\S+) % with 6 and (\S+) % with 8; nine of ten within some (\S+), (\S+) and (\S+) %\.", page)
+    found = left_out(1000)
+    figures = [*found.max(axis=0), *np.quantile(found, 0.9, axis=0)]
+    assert [f"{100.0 * each:.1g}" for each in figures] == list(said)
 
 
 def test_the_moment_is_that_of_all_the_plates_parts() -> None:
