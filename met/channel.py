@@ -54,6 +54,7 @@ DIMENSIONS = {XYZ: "axis", WXYZ: "quaternion"}
 
 JOINT_AXIS = "about or along the joint's axis"
 WORLD_AXES = "world axes"
+CONTINUOUS = "to world axes, continuous from w >= 0"
 
 # What the engine holds of a bed and a law, besides their own memory: name, unit, meaning.
 OF_BED = (
@@ -80,13 +81,13 @@ OF_JOINT = (
 )
 OF_LINK = (
     ("position", "m", "origin of the link's frame", XYZ, WORLD_AXES),
-    ("orientation", "1", "unit quaternion of the link's frame", WXYZ, "from link axes to world axes, w >= 0"),
+    ("orientation", "1", "unit quaternion of the link's frame", WXYZ, f"from link axes {CONTINUOUS}"),
     ("velocity", "m/s", "velocity of the link frame's origin", XYZ, WORLD_AXES),
     ("rate", "rad/s", "angular velocity of the link", XYZ, WORLD_AXES),
 )
 OF_PAYLOAD = (
     ("position", "m", "origin of the payload's frame", XYZ, WORLD_AXES),
-    ("orientation", "1", "unit quaternion of the payload's frame", WXYZ, "from payload axes to world axes, w >= 0"),
+    ("orientation", "1", "unit quaternion of the payload's frame", WXYZ, f"from payload axes {CONTINUOUS}"),
     ("velocity", "m/s", "velocity of the payload frame's origin", XYZ, WORLD_AXES),
     ("rate", "rad/s", "angular velocity of the payload", XYZ, WORLD_AXES),
     ("distance", "m", "from its point of the link to the payload's frame", (), ""),

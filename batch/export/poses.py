@@ -175,11 +175,25 @@ def world_poses(
     return {name: motion.pose for name, motion in found.items()}
 
 
-def moved(pose: Pose, rows: int | tuple[int, ...]) -> Moved:
-    """A pose with its numbers by row, or by whatever these are the sizes of."""
+def moved(pose: Pose, rows: int | tuple[int, ...], time: int | None = 0) -> Moved:
+    """A pose with its numbers by row, or by whatever these are the sizes of. time: along which axis of these its
+    orientation is without a jump; None: along none, each with w >= 0."""
     rotation = tuple(tuple(np.broadcast_to(np.asarray(entry, np.float64), rows) for entry in row) for row in pose.R)
     parts = quaternion(rotation)  # type: ignore[arg-type]
-    return Moved(_rows(pose.p, rows), _rows(parts, rows))
+    turn = _rows(parts, rows)
+    return Moved(_rows(pose.p, rows), turn if time is None else unbroken(turn, time))
+
+
+def unbroken(q: np.ndarray, axis: int) -> np.ndarray:
+    """Unit quaternions (..., 4) of which each has the sign by which it is nearer the one before it along an axis, as in
+    what is recorded (`met.program.orientations`); rows that are not-a-number are passed over."""
+    rows = np.moveaxis(q, axis, 0)
+    number = np.arange(len(rows)).reshape(-1, *(1,) * (rows.ndim - 2))
+    known = np.maximum.accumulate(np.where(np.isfinite(rows).all(axis=-1), number, 0), axis=0)
+    before = np.take_along_axis(rows, known[:-1, ..., None], axis=0)
+    flips = np.where(np.sum(rows[1:] * before, axis=-1) < 0.0, -1.0, 1.0)
+    signs = np.concatenate([np.ones_like(rows[:1, ..., 0]), np.cumprod(flips, axis=0)])[: len(rows)]
+    return np.moveaxis(rows * signs[..., None], 0, axis)
 
 
 def _rows(numbers: Sequence[Any], rows: int | tuple[int, ...]) -> np.ndarray:

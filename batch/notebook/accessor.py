@@ -86,7 +86,7 @@ class Accessor(Generic[Data]):
         takes them.
 
         position     (recorded_case, time, link, axis), m: origin of the link's frame
-        orientation  (recorded_case, time, link, quaternion): w, x, y, z, from link axes to world axes, w >= 0
+        orientation  (recorded_case, time, link, quaternion): w, x, y, z, from link axes to world axes
 
         Computed from the Dataset's q, at its instants, and the case's own parameters; not-a-number after a failure.
         """

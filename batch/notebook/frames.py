@@ -33,8 +33,9 @@ OWN = frozenset({"position", "orientation", LINK, "axis", "quaternion"})
 
 POSITION_TOLD = {"units": "m", "long_name": "origin of the link's frame", "frame": "world axes"}
 ORIENTATION_TOLD = {
-    "units": "1", "long_name": "unit quaternion of the link's frame", "frame": "from link axes to world axes, w >= 0"
-}  # fmt: skip
+    "units": "1", "long_name": "unit quaternion of the link's frame",
+    "frame": "from link axes to world axes, continuous from w >= 0",
+}
 """What an archive says of the same where it is recorded."""
 
 
@@ -73,7 +74,8 @@ def _frames(path: Path, data: xarray.Dataset, group: Group, own: Experiment, lin
     base = _base(data, own, instants, values)
     world = world_poses(own, values, rows, base)
     unknown = np.isnan(sum((*rows, *base.p), np.zeros(shape)))
-    poses = [moved(world[link], shape) for link in links]
+    along = dims.index("time") if "time" in dims else None
+    poses = [moved(world[link], shape, along) for link in links]
     kept: dict[str, Any] = {}
     for name, array in instants.coords.items():
         if name in OWN:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 
 from met.channel import Channel
 from met.plan import Experiment
-from met.program import balancing, base, failing, guiding, link_sensors, payloads, sensing
+from met.program import balancing, base, failing, guiding, link_sensors, orientations, payloads, sensing
 from met.program.evaluation import gravity, law
 from met.program.machine import PARAMETER, Actuator, Machine
 from met.program.observe import derived
@@ -70,7 +70,7 @@ class Builder:
         for divisor in sorted({channel.divisor for _, _, channel in self.machine.metrics}):
             tick.append(Every(divisor, (Run(Phase(f"metrics_{divisor}", self._metrics(divisor))),)))
         if columns:
-            tick.append(Record(Phase("record", self._recorder(columns, at_rows)), self.schedule.record))
+            tick.append(Record(Phase("record", self._recorder(columns, held, at_rows)), self.schedule.record))
 
         coordinates = tuple(coordinate.path for coordinate in self.machine.experiment.cases.coordinates)
         return Program(
@@ -269,18 +269,21 @@ class Builder:
 
     def _observe(self, held: list[Channel]) -> Body:
         def body(tape: Tape) -> None:
-            arm = self.step.observed(tape)
-            for channel in held:
-                tape.write(channel.path, arm.value(channel))
+            found = orientations.values(tape, self.step.observed(tape), held, orientations.INSTANT)
+            for path, value in found.items():
+                tape.write(path, value)
 
         return body
 
-    def _recorder(self, columns: list[str], at_rows: list[Channel]) -> Body:
-        """at_rows: the channels that nobody but the recorder needs, computed where a row is kept."""
+    def _recorder(self, columns: list[str], held: list[Channel], at_rows: list[Channel]) -> Body:
+        """held: derived channels that are computed at every instant.
+        at_rows: those that nobody but the recorder needs, computed where a row is kept."""
+        seen = [channel for channel in held if channel.path in columns]
 
         def body(tape: Tape) -> None:
-            arm = self.step.observed(tape) if at_rows else None
-            fresh = {channel.path: arm.value(channel) for channel in at_rows} if arm is not None else {}
+            fresh = orientations.held(tape, seen)
+            if at_rows:
+                fresh |= orientations.values(tape, self.step.observed(tape), at_rows, orientations.ROW)
             for column, path in enumerate(columns):
                 tape.record(column, fresh[path] if path in fresh else tape.read(path))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 
-from met.channel import WXYZ, XYZ, Channel
+from met.channel import XYZ, Channel
 from met.dynamics.effective_inertia import effective_inertia
 from met.dynamics.energy import Energy, energy
 from met.dynamics.kinematics import LinkMotion, jacobian
@@ -22,7 +22,7 @@ from met.program.base import Base, motions
 from met.program.evaluation import Derivative
 from met.program.machine import Machine, ReadCell
 from met.trace import Real, sqrt
-from met.vectors import quaternion
+from met.vectors import Quaternion, quaternion
 
 
 def derived(machine: Machine) -> tuple[list[Channel], list[Channel]]:
@@ -57,13 +57,18 @@ class Observed:
         self._jacobians: dict[str, tuple[tuple[Vector, Vector], ...]] = {}
 
     def value(self, channel: Channel) -> Real:
-        """A derived channel, in its unit."""
+        """A derived channel, in its unit; none of an orientation, whose sign depends on what was before."""
         parts = channel.path.split(".")
         if parts[0] == "links":
             return self._of_link(channel, parts[1:])
         if parts[0] == "payloads":
             return self._of_payload(parts[1:])
         return self._of_joint(channel.joint, parts[1:]) if channel.joint else self._of_arm(parts)
+
+    def orientation(self, name: str) -> Quaternion:
+        """That of a link or a payload, `links.tip.orientation`, with w >= 0."""
+        kind, own, _ = name.split(".")
+        return quaternion((self.motions if kind == "links" else self.seen)[own].pose.R)
 
     def _of_joint(self, joint: str, parts: list[str]) -> Real:
         i, solved = self.joints.index(joint), self.derivative.solved
@@ -157,8 +162,6 @@ class Observed:
 
 
 def _of_frame(motion: LinkMotion, kind: str, part: str) -> Real:
-    """A component of where a frame is in the world, or of how it moves."""
-    if kind == "orientation":
-        return quaternion(motion.pose.R)[WXYZ.index(part)]
+    """A component of where a frame's origin is in the world, or of how the frame moves."""
     vectors = {"position": motion.position, "velocity": motion.velocity, "rate": motion.rate}
     return vectors[kind]()[XYZ.index(part)]

@@ -70,6 +70,16 @@ def test_the_frames_are_where_the_kinematics_have_them(reaches: tuple[ArchiveFil
         np.testing.assert_allclose(far, file.groups[0].signal("links.wrist.position", case)[0], rtol=0, atol=1e-12)
 
 
+def test_no_frame_jumps_between_the_two_quaternions_of_its_turn(pick: tuple[ArchiveFile, Mcap]) -> None:
+    _, read = pick
+    turns = np.array([
+        [[turn.rotation.w, turn.rotation.x, turn.rotation.y, turn.rotation.z] for turn in message.data.transforms]
+        for message in read.of("/tf")
+    ])  # fmt: skip
+    assert (turns[0, :, 0] >= 0.0).all() and (turns[..., 0] < 0.0).any()  # the lamp passes half a turn
+    assert (np.sum(turns[1:] * turns[:-1], axis=-1) > 0.0).all()
+
+
 def test_the_clock_is_the_simulated_time_from_zero_in_order(pick: tuple[ArchiveFile, Mcap]) -> None:
     _, read = pick
     assert [message.time for message in read.of("/tf")] == [20_000_000 * row for row in range(51)]

@@ -65,7 +65,9 @@ def test_the_frames_are_those_of_the_kinematics_one_row_at_a_time(reaches: xarra
                 pose = motions[link].pose
                 here = frames.isel(recorded_case=case, time=row, link=place)
                 np.testing.assert_allclose(here["position"], pose.p, rtol=0, atol=CLOSE)
-                np.testing.assert_allclose(here["orientation"], quaternion(pose.R), rtol=0, atol=CLOSE)
+                turn = np.array(quaternion(pose.R))  # whose sign is of that row alone
+                sign = np.sign(turn @ here["orientation"].values)
+                np.testing.assert_allclose(here["orientation"], sign * turn, rtol=0, atol=CLOSE)
 
 
 def test_the_frames_are_those_of_an_export(reaches: xarray.Dataset) -> None:
@@ -202,3 +204,25 @@ def test_a_case_without_a_history(tmp_path: Path) -> None:
                 "E328", "no history of case #2 of `reaches` was kept\n"
                 f"  `met run {archive} --case '#2'` runs it again, to the same bits"
             )  # fmt: skip
+
+
+def test_orientations_do_not_jump_where_a_link_passes_half_a_turn(reaches: xarray.Dataset) -> None:
+    lamp = reaches.met.frames("lamp")["orientation"].isel(link=0)  # whose q goes from 3 rad to beyond pi
+    assert (lamp.sel(quaternion="w").isel(time=0) >= 0.0).all() and (lamp.sel(quaternion="w") < 0.0).any()
+    assert ((lamp * lamp.shift(time=1)).sum("quaternion").isel(time=slice(1, None)) > 0.0).all()
+    turned = reaches.transpose("time", ...).met.frames("lamp")["orientation"].isel(link=0)
+    np.testing.assert_array_equal(turned.transpose(*lamp.dims), lamp)
+    end = reaches.isel(time=-1).met.frames("lamp")["orientation"].isel(link=0)
+    np.testing.assert_array_equal(end, -lamp.isel(time=-1))  # alone, it is the first: w >= 0
+
+
+def test_rows_that_are_unknown_do_not_break_an_orientation() -> None:
+    half = np.linspace(0.0, 5.0, 40)
+    closed = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=-1)
+    given = np.where(closed[:, :1] < 0.0, -closed, closed)
+    given[[0, 1, 11, 12, 39]] = np.nan
+    found = poses.unbroken(np.stack([given, -given], axis=1), 0)
+    known = np.isfinite(given[:, 0])
+    np.testing.assert_array_equal(found[known, 0], closed[known])
+    np.testing.assert_array_equal(found[known, 1], -closed[known])
+    assert np.isnan(found[~known]).all()
