@@ -12,7 +12,7 @@ from ic.meaning.arm import Arm
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import value_at
 from ic.meaning.scope import Scope
-from ic.meaning.servos import unit_written
+from ic.meaning.servos import apart, unit_written
 from met import models
 from met.diagnostic import Label
 from met.plan import EnvironmentUse
@@ -63,7 +63,8 @@ def remark_beginnings(scope: Scope, uses: tuple[EnvironmentUse, ...]) -> None:
 
         def told(values: np.ndarray, use: EnvironmentUse = use, joint: str | None = joint, place: Any = place,
                  also: list[Label] = also, shown: tuple[str, float] = shown) -> tuple[np.ndarray, list[str]]:
-            beyond = np.flatnonzero((values[:, 0] < values[:, 1]) | (values[:, 0] > values[:, 2]))
+            q, lower, upper = values.T
+            beyond = np.flatnonzero(((q < lower) & apart(q, lower)) | ((q > upper) & apart(q, upper)))
             if beyond.size:
                 (q, lower, upper), unit = values[beyond[0]] / shown[1], shown[0]
                 which = f"below {lower:g} {unit}" if q < lower else f"above {upper:g} {unit}"

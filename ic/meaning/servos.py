@@ -39,7 +39,10 @@ from met.plan import Command, SensorUse, ServoUse
 from met.trace import Scalar, where
 
 SLOWEST, FASTEST = 1e-3, 1e9
-APART = 1e-9  # rad or m: far above rounding of a deck's numbers, far below what anyone sees
+APART, DIGITS = 1e-9, 1e-5
+"""Positions are the same place within APART (rad or m: far above rounding of a deck's numbers, far below what anyone
+sees) and a unit of the sixth digit: so many are printed, and a position that was copied from there is the one meant."""
+
 RATE = Parameter(name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, doc="how often the servo's computer ticks")
 NOT_PARAMETERS = ("model", "command", "rate")
 ASKED: Mapping[str, Mapping[str, str]] = MappingProxyType({
@@ -267,13 +270,18 @@ def check_start(scope: Scope, use: Use) -> None:
         return  # a sweep varies one of them
     unit, scale = unit_written([*asked.values(), begins], begins.unit)
     value, _ = profile.course(SimpleNamespace(**{name: each.value for name, each in asked.items()}), 0.0)
-    if abs(value - begins.value) > APART:
+    if apart(value, begins.value):
         places = [each.origin.place for each in asked.values() if each.origin.place is not None]
         also = [] if begins.origin.place is None else [Label(begins.origin.place, "the joint begins here")]
         scope.complaints.remark(
             "D169", f"the command of joint `{use.joint}` begins at {value / scale:g} {unit}, and the joint at "
             f"{begins.value / scale:g} {unit}: it jumps", places[0] if places else use.place, also=also,
             help=f"write `{use.joint}.q = {value / scale:.12g} {unit};` in `initial`, or begin the command elsewhere")
+
+
+def apart(a: Any, b: Any) -> Any:
+    """Whether two positions, or two arrays of them, are more than rounding apart."""
+    return np.abs(a - b) > APART + DIGITS * np.maximum(np.abs(a), np.abs(b))
 
 
 def unit_written(found: Iterable[Settled], wanted: str) -> tuple[str, float]:

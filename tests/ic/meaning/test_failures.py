@@ -154,6 +154,7 @@ warning[D294]: joint `hinge` begins at 0.5 rad, beyond an end of `end`: above 0.
   ::: deck.ic:15:19  this one
    = help: the run begins with what drives it back: begin within, or move the end
 """
-    assert codes(tmp_path, ARM, SERVO, changed(run, ("0.5 rad", "20 deg"))) == []
+    for within in ("20 deg", "0.349066 rad"):  # which is above 20 deg in the seventh digit
+        assert codes(tmp_path, ARM, SERVO, changed(run, ("0.5 rad", within))) == []
     sweep = "sweep starts of hold { vary initial.hinge.q = [0, -30] deg; }\n"
     assert codes(tmp_path, ARM, SERVO, changed(run, ("0.5 rad", "0 rad")), sweep, select=["starts"]) == ["D294"]

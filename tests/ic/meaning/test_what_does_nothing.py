@@ -121,6 +121,20 @@ def test_a_course_jumps_where_its_value_at_the_start_is_not_the_joints(tmp_path:
     assert codes(tmp_path, ARM, changed(IDEAL, ("0 rad", course)), RUN) == ["D169"] * jumps
 
 
+@pytest.mark.parametrize(("asked", "begins", "jumps"), [
+    ("30 deg", "0.523599 rad", False),  # six digits, as they are printed
+    ("0.3 deg", "0.1 deg + 0.2 deg", False),
+    ("720 deg", "2 cycle", False),
+    ("12.5664 rad", "2 cycle", False),
+    ("30 deg", "0.52361 rad", True),
+    ("1.00002 rad", "1 rad", True),
+    ("2e-9 rad", "0 rad", True),
+])
+def test_what_is_the_same_place_to_rounding_is_no_jump(tmp_path: Path, asked: str, begins: str, jumps: bool) -> None:
+    run = changed(RUN, ("duration", f"initial {{ hinge.q = {begins}; }}\n    duration"))
+    assert codes(tmp_path, ARM, changed(IDEAL, ("0 rad", asked)), run) == ["D169"] * jumps
+
+
 def test_of_what_a_sweep_varies_and_of_a_real_servo_nothing_is_said(tmp_path: Path) -> None:
     sweep = "sweep starts of hold { vary initial.hinge.q = [0.1, 0.2] rad; }\n"
     assert codes(tmp_path, ARM, IDEAL, RUN, sweep, select=["starts"]) == []
