@@ -1,17 +1,35 @@
-"""What differs between two plans, in the words of their decks: for who comes back to a campaign with another deck."""
+"""What differs between two plans, in the words of their decks: for who comes back to a campaign with another deck, and
+for who compares two archives."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
+from met.diagnostic import Place
 from met.distinct import distinct
-from met.keys import LATER_FIELDS, SILENT_FIELDS
-from met.plan import Cases, Experiment, Formula, Plan, Quantity, Schedule
+from met.frozen import frozen
+from met.keys import LATER_FIELDS, SILENT_FIELDS, inputs, structure_key
+from met.plan import BASE, Base, Cases, Command, Course, Experiment, Formula, Plan, Quantity, Schedule, Structure
+
+AXES = ("x", "y", "z")
+
+
+@frozen
+class Change:
+    """A change that may change numbers, in words.
+
+    follows  whether it cannot be the cause: it follows from something else that is told
+    before   the place that wrote the old value, now: the new one, where a parameter differs
+    """
+
+    text: str
+    follows: bool = False
+    before: Place | None = None
+    now: Place | None = None
 
 
 def changes(before: Plan, now: Plan, *, ordered: bool = True) -> list[str]:
@@ -19,82 +37,71 @@ def changes(before: Plan, now: Plan, *, ordered: bool = True) -> list[str]:
     out = []
     old, new = ({experiment.name: experiment for experiment in plan.experiments} for plan in (before, now))
     if list(old) != list(new):
-        out.append(f"runs and sweeps: {', '.join(old)}, now {', '.join(new)}")
+        out.append(f"runs and sweeps: {', '.join(old)} -> {', '.join(new)}")
     for name in old:
         if name in new:
             head = f"{name}: " if len(new) > 1 else ""
-            out += [head + line for line in _experiment(old[name], new[name], ordered)]
+            found = between(old[name], new[name], ordered=ordered)
+            out += [head + each.text for each in sorted(found, key=lambda each: each.follows)]
     return out
 
 
-def _experiment(before: Experiment, now: Experiment, ordered: bool) -> Iterator[str]:
-    yield from _schedule(before.structure.schedule, now.structure.schedule)
-    yield from _fields("", replace(before.structure, schedule=now.structure.schedule), now.structure)
-    for path in dict.fromkeys([*before.parameters, *now.parameters]):
-        old, new = before.parameters.get(path), now.parameters.get(path)
-        if old is None or new is None:
-            yield f"{path} is {'new' if old is None else 'gone'}"
-        elif _value(old) != _value(new) and not (isinstance(old.value, Formula) and isinstance(new.value, Formula)):
-            place = new.origin.place
-            yield f"{path}: {', now '.join(_apart(old, new))}" + (f" ({place.file}:{place.line})" if place else "")
-    yield from _cases(before.cases, now.cases, ordered)
-    if before.formulas != now.formulas:
-        yield "what follows from the varied parameters"
+def between(before: Experiment, now: Experiment, *, ordered: bool) -> list[Change]:
+    """What differs between two experiments. ordered: another order of cases does."""
+    structures = [*_structures(before.structure, now.structure)]
+    new = {entity for entity, _ in structures if entity}
+    out = [Change(text) for _, text in structures if text]
+    cases = [Change(text) for text in _cases(before.cases, now.cases, ordered)]
+    out += [*_parameters(before, now, new), *cases]
+    if before.formulas != now.formulas and not out:
+        out.append(Change("what follows from the varied parameters is computed otherwise"))
+    if not out and structure_key(before.structure, inputs(before)) != structure_key(now.structure, inputs(now)):
+        out.append(Change("the structure"))  # no words for it here
+    return out
 
 
-def _schedule(before: Schedule, now: Schedule) -> Iterator[str]:
-    for name, old, new in (
-        ("duration", f"{before.duration:g} s", f"{now.duration:g} s"),
-        ("base rate", f"{before.base_hz:g} Hz", f"{now.base_hz:g} Hz"),
-        ("rates.dynamics", f"{before.base_hz / before.dynamics:g} Hz", f"{now.base_hz / now.dynamics:g} Hz"),
-        ("rates.record", f"{before.base_hz / before.record:g} Hz", f"{now.base_hz / now.record:g} Hz"),
-    ):
-        if old != new:
-            yield f"{name}: {old}, now {new}"
+# Parameters
 
 
-def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
-    old, new = ({c.path: c.values if ordered else np.sort(c.values) for c in cases.coordinates}
-                for cases in (before, now))  # fmt: skip
-    if before.count != now.count:
-        yield f"{before.count:,} cases, now {now.count:,}"
-    for path in dict.fromkeys([*old, *new]):
-        if path not in old or path not in new:
-            yield f"{path} is {'varied' if path in new else 'not varied any more'}"
-        elif not np.array_equal(old[path], new[path], equal_nan=True):
-            some = [f"{len(distinct(values)):,} values from {values.min():g} to {values.max():g}" for values in
-                    (old[path], new[path])]  # fmt: skip
-            yield f"{path}: {some[0]}, now {some[1]}" if some[0] != some[1] else f"values of {path}"
-    for name in ("seed", "seeds"):
-        if getattr(before, name) != getattr(now, name):
-            yield f"{name}: {getattr(before, name)}, now {getattr(now, name)}"
-    if not np.array_equal(_array(before.repeats), _array(now.repeats)):
-        yield "repeats"
+def _parameters(before: Experiment, now: Experiment, new: set[str]) -> Iterator[Change]:
+    """new: beginnings of the paths of what is new or gone, or of another kind, as a whole."""
+    for path, old in sorted(before.parameters.items()):
+        if path in now.parameters and _unlike(old, now.parameters[path]):
+            yield _changed(path, old, now.parameters[path])
+    for word, mine, other in (("new", now, before), ("gone", before, now)):
+        for name, members in _vectors(sorted(mine.parameters.keys() - other.parameters.keys())).items():
+            first, *_ = quantities = [mine.parameters[each] for each in members]
+            follows = first.origin.kind == "derived" or any(name.startswith(entity) for entity in new)
+            places = (None, first.origin.place) if mine is now else (first.origin.place, None)
+            yield Change(f"{name} is {word}: {_shown_all(quantities)}{_at(first)}", follows, *places)
 
 
-def _fields(path: str, before: Any, now: Any) -> Iterator[str]:
-    """What differs between two structures, field by field."""
-    if type(before) is type(now) and dataclasses.is_dataclass(before):
-        for each in dataclasses.fields(before):
-            if each.name not in SILENT_FIELDS or each.name in LATER_FIELDS:
-                name = f"{path}.{each.name}" if path else each.name
-                yield from _fields(name, getattr(before, each.name), getattr(now, each.name))
-    elif isinstance(before, tuple) and isinstance(now, tuple):
-        old, new = ({_name(each, index): each for index, each in enumerate(one)} for one in (before, now))
-        if list(old) != list(new) and sorted(old) == sorted(new):
-            yield f"{path}: in another order"
-        for name in dict.fromkeys([*old, *new]):
-            if name not in old or name not in new:
-                yield f"{path}: {name} is {'new' if name in new else 'gone'}"
-            else:
-                yield from _fields(f"{path}.{name}", old[name], new[name])
-    elif before != now:
-        yield f"{path}: {before}, now {now}"
+def _unlike(old: Quantity, new: Quantity) -> bool:
+    return _value(old) != _value(new) and not (isinstance(old.value, Formula) and isinstance(new.value, Formula))
 
 
-def _name(each: Any, index: int) -> str:
-    """What one of several is called: a servo by its joint, a link by its name, another by its place."""
-    return str(getattr(each, "joint", getattr(each, "name", index)))
+def _changed(path: str, old: Quantity, new: Quantity) -> Change:
+    """A parameter that both have. One that is computed, or becomes one that a sweep varies, follows from what is told
+    beside it."""
+    follows = new.origin.kind == "derived" or isinstance(old.value, Formula) or isinstance(new.value, Formula)
+    return Change(f"{path}: {' -> '.join(_apart(old, new))}{_at(new)}", follows, old.origin.place, new.origin.place)
+
+
+def _at(quantity: Quantity) -> str:
+    place = quantity.origin.place
+    return f" ({place.file}:{place.line})" if place else ""
+
+
+def _vectors(paths: Iterable[str]) -> dict[str, list[str]]:
+    """The paths by name; three that are a vector's components, under the vector's."""
+    found: dict[str, list[str]] = {}
+    known = dict.fromkeys(paths)
+    for path in known:
+        vector, _, axis = path.rpartition(".")
+        members = [f"{vector}.{each}" for each in AXES]
+        whole = axis in AXES and all(each in known for each in members)
+        found[vector if whole else path] = members if whole else [path]
+    return found
 
 
 def _value(quantity: Quantity) -> Any:
@@ -110,11 +117,191 @@ def _apart(before: Quantity, now: Quantity) -> tuple[str, str]:
     return texts
 
 
-def _shown(quantity: Quantity, digits: int) -> str:
+def _shown(quantity: Quantity, digits: int = 6) -> str:
     value = _value(quantity)
     shown = f"{value:.{digits}g}" if isinstance(value, float) else str(value)
     return f"{shown} {quantity.unit}" if isinstance(value, float) and quantity.unit != "1" else shown
 
 
+def _shown_all(quantities: Sequence[Quantity]) -> str:
+    if len(quantities) == 1:
+        return _shown(quantities[0])
+    unit = quantities[0].unit
+    numbers = ", ".join(_shown(dataclasses.replace(each, unit="1")) for each in quantities)
+    return f"[{numbers}]" + (f" {unit}" if unit != "1" else "")
+
+
+# Cases
+
+
+def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
+    old, new = ({c.path: c for c in cases.coordinates} for cases in (before, now))
+    if before.count != now.count:
+        yield f"{_count(before)} -> {_count(now)}"
+    for path in dict.fromkeys([*old, *new]):
+        if path not in old:
+            yield f"{path} is varied now: {_span(new[path])}"
+        elif path not in new:
+            yield f"{path} is not varied any more"
+        elif not np.array_equal(*((each[path].values if ordered else distinct(each[path].values))
+                                  for each in (old, new)), equal_nan=True):  # fmt: skip
+            spans = [_span(each[path]) for each in (old, new)]
+            yield f"{path}: {' -> '.join(spans)}" if spans[0] != spans[1] else f"{path}: other values ({spans[1]})"
+    for name in ("seed", "seeds"):
+        if getattr(before, name) != getattr(now, name):
+            yield f"{name}: {getattr(before, name)} -> {getattr(now, name)}"
+    if not np.array_equal(_array(before.repeats), _array(now.repeats)):
+        repeats = [len(distinct(_array(each.repeats))) for each in (before, now)]
+        yield f"repeats: {repeats[0]} -> {repeats[1]}" if repeats[0] != repeats[1] else "repeats: in other cases"
+
+
+def _count(cases: Cases) -> str:
+    return f"{cases.count:,} case{'s' if cases.count != 1 else ''}"
+
+
+def _span(coordinate: Any) -> str:
+    """Which values a varied parameter takes, in the deck's unit."""
+    values = distinct(coordinate.values) / coordinate.scale
+    unit = f" {coordinate.unit}" if coordinate.unit not in ("", "1") else ""
+    if len(values) <= 3:
+        return f"[{', '.join(f'{value:g}' for value in values)}]{unit}"
+    return f"{len(values):,} values from {values.min():g} to {values.max():g}{unit}"
+
+
 def _array(values: np.ndarray | None) -> np.ndarray:
     return np.empty(0) if values is None else values
+
+
+# Structures
+
+ENTITIES = {
+    "links": ("link", ("links.{}.",)), "joints": ("joint", ("{}.", "initial.{}.")),
+    "servos": ("servo of", ("{}.servo.",)), "environment": ("environment", ("environment.{}.",)),
+    "metrics": ("metric", ("metrics.{}.",)), "record": ("record:", ()),
+    "substitutions": ("bed of", ("{}.bed.", "{}.law.")),
+    "payloads": ("payload", ("payloads.{}.",)), "guides": ("guide", ("guides.{}.",)),
+    "sensors": ("sensor", ("sensors.{}.",)),
+}  # fmt: skip
+"""Of the fields that hold several things: what one is called, and how the paths of its parameters begin."""
+
+WHOLE = {"joints": {"kind"}, "servos": {"model", "command"}, "environment": {"model"}, "metrics": {"model"},
+         "guides": {"model"}, "sensors": {"model"}, "substitutions": {"bed", "law"}}  # fmt: skip
+"""Fields by whose change a thing has other parameters."""
+
+NOT_TOLD = SILENT_FIELDS - LATER_FIELDS | {"channels", "words", "schedule", "base"}
+"""Fields that are not told by themselves: channels follow from what is recorded, words are parameters too, a schedule
+has rates, and the base is told of first."""
+
+
+def _structures(before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
+    """Changes in words, each with the beginning of the paths of the parameters that follow from it; "" of none."""
+    yield from (("", text) for text in _schedule(before.schedule, now.schedule))
+    yield from _base(before.base, now.base)
+    for field in dataclasses.fields(Structure):
+        old, new = getattr(before, field.name), getattr(now, field.name)
+        if field.name in NOT_TOLD or (old == new and before.schedule == now.schedule):
+            continue
+        if field.name in ENTITIES:
+            yield from _entities(field.name, before, now)
+        elif old != new:
+            yield "", f"{field.name}: {_word(old)} -> {_word(new)}"
+
+
+def _schedule(before: Schedule, now: Schedule) -> Iterator[str]:
+    for name, old, new in (
+        ("duration", f"{before.duration:g} s", f"{now.duration:g} s"),
+        ("rates.dynamics", f"{before.base_hz / before.dynamics:g} Hz", f"{now.base_hz / now.dynamics:g} Hz"),
+        ("rates.record", f"{before.base_hz / before.record:g} Hz", f"{now.base_hz / now.record:g} Hz"),
+    ):
+        if old != new:
+            yield f"{name}: {old} -> {new}"
+
+
+def _base(before: Base | None, now: Base | None) -> Iterator[tuple[str, str]]:
+    kinds = ["fixed" if each is None else each.kind for each in (before, now)]
+    if kinds[0] != kinds[1]:
+        yield f"initial.{BASE}.", f"base: {kinds[0]} -> {kinds[1]}"
+        yield from ((path, "") for path in (f"{BASE}.", f"links.{BASE}."))
+    elif before is not None and now is not None:
+        yield from _courses("base", "base.", before.courses, now.courses)
+
+
+def _courses(what: str, path: str, before: Sequence[Course], now: Sequence[Course]) -> Iterator[tuple[str, str]]:
+    old, new = ({each.component: each.model for each in courses} for courses in (before, now))
+    for component in dict.fromkeys([*old, *new]):
+        models = [each.get(component, "none") for each in (old, new)]
+        if models[0] != models[1]:
+            yield f"{path}{component}.", f"{what}: {component} {models[0]} -> {models[1]}"
+
+
+def _entities(field: str, before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
+    """What several things of a kind are: which are new or gone, and what of the others differs."""
+    what, begins = ENTITIES[field]
+    old, new = ({_name(each): each for each in getattr(structure, field)} for structure in (before, now))
+    if list(old) != list(new) and sorted(old) == sorted(new) and field != "servos":
+        yield "", f"{field}: in another order"
+    for name in dict.fromkeys([*old, *new]):
+        heads = [begin.format(name) for begin in begins]
+        if field == "links" and name == BASE:
+            continue
+        if name not in old or name not in new:
+            text = f"{what} {name} is {'new' if name in new else 'gone'}"
+            yield from zip(heads or [""], [text, ""], strict=False)
+            continue
+        for key, text in _thing(field, old[name], new[name], before, now):
+            told = f"{what} {name} {text}" if what.endswith(":") else f"{what} {name}: {text}"
+            yield from zip(heads if key in WHOLE.get(field, ()) else [""], [told, ""], strict=False)
+
+
+def _thing(field: str, old: Any, new: Any, before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
+    """What differs of one thing: the name of its field, and words."""
+    for each in dataclasses.fields(new):
+        one, two = getattr(old, each.name), getattr(new, each.name)
+        if each.name == "divisor":
+            rates = [_rate(divisor, structure.schedule) for divisor, structure in ((one, before), (two, now))]
+            if rates[0] != rates[1] and not _with_dynamics(one, two, before, now):
+                yield each.name, f"rate {rates[0]} -> {rates[1]}"
+        elif one == two or each.name in NOT_TOLD:
+            continue
+        elif each.name == "courses":
+            yield from (("courses", text.removeprefix(": ")) for _, text in _courses("", "", one, two))
+        elif field == "servos" and each.name == "sensors":
+            yield from (("sensors", text) for text in _sensors(one, two))
+        elif field == "record" and each.name == "joints":
+            if {joint.name for joint in before.moving} == {joint.name for joint in now.moving}:
+                yield each.name, f"of {_word(one)} -> of {_word(two)}"
+        else:
+            yield each.name, f"{each.name} {_word(one)} -> {_word(two)}"
+
+
+def _with_dynamics(one: int | None, two: int | None, before: Structure, now: Structure) -> bool:
+    """Whether something ticked with the dynamics' steps, and does, so that its rate is told by theirs."""
+    return one == before.schedule.dynamics and two == now.schedule.dynamics
+
+
+def _sensors(before: Sequence[Any], now: Sequence[Any]) -> Iterator[str]:
+    old, new = ({each.of: each.model for each in sensors} for sensors in (before, now))
+    for of in dict.fromkeys([*old, *new]):
+        models = [each.get(of, "none") for each in (old, new)]
+        if models[0] != models[1]:
+            yield f"sensor of {of} {models[0]} -> {models[1]}"
+
+
+def _rate(divisor: int | None, schedule: Schedule) -> str:
+    return "at every stage" if divisor is None else f"{schedule.base_hz / divisor:g} Hz"
+
+
+def _name(each: Any) -> str:
+    """What one of several is called: a servo by its joint, a link by its name."""
+    return str(getattr(each, "joint", None) or each.name)
+
+
+def _word(value: Any) -> str:
+    """A field's value in words."""
+    words: dict[type, Callable[[Any], str]] = {
+        bool: lambda each: "on" if each else "off",
+        tuple: lambda each: ", ".join(map(str, each)) or "none",
+        Command: lambda each: f"{each.kind}({each.model or f'guide {each.guide}'})",
+        type(None): lambda each: "none",
+    }
+    return words.get(type(value), str)(value)

@@ -1,12 +1,12 @@
-"""What made two archives: which parameters, models, decks and versions differ."""
+"""What made two archives: which decks, names, parameters, models and versions differ, causes before what follows."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from batch.archive.read import ArchiveFile, Group
-from batch.changes import changes
+from batch.changes import Change, between
+from batch.differences.decks import Deck, Decks, decks
 from met.frozen import frozen
 from met.plan import Experiment, Plan
 
@@ -16,36 +16,39 @@ class Changed:
     """What differs, in words.
 
     versions   of MET, its libraries and its commit
-    code       experiments whose programs differ: where none does, equal inputs give equal bits
-    structure  experiments whose structures differ (models, rates, what is varied)
-    meaning    parameters, models, rates and cases, as the decks have them now
+    decks      files of the decks that differ, and how
+    meaning    what was written otherwise: names that stand for values, parameters, models, rates, cases
+    follows    what differs because of that: parameters that are computed, those of what is new or gone
     defaults   parameters that a model has got since, and their defaults
-    decks      files that differ, with how many lines are new and gone
+    structure  experiments whose structures differ (models, rates, what is varied)
+    code       experiments whose programs differ: where none does, equal inputs give equal bits
     """
 
     versions: tuple[str, ...] = ()
-    code: tuple[str, ...] = ()
-    structure: tuple[str, ...] = ()
+    decks: tuple[Deck, ...] = ()
     meaning: tuple[str, ...] = ()
+    follows: tuple[str, ...] = ()
     defaults: tuple[str, ...] = ()
-    decks: tuple[str, ...] = ()
-
-    @property
-    def anything(self) -> bool:
-        return any((self.versions, self.code, self.structure, self.meaning, self.defaults, self.decks))
+    structure: tuple[str, ...] = ()
+    code: tuple[str, ...] = ()
 
 
 def changed(
     a: ArchiveFile, b: ArchiveFile, pairs: Sequence[tuple[Group, Group]], plans: Sequence[Plan | str]
 ) -> Changed:
     """What differs between what two archives were made from. plans: of each, or why it cannot be read here."""
-    meaning, defaults = _meaning(plans, pairs)
+    texts = decks(a.sources(), b.sources())
+    meaning, follows, defaults = _meaning(plans, pairs, texts)
+    causes = [*_defines(a, b), *(texts.names if meaning or follows else ())]
     return Changed(
-        tuple(_versions(a, b)),
-        tuple(one.name for one, two in pairs if _unlike(one, two, "code_key")),
-        tuple(one.name for one, two in pairs if _unlike(one, two, "structure_key")),
-        tuple(meaning), tuple(defaults), tuple(_decks(a.sources(), b.sources())),
-    )  # fmt: skip
+        versions=tuple(_versions(a, b)),
+        decks=texts.files,
+        meaning=(*causes, *(meaning or (() if causes else follows))),
+        follows=tuple(follows) if meaning or causes else (),
+        defaults=tuple(defaults),
+        structure=tuple(one.name for one, two in pairs if _unlike(one, two, "structure_key")),
+        code=tuple(one.name for one, two in pairs if _unlike(one, two, "code_key")),
+    )
 
 
 def _unlike(a: Group, b: Group, name: str) -> bool:
@@ -65,9 +68,14 @@ def _versions(a: ArchiveFile, b: ArchiveFile) -> list[str]:
         out.append("MET's commit " + ", now ".join(f"{commit[:10]}{_dirty(dirty)}" for commit, dirty in commits))
     elif commits[0][1] == "yes":
         out.append(f"MET's commit {commits[0][0][:10]} in both,{_dirty('yes')}, which may be others")
-    if one.get("defines") != two.get("defines"):
-        out.append(f"-D {one.get('defines') or 'nothing'}, now {two.get('defines') or 'nothing'}")
     return out
+
+
+def _defines(a: ArchiveFile, b: ArchiveFile) -> Iterator[str]:
+    """What the command lines defined."""
+    one, two = (str(each.provenance.get("defines") or "nothing") for each in (a, b))
+    if one != two:
+        yield f"-D {one} -> {two}"
 
 
 def _dirty(dirty: str) -> str:
@@ -75,29 +83,46 @@ def _dirty(dirty: str) -> str:
 
 
 def _meaning(
-    plans: Sequence[Plan | str], pairs: Sequence[tuple[Group, Group]]
-) -> tuple[list[str], list[str]]:
-    """Changes of matched experiments; parameters that are new, and have their defaults, apart."""
+    plans: Sequence[Plan | str], pairs: Sequence[tuple[Group, Group]], texts: Decks
+) -> tuple[list[str], list[str], list[str]]:
+    """Changes of matched experiments: those that were written, and those that follow; parameters that are new, and have
+    their defaults, apart. What is so in all of several experiments is told once."""
     before, now = plans
     if isinstance(before, str) or isinstance(now, str):
-        return [f"the plan cannot be read here: {why}" for why in plans if isinstance(why, str)], []
-    defaults: list[str] = []
-    out: list[str] = []
-    for one, two in pairs:
-        old, new = _experiment(before, one.name), _experiment(now, two.name)
-        if old is None or new is None:
-            continue
-        fresh = [path for path, quantity in new.parameters.items()
-                 if path not in old.parameters and quantity.origin.kind == "default"]  # fmt: skip
-        for path in fresh:
-            quantity = new.parameters[path]
-            unit = f" {quantity.unit}" if quantity.unit not in ("", "1") else ""
-            defaults.append(f"{path} is new, at its default, {quantity.value}{unit}")
-        told = [*changes(_alone(before, old), _alone(now, new), ordered=False), *_tolerances(old, new)]
-        known = {f"{path} is new" for path in fresh}
-        head = f"{two.name}: " if len(pairs) > 1 else ""
-        out += [head + line for line in told if line not in known]
-    return out, list(dict.fromkeys(defaults))
+        return [f"the plan cannot be read here: {why}" for why in plans if isinstance(why, str)], [], []
+    several = [(one.name, two.name) for one, two in pairs if one.name in _names(before) and two.name in _names(now)]
+    of: dict[tuple[int, str], list[str]] = {}
+    for one, two in several:
+        old, new = _experiment(before, one), _experiment(now, two)
+        fresh = {path: quantity for path, quantity in new.parameters.items()
+                 if path not in old.parameters and quantity.origin.kind == "default"}  # fmt: skip
+        for each in between(old, new, ordered=False):
+            path = each.text.partition(" is new")[0]
+            kind = 2 if path in fresh and not each.follows else int(_follows(each, texts))
+            text = f"{path} is new, at its default{each.text.partition(' is new')[2].replace(':', ',', 1)}"
+            of.setdefault((kind, text if kind == 2 else each.text), []).append(two)
+        for line in _tolerances(old, new):
+            of.setdefault((0, line), []).append(two)
+    out: tuple[list[str], list[str], list[str]] = ([], [], [])
+    for (kind, line), names in of.items():
+        whole = len(names) == len(several)
+        out[kind].extend([line] if whole else [f"{name}: {line}" for name in names])
+    return out
+
+
+def _follows(change: Change, texts: Decks) -> bool:
+    """Whether a parameter has another value although no line that writes it differs."""
+    if not texts.files or (change.before is None and change.now is None):
+        return change.follows
+    written = [(change.before, texts.stale), (change.now, texts.fresh)]
+    return change.follows or not any(
+        place is not None and ((place.file, place.line) in lines or place.file not in texts.known)
+        for place, lines in written
+    )  # what stands in no file was written on a command line
+
+
+def _names(plan: Plan) -> set[str]:
+    return {experiment.name for experiment in plan.experiments}
 
 
 def _tolerances(before: Experiment, now: Experiment) -> Iterator[str]:
@@ -106,38 +131,8 @@ def _tolerances(before: Experiment, now: Experiment) -> Iterator[str]:
     for name in dict.fromkeys([*old, *new]):
         texts = [one[name].text if name in one else "none" for one in (old, new)]
         if name not in old or name not in new or old[name].value != new[name].value:
-            yield f"tolerances.{name}: {texts[0]}, now {texts[1]}"
+            yield f"tolerances.{name}: {texts[0]} -> {texts[1]}"
 
 
-def _experiment(plan: Plan, name: str) -> Experiment | None:
-    return next((experiment for experiment in plan.experiments if experiment.name == name), None)
-
-
-def _alone(plan: Plan, experiment: Experiment) -> Plan:
-    """A plan of one experiment, under a name that both sides share."""
-    from dataclasses import replace
-
-    return replace(plan, experiments=(replace(experiment, name="it"),))
-
-
-def _decks(a: dict[str, str], b: dict[str, str]) -> list[str]:
-    """a, b: texts of the files by name, the deck itself first."""
-    out = []
-    heads = next(iter(a), ""), next(iter(b), "")
-    if heads[0] != heads[1] and heads[0] not in b and heads[1] not in a:  # the deck has another name
-        out.append(_lines(f"{heads[0]}, now {heads[1]}", a[heads[0]], b[heads[1]]))
-        a, b = ({name: text for name, text in one.items() if name not in heads} for one in (a, b))
-    for name in dict.fromkeys([*a, *b]):
-        if name not in a or name not in b:
-            out.append(f"{name} is {'new' if name in b else 'gone'}")
-        elif a[name] != b[name]:
-            out.append(_lines(name, a[name], b[name]))
-    return out
-
-
-def _lines(name: str, before: str, after: str) -> str:
-    """How many lines are others."""
-    old, now = (Counter(text.splitlines(keepends=True)) for text in (before, after))
-    new, gone = (now - old).total(), (old - now).total()
-    said = f"{new} line{'s' if new != 1 else ''} new, {gone} gone" if new or gone else "its lines are in another order"
-    return f"{name}: {said if before != after else 'the same lines'}"
+def _experiment(plan: Plan, name: str) -> Experiment:
+    return next(experiment for experiment in plan.experiments if experiment.name == name)

@@ -8,7 +8,7 @@ from typing import Any
 from batch.differences.found import Diff, Experiment, Signal
 from batch.summary import finite
 
-SCHEMA, VERSION = "met.diff", 1
+SCHEMA, VERSION = "met.diff", 2
 
 
 def as_data(found: Diff) -> dict[str, Any]:

@@ -7,57 +7,70 @@ from collections.abc import Iterator, Sequence
 from batch.differences import words
 from batch.differences.found import Diff, Experiment, Signal
 from ic.printing.columns import columns
+from met.frozen import frozen
 
-MOST_LINES = 12
+MOST_LINES, OF_KIND = 12, {"deck": 24, "follows": 6}
 """Of one kind of change."""
 
 SHOWN_ENDED, SHOWN_WORST = 8, 5
 
+LONGEST = 120
+"""Characters of a deck's line."""
 
-def told(found: Diff) -> list[str]:
-    """All of it, for people."""
-    out = [f"a  {found.a}", f"b  {found.b}", *_changed(found)]
+
+@frozen
+class Cut:
+    """What is left out of a long text. every: nothing; remedy: what shows it, a command."""
+
+    every: bool = False
+    remedy: str = "`met diff ... --all`"
+
+    def few(self, lines: Sequence[str], most: int, indent: str) -> list[str]:
+        """The first of the lines, and how many more there are."""
+        left = 0 if self.every else max(0, len(lines) - most)
+        return [*lines[: len(lines) - left], *([f"{indent}and {left:,} more: {self.remedy}"] if left else [])]
+
+
+def told(found: Diff, cut: Cut | None = None) -> list[str]:
+    """All of it, for people; what is cut says how to see it."""
+    cut = cut or Cut()
+    out = [f"a  {found.a}", f"b  {found.b}", *_changed(found, cut)]
     for line in words.alone(found):
         out += ["", line]
     for experiment in found.experiments:
-        out += ["", *_experiment(found, experiment)]
+        out += ["", *_experiment(found, experiment, cut)]
     return [*out, "", words.verdict(found)]
 
 
-def _changed(found: Diff) -> Iterator[str]:
-    said = [line for kind, lines in words.made(found) for line in _few(f"{kind:<10}", lines)]
+def _changed(found: Diff, cut: Cut) -> Iterator[str]:
+    made = words.made(found)
     yield ""
-    if not said:
+    if not made:
         yield words.SAME
-    for line in said:
-        yield f"  {line}"
+    for kind, lines in made:
+        short = [line if cut.every or len(line) <= LONGEST else f"{line[:LONGEST]} ..." for line in lines]
+        for line in cut.few(short, OF_KIND.get(kind, MOST_LINES), ""):
+            yield f"  {'' if line.startswith(' ') else kind:<10} {line}"
 
 
-def _few(head: str, lines: Sequence[str]) -> list[str]:
-    out = [f"{head} {line}" for line in lines[:MOST_LINES]]
-    return out + ([f"{head} and {len(lines) - MOST_LINES} more"] if len(lines) > MOST_LINES else [])
-
-
-def _experiment(found: Diff, experiment: Experiment) -> list[str]:
+def _experiment(found: Diff, experiment: Experiment, cut: Cut) -> list[str]:
     out = [words.heading(experiment), *(f"  {line}" for line in words.missing(found, experiment))]
-    out += _ended(experiment)
+    out += _ended(experiment, cut)
     out += [f"  note: {note}" for note in experiment.notes]
     out += [f"  {line}" for line in words.allowed(found, experiment)]
     out += [f"  {line}" for line in words.requirements(experiment)]
     out += _signals(experiment.signals)
     out += _samples(experiment)
-    out += _worst(found, experiment)
+    out += _worst(found, experiment, cut)
     return out
 
 
-def _ended(experiment: Experiment) -> Iterator[str]:
+def _ended(experiment: Experiment, cut: Cut) -> Iterator[str]:
     """Cases that end otherwise, in kinds."""
     for ending in words.endings(experiment):
         yield f"  {ending.text}: {ending.cases}"
-        for each in ending.each[:SHOWN_ENDED]:
-            yield f"    #{each.case} {each.case_id[:8]}  {words.cause(each)}"
-        if len(ending.each) > SHOWN_ENDED:
-            yield f"    and {len(ending.each) - SHOWN_ENDED:,} more"
+        each = [f"    #{case.case} {case.case_id[:8]}  {words.cause(case)}" for case in ending.each]
+        yield from cut.few(each, SHOWN_ENDED, "    ")
 
 
 def _signals(signals: Sequence[Signal]) -> list[str]:
@@ -85,12 +98,13 @@ def _samples(experiment: Experiment) -> list[str]:
     return ["", *columns(rows, right=range(1, 7)), *([f"  {note}"] if note else [])]
 
 
-def _worst(found: Diff, experiment: Experiment) -> list[str]:
+def _worst(found: Diff, experiment: Experiment, cut: Cut) -> list[str]:
     if not experiment.worst:
         return []
-    out = ["", f"  {words.WORST}:"]
-    for each in experiment.worst[:SHOWN_WORST]:
+    out = []
+    for each in experiment.worst:
         what, before, now = words.most(each)
-        out.append(f"    #{each.case_b} {each.case_id[:8]}  {what}: {before}, now {now}")
-        out.append(f"      {'; '.join(words.again(found, experiment, each))}")
-    return out
+        out.append(f"    #{each.case_b} {each.case_id[:8]}  {what}: {before}, now {now}\n"
+                   f"      {'; '.join(words.again(found, experiment, each))}")  # fmt: skip
+    few = cut.few(out, SHOWN_WORST, "    ")
+    return ["", f"  {words.WORST}:", *(line for each in few for line in each.split("\n"))]

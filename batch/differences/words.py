@@ -10,24 +10,27 @@ from batch.differences.samples import LEVEL, Sample
 from batch.failures import STATUS, ranges
 from batch.output import quoted
 from batch.signals import number_text
+from batch.visible import visible
 from met.frozen import frozen
 
 SAME = "made from the same: deck, parameters, models and versions"
 
 
 def made(found: Diff) -> list[tuple[str, tuple[str, ...]]]:
-    """What made the two and differs: its kind and what is said of it."""
+    """What made the two and differs: its kind and what is said of it, causes before what follows from them. What is
+    indented belongs to the line above."""
     changed = found.changed
     why = ": constants are part of it" if changed.meaning or changed.structure else ""
     said = [
         ("versions", changed.versions),
-        ("code", tuple(f"the program of `{name}` is another{why}" for name in changed.code)),
-        ("structure", tuple(f"that of `{name}` is another" for name in changed.structure)),
-        ("deck", changed.decks),
+        ("deck", tuple(text for deck in changed.decks for text in (deck.said, *(f"  {line}" for line in deck.lines)))),
         ("changed", changed.meaning),
+        ("follows", changed.follows),
         ("new", changed.defaults),
+        ("structure", tuple(f"that of `{name}` is another" for name in changed.structure)),
+        ("code", tuple(f"the program of `{name}` is another{why}" for name in changed.code)),
     ]
-    return [(kind, lines) for kind, lines in said if lines]
+    return [(kind, tuple(map(visible, lines))) for kind, lines in said if lines]
 
 
 def alone(found: Diff) -> list[str]:

@@ -27,14 +27,19 @@ def _noted(said: Sequence[str]) -> Html | None:
 
 
 def _lines(found: Made) -> list[Html]:
-    shown = [el("p", line) for line in found.lines[:SHOWN_LINES]]
+    shown = [_line(line) for line in found.lines[:SHOWN_LINES]]
     folded = found.lines[SHOWN_LINES:]
     if folded:
-        more = [el("p", line) for line in folded]
+        more = [_line(line) for line in folded]
         more += [el("p", f"and {found.left:,} more", cls="under")] if found.left else []
         summary = el("summary", f"and {len(folded) + found.left:,} more")
         shown.append(el("details", summary, more))
     return shown
+
+
+def _line(said: str) -> Html:
+    """What is indented is a line of a deck."""
+    return el("p", said[2:], cls="text") if said.startswith("  ") else el("p", said)
 
 
 def compared(found: Compared) -> Html:

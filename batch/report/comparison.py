@@ -21,7 +21,7 @@ MOST_LINES, MOST_ENDED = 200, 20
 
 KINDS = {
     "versions": "Versions", "code": "Code", "structure": "Structure", "deck": "Deck",
-    "changed": "Parameters and models", "new": "New parameters",
+    "changed": "Parameters and models", "follows": "What follows", "new": "New parameters",
 }  # fmt: skip
 
 

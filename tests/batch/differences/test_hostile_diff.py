@@ -18,9 +18,9 @@ import batch
 import ic
 from batch.differences import matching
 from batch.differences.campaigns import diff
-from batch.differences.changed import _decks
 from batch.differences.compare import compare
 from batch.differences.data import as_data
+from batch.differences.decks import decks
 from batch.differences.found import Diff, Experiment, Required, Signal
 from batch.differences.told import told
 from batch.differences.tolerance import Tolerance, tolerances
@@ -305,7 +305,9 @@ def test_a_requirement_in_one_alone_is_told(ran: Callable[..., Path]) -> None:
 
 def test_a_deck_in_which_every_line_changed_is_told_at_once() -> None:
     before = "".join(f"    vary links.boom.mass = [{i}, {i + 1}, {i + 2}] kg;\n" for i in range(300))
-    assert _decks({"deck.ic": before}, {"deck.ic": before.replace("kg", "g")}) == ["deck.ic: 300 lines new, 300 gone"]
+    [found] = decks({"deck.ic": before}, {"deck.ic": before.replace("kg", "g")}).files
+    assert found.said == "deck.ic: 300 lines new, 300 gone"
+    assert len(found.lines) == 601
 
 
 # Against an oracle

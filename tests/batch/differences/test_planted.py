@@ -146,7 +146,7 @@ def test_parameters_that_changed_and_one_that_is_new(monkeypatch: pytest.MonkeyP
 
     found = diff(*two(monkeypatch, tmp_path, order(8), change=change)).changed
     [line] = found.meaning
-    assert line.startswith("elbow.servo.f_c: 0.0205 N*m, now 0.03 N*m")
+    assert line.startswith("elbow.servo.f_c: 0.0205 N*m -> 0.03 N*m")
     assert found.defaults == ("elbow.servo.k_aw is new, at its default, 0.5 1/s",)
 
 
@@ -194,6 +194,6 @@ def test_the_same_answer_for_programs(monkeypatch: pytest.MonkeyPatch, tmp_path:
             run.signals["q"][place[3], 1, 0] += 1.0
 
     said: dict[str, Any] = json.loads(json.dumps(as_data(diff(*two(monkeypatch, tmp_path, order(9), plant)))))
-    assert (said["schema"], said["version"], said["verdict"]) == ("met.diff", 1, "different")
+    assert (said["schema"], said["version"], said["verdict"]) == ("met.diff", 2, "different")
     [different] = [each for each in said["experiments"][0]["signals"] if each["verdict"] == "different"]
     assert (different["name"], different["different"], different["largest"]) == ("q", 1, pytest.approx(1.0))

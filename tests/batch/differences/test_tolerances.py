@@ -61,7 +61,7 @@ def test_the_deck_of_the_second_says_it(archives: Callable[..., tuple[Path, Path
     assert counts(diff(a, b)) == (CASES - 2, 1, 1)
     assert counts(diff(b, a)) == (CASES - 2, 0, 2)  # that of a, which allows nothing
     lines = told(diff(a, b))
-    assert "  changed    tolerances.q: none, now 5e-06 SI" in lines
+    assert "  changed    tolerances.q: none -> 5e-06 SI" in lines
     assert "  the deck of b allows q 5e-06 SI" in lines and lines[-1] == "different"
     assert any(line.endswith("5e-06 SI, 200 times that") for line in lines)
 

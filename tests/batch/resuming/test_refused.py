@@ -86,32 +86,34 @@ def with_entry(entry: str) -> tuple[str, str]:
 AXIS = "gearbox.kp = linspace(0.010, 0.040, 40) V*s/rad"
 CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "the range of an axis": (
-        ("0.040", "0.050"), ("gearbox.kp: 40 values from 0.01 to 0.04, now 40 values from 0.01 to 0.05",)
+        ("0.040", "0.050"),
+        ("gearbox.kp: 40 values from 0.01 to 0.04 V*s/rad -> 40 values from 0.01 to 0.05 V*s/rad",)
     ),
-    "values between": ((AXIS, "gearbox.kp = logspace(0.010, 0.040, 40) V*s/rad"), ("values of gearbox.kp",)),
+    "values between": ((AXIS, "gearbox.kp = logspace(0.010, 0.040, 40) V*s/rad"),
+                       ("gearbox.kp: other values (40 values from 0.01 to 0.04 V*s/rad)",)),
     "how many values": (
         ("40)", "41)"),
-        ("40 cases, now 41", "gearbox.kp: 40 values from 0.01 to 0.04, now 41 values from 0.01 to 0.04"),
+        ("40 cases -> 41 cases",
+         "gearbox.kp: 40 values from 0.01 to 0.04 V*s/rad -> 41 values from 0.01 to 0.04 V*s/rad"),
     ),
     "another axis": (
         (AXIS, "gearbox.ki = linspace(0.1, 0.2, 40) V/rad"),
         (
-            "elbow.servo.ki: 0.125 V/rad, now varied (d.ic:7)",
-            "elbow.servo.kp: varied, now 0.02 V*s/rad (<servos/rigid_gearbox.ic>:12)",
-            "shoulder.servo.ki: 0.125 V/rad, now varied (d.ic:7)",
-            "shoulder.servo.kp: varied, now 0.02 V*s/rad (<servos/rigid_gearbox.ic>:12)",
             "gearbox.kp is not varied any more",
-            "gearbox.ki is varied",
-            "what follows from the varied parameters",
+            "gearbox.ki is varied now: 40 values from 0.1 to 0.2 V/rad",
+            "elbow.servo.ki: 0.125 V/rad -> varied (d.ic:7)",
+            "elbow.servo.kp: varied -> 0.02 V*s/rad (<servos/rigid_gearbox.ic>:12)",
+            "shoulder.servo.ki: 0.125 V/rad -> varied (d.ic:7)",
+            "shoulder.servo.kp: varied -> 0.02 V*s/rad (<servos/rigid_gearbox.ic>:12)",
         ),
     ),
     "a parameter": (
-        with_entry("servos { elbow { f_c = 0.03 N*m; } }"), ("elbow.servo.f_c: 0.0205 N*m, now 0.03 N*m (d.ic:4)",)
+        with_entry("servos { elbow { f_c = 0.03 N*m; } }"), ("elbow.servo.f_c: 0.0205 N*m -> 0.03 N*m (d.ic:4)",)
     ),
-    "a rate": (with_entry("rates { record = 12.5 Hz; }"), ("rates.record: 25 Hz, now 12.5 Hz",)),
+    "a rate": (with_entry("rates { record = 12.5 Hz; }"), ("rates.record: 25 Hz -> 12.5 Hz",)),
     "a signal": (with_entry("record += [qdd];"), ("record: qdd is new",)),
-    "a metric": (with_entry("metric end = final { of = elbow.q; }"), ("metrics: end is new",)),
-    "the integrator": (with_entry("integrator = rk4;"), ("integrator: modified_euler, now rk4",)),
+    "a metric": (with_entry("metric end = final { of = elbow.q; }"), ("metric end is new",)),
+    "the integrator": (with_entry("integrator = rk4;"), ("integrator: modified_euler -> rk4",)),
 }  # fmt: skip
 
 
@@ -136,7 +138,7 @@ def test_another_campaign_is_left_alone(archive: Path, here: Path, what: str) ->
 def test_another_duration_is_another_campaign(archive: Path, here: Path, histories: str) -> None:
     begin(archive, compiled(here), histories=histories)
     said = refused(archive, compiled(here, ("duration = 2 s", "duration = 4 s")), histories=histories)
-    assert " = help: changed since: duration: 2 s, now 4 s\n" in said
+    assert " = help: changed since: duration: 2 s -> 4 s\n" in said
 
 
 KEPT: dict[str, tuple[dict[str, Any], str]] = {

@@ -1,0 +1,200 @@
+"""What differs between the decks of two archives: which files, their lines, and the names that stand for values.
+
+The texts are an archive's, so nothing here reads a file, runs a deck or follows an `#include`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import Any
+
+from met.frozen import frozen
+
+CONTEXT = 1
+"""Lines that are shown about a difference."""
+
+MOST_COMPARED = 4_000
+"""Lines, from the first that differs to the last, that are compared one by one: the time is the square of it."""
+
+LONGEST_VALUE = 60
+"""Characters of a macro's text that are shown."""
+
+MOST_MOVED = 30
+"""Files of either that are looked for under another name."""
+
+OF_ARGUMENTS = "()"
+"""Of the name of a macro that takes some, whose text says little alone."""
+
+ALIKE = 0.5
+"""Share of the lines that a file has with one of another name, so that it is taken for the same."""
+
+
+@frozen
+class Deck:
+    """A file of the decks that differs. said: how, in words; lines: what differs as a unified difference, without its
+    heads; none where a file is new or gone, or too long to be compared."""
+
+    said: str
+    lines: tuple[str, ...] = ()
+
+
+@frozen
+class Decks:
+    """What differs between two archives' files.
+
+    files   each that differs
+    names   `let`s and macros whose text differs, in words
+    fresh   lines that only the second has, by file and number: where a value's place is one of them, it was written so
+    stale   the same of the first
+    known   names of all files
+    """
+
+    files: tuple[Deck, ...]
+    names: tuple[str, ...]
+    fresh: frozenset[tuple[str, int]]
+    stale: frozenset[tuple[str, int]]
+    known: frozenset[str]
+
+
+def decks(a: Mapping[str, str], b: Mapping[str, str]) -> Decks:
+    """a, b: texts of the files by name, the deck itself first."""
+    pairs = _pairs(a, b)
+    found, fresh, stale = [], set(), set()
+    for old, new in pairs:
+        before, now = a.get(old, "").splitlines(), b.get(new, "").splitlines()
+        known = set(before), set(now)
+        fresh |= {(new, number) for number, line in enumerate(now, 1) if line not in known[0]}
+        stale |= {(old, number) for number, line in enumerate(before, 1) if line not in known[1]}
+        if not old or not new:
+            found.append(Deck(f"{old or new} is {'new' if new else 'gone'}: {_lines(len(before) + len(now))}"))
+        elif a[old] != b[new] or PurePosixPath(old).name != PurePosixPath(new).name:
+            name = new if old == new else f"{old}, now {new}"
+            found.append(Deck(f"{name}: {_counted(a[old], b[new])}", tuple(_unified(before, now))))
+    return Decks(tuple(found), tuple(_names(a, b)), frozenset(fresh), frozenset(stale), frozenset((*a, *b)))
+
+
+def _pairs(a: Mapping[str, str], b: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Which file of the one is which of the other, by name; the decks themselves; then by what they have in common.
+    "" where there is none."""
+    pairs = {name: name for name in a if name in b}
+    heads = next(iter(a), ""), next(iter(b), "")
+    if all(heads) and heads[0] not in pairs and heads[1] not in pairs.values():
+        pairs[heads[0]] = heads[1]
+    left = [name for name in a if name not in pairs][:MOST_MOVED]
+    rest = [name for name in b if name not in pairs.values()]
+    lines = [{name: Counter(texts[name].splitlines()) for name in names[:MOST_MOVED]}
+             for texts, names in ((a, left), (b, rest))]  # fmt: skip
+    for name in left:
+        alike = {each: _alike(name, each, lines[0][name], lines[1][each]) for each in rest if each in lines[1]}
+        near = max(alike, key=alike.__getitem__, default="")
+        if near and alike[near] >= ALIKE:
+            pairs[name] = near
+            rest.remove(near)
+    return [(name, pairs.get(name, "")) for name in a] + [("", name) for name in rest]
+
+
+def _alike(old: str, new: str, before: Counter[str], now: Counter[str]) -> float:
+    """The share of lines that two files have in common; more than all where they have one name in other folders."""
+    share = (before & now).total() / max(before.total(), now.total(), 1)
+    return share + float(PurePosixPath(old).name == PurePosixPath(new).name)
+
+
+def _counted(before: str, after: str) -> str:
+    """How many lines are others."""
+    old, now = (Counter(text.splitlines(keepends=True)) for text in (before, after))
+    new, gone = (now - old).total(), (old - now).total()
+    said = f"{_lines(new)} new, {gone} gone" if new or gone else "its lines are in another order"
+    return said if before != after else "the same lines"
+
+
+def _lines(count: int) -> str:
+    return f"{count:,} line{'s' if count != 1 else ''}"
+
+
+def _unified(before: Sequence[str], now: Sequence[str]) -> Iterator[str]:
+    """The lines that differ, each with a mark, under the numbers of the lines: as `diff -U1` has them."""
+    first = next((i for i, (x, y) in enumerate(zip(before, now, strict=False)) if x != y), min(len(before), len(now)))
+    most = min(len(before), len(now)) - first
+    backwards = zip(reversed(before), reversed(now), strict=False)
+    last = next((i for i, (x, y) in enumerate(backwards) if x != y or i >= most), most)
+    start, end = max(0, first - CONTEXT), max(0, last - CONTEXT)
+    parts = [lines[start : len(lines) - end] for lines in (before, now)]
+    if max(map(len, parts)) > MOST_COMPARED:
+        return
+    matcher = difflib.SequenceMatcher(None, *parts)
+    for group in matcher.get_grouped_opcodes(CONTEXT):
+        (_, i1, _, j1, _), (_, _, i2, _, j2) = group[0], group[-1]
+        yield f"@@ -{start + i1 + 1},{i2 - i1} +{start + j1 + 1},{j2 - j1} @@"
+        for kind, i, i_end, j, j_end in group:
+            if kind == "equal":
+                yield from (f" {line}" for line in parts[0][i:i_end])
+            else:
+                yield from (f"-{line}" for line in parts[0][i:i_end])
+                yield from (f"+{line}" for line in parts[1][j:j_end])
+
+
+# Names that stand for values
+
+
+def _names(a: Mapping[str, str], b: Mapping[str, str]) -> Iterator[str]:
+    """`let`s and macros of both decks that have another text; one that is written several times is left to its lines.
+    """
+    old, new = (_written(files) for files in (a, b))
+    for key in dict.fromkeys([*old, *new]):
+        before, now = old.get(key, []), new.get(key, [])
+        if [text for text, _ in before] == [text for text, _ in now] or max(len(before), len(now)) > 1:
+            continue
+        (text, at), kind = (now or before)[0], "new" if now else "gone"
+        if not before or not now:
+            yield f"{key} is {kind}{'' if key.endswith(OF_ARGUMENTS) else _of(text)} ({at})"
+        elif max(len(before[0][0]), len(text)) > LONGEST_VALUE or key.endswith(OF_ARGUMENTS):
+            yield f"{key} is another ({at})"
+        else:
+            yield f"{key}: {before[0][0] or 'nothing'} -> {text or 'nothing'} ({at})"
+
+
+def _of(text: str) -> str:
+    return f": {text}" if 0 < len(text) <= LONGEST_VALUE else ""
+
+
+def _written(files: Mapping[str, str]) -> dict[str, list[tuple[str, str]]]:
+    """What is written of each name, and where: `let reach`, `#define PAIRS`, `#define ROD()`."""
+    found: dict[str, list[tuple[str, str]]] = {}
+    for name, text in files.items():
+        if name.rstrip(">").endswith(".ic"):
+            for line, key, written in sorted(_of_file(name, text)):
+                found.setdefault(key, []).append((written, f"{name}:{line}"))
+    return found
+
+
+def _of_file(name: str, text: str) -> Iterator[tuple[int, str, str]]:
+    """The line, the name and the text of each `let` and macro."""
+    from ic.text.lexer import Text, Token, logical_lines
+
+    let: list[Token] | None = None
+    for line in logical_lines(Text(name, text)):
+        words = [at for at, each in enumerate(line) if each.text.strip()]
+        if words and line[words[0]].text == "#":
+            if len(words) > 2 and line[words[1]].text == "define":
+                at = words[2]
+                takes = OF_ARGUMENTS if line[at + 1].text == "(" else ""
+                yield line[at].line, f"#define {line[at].text}{takes}", _text(line[at + 1 :])
+            continue
+        for each in line:
+            if each.text == "let":
+                let = []
+            elif each.text == ";" and let is not None:
+                head = [at for at, token in enumerate(let) if token.text.strip()][:2]
+                if len(head) == 2 and let[head[1]].text == "=":
+                    yield let[head[0]].line, f"let {let[head[0]].text}", _text(let[head[1] + 1 :])
+                let = None
+            elif let is not None:
+                let.append(each)
+
+
+def _text(tokens: Sequence[Any]) -> str:
+    """As it was written, without comments and with single spaces."""
+    return " ".join("".join(each.text for each in tokens).split())
