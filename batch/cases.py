@@ -90,8 +90,8 @@ def table_across(pool: Pool, by: By, most: int | None = SHOWN_CASES) -> list[str
 
 def title(group: Group, most: int | None = None, *, by: By | None = None) -> str:
     """What the order of the table is, or of its beginning."""
-    if by is not None and ordering.has(group, by):
-        return by.title
+    if (found := ordering.within(group, by)) is not None:
+        return found.title
     outcomes = requirements.outcomes(group)
     number = f"{min(most, group.count)} " if most is not None else ""
     if (group.values("status") != 0).any() or (outcomes != 1).any():

@@ -19,13 +19,14 @@ if TYPE_CHECKING:
 @click.option("--run", "experiments", multiple=True, metavar="NAME", help="Only this run or sweep of the archive.")
 @click.option("--case", metavar="ID", help="All about this case alone: the beginning of its id, or '#0'.")
 @click.option("--all-cases", is_flag=True, help="All rows of the table of cases, not the first 20 alone.")
-@click.option("--sort", metavar="NAME", help="Cases by this metric or varied parameter, smallest first.")
-@click.option("--reverse", is_flag=True, help="Of --sort: largest first.")
+@click.option("--sort", multiple=True, metavar="NAME", help="Cases by this metric or varied parameter, smallest first; "
+              "NAME:largest: largest first. Repeated: equal ones by the next.")  # fmt: skip
+@click.option("--reverse", is_flag=True, help="Of --sort: largest first, by each NAME that does not say it itself.")
 @click.option("--no-plots", is_flag=True, help="Numbers only.")
 @format_option
 def show(
     archive: str, signals: tuple[str, ...], experiments: tuple[str, ...], case: str | None, all_cases: bool,
-    sort: str | None, reverse: bool, no_plots: bool, form: str,
+    sort: tuple[str, ...], reverse: bool, no_plots: bool, form: str,
 ) -> int:  # fmt: skip
     """Show what an archive holds: what was run, how it went, metrics, requirements, and SIGNALs (`qd`, `elbow.q`).
 
@@ -35,15 +36,15 @@ def show(
     import sys
 
     from batch.archive.read import ArchiveFile
-    from batch.ordering import By
+    from batch.ordering import by_names
     from batch.show import as_json, show
     from met.render import wants_colour
 
-    if reverse and sort is None:
+    if reverse and not sort:
         raise click.UsageError("--reverse is of --sort, and nothing is sorted: `--sort NAME`")
-    if case is not None and sort is not None:
+    if case is not None and sort:
         raise click.UsageError("--sort is of many cases, and --case of one")
-    by = None if sort is None else By(sort, reverse)
+    by = by_names(sort, reverse=reverse)
     with ArchiveFile(archive) as file:
         if form == "json":
             click.echo(as_json(file, experiments, case=case, all_cases=all_cases, by=by))

@@ -1,4 +1,4 @@
-"""In which order cases are listed: worst first, or by a metric or what is varied."""
+"""In which order cases are listed: worst first, or by metrics and what is varied, one after the other."""
 
 from __future__ import annotations
 
@@ -17,16 +17,47 @@ ROLES: tuple[Role, ...] = ("metric", "parameter", "repeat")
 """Of columns that cases may be listed by."""
 
 
+WAYS = {"smallest": False, "largest": True}
+"""What may be said of a name, `settle:largest`, and whether the largest comes first then."""
+
+
 @frozen
 class By:
-    """A metric's name, a varied parameter's path, or `repeat`; smallest first, unless `largest`."""
+    """A metric's name, a varied parameter's path, or `repeat`; smallest first, unless `largest`. then: by what those
+    are listed that are equal in this."""
 
     name: str
     largest: bool = False
+    then: tuple[By, ...] = ()
+
+    @property
+    def keys(self) -> tuple[By, ...]:
+        return (self, *self.then)
 
     @property
     def title(self) -> str:
-        return f"cases by {self.name}, {'largest' if self.largest else 'smallest'} first:"
+        words = [f"{key.name}, {'largest' if key.largest else 'smallest'} first" for key in self.keys]
+        return f"cases by {'; then by '.join(words)}:"
+
+
+def by_names(names: Sequence[str], *, reverse: bool = False) -> By | None:
+    """In the order of these names, each `NAME`, `NAME:largest` or `NAME:smallest`; None where there are none. reverse:
+    largest first of all that do not say it themselves. Raises Problem E329."""
+    keys = []
+    for each in names:
+        name, colon, way = each.partition(":")
+        if colon and way not in WAYS:
+            helps = f"`--sort {name}:largest`, or `--sort {name}:smallest`"
+            raise Problem(error("E329", f"`{each}` is no order of cases: `{way}` is neither largest nor smallest",
+                                help=helps))  # fmt: skip
+        if name in [key.name for key in keys]:
+            raise Problem(error("E329", f"cases are to be listed by `{name}` twice", help="leave one out"))
+        keys.append(By(name, WAYS[way] if colon else reverse))
+    return _joined(keys)
+
+
+def _joined(keys: Sequence[By]) -> By | None:
+    return By(keys[0].name, keys[0].largest, tuple(keys[1:])) if keys else None
 
 
 def check(groups: Sequence[Group], by: By | None) -> None:
@@ -34,9 +65,10 @@ def check(groups: Sequence[Group], by: By | None) -> None:
     if by is None:
         return
     known = list(dict.fromkeys(name for group in groups for name in _names(group)))
-    if by.name not in known:
-        helps = [*did_you_mean(by.name, known), *([f"here: {', '.join(known)}"] if known else [])]
-        raise Problem(error("E329", f"no metric or varied parameter `{by.name}`", help=helps))
+    for key in by.keys:
+        if key.name not in known:
+            helps = [*did_you_mean(key.name, known), *([f"here: {', '.join(known)}"] if known else [])]
+            raise Problem(error("E329", f"no metric or varied parameter `{key.name}`", help=helps))
     if all(len(pool.cases) == 1 for pool in pools(groups)):
         names = " and ".join(f"`{group.name}`" for group in groups)
         verb = "is" if len(groups) == 1 else "are each"
@@ -47,20 +79,29 @@ def check(groups: Sequence[Group], by: By | None) -> None:
 def positions(group: Group, by: By | None = None) -> np.ndarray:
     """Positions of the cases, by what is asked for, equal ones and those that have no value, which are last, in the
     order of the case table; worst first where nothing is asked for, or the group does not have it."""
-    if by is None or not has(group, by):
+    by = within(group, by)
+    if by is None:
         return worst_first(group)
-    values = np.asarray(group.values(_names(group)[by.name]), np.float64)
-    return np.argsort(-values if by.largest else values, kind="stable")
+    names = _names(group)
+    return _order(by, [np.asarray(group.values(names[key.name]), np.float64) for key in by.keys])
 
 
 def across(pool: Pool, by: By) -> np.ndarray:
     """The same of the cases of all structures of a sweep, one of which has it: those of others are last."""
-    [column] = [column for column in pool.columns if column.label == by.name and column.role in ROLES]
-    return np.argsort(-column.values if by.largest else column.values, kind="stable")
+    columns = {column.label: column for column in pool.columns if column.role in ROLES}
+    return _order(by, [columns[key.name].values for key in by.keys])
 
 
-def has(group: Group, by: By) -> bool:
-    return by.name in _names(group)
+def _order(by: By, values: Sequence[np.ndarray]) -> np.ndarray:
+    """Places by the first of the values, equal ones by the next; not-a-number last in each."""
+    keys = [-each if key.largest else each for key, each in zip(by.keys, values, strict=True)]
+    return np.lexsort(keys[::-1])
+
+
+def within(group: Group, by: By | None) -> By | None:
+    """Of what is asked for what the group has; None where it has none of it."""
+    names = _names(group) if by is not None else {}
+    return _joined([key for key in by.keys if key.name in names]) if by is not None else None
 
 
 def worst_first(group: Group) -> np.ndarray:

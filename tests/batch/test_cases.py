@@ -12,7 +12,7 @@ import pytest
 import batch
 from batch import cases, ordering
 from batch.archive.read import ArchiveFile
-from batch.ordering import By
+from batch.ordering import By, by_names
 from batch.running import run_and_tell
 from batch.show import as_json, show
 from met import keys, plan_file
@@ -96,6 +96,51 @@ def test_by_a_metric_or_what_is_varied_and_without_a_value_last(
     assert order[len(known) :] == ([] if name == "gearbox.kp" else [7, 12])
     title = lines.index(f"cases by {name}, {'largest' if largest else 'smallest'} first:")
     assert [line.split()[0] for line in lines[title + 3 :]] == [f"#{row}" for row in order]
+
+
+def test_by_several_each_its_own_way_round(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from met import run
+
+    monkeypatch.setattr(run, "run", partial(plans.answer, fails=frozenset({7, 12})))
+    with made(plans.gains(20)) as file:
+        group = file.groups[0]
+        by = by_names(["links.lower.mass", "volts:smallest"], reverse=True)
+        assert by is not None
+        order = ordering.positions(group, by).tolist()
+        mass, volts = group.values("links.lower.mass"), group.values("volts")
+        text = show(file, plots=False, by=by, all_cases=True)
+    assert len(set(mass.tolist())) < 20, "no two are equal in the first"
+    rank = np.where(np.isnan(volts), np.inf, volts)
+    assert order == sorted(range(20), key=lambda row: (-mass[row], rank[row], row))
+    assert "cases by links.lower.mass, largest first; then by volts, smallest first:\n" in text
+
+
+def test_which_way_round_is_said_of_each_or_of_all() -> None:
+    def ways(*names: str, reverse: bool = False) -> list[bool]:
+        found = by_names(names, reverse=reverse)
+        return [] if found is None else [key.largest for key in found.keys]
+
+    assert ways() == []
+    assert ways("a", "b:largest", "c:smallest") == [False, True, False]
+    assert ways("a", "b:largest", "c:smallest", reverse=True) == [True, True, False]
+
+
+@pytest.mark.parametrize(("words", "said"), [
+    (["volts:up"], "error[E329]: `volts:up` is no order of cases: `up` is neither largest nor smallest\n"
+                   " = help: `--sort volts:largest`, or `--sort volts:smallest`\n\n1 error\n"),
+    (["volts", "volts:largest"], "error[E329]: cases are to be listed by `volts` twice\n"
+                                 " = help: leave one out\n\n1 error\n"),
+    (["volts", "vlts"], "error[E329]: no metric or varied parameter `vlts`\n"
+                        " = help: did you mean `volts`?\n"
+                        " = help: here: settle, volts, gearbox.kp, links.lower.mass\n\n1 error\n"),
+])  # fmt: skip
+def test_an_order_that_is_none_is_told(
+    here: Path, engine: None, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    batch.run(plans.plan(plans.gains(3)), output="a.h5")
+    capsys.readouterr()
+    assert main(["show", "a.h5", *(each for word in words for each in ("--sort", word))]) == 2
+    assert capsys.readouterr().err == said
 
 
 def test_what_cases_cannot_be_listed_by_is_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
