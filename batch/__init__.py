@@ -63,7 +63,7 @@ def run(
     plan          what `ic.compile` gives, or a plan file (`met plan DECK -o p.json`)
     output        the archive; None: in the current folder, called as `met run` calls it: the deck's name, and those of
                   the runs and sweeps that were asked for (`two_link.gains.h5`). FILE.mcap, FILE.csv or FILE.parquet:
-                  FILE.h5, and an export of it
+                  FILE.h5, and an export of it: a table of a sweep has its metrics, or the histories that are asked for
     experiments   names of runs and sweeps; None: all of the plan's
     cases         rows of the case table, `"#7"`, or the beginnings of case_ids; None: all
     histories     whose signals are kept, one word or several: "default" (all while the archive stays below 1 GiB, else
@@ -90,10 +90,10 @@ def run(
         _plan(plan), output=archive, experiments=experiments, cases=cases, histories=histories, float32=float32
     )
     if target is not None:
-        straight.check(campaign, target)
+        straight.check(campaign, target, histories=histories != "default")
     performed = perform(campaign, executor=chosen, fresh=fresh, max_failures=max_failures, progress=progress)
     if target is not None:
-        straight.written(campaign, target)
+        straight.written(campaign, target, histories=histories != "default")
     return look(campaign.output, (*campaign.notes, *performed.notes))
 
 

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Literal
+
 import click
 
 from met.cli import YES, format_option, loudness_options
+
+if TYPE_CHECKING:
+    from batch.export import Rows
 
 
 @click.command(short_help="Write an archive for Foxglove (MCAP), or as a table (CSV, Parquet).")
@@ -15,31 +20,39 @@ from met.cli import YES, format_option, loudness_options
 @click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'; "
               "may be repeated, and the first is then drawn solid.")  # fmt: skip
 @click.option("--signals", multiple=True, metavar="LIST", help="Only these: qd,elbow.q; may be repeated [all].")
+@click.option("--histories/--metrics", "histories", default=None, help="Of a table, a row an instant or a row a case "
+              "[a case of a sweep; an instant where --case or --signals is given].")  # fmt: skip
+@click.option("--units", type=click.Choice(["si", "deck"]), default="si", show_default=True, help="Of a table: metrics "
+              "and what is varied in SI, or as the deck writes them; signals are in SI.")  # fmt: skip
 @click.option("--layout", is_flag=True, help="Also write how Foxglove shows it, in FILE.layout.json.")
 @click.option("--force", is_flag=True, help="Write over a file that is there, whatever it is.")
 @format_option
 @loudness_options
 def export(
     archive: str, output: str | None, kind: str | None, runs: tuple[str, ...], cases: tuple[str, ...],
-    signals: tuple[str, ...], layout: bool, force: bool, form: str, quiet: bool, verbose: bool,
+    signals: tuple[str, ...], histories: bool | None, units: Literal["si", "deck"], layout: bool, force: bool,
+    form: str, quiet: bool, verbose: bool,
 ) -> int:  # fmt: skip
-    """Write the histories of an archive for other tools.
+    """Write an archive for other tools.
 
     MCAP opens in Foxglove and Lichtblick: the arm moves in 3D, without a URDF, beside its signals and what was said of
-    it; several cases are overlaid. CSV and Parquet are tables of the signals.
+    it; several cases are overlaid. CSV and Parquet are tables: of a sweep a row a case, with what is varied and its
+    metrics; of a run, or with --histories, a row an instant, with the signals.
     """
     import json
 
-    from batch.export import export
+    from batch.export import export, what
     from ic.printing.columns import size
 
     names = [name.strip() for each in signals for name in each.split(",") if name.strip()]
-    done = export(archive, output, form=kind, runs=runs, cases=cases, signals=names, layout=layout, force=force)
+    table: Rows | None = None if histories is None else "histories" if histories else "metrics"
+    done = export(archive, output, form=kind, runs=runs, cases=cases, signals=names, table=table, units=units,
+                  layout=layout, force=force)  # fmt: skip
     written = [path for path in (done.path, done.layout) if path is not None]
     if form == "json":
-        told = {"written": [str(path) for path in written], "cases": done.cases, "rows": done.rows}
+        told = {"written": [str(path) for path in written], "cases": done.cases, "rows": done.rows, "table": done.table}
         click.echo(json.dumps(told, indent=1))
     elif not quiet:
         for path in written:
-            click.echo(f"{path}  ({size(path.stat().st_size)})")
+            click.echo(f"{path}  ({size(path.stat().st_size)}){what(done) if path == done.path else ''}")
     return YES

@@ -72,8 +72,9 @@ def run_and_tell(
             source, names, everything, archive, cases, histories, float32, defines, include_dirs, settings,
             quiet or json,
         )  # fmt: skip
+    of_histories = bool(histories)
     if target is not None:
-        check(campaign, target)
+        check(campaign, target, histories=of_histories)
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
     try:
         performed = perform(
@@ -101,14 +102,14 @@ def run_and_tell(
     exported = None
     refused: list[str] = []
     try:
-        exported = None if target is None else written(campaign, target)
+        exported = None if target is None else written(campaign, target, histories=of_histories)
     except Problem as problem:
         refused = [each.message for each in problem.diagnostics]
         if not json:
             _complain(problem, json)
     except KeyboardInterrupt as interrupt:
         if target is not None:
-            say(f"{campaign.output} is whole; {target} is missing: `{later(campaign, target)}`")
+            say(f"{campaign.output} is whole; {target} is missing: `{later(campaign, target, histories=of_histories)}`")
         raise type(interrupt) from None
     ok = all(summary.ok for summary in summaries)
     missing = target is not None and exported is None
@@ -124,7 +125,7 @@ def run_and_tell(
         for line in _compared(again, unlike):
             say(line)
         if missing and target is not None:
-            say(f"exit 1: {target} is missing: `{later(campaign, target)}`")
+            say(f"exit 1: {target} is missing: `{later(campaign, target, histories=of_histories)}`")
     return ok and not unlike and not missing
 
 

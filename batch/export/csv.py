@@ -1,23 +1,24 @@
-"""Histories as CSV: a row an instant, a column a number, the cases one under the other.
+"""Tables as CSV: of cases, a row each; of histories, a row an instant, the cases one under the other.
 
     # MET 0.1.0: gains of two_link.ic
-    # units: 1,s,rad,rad,rad/s
-    case,time,shoulder.q,elbow.q,shoulder.qd
+    # units: 1,V*s/rad,s,rad,rad,rad/s
+    case,gearbox.kp,time,shoulder.q,elbow.q,shoulder.qd
 
 `#` begins a comment (`pandas.read_csv(path, comment="#")`). Numbers are written so that reading gives the same bits.
-The columns `run` and `case` are there where there are several.
+Of histories the column `run` is there where there are several, `case` and what is varied where there are cases.
 """
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from batch.archive.read import ArchiveFile
+from batch.export.cases import Table, of_varied, value_of, varied
 from batch.export.output import whole
 from batch.export.picking import Case, Column
 from met.version import VERSION
@@ -33,26 +34,59 @@ def united(cases: Sequence[Case]) -> list[Column]:
     return list({column.path: column for case in cases for column in case.columns}.values())
 
 
-def write(file: ArchiveFile, cases: Sequence[Case], output: Path) -> int:
-    """Write the cases; the number of rows. Raises Problem E305."""
-    columns, several = united(cases), len(cases) > 1
+def write(file: ArchiveFile, cases: Sequence[Case], output: Path, *, deck: bool = False) -> int:
+    """Write the cases' histories; the number of rows. deck: what is varied in the deck's units. Raises Problem E305."""
+    columns, groups = united(cases), list({case.group.name: case.group for case in cases}.values())
     runs = dict.fromkeys(case.asked for case in cases)
-    heads = [*([("run", "")] if len(runs) > 1 else []), *([("case", "1")] if several else []), ("time", "s")]
+    fields = [of_varied(variable, deck=deck) for variable in varied(groups)]
+    numbered = len(cases) > 1 or bool(fields)
+    heads = [*([("run", "")] if len(runs) > 1 else []), *([("case", "1")] if numbered else [])]
+    heads += [*((field.name, field.unit) for field in fields), ("time", "s")]
     heads += [(column.path, column.unit) for column in columns]
+    with whole(output) as sink:
+        sink.write(memoryview(_head(file, runs, heads)))
+        for case in cases:
+            begin: list[object] = [case.asked] if len(runs) > 1 else []
+            begin += [case.number] if numbered else []
+            begin += [value_of(field, case.group, case.position) for field in fields]
+            cells = [texts(case.time), *_cells(case, columns)]
+            same = _line(begin)
+            rows = "".join(",".join((*same, *row)) + "\n" for row in zip(*cells, strict=True))
+            sink.write(memoryview(rows.encode("utf-8", "replace")))
+            sink.check()
+    return sum(len(case.time) for case in cases)
+
+
+def write_cases(file: ArchiveFile, table: Table, output: Path) -> int:
+    """Write a table of cases; the number of rows. Raises Problem E305."""
+    with whole(output) as sink:
+        sink.write(memoryview(_head(file, table.runs, [(field.name, field.unit) for field in table.fields])))
+        for columns in table.blocks():
+            rows = "".join(",".join(_line(row)) + "\n" for row in zip(*columns, strict=True))
+            sink.write(memoryview(rows.encode("utf-8", "replace")))
+            sink.check()
+    return table.count
+
+
+def _head(file: ArchiveFile, runs: Iterable[str], heads: Sequence[tuple[str, str]]) -> bytes:
+    """What it is of, the columns' units, their names."""
     head = io.StringIO()
     lines = csv.writer(head, lineterminator="\n")
     head.write(f"# MET {VERSION}: {', '.join(runs)} of {' '.join(file.deck.split())}\n# units: ")
     lines.writerow([unit for _, unit in heads])
     lines.writerow([name for name, _ in heads])
-    with whole(output) as sink:
-        sink.write(memoryview(head.getvalue().encode("utf-8", "replace")))
-        for case in cases:
-            begin = [*([case.asked] if len(runs) > 1 else []), *([str(case.number)] if several else [])]
-            cells = [texts(case.time), *_cells(case, columns)]
-            rows = "".join(",".join((*begin, *row)) + "\n" for row in zip(*cells, strict=True))
-            sink.write(memoryview(rows.encode()))
-            sink.check()
-    return sum(len(case.time) for case in cases)
+    return head.getvalue().encode("utf-8", "replace")
+
+
+def _line(cells: Sequence[object]) -> list[str]:
+    """Cells as CSV has them: numbers as `repr` writes them, words in quotes where they need some."""
+    return [_quoted(cell) if isinstance(cell, str) else "" if cell is None else repr(cell) for cell in cells]
+
+
+def _quoted(text: str) -> str:
+    if not set(text) & set(',"\r\n'):
+        return text
+    return '"' + text.replace('"', '""') + '"'
 
 
 def _cells(case: Case, columns: Sequence[Column]) -> list[list[str]]:

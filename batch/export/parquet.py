@@ -1,4 +1,4 @@
-"""Histories as a Parquet file: the table of batch/export/csv.py, with what is varied as columns too.
+"""Tables as a Parquet file: those of batch/export/csv.py, with the run and the case in each.
 
 A column's metadata has its `unit` and `about`; the file's has `met.export`, as JSON. It is made by pyarrow, which is
 too large (170 MB) to come with MET unasked.
@@ -7,14 +7,15 @@ too large (170 MB) to come with MET unasked.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Stored
+from batch.archive.read import ArchiveFile
 from batch.archive.sink import temporary_of
+from batch.export.cases import Field, Table, of_varied, value_of, varied
 from batch.export.csv import united
 from batch.export.output import whole
 from batch.export.picking import Case, Column
@@ -40,18 +41,18 @@ def own(path: Path) -> bool:
         return ABOUT.encode() in file.read()
 
 
-def write(file: ArchiveFile, cases: Sequence[Case], output: Path) -> int:
-    """Write the cases; the number of rows. Raises Problem E305, and E373 where there is no pyarrow."""
+def write(file: ArchiveFile, cases: Sequence[Case], output: Path, *, deck: bool = False) -> int:
+    """Write the cases' histories; the number of rows. deck: what is varied in the deck's units. Raises Problem E305,
+    and E373 where there is no pyarrow."""
     arrow, parquet = pyarrow_here()
     columns, runs = united(cases), dict.fromkeys(case.asked for case in cases)
-    told = {"archive": file.path.name, "deck": file.deck, "runs": list(runs), "met": VERSION,
-            "provenance": file.provenance}  # fmt: skip
-    schema = _schema(arrow, cases, columns).with_metadata({ABOUT: json.dumps(told)})
+    fields = [of_varied(variable, deck=deck) for variable in varied([case.group for case in _one_each(cases)])]
+    schema = _schema(arrow, cases, fields, columns).with_metadata(_about(file, runs))
     with whole(output) as sink:
         with parquet.ParquetWriter(str(temporary_of(output)), schema, compression="zstd") as writer:
             waiting: list[Any] = []
             for case in cases:
-                waiting.append(_table(arrow, schema, case))
+                waiting.append(_table(arrow, schema, case, fields))
                 if sum(map(len, waiting)) >= GROUP_ROWS:
                     writer.write_table(arrow.concat_tables(waiting))
                     waiting = []
@@ -59,6 +60,27 @@ def write(file: ArchiveFile, cases: Sequence[Case], output: Path) -> int:
                 writer.write_table(arrow.concat_tables(waiting))
         sink.check()
     return sum(len(case.time) for case in cases)
+
+
+def write_cases(file: ArchiveFile, table: Table, output: Path) -> int:
+    """Write a table of cases; the number of rows. Raises Problem E305, E373."""
+    arrow, parquet = pyarrow_here()
+    kinds = {"float": arrow.float64(), "int": arrow.int64(), "str": arrow.string()}
+    fields = [arrow.field(each.name, kinds[each.kind], metadata=_told(each.unit, each.about)) for each in table.fields]
+    schema = arrow.schema(fields).with_metadata(_about(file, table.runs))
+    with whole(output) as sink:
+        with parquet.ParquetWriter(str(temporary_of(output)), schema, compression="zstd") as writer:
+            for columns in table.blocks():
+                arrays = [arrow.array(values, field.type) for values, field in zip(columns, schema, strict=True)]
+                writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
+        sink.check()
+    return table.count
+
+
+def _about(file: ArchiveFile, runs: Iterable[str]) -> dict[str, str]:
+    told = {"archive": file.path.name, "deck": file.deck, "runs": list(runs), "met": VERSION,
+            "provenance": file.provenance}  # fmt: skip
+    return {ABOUT: json.dumps(told)}
 
 
 def pyarrow_here() -> tuple[Any, Any]:
@@ -72,14 +94,14 @@ def pyarrow_here() -> tuple[Any, Any]:
     return pyarrow, parquet
 
 
-def _schema(arrow: Any, cases: Sequence[Case], columns: Sequence[Column]) -> Any:
+def _schema(arrow: Any, cases: Sequence[Case], alike: Sequence[Field], columns: Sequence[Column]) -> Any:
     """Names, types and units: what case it is, what is varied, the time, the signals."""
     double = {column.path for case in _one_each(cases) for column in case.columns
               if case.signal(column.variable).dtype != np.float32}  # fmt: skip
     fields = [arrow.field("run", arrow.string()), arrow.field("case", arrow.int64())]
-    for variable in _varied(cases):
-        kind = arrow.string() if variable.role == "choice" else arrow.float64()
-        fields.append(arrow.field(_apart(variable), kind, metadata=_told(variable.unit, variable.long_name)))
+    for each in alike:
+        kind = arrow.string() if each.kind == "str" else arrow.float64()
+        fields.append(arrow.field(each.name, kind, metadata=_told(each.unit, each.about)))
     fields.append(arrow.field("time", arrow.float64(), metadata=_told("s", "time")))
     for column in columns:
         kind = arrow.float64() if column.path in double else arrow.float32()
@@ -96,23 +118,11 @@ def _one_each(cases: Sequence[Case]) -> list[Case]:
     return list({case.group.name: case for case in cases}.values())
 
 
-def _varied(cases: Sequence[Case]) -> list[Stored]:
-    """What is varied in any of the cases: choices of structure, then numbers."""
-    groups = [case.group for case in _one_each(cases)]
-    found = {v.name: v for role in ("choice", "coordinate") for group in groups for v in group.role(role)}
-    return list(found.values())
-
-
-def _apart(variable: Stored) -> str:
-    """The column of what is varied: a deck may vary a `let run`."""
-    return f"coordinates.{variable.name}" if variable.name == "run" else variable.name
-
-
-def _table(arrow: Any, schema: Any, case: Case) -> Any:
+def _table(arrow: Any, schema: Any, case: Case, fields: Sequence[Field]) -> Any:
     """A case as a table; nulls in columns that it does not have."""
     rows = len(case.time)
     alike: dict[str, Any] = {"run": case.asked, "case": case.number}
-    alike |= {_apart(v): case.group.at(v.name, [case.position])[0] for v in _varied([case])}
+    alike |= {field.name: value_of(field, case.group, case.position) for field in fields}
     arrays: dict[str, Any] = {"time": case.time}
     signals = {name: case.signal(name) for name in dict.fromkeys(column.variable for column in case.columns)}
     arrays |= {column.path: signals[column.variable][:, column.place] for column in case.columns}
@@ -121,7 +131,5 @@ def _table(arrow: Any, schema: Any, case: Case) -> Any:
         if field.name in arrays:
             made.append(arrow.array(arrays[field.name], field.type))
         else:
-            value = alike.get(field.name)
-            value = value.item() if isinstance(value, np.generic) else value
-            made.append(arrow.repeat(arrow.scalar(value, field.type), rows))
+            made.append(arrow.repeat(arrow.scalar(alike.get(field.name), field.type), rows))
     return arrow.Table.from_arrays(made, schema=schema)

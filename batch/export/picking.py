@@ -81,11 +81,11 @@ def pick(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: 
     if cases:
         order = {key: at for at, key in enumerate(wanted)}
         return sorted(found, key=lambda case: order[case.group, case.position])
-    ranks = {group.name: _rank(names, group) for group in groups}
+    ranks = {group.name: rank(names, group) for group in groups}
     return sorted(found, key=lambda case: (ranks[case.group.name], case.number))
 
 
-def _rank(names: Sequence[str], group: Group) -> int:
+def rank(names: Sequence[str], group: Group) -> int:
     """The first of the names by which a group is asked for."""
     return min(at for at, name in enumerate(names) if name in (group.name, group.sweep))
 

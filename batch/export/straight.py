@@ -20,11 +20,12 @@ def parted(output: str | os.PathLike[str] | None) -> tuple[Path | None, Path | N
     return target.with_suffix(".h5"), target
 
 
-def check(campaign: Campaign, target: Path) -> None:
-    """Refuse what could not be exported in the end, before anything runs. Raises Problem E305, E323, E370-E374."""
+def check(campaign: Campaign, target: Path, *, histories: bool) -> None:
+    """Refuse what could not be exported in the end, before anything runs. histories: whether they were asked for.
+    Raises Problem E305, E323, E370-E374."""
     form = target.suffix.lower().removeprefix(".")
     kept = sum(len(part.kept) for part in campaign.parts)
-    if not kept and not campaign.keep.later:
+    if not kept and not campaign.keep.later and (form == "mcap" or histories or campaign.cases == 1):
         message = f"{target} would be empty: no histories are kept"
         helps = ["`--histories all` keeps them, and `--histories '#0'` those of a case"]
         if not any(part.experiment.structure.record for part in campaign.parts):
@@ -60,16 +61,16 @@ def _placed(campaign: Campaign, target: Path) -> None:
             raise Problem(error("E370", message, help=helps))
 
 
-def later(campaign: Campaign, target: Path) -> str:
+def later(campaign: Campaign, target: Path, *, histories: bool) -> str:
     """The command that makes the export of an archive that is whole."""
     runs = _asked(campaign)
     named = "".join(f" --run {quoted(name)}" for name in runs) if len(runs) > 1 else ""
-    return f"met export {quoted(campaign.output)}{named} -o {quoted(target)}"
+    return f"met export {quoted(campaign.output)}{named}{' --histories' * histories} -o {quoted(target)}"
 
 
-def written(campaign: Campaign, target: Path) -> Exported:
+def written(campaign: Campaign, target: Path, *, histories: bool) -> Exported:
     """Export all that was run. Raises Problem."""
-    return export(campaign.output, target, runs=_asked(campaign))
+    return export(campaign.output, target, runs=_asked(campaign), table="histories" if histories else None)
 
 
 def _asked(campaign: Campaign) -> list[str]:

@@ -29,7 +29,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_commands_write_what_they_name(folder: Path) -> None:
     written = {path.name for path in folder.iterdir() if path.name.startswith("lengths")}
-    assert written == {"lengths.mcap", "lengths.layout.json", "lengths.csv", "lengths.parquet"}
+    assert written == {"lengths.mcap", "lengths.layout.json", "lengths.csv", "lengths.qd.csv", "lengths.parquet"}
 
 
 def test_the_topics_of_the_table_are_in_the_file(folder: Path) -> None:
@@ -41,13 +41,14 @@ def test_the_topics_of_the_table_are_in_the_file(folder: Path) -> None:
     assert {topic.partition("/")[0] for topic in read.entities("/case0/scene")} == {"case0"}
 
 
-def test_the_table_begins_as_it_is_shown(folder: Path) -> None:
-    [shown] = re.findall(r"```text\n(.*?)```", PAGE, re.DOTALL)
-    assert (folder / "lengths.csv").read_text(encoding="utf-8").startswith(shown)
+def test_the_tables_begin_as_they_are_shown(folder: Path) -> None:
+    shown = re.findall(r"```text\n(.*?)\n```", PAGE, re.DOTALL)
+    for name, text in zip(("lengths.csv", "lengths.qd.csv"), shown, strict=True):
+        assert (folder / name).read_text(encoding="utf-8").startswith(text), name
 
 
 def test_the_options_are_those_of_the_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["export", "--help"]) == cli.YES
     told = set(re.findall(r"--[a-z]+", capsys.readouterr().out))
-    named = set(re.findall(r"^\| `(--[a-z]+)", PAGE, re.MULTILINE))
+    named = set(re.findall(r"^\| `(--[a-z]+)", PAGE, re.MULTILINE)) | {"--metrics"}
     assert named <= told and told - named == {"--output", "--to", "--format", "--quiet", "--verbose", "--help"}

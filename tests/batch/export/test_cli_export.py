@@ -32,7 +32,7 @@ def test_it_says_what_it_wrote(archive: Path, capsys: pytest.CaptureFixture[str]
 def test_programs_are_told_in_json(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["export", "a.h5", "-o", "b.csv", "--run", "gains", "--case", "#2", "--case", "#0", "--format", "json"]
     assert cli.main(words) == cli.YES
-    assert json.loads(capsys.readouterr().out) == {"written": ["b.csv"], "cases": 2, "rows": 102}
+    assert json.loads(capsys.readouterr().out) == {"written": ["b.csv"], "cases": 2, "rows": 102, "table": "histories"}
     assert cli.main(words) == cli.BAD_INPUT
     assert json.loads(capsys.readouterr().out)["diagnostics"][0]["code"] == "E374"
     assert cli.main([*words, "--force"]) == cli.YES

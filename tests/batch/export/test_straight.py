@@ -123,7 +123,7 @@ def test_an_archive_of_another_format_is_refused(here: Path) -> None:
 def test_an_export_that_fails_leaves_the_archive_and_says_so(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def full(*_: object) -> None:
+    def full(*_: object, **options: object) -> None:
         raise Problem(error("E305", "cannot write x.mcap: no space left on device"))
 
     monkeypatch.setattr(running, "written", full)

@@ -1,0 +1,154 @@
+"""A table of cases: a row a case, with what is varied in it, how it ended, its metrics and whether it meets each
+requirement. `csv` and `parquet` write it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from batch import requirements
+from batch.archive.read import ArchiveFile, Group, Stored
+from batch.export.picking import rank
+from batch.failures import STATUS
+from batch.show import chosen, picked
+from met.frozen import frozen
+
+BLOCK = 10_000
+"""Rows that are in memory at once."""
+
+OUTCOME = {1: "met", 0: "missed"}
+
+
+@frozen
+class Field:
+    """A column of the table. kind: "float", "int" or "str"; variable: the archive's, which some structures may lack;
+    scale: what SI values are divided by."""
+
+    name: str
+    unit: str
+    about: str
+    kind: str
+    variable: str = ""
+    scale: float = 1.0
+
+
+@frozen
+class Table:
+    """The cases of runs and sweeps. places: the group and the position in it of each row."""
+
+    runs: tuple[str, ...]
+    groups: tuple[Group, ...]
+    places: tuple[np.ndarray, np.ndarray]
+    fields: tuple[Field, ...]
+
+    @property
+    def count(self) -> int:
+        return len(self.places[0])
+
+    def blocks(self) -> Iterator[list[list[object]]]:
+        """All rows, some at a time: of each field its values, None where a cell is empty."""
+        for first in range(0, self.count, BLOCK):
+            group_of, positions = (each[first : first + BLOCK] for each in self.places)
+            yield [self._column(field, group_of, positions) for field in self.fields]
+
+    def _column(self, field: Field, group_of: np.ndarray, positions: np.ndarray) -> list[object]:
+        out: list[object] = [None] * len(positions)
+        for number in np.unique(group_of).tolist():
+            here = np.flatnonzero(group_of == number)
+            values = _values(self.groups[number], field, positions[here])
+            for place, value in zip(here.tolist(), values, strict=True):
+                out[place] = value
+        return out
+
+
+def table(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], *, deck: bool = False) -> Table:
+    """The cases of these runs and sweeps (none: of the first), in the order they are asked for (none: all, by their
+    positions). deck: numbers in the deck's units. Raises Problem E325, E328."""
+    names = tuple(runs) or (file.groups[0].sweep or file.groups[0].name,)
+    groups = chosen(file, names)
+    if cases:
+        wanted = dict.fromkeys((groups.index(group), int(position or 0))
+                               for case in cases for group, position in picked(file, names, case))  # fmt: skip
+        group_of, positions = np.array(list(wanted), np.int64).T
+    else:
+        group_of = np.repeat(np.arange(len(groups)), [group.count for group in groups])
+        positions = np.concatenate([np.arange(group.count) for group in groups])
+        numbers = np.concatenate([group.values("case") for group in groups])
+        ranks = np.array([rank(names, group) for group in groups])[group_of]
+        order = np.lexsort((numbers, ranks))
+        group_of, positions = group_of[order], positions[order]
+    asked = tuple(dict.fromkeys(group.sweep or group.name for group in groups))
+    return Table(asked, groups, (group_of, positions), tuple(_fields(groups, deck=deck)))
+
+
+def _fields(groups: Sequence[Group], *, deck: bool) -> Iterator[Field]:
+    """Which case it is, what is varied, how it ended, metrics, requirements."""
+    if len({group.sweep or group.name for group in groups}) > 1:
+        yield Field("run", "", "run or sweep", "str")
+    yield Field("case", "1", "position in the case table", "int", "case")
+    yield Field("case_id", "", "name of the case", "str", "case_id")
+    for variable in varied(groups):
+        yield of_varied(variable, deck=deck)
+    if any("repeat" in group.variables and group.values("repeat").any() for group in groups):
+        yield Field("repeat", "1", "repeat of noise", "int", "repeat")
+    yield Field("status", "", "how it ended", "str", "status")
+    for variable in {v.name: v for group in groups for v in group.role("metric")}.values():
+        unit, scale = in_unit(variable, deck=deck)
+        yield Field(variable.name, unit, variable.long_name, "float", variable.name, scale)
+    for text in dict.fromkeys(text for group in groups for text in requirements.texts(group)):
+        yield Field(f"require {text}", "", "met, missed, or empty where that is not known", "str")
+    if any((group.values("status") != 0).any() for group in groups):
+        yield Field("cause", "", "why it failed", "str", "cause")
+
+
+def varied(groups: Sequence[Group]) -> list[Stored]:
+    """What is varied in any of the groups: choices of structure, then numbers."""
+    return list({v.name: v for role in ("choice", "coordinate") for group in groups for v in group.role(role)}.values())
+
+
+def of_varied(variable: Stored, *, deck: bool) -> Field:
+    """The column of what is varied: a deck may vary a `let run`."""
+    name = f"coordinates.{variable.name}" if variable.name == "run" else variable.name
+    if variable.role == "choice":
+        return Field(name, "", variable.long_name, "str", variable.name)
+    unit, scale = in_unit(variable, deck=deck)
+    return Field(name, unit, variable.long_name, "float", variable.name, scale)
+
+
+def in_unit(variable: Stored, *, deck: bool) -> tuple[str, float]:
+    """The unit of a variable, and what its SI values are divided by. deck: as the deck writes it, where it does."""
+    if not deck or "deck_unit" not in variable.attributes:
+        return variable.unit, 1.0
+    return str(variable.attributes["deck_unit"]), float(variable.attributes.get("deck_scale", 1.0))
+
+
+def value_of(field: Field, group: Group, position: int) -> object:
+    """What is varied, in one case; None where its structure does not have it."""
+    [value] = _values(group, field, np.array([position]))
+    return value
+
+
+def _values(group: Group, field: Field, positions: np.ndarray) -> list[object]:
+    if field.name == "run" and not field.variable:
+        return [group.sweep or group.name] * len(positions)
+    if not field.variable:
+        return _outcomes(group, field.name.removeprefix("require "), positions)
+    if field.variable not in group.variables:
+        return [None] * len(positions)
+    values = group.at(field.variable, positions)
+    if field.variable == "status":
+        return [STATUS.get(int(value), "unknown") for value in values]
+    if field.kind == "str":
+        return [str(value) for value in values]
+    if field.kind == "int":
+        return [int(value) for value in values]
+    return [float(value) for value in (values / field.scale if field.scale != 1.0 else values)]
+
+
+def _outcomes(group: Group, text: str, positions: np.ndarray) -> list[object]:
+    texts = requirements.texts(group)
+    if text not in texts:
+        return [None] * len(positions)
+    found = requirements.outcomes(group, positions)[:, texts.index(text)]
+    return [OUTCOME.get(int(value)) for value in found]
