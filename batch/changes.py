@@ -143,8 +143,7 @@ def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
             yield f"{path} is varied now: {_span(new[path])}"
         elif path not in new:
             yield f"{path} is not varied any more"
-        elif not np.array_equal(*((each[path].values if ordered else distinct(each[path].values))
-                                  for each in (old, new)), equal_nan=True):  # fmt: skip
+        elif not _same(old[path].values, new[path].values, ordered):
             spans = [_span(each[path]) for each in (old, new)]
             yield f"{path}: {' -> '.join(spans)}" if spans[0] != spans[1] else f"{path}: other values ({spans[1]})"
     for name in ("seed", "seeds"):
@@ -153,6 +152,12 @@ def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
     if not np.array_equal(_array(before.repeats), _array(now.repeats)):
         repeats = [len(distinct(_array(each.repeats))) for each in (before, now)]
         yield f"repeats: {repeats[0]} -> {repeats[1]}" if repeats[0] != repeats[1] else "repeats: in other cases"
+
+
+def _same(before: np.ndarray, now: np.ndarray, ordered: bool) -> bool:
+    """Whether a parameter takes the same values; ordered: in the same cases of the table."""
+    one, two = (before, now) if ordered else (distinct(before), distinct(now))
+    return np.array_equal(one, two, equal_nan=True)
 
 
 def _count(cases: Cases) -> str:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import glob
 from typing import Any
 
 import click
 
 from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
+
+MOST_NAMED = 5
+"""Archives that are named where none was meant."""
 
 
 class Seconds(click.ParamType):
@@ -132,6 +136,7 @@ def status(where: str, form: str) -> int:
     import time
     from pathlib import Path
 
+    from batch.output import quoted
     from batch.status import found, here, lines, report, whole
     from met.diagnostic import Problem, error
 
@@ -140,10 +145,13 @@ def status(where: str, form: str) -> int:
         if (data := whole(Path(where.removesuffix(".campaign")))) is None:
             others = here(Path(where).parent)
             helps = ["campaigns here: " + ", ".join(others)] if others else []
+            archives = sorted(path.name for path in Path(where).parent.glob(f"{glob.escape(Path(where).stem)}*.h5"))
+            if archives and not where.endswith(".h5"):
+                helps.append("a status is of an archive; here: " + ", ".join(map(quoted, archives[:MOST_NAMED])))
             helps.append("`met run DECK -o ARCHIVE` begins one; its folder is beside the archive until that is whole")
             raise Problem(error("E359", f"no campaign fills {where}", help=helps))
         since = f", begun at {data['began']}" if data["began"] != "unknown" else ""
-        said = f"{data['archive']} is whole: {data['cases']:,} cases{since}"
+        said = f"{data['archive']} is whole: {data['cases']:,} case{'s' if data['cases'] != 1 else ''}{since}"
         click.echo(json.dumps(data, indent=1) if form == "json" else said)
         return YES
     data = report(folder, time.time())

@@ -43,7 +43,7 @@ class By:
 def by_names(names: Sequence[str], *, reverse: bool = False) -> By | None:
     """In the order of these names, each `NAME`, `NAME:largest` or `NAME:smallest`; None where there are none. reverse:
     largest first of all that do not say it themselves. Raises Problem E329."""
-    keys = []
+    keys: list[By] = []
     for each in names:
         name, colon, way = each.partition(":")
         if colon and way not in WAYS:

@@ -336,7 +336,8 @@ def check_signature(path: Path) -> None:
             begins = file.read(len(SIGNATURE))
     except OSError as reason:
         why = (reason.strerror or str(reason)).lower()
-        helps = "archives are written by `met run DECK`" if isinstance(reason, FileNotFoundError) else ()
+        deck = f"`met run {path}` writes one" if path.suffix == ".ic" else "archives are written by `met run DECK`"
+        helps = deck if isinstance(reason, FileNotFoundError) else ()
         raise Problem(error("E301", f"cannot read the archive {path}: {why}", help=helps)) from reason
     if begins != SIGNATURE:
         helps = f"`met run {path}` runs a deck into one" if path.suffix == ".ic" else ()

@@ -446,10 +446,12 @@ def _incomparable(a: Group, b: Group, name: str, role: str) -> str:
         if name not in other.variables or other.variables[name].role != role:
             return f"only in {mine.path}"
     one, two = a.variables[name], b.variables[name]
+    if role == "signal" and a.joints(one) != b.joints(two):
+        return f"of {', '.join(a.joints(one)) or 'no joint'}, now of {', '.join(b.joints(two)) or 'no joint'}"
     if (one.unit, one.units_by_joint) != (two.unit, two.units_by_joint):
         return f"in {one.unit or 'units by joint'} and in {two.unit or 'units by joint'}"
-    if role == "signal" and (a.joints(one), a.components(one)) != (b.joints(two), b.components(two)):
-        return "of other joints or components"
+    if role == "signal" and a.components(one) != b.components(two):
+        return "of other components"
     return ""
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -72,7 +72,9 @@ def decks(a: Mapping[str, str], b: Mapping[str, str]) -> Decks:
             found.append(Deck(f"{old or new} is {'new' if new else 'gone'}: {_lines(len(before) + len(now))}"))
         elif a[old] != b[new] or PurePosixPath(old).name != PurePosixPath(new).name:
             name = new if old == new else f"{old}, now {new}"
-            found.append(Deck(f"{name}: {_counted(a[old], b[new])}", tuple(_unified(before, now))))
+            other = PurePosixPath(old).name != PurePosixPath(new).name and _share(before, now) < ALIKE
+            lines = () if other else tuple(_unified(before, now))
+            found.append(Deck(f"{name}: {'another deck, ' if other else ''}{_counted(a[old], b[new])}", lines))
     return Decks(tuple(found), tuple(_names(a, b)), frozenset(fresh), frozenset(stale), frozenset((*a, *b)))
 
 
@@ -98,8 +100,13 @@ def _pairs(a: Mapping[str, str], b: Mapping[str, str]) -> list[tuple[str, str]]:
 
 def _alike(old: str, new: str, before: Counter[str], now: Counter[str]) -> float:
     """The share of lines that two files have in common; more than all where they have one name in other folders."""
-    share = (before & now).total() / max(before.total(), now.total(), 1)
-    return share + float(PurePosixPath(old).name == PurePosixPath(new).name)
+    return _share(before, now) + float(PurePosixPath(old).name == PurePosixPath(new).name)
+
+
+def _share(before: Iterable[str], now: Iterable[str]) -> float:
+    """The share of the longer one's lines that both have."""
+    lines = Counter(before), Counter(now)
+    return (lines[0] & lines[1]).total() / max(lines[0].total(), lines[1].total(), 1)
 
 
 def _counted(before: str, after: str) -> str:
@@ -121,10 +128,10 @@ def _unified(before: Sequence[str], now: Sequence[str]) -> Iterator[str]:
     backwards = zip(reversed(before), reversed(now), strict=False)
     last = next((i for i, (x, y) in enumerate(backwards) if x != y or i >= most), most)
     start, end = max(0, first - CONTEXT), max(0, last - CONTEXT)
-    parts = [lines[start : len(lines) - end] for lines in (before, now)]
+    parts = [list(lines[start : len(lines) - end]) for lines in (before, now)]
     if max(map(len, parts)) > MOST_COMPARED:
         return
-    matcher = difflib.SequenceMatcher(None, *parts)
+    matcher = difflib.SequenceMatcher(None, parts[0], parts[1])
     for group in matcher.get_grouped_opcodes(CONTEXT):
         (_, i1, _, j1, _), (_, _, i2, _, j2) = group[0], group[-1]
         yield f"@@ -{start + i1 + 1},{i2 - i1} +{start + j1 + 1},{j2 - j1} @@"

@@ -205,6 +205,11 @@ def test_a_file_under_another_name_or_in_another_folder_is_the_same_file() -> No
     assert not same.files
 
 
+def test_another_deck_is_counted_alone() -> None:
+    [found] = decks({"one.ic": "a\nb\nc\n"}, {"two.ic": "d\ne\n"}).files
+    assert (found.said, found.lines) == ("one.ic, now two.ic: another deck, 2 lines new, 3 gone", ())
+
+
 @pytest.mark.parametrize(("before", "now", "lines"), [
     ("", "a\n", ["@@ -1,0 +1,1 @@", "+a"]),
     ("a\n", "a\na\n", ["@@ -1,1 +1,2 @@", " a", "+a"]),
