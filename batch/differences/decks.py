@@ -19,6 +19,9 @@ CONTEXT = 1
 MOST_COMPARED = 4_000
 """Lines, from the first that differs to the last, that are compared one by one: the time is the square of it."""
 
+LONGEST_READ = 1_000_000
+"""Characters of a file that is searched for names: longer ones take seconds, and nobody wrote them."""
+
 LONGEST_VALUE = 60
 """Characters of a macro's text that are shown."""
 
@@ -149,7 +152,8 @@ def _unified(before: Sequence[str], now: Sequence[str]) -> Iterator[str]:
 def _names(a: Mapping[str, str], b: Mapping[str, str]) -> Iterator[str]:
     """`let`s and macros of both decks that have another text; one that is written several times is left to its lines.
     """
-    old, new = (_written(files) for files in (a, b))
+    old, new = (_written({name: text for name, text in mine.items() if other.get(name) != text})
+                for mine, other in ((a, b), (b, a)))  # fmt: skip
     for key in dict.fromkeys([*old, *new]):
         before, now = old.get(key, []), new.get(key, [])
         if [text for text, _ in before] == [text for text, _ in now] or max(len(before), len(now)) > 1:
@@ -171,7 +175,7 @@ def _written(files: Mapping[str, str]) -> dict[str, list[tuple[str, str]]]:
     """What is written of each name, and where: `let reach`, `#define PAIRS`, `#define ROD()`."""
     found: dict[str, list[tuple[str, str]]] = {}
     for name, text in files.items():
-        if name.rstrip(">").endswith(".ic"):
+        if name.rstrip(">").endswith(".ic") and len(text) <= LONGEST_READ:
             for line, key, written in sorted(_of_file(name, text)):
                 found.setdefault(key, []).append((written, f"{name}:{line}"))
     return found
