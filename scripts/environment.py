@@ -1,9 +1,10 @@
 """Makes or mends MET's environment, .venv in the checkout; started by scripts/environment, which finds the Python.
 
-    environment.py ROOT PYTHON run|test
+    environment.py ROOT PYTHON run|test|all
 
-The environment holds exactly what a lock file names (requirements.lock; for `test` requirements-test.lock, the same
-and more) and MET itself, installed so that the checkout's files are what runs. It is whole or it is not there:
+The environment holds exactly what a lock file names and MET itself, installed so that the checkout's files are what
+runs. Each lock holds all of the one before: requirements.lock for `run`, requirements-test.lock for `test`,
+requirements-all.lock for `all`. The environment is whole or it is not there:
 
     .venv/met/                    made first: this environment is ours, and may be taken away again
     .venv/met/made                the checkout's path and the Python it was made with
@@ -25,7 +26,9 @@ import sys
 from pathlib import Path
 
 VERSION = ".".join(map(str, sys.version_info[:3]))
-LOCKS = {"run": "requirements.lock", "test": "requirements-test.lock"}
+# What each purpose installs, the smallest first: an environment made for one serves all before it.
+LOCKS = {"run": "requirements.lock", "test": "requirements-test.lock", "all": "requirements-all.lock"}
+ADDED = {"test": "what the tests need", "all": "what `scripts/test --all` needs"}
 NO_CONNECTION = re.compile(
     r"NewConnectionError|NameResolutionError|ConnectTimeout|ProxyError|Network is unreachable|Connection refused"
     r"|name resolution|Name or service not known|Max retries exceeded"
@@ -75,14 +78,15 @@ def make(root: Path, python: str, purpose: str) -> None:
     reason = why_anew(root, venv, python)
     if reason is None and holds(root, marks, purpose):
         return
-    if reason is None and not (marks / LOCKS["test"]).exists():
-        say("adding what the tests need to the environment")
+    if reason is None and not (marks / LOCKS[purpose]).exists():
+        say(f"adding {ADDED[purpose]} to the environment")
         install(root, venv, purpose)
-        mark(root, marks, "test")
+        for smaller in up_to(purpose):
+            mark(root, marks, smaller)
         return
     if venv.exists():
-        say(f"making the environment in .venv anew: {reason or 'requirements-test.lock has changed'}")
-        purpose = "test" if (marks / LOCKS["test"]).exists() else purpose
+        say(f"making the environment in .venv anew: {reason or f'{LOCKS[purpose]} has changed'}")
+        purpose = max(purpose, made_for(marks), key=list(LOCKS).index)
     else:
         say(f"making the environment in .venv with Python {VERSION} (once, a minute or so)")
     clear(venv)
@@ -95,10 +99,20 @@ def make(root: Path, python: str, purpose: str) -> None:
         marks / "log",
         "cannot install MET itself",
     )
-    if purpose == "test":
-        mark(root, marks, "test")
-    mark(root, marks, "run")
+    for smaller in reversed(up_to(purpose)):
+        mark(root, marks, smaller)
     say("the environment is ready")
+
+
+def up_to(purpose: str) -> list[str]:
+    """The purposes that an environment made for `purpose` serves, the smallest first."""
+    purposes = list(LOCKS)
+    return purposes[: purposes.index(purpose) + 1]
+
+
+def made_for(marks: Path) -> str:
+    """The largest purpose that the environment was once made for, whatever has become of its lock since."""
+    return next((purpose for purpose in reversed(LOCKS) if (marks / LOCKS[purpose]).exists()), "run")
 
 
 def why_anew(root: Path, venv: Path, python: str) -> str | None:
@@ -115,9 +129,27 @@ def why_anew(root: Path, venv: Path, python: str) -> str | None:
         return "requirements.lock has changed"
     if os.environ.get("MET_PYTHON") and made_with != python:
         return f"MET_PYTHON is now {python}, it was {made_with}"
-    if not os.access(venv / "bin" / "python", os.X_OK):
+    return why_not_started(venv / "bin" / "python", made_with)
+
+
+def why_not_started(python: Path, made_with: str) -> str | None:
+    """Why the environment's Python does not start; None where it does.
+
+    Raises Refusal where it is there and this user may not run it: the environment is another user's, and whole.
+    """
+    try:
+        python.stat()
+        if os.access(python, os.X_OK):
+            return None
+    except PermissionError:
+        pass
+    except OSError:
         return f"its Python, {made_with}, is gone"
-    return None
+    raise Refusal(
+        f"the environment in {python.parents[1]} was made with {made_with}, which you may not run: another user's "
+        f"Python. Use a checkout of your own, or have this one's owner name a Python that all may run, once: "
+        f"MET_PYTHON=/usr/bin/python3 scripts/met --version"
+    )
 
 
 def holds(root: Path, marks: Path, purpose: str) -> bool:

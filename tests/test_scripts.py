@@ -16,8 +16,8 @@ from tempfile import mkdtemp
 import pytest
 
 ROOT = Path(__file__).parents[1]
-LOCKS = ("requirements.lock", "requirements-test.lock")
-TOOLS = ("sh", "bash", "cmp", "readlink", "dirname", "cat", "uname", "env")
+LOCKS = ("requirements.lock", "requirements-test.lock", "requirements-all.lock")
+TOOLS = ("sh", "bash", "readlink", "dirname", "cat", "uname", "env")
 
 
 @pytest.fixture
@@ -220,6 +220,34 @@ def test_a_read_only_checkout_is_refused_in_one_line(checkout: Path) -> None:
             f"met: error: cannot make the environment in {checkout}/.venv: Permission denied; it needs a checkout that "
             "you may write to, with 1 GB free"
         ],
+    )
+
+
+def test_a_python_that_another_user_may_not_run_is_refused_in_one_line(checkout: Path, tmp_path: Path) -> None:
+    """As for a second user of a checkout whose environment is made of a Python in its owner's closed home."""
+    make_ready(checkout)
+    shutil.copy(ROOT / "scripts" / "environment", checkout / "scripts")
+    closed = tmp_path / "closed"
+    closed.mkdir()
+    program(closed / "python3", "#!/bin/sh\n")
+    (checkout / ".venv" / "bin" / "python").unlink()
+    (checkout / ".venv" / "bin" / "python").symlink_to(closed / "python3")
+    (checkout / ".venv" / "met" / "made").write_text(f"{checkout}\n{closed}/python3\n")
+    closed.chmod(0o000)
+    done = subprocess.run(
+        [checkout / "scripts" / "met"],
+        capture_output=True,
+        text=True,
+        cwd="/",
+        env={"PATH": f"{Path(_any_users_python()).parent}:/usr/bin:/bin", "HOME": "/"},
+        user=65534 if os.geteuid() == 0 else None,
+    )
+    closed.chmod(0o755)
+    assert (done.returncode, done.stderr) == (
+        2,
+        f"met: error: the environment in {checkout}/.venv was made with {closed}/python3, which you may not run: "
+        "another user's Python. Use a checkout of your own, or have this one's owner name a Python that all may run, "
+        "once: MET_PYTHON=/usr/bin/python3 scripts/met --version\n",
     )
 
 

@@ -19,7 +19,7 @@ from tests.batch import plans
 
 pytestmark = pytest.mark.usefixtures("engine")
 
-ENGINES = ("h5netcdf", "netcdf4")
+ENGINES = ("h5netcdf", pytest.param("netcdf4", marks=pytest.mark.oracle))
 
 
 def opened(path: Path, engine: str) -> Any:

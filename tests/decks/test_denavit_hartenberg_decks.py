@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import ic
@@ -16,6 +15,9 @@ from met.dynamics.kinematics import link_motions
 from met.plan import Experiment
 from met.program.machine import Machine
 from tests.oracles import denavit_hartenberg as dh
+from tests.oracles.package import Package
+
+pin = Package("pinocchio")
 
 SEED = 560
 
@@ -48,6 +50,7 @@ def passive_puma(folder: Path, q: np.ndarray, qd: np.ndarray) -> Experiment:
     return ic.compile(folder / "deck.ic", select=["states"]).experiments[0]
 
 
+@pytest.mark.oracle
 def test_the_puma_falls_as_pinocchio_built_from_the_published_tables(tmp_path: Path) -> None:
     rng = np.random.default_rng(SEED)
     q, qd = rng.uniform(-2.5, 2.5, (8, 6)), rng.uniform(-1.0, 1.0, (8, 6))

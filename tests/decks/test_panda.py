@@ -6,12 +6,15 @@ import re
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
+import pytest
 
 import ic
 from met import run as engine
 from met.plan import Experiment
+from tests.oracles.package import Package
 from tests.oracles.panda_pinocchio import FRANKA_GRAVITY_READY, READY, follow, panda
+
+pin = Package("pinocchio")
 
 DEG = np.pi / 180.0
 JOINTS = tuple(f"joint{i}" for i in range(1, 8))
@@ -37,6 +40,7 @@ def zipped(what: str, values: np.ndarray, unit: str) -> str:
     return "".join(f"initial.{j}.{what} = {v} {unit}; " for j, v in zip(JOINTS, values.T.tolist(), strict=True))
 
 
+@pytest.mark.oracle
 def test_accelerations_are_those_of_pinocchio_built_from_the_published_tables(tmp_path):
     seed = 20190401
     random = np.random.default_rng(seed)
@@ -56,6 +60,7 @@ def test_accelerations_are_those_of_pinocchio_built_from_the_published_tables(tm
     np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-9 * np.abs(expected).max(), err_msg=f"{seed=}")
 
 
+@pytest.mark.oracle
 def test_holding_the_ready_pose_takes_the_gravity_torques_of_pinocchio_and_of_frankas_own_model(tmp_path):
     servos = "".join(
         f"{j} = panda_{j} {{ f_c = 0 N*m;  command = position({v!r} rad); }}"
@@ -77,6 +82,7 @@ def test_holding_the_ready_pose_takes_the_gravity_torques_of_pinocchio_and_of_fr
     np.testing.assert_allclose(tau, FRANKA_GRAVITY_READY, atol=0.1)
 
 
+@pytest.mark.oracle
 def test_the_reach_without_friction_is_that_of_pinocchio_under_the_same_servos(tmp_path):
     away = np.array([45.0, 15.0, -20.0, -90.0, 25.0, 110.0, 10.0]) * DEG
 

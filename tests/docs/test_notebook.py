@@ -14,10 +14,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import nbformat
 import pytest
 
 import ic
+from tests.oracles.package import Package
+
+nbformat = Package("nbformat")
+
+pytestmark = pytest.mark.oracle
 
 DOCS = Path(__file__).parents[2] / "docs"
 NOTEBOOK = DOCS / "campaign.ipynb"

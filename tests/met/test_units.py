@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
-import pint
 import pytest
 
 from met import units
 from met.units import UNITS, Dimension, parse_unit, same, suggest, text
+from tests.oracles.package import Package
+
+pint = Package("pint")
 
 # what pint calls those that it names otherwise
 PINT_NAMES = {"%": "percent", "cycle": "turn", "t": "metric_ton", "um": "micrometer", "us": "microsecond",
@@ -20,6 +22,7 @@ def pint_registry():
     return pint.UnitRegistry()
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize("name", [n for n in UNITS if n not in ("rpm", "cycle", "Hz", "kHz")])
 def test_every_unit_has_the_size_and_dimension_that_pint_gives_it(name, pint_registry):
     quantity = pint_registry.Quantity(1.0, PINT_NAMES.get(name, name)).to_base_units()

@@ -10,11 +10,13 @@ from __future__ import annotations
 import itertools
 import re
 
-import pint
 import pytest
 
 from met.units import UNITS, Dimension, counted, parse_unit, same
 from tests.met.test_units import PINT_NAMES
+from tests.oracles.package import Package
+
+pint = Package("pint")
 
 UNIT = re.compile(r"[A-Za-z]+|%")
 
@@ -56,6 +58,7 @@ def in_pint(registry: pint.UnitRegistry, written: str) -> pint.Quantity:
     return (registry.Quantity(1.0) * registry.parse_expression(named)).to_base_units()
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize("written", WRITTEN)
 def test_a_written_unit_has_pints_size_and_dimension(written: str, registry: pint.UnitRegistry) -> None:
     theirs, mine = in_pint(registry, written), parse_unit(written)
@@ -66,6 +69,7 @@ def test_a_written_unit_has_pints_size_and_dimension(written: str, registry: pin
     assert mine.dimension._replace(rad=0) == Dimension(**known)
 
 
+@pytest.mark.oracle
 def test_one_unit_stands_for_another_where_pint_says_so_and_the_angle_does_not_count(
     registry: pint.UnitRegistry,
 ) -> None:
@@ -78,12 +82,14 @@ def test_one_unit_stands_for_another_where_pint_says_so_and_the_angle_does_not_c
         assert same(*mine) is alike, (a, b)
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize(("a", "b"), WRONG_IN_PINT)
 def test_what_pint_takes_for_one_another_is_told_apart(a: str, b: str, registry: pint.UnitRegistry) -> None:
     assert in_pint(registry, a).dimensionality == in_pint(registry, b).dimensionality
     assert not same(parse_unit(a).dimension, parse_unit(b).dimension)
 
 
+@pytest.mark.oracle
 def test_a_newton_metre_without_its_sign_is_no_unit(registry: pint.UnitRegistry) -> None:
     # pint reads a unit of textiles, kilometres a kilogram
     assert registry.parse_expression("Nm").dimensionality == {"[length]": 1, "[mass]": -1}

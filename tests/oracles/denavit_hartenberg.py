@@ -9,7 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import pinocchio as pin
+
+from tests.oracles.package import Package
+
+pin = Package("pinocchio")
 
 Array = np.ndarray
 Row = tuple[float, float, float, float]

@@ -8,7 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import pinocchio as pin
+
+from tests.oracles.package import Package
+
+pin = Package("pinocchio")
 
 Array = np.ndarray
 

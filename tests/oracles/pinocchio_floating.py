@@ -11,10 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from met.dynamics.tree import Body
+from tests.oracles.package import Package
 from tests.oracles.pinocchio_tree import classical, on_joints
+
+pin = Package("pinocchio")
 
 Array = np.ndarray
 

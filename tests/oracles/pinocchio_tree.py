@@ -9,9 +9,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from met.dynamics.tree import Body
+from tests.oracles.package import Package
+
+pin = Package("pinocchio")
 
 
 def on_joints(arm: Any, wrenches: Mapping[str, tuple[Sequence[float], Sequence[float]]]) -> pin.StdVec_Force:

@@ -10,7 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
+from scipy.spatial.transform import Rotation
+
+from tests.oracles.package import Package
+
+pin = Package("pinocchio")
 
 Array = np.ndarray
 X, Y, Z = np.eye(3)
@@ -66,7 +70,7 @@ def fixed_on(made: pin.Model, mass: float, com: Sequence[float], every_way: floa
 
 
 def turn(axis: Array, angle: float) -> Array:
-    return pin.exp3(axis * angle)
+    return Rotation.from_rotvec(axis * angle).as_matrix()
 
 
 # --- Nguyen and Hughes 1994, as in github.com/vyas-shubham/TraceableRobotModels, SRMS_Canadarm.urdf: for each body the

@@ -9,7 +9,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
+
+from tests.oracles.package import Package
+
+pin = Package("pinocchio")
 
 
 class UrdfPinocchio:

@@ -111,6 +111,7 @@ def test_a_name_of_a_deck_stays_in_its_line(here: Path) -> None:
 # Parquet
 
 
+@pytest.mark.oracle
 @pytest.mark.usefixtures("engine")
 def test_a_parquet_file_holds_the_same_with_units_and_what_is_varied(here: Path) -> None:
     from pyarrow import parquet
@@ -140,6 +141,7 @@ def test_a_parquet_file_holds_the_same_with_units_and_what_is_varied(here: Path)
     }  # fmt: skip
 
 
+@pytest.mark.oracle
 def test_a_parquet_file_of_several_structures_has_nulls_and_their_choices(tmp_path: Path) -> None:
     from pyarrow import parquet
 
@@ -152,6 +154,7 @@ def test_a_parquet_file_of_several_structures_has_nulls_and_their_choices(tmp_pa
     }  # fmt: skip
 
 
+@pytest.mark.oracle
 @pytest.mark.usefixtures("engine")
 def test_many_cases_are_gathered_into_row_groups(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from pyarrow import parquet

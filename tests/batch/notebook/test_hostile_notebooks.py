@@ -167,6 +167,7 @@ def test_the_archive_may_be_told_by_a_path(tmp_path: Path) -> None:
         xarray.testing.assert_identical(lost.met.frames(), data.met.frames())
 
 
+@pytest.mark.oracle
 def test_a_parameter_called_run_is_a_column_of_parquet(tmp_path: Path) -> None:
     from pyarrow import parquet
 

@@ -37,7 +37,7 @@ def test_xarray_is_loaded_by_who_opens_and_not_by_who_imports() -> None:
     subprocess.run([sys.executable, "-W", "error", "-c", script], check=True)
 
 
-@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4", None])
+@pytest.mark.parametrize("engine", ["h5netcdf", pytest.param("netcdf4", marks=pytest.mark.oracle), None])
 def test_what_xarray_opens_alone_has_it_too(archive: Path, data: xarray.Dataset, engine: Any) -> None:
     with xarray.open_dataset(archive, engine=engine) as same:
         chosen = same.met.sel({"gearbox.kp": "0.03 V*s/rad"})

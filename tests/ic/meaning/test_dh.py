@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from ic.meaning.dh import CONVENTIONS, JointFrame
@@ -18,6 +17,9 @@ from met.program.machine import Machine
 from met.trace import Formulas, Graph
 from tests.ic.small_decks import check, experiment, told
 from tests.oracles import denavit_hartenberg as dh
+from tests.oracles.package import Package
+
+pin = Package("pinocchio")
 
 # ruff: noqa: E501 - messages are as wide as they are
 
@@ -142,6 +144,7 @@ def bodies(count: int) -> tuple[dh.Body, ...]:
                  for _ in range(count))  # fmt: skip
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize(("convention", "rows", "kinds"), [table for table in TABLES if "F" not in table.values[2]])
 def test_accelerations_are_those_of_pinocchio_by_the_same_table(
     tmp_path: Path, convention: str, rows: tuple[dh.Row, ...], kinds: str

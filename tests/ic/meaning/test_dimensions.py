@@ -9,11 +9,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pint
 import pytest
 
 from tests.ic.small_decks import check, told
 from tests.met.test_units import PINT_NAMES
+from tests.oracles.package import Package
+
+pint = Package("pint")
 
 DECK = """\
 arm one {
@@ -138,6 +140,7 @@ def test_the_tables_are_large_enough_to_mean_something() -> None:
     assert len(TAKEN) + len(REFUSED) >= 250
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize(("place", "written"), TAKEN)
 def test_a_quantity_of_the_wanted_dimension_is_taken_at_pints_size(
     place: str, written: str, tmp_path: Path, registry: pint.UnitRegistry

@@ -34,6 +34,7 @@ run fall {
 """
 
 
+@pytest.mark.oracle
 def test_a_yoke_without_mass_and_a_point_move_as_in_pinocchio(tmp_path: Path) -> None:
     found = experiment(tmp_path, YOKE, FALL)
     assert [found.parameters[f"links.yoke.inertia.{each}"].value for each in ("xx", "yy", "zz", "xy", "xz", "yz")] == [0.0] * 6

@@ -18,6 +18,8 @@ from tests.oracles import dense
 from tests.oracles.random_tree import RandomArm, random_tree
 from tests.oracles.worst import Worst, relative
 
+pytestmark = pytest.mark.oracle
+
 CASES = 24
 VECTORS = ("q", "qd", "tau", "qdd", "mode", "rotor")
 

@@ -22,6 +22,7 @@ from tests.oracles.worst import Worst, relative
 SEEDS = range(30)
 
 
+@pytest.mark.oracle
 def test_energy_and_momentum_agree_with_pinocchio() -> None:
     kinetic, momentum = Worst("kinetic energy"), Worst("momentum")
     for arm, tree in forest():
@@ -35,6 +36,7 @@ def test_energy_and_momentum_agree_with_pinocchio() -> None:
     momentum.below(CLOSE)
 
 
+@pytest.mark.oracle
 def test_potential_energy_differs_between_places_as_in_pinocchio() -> None:
     # Pinocchio counts links fixed to the base as well: a difference between two places does not.
     worst = Worst("potential energy")

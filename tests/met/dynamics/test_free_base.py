@@ -74,6 +74,7 @@ def whole(solved: Solved) -> np.ndarray:
     return np.concatenate([*solved.base_acceleration, solved.qdd])
 
 
+@pytest.mark.oracle
 def test_accelerations_agree_with_pinocchios_free_flyer() -> None:
     # As a share of the largest of all.
     worst = Worst("free base: accelerations against aba")
@@ -84,6 +85,7 @@ def test_accelerations_agree_with_pinocchios_free_flyer() -> None:
     worst.below(CLOSE)
 
 
+@pytest.mark.oracle
 def test_mixed_modes_agree_with_pinocchios_free_flyer_both_ways() -> None:
     inverse, forward = Worst("free base, mixed modes: forces against rnea"), Worst("free base, mixed modes: aba")
     for arm, tree, base in fleet():
@@ -98,6 +100,7 @@ def test_mixed_modes_agree_with_pinocchios_free_flyer_both_ways() -> None:
     forward.below(CLOSE)
 
 
+@pytest.mark.oracle
 def test_energy_and_momentum_agree_with_pinocchios_free_flyer() -> None:
     kinetic, potential, momentum = (Worst(f"free base: {what}") for what in ("kinetic", "potential", "momentum"))
     for arm, tree, base in fleet():
@@ -129,6 +132,7 @@ def test_momentum_changes_by_the_external_wrench_alone() -> None:
     worst.below(CLOSE)
 
 
+@pytest.mark.oracle
 def test_qdd_given_back_in_acceleration_mode_returns_the_same_motion_and_torques() -> None:
     motion, torques = Worst("free base, qdd given back: accelerations"), Worst("free base, qdd given back: tau")
     for arm, tree, base in fleet():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from met.dynamics.energy import energy
 from met.dynamics.generalized import base_answers
@@ -25,6 +26,7 @@ def test_the_answer_leaves_no_momentum() -> None:
     assert worst < 1e-11  # poses of some metres, inertias over three decades
 
 
+@pytest.mark.oracle
 def test_pinocchio_finds_none_either() -> None:
     worst = 0.0
     for arm, tree, flight in fleet()[::15]:

@@ -17,6 +17,7 @@ from tests.oracles.two_link_lagrange import Rods, mass_matrix, velocity_torque
 from tests.oracles.worst import Worst, relative
 
 
+@pytest.mark.oracle
 def test_qdd_given_back_in_acceleration_mode_returns_the_same_motion_and_torques() -> None:
     motion, torques = Worst("qdd given back: qdd"), Worst("qdd given back: tau")
     for arm, tree in forest():

@@ -23,6 +23,7 @@ SEEDS = range(30)
 CLOSE = 1e-12
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize("seed", SEEDS)
 def test_every_links_own_frame_is_where_pinocchio_has_it(seed: int) -> None:
     arm = random_tree(seed)
@@ -35,6 +36,7 @@ def test_every_links_own_frame_is_where_pinocchio_has_it(seed: int) -> None:
         assert np.allclose(motion.pose.p, p, rtol=CLOSE, atol=20 * CLOSE), f"seed {seed}, {name}"
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize("seed", SEEDS)
 def test_links_and_points_of_them_move_as_in_pinocchio(seed: int) -> None:
     arm = random_tree(seed)
@@ -133,6 +135,7 @@ def test_a_rotation_that_is_not_a_number_has_no_quaternion() -> None:
     assert np.isnan(quaternion(((nan, nan, nan),) * 3)).all()
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_point_of_a_link_accelerates_as_in_pinocchio(seed: int) -> None:
     arm = random_tree(seed)
@@ -146,6 +149,7 @@ def test_a_point_of_a_link_accelerates_as_in_pinocchio(seed: int) -> None:
         assert np.allclose(found, expected, rtol=0.0, atol=1e-13 * (1.0 + np.max(np.abs(expected)))), f"seed {seed}"
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize("seed", SEEDS)
 def test_on_a_base_that_moves_too(seed: int) -> None:
     arm, rng = random_tree(seed), np.random.default_rng(seed)

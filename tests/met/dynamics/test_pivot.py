@@ -48,6 +48,7 @@ def without(bodies: tuple[Body, ...]) -> tuple[Body, ...]:
     return tuple(made)
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize("seed", range(40))
 def test_accelerations_and_frames_are_those_of_pinocchio_for_the_arm_in_two_bodies(seed: int) -> None:
     arm = random_tree(seed)

@@ -16,6 +16,7 @@ from tests.oracles.random_tree import random_tree
 from tests.oracles.worst import Worst, relative
 
 
+@pytest.mark.oracle
 def test_accelerations_agree_with_pinocchio() -> None:
     # As a share of the arm's largest acceleration.
     worst = Worst("qdd against aba")
@@ -25,6 +26,7 @@ def test_accelerations_agree_with_pinocchio() -> None:
     worst.below(CLOSE)
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize("size", [1e-14, 1e-10, 1e-7, 1e-4, 1e-2])
 def test_axes_that_are_almost_parallel_cost_no_digits(size: float) -> None:
     # Their common normal may be a kilometre away. Right angles written with eight digits are the usual case.
@@ -41,6 +43,7 @@ def test_axes_that_are_almost_parallel_cost_no_digits(size: float) -> None:
         assert relative(passed(arm, True).qdd, expected) < CLOSE, f"seed {seed}"
 
 
+@pytest.mark.oracle
 def test_torques_agree_with_pinocchio() -> None:
     worst = Worst("tau against rnea")
     for arm, tree in forest():
@@ -49,6 +52,7 @@ def test_torques_agree_with_pinocchio() -> None:
     worst.below(CLOSE)
 
 
+@pytest.mark.oracle
 def test_mixed_modes_agree_with_pinocchio_both_ways() -> None:
     inverse, forward = Worst("mixed modes: tau against rnea"), Worst("mixed modes: qdd against aba")
     for arm, tree in forest():
@@ -75,6 +79,7 @@ def test_mixed_modes_agree_with_linear_algebra() -> None:
     torques.below(CLOSE)
 
 
+@pytest.mark.oracle
 def test_tau_load_is_tau_less_the_rotors_share() -> None:
     worst = Worst("tau_load against rnea without rotors")
     for arm, tree in forest():
@@ -84,6 +89,7 @@ def test_tau_load_is_tau_less_the_rotors_share() -> None:
     worst.below(CLOSE)
 
 
+@pytest.mark.oracle
 def test_without_velocity_products_only_rates_in_the_equation_of_motion_are_gone() -> None:
     worst = Worst("velocity products off: tau against rnea at rest")
     for arm, tree in forest():
@@ -93,6 +99,7 @@ def test_without_velocity_products_only_rates_in_the_equation_of_motion_are_gone
     worst.below(CLOSE)
 
 
+@pytest.mark.oracle
 def test_reactions_agree_with_pinocchio_in_the_links_own_frames() -> None:
     # Each as a share of its own largest component, moment or force.
     worst, along = Worst("reactions against rnea"), Worst("their component along the joint against tau_load")

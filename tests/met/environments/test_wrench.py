@@ -34,6 +34,7 @@ run it {{
 """
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize("axes", ["world", "link"])
 @pytest.mark.parametrize("link", ["boom", "side", "tool"])
 def test_it_pushes_as_pinocchios_external_force_does(tmp_path: Path, link: str, axes: str) -> None:

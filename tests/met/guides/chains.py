@@ -5,10 +5,12 @@ from __future__ import annotations
 import random
 
 import numpy as np
-import pinocchio as pin
 
 from met.plan import Experiment
+from tests.oracles.package import Package
 from tests.oracles.plan_tree import pinocchio
+
+pin = Package("pinocchio")
 
 Array = np.ndarray
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from met import run as engine
 from tests.ic.small_decks import experiment
 from tests.met.guides.chains import HZ, PATH, Oracle, chain, least_squares, path, wanted
+from tests.oracles.package import Package
+
+pin = Package("pinocchio")
 
 LAW = f"{path()} max_damping = 0.4 m; threshold = 0.6 m; gain = 3 1/s; length = 0.7 m;"
 LENGTH, GAIN, DAMPING, THRESHOLD = 0.7, 3.0, 0.4, 0.6
@@ -31,6 +33,7 @@ def law(oracle: Oracle, q: np.ndarray, t: float, begun: tuple[np.ndarray, np.nda
     return units * least_squares(scaled, shown, task), error, scaled
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize(("guides", "rows"), [
     ("pose", [0, 1, 2, 3, 4, 5]), ("position", [0, 1, 2]), ("xy", [0, 1]), ("xz", [0, 2]), ("yz", [1, 2]),
 ])
@@ -61,6 +64,7 @@ def test_every_tick_is_the_damped_least_squares(
     assert damped > 0 or guides != "pose"
 
 
+@pytest.mark.oracle
 def test_without_damping_the_path_is_kept(tmp_path: Path) -> None:
     text = f"{path()} max_damping = 0 m; threshold = 0 m; gain = 3 1/s;"
     plan = experiment(tmp_path, chain(3, 7, text))
@@ -90,6 +94,7 @@ def test_limits_shorten_the_rates_and_keep_their_direction(tmp_path: Path) -> No
     assert (share < 1.0).sum() > 40
 
 
+@pytest.mark.oracle
 def test_a_position_command_is_the_integral_of_the_rates(tmp_path: Path) -> None:
     # The ideal servo follows a position with its slope, so commands and joints go together up to its lag.
     plan = experiment(tmp_path, chain(5, 7, f"{LAW} loop = open;", command="position"))
@@ -102,6 +107,7 @@ def test_a_position_command_is_the_integral_of_the_rates(tmp_path: Path) -> None
         np.testing.assert_allclose(asked[i + 1] - asked[i], rates / HZ, rtol=0, atol=1e-12)
 
 
+@pytest.mark.oracle
 def test_an_open_loop_goes_by_its_commands_and_shows_where_the_arm_is(tmp_path: Path) -> None:
     text = chain(5, 7, f"{LAW} loop = open;", command="position", bandwidth=3.0)
     plan = experiment(tmp_path, text)
@@ -113,6 +119,7 @@ def test_an_open_loop_goes_by_its_commands_and_shows_where_the_arm_is(tmp_path: 
     assert shown == pytest.approx(np.linalg.norm(begun[1] + far - p), abs=1e-12)
 
 
+@pytest.mark.oracle
 def test_the_path_is_kept_better_in_proportion_to_the_period(tmp_path: Path) -> None:
     # Open loop with a position command: the law's own error, no servo's. Euler's steps of the path's rate, so order 1.
     errors = []

@@ -179,6 +179,7 @@ def compare(
     return run
 
 
+@pytest.mark.oracle
 def test_an_arm_with_a_stuck_joint_a_slide_a_branch_and_fixed_links(tmp_path: Path) -> None:
     names = [*JOINTS, "energy", "momentum", *of_links(DECK)]
     run = compare(experiment(tmp_path, recording(DECK, *names), "masses"), names)
@@ -192,6 +193,7 @@ servo hold   { model = locked;  release = 0.4 s; }
 """  # noqa: E501 - a deck is as wide as it is
 
 
+@pytest.mark.oracle
 def test_joints_that_are_told_their_acceleration(tmp_path: Path) -> None:
     text = DECK.replace("swing = turner;", "swing = follow;  pan = hold;").replace("  pan.qd = 1 rad/s;", "")
     names = [*JOINTS, "energy", "momentum", "links.lamp.position"]
@@ -203,6 +205,7 @@ def test_joints_that_are_told_their_acceleration(tmp_path: Path) -> None:
     assert run.signals["mode"][0, [0, -1]].tolist() == [[1.0, 0.0, 0.0], [1.0, 0.0, 1.0]]
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize("seed", range(8))
 def test_random_decks(tmp_path: Path, seed: int) -> None:
     text = random_deck(seed)

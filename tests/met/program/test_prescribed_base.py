@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import mpmath
 import numpy as np
 import pytest
 
@@ -13,8 +12,11 @@ from met.program import build
 from met.trace.reference import execute
 from tests.ic.small_decks import changed, experiment
 from tests.met.program.free_flyers import ARM
+from tests.oracles.package import Package
 from tests.oracles.pinocchio_floating import Flight, FloatingPinocchio
 from tests.oracles.plan_tree import bodies
+
+mpmath = Package("mpmath")
 
 RUN = """\
 run shaken {
@@ -75,6 +77,7 @@ def motion(t: float) -> tuple[np.ndarray, ...]:
                      for x in (now[1], now[0], w, v, wd, a))
 
 
+@pytest.mark.oracle
 def test_pose_and_velocity_are_those_of_the_courses(tmp_path: Path) -> None:
     run = engine.run(experiment(tmp_path, ARM, RUN))
     for i, t in enumerate(run.time):
@@ -86,6 +89,7 @@ def test_pose_and_velocity_are_those_of_the_courses(tmp_path: Path) -> None:
         np.testing.assert_allclose(_matrix(q), R, rtol=0, atol=1e-15 * 4)
 
 
+@pytest.mark.oracle
 def test_the_arm_upon_it_moves_as_pinocchio_says(tmp_path: Path) -> None:
     # The joints are free, so what Pinocchio's inverse dynamics needs of them for this motion of base and joints is
     # nothing; as a share of what the base's acceleration asks of joints that are held.

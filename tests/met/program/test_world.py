@@ -26,6 +26,7 @@ def world(tmp_path: Path, text: str = TREE) -> ArmWorld:
     return ArmWorld(machine, lambda _: 0.0, machine.tree(lambda _: 0.0), Motion(Q, QD), Base(), time=0.0, begin=0.0)
 
 
+@pytest.mark.oracle
 def test_orientation_and_rate_are_those_of_pinocchio(tmp_path: Path) -> None:
     arm = pinocchio(experiment(tmp_path, TREE, RUN))
     found = world(tmp_path)

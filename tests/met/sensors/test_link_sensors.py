@@ -39,6 +39,7 @@ def matrix(quaternion: np.ndarray) -> np.ndarray:
 # What is felt
 
 
+@pytest.mark.oracle
 def test_on_a_free_arm_it_is_what_pinocchio_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Forward dynamics and kinematics are both Pinocchio's, gravity and a wrench in it; on a link and on the base."""
     known(monkeypatch)
@@ -70,6 +71,7 @@ def test_on_a_free_arm_it_is_what_pinocchio_says(tmp_path: Path, monkeypatch: py
     assert worst < 1e-12, worst
 
 
+@pytest.mark.oracle
 def test_on_a_prescribed_base_its_acceleration_is_felt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     known(monkeypatch)
     more = triad("base", "base", "[0, 0, 0] m") + triad("lower", "lower", f"{list(POINT)} m")

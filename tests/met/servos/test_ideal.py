@@ -75,6 +75,7 @@ def test_a_straight_course_is_followed_exactly_at_any_rate_of_the_servo(
     np.testing.assert_allclose(found["q"][before_end], q(t[before_end]), rtol=0, atol=1e-12)  # 500 steps' rounding
 
 
+@pytest.mark.oracle
 def test_the_torque_is_that_of_inverse_dynamics_with_the_rotors_share(tmp_path: Path) -> None:
     run = f"""\
 servo spin {{ model = ideal; bandwidth = 10 s^-1; rotor = 0.4 kg*m^2; command = rate(sine(amplitude = 1 rad/s, frequency = 1 Hz)); }}

@@ -29,6 +29,7 @@ run it {{
 TURN, RAISE, PUSH, WAG = range(4)
 
 
+@pytest.mark.oracle
 def test_a_locked_joint_stays_and_takes_what_the_arm_puts_on_it(tmp_path: Path) -> None:
     deck = experiment(tmp_path, TREE, RUN)
     found = engine.run(deck).signals

@@ -20,6 +20,8 @@ from tests.ic.small_decks import experiment
 from tests.met.tree_deck import GRAVITY, TREE
 from tests.oracles.plan_tree import pinocchio
 
+pytestmark = pytest.mark.oracle
+
 ROTOR = 0.3
 
 

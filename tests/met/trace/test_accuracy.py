@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
-import mpmath
 import numpy as np
 import pytest
 
 from met import trace
 from met.trace import Formulas, Graph
+from tests.oracles.package import Package
+
+mpmath = Package("mpmath")
 
 QUARTER = np.longdouble(math.pi / 2) + np.longdouble(6.123233995736766e-17)
 SMALLEST, LARGEST, TINY = 5e-324, 1.7976931348623157e308, 2.0**-1022
@@ -95,6 +97,7 @@ def one_number(name):
 # in each limit, 0.5 is the last rounding. exp, log: a polynomial's last sum. sin, cos: what is left of the angle may be
 # a unit off. tan: a quotient of two that are 0.8 off. atan2: a quotient, then two sums. tanh: 1 off in e^x - 1 twice.
 # asin, acos: a leg that is 0.8 off goes into atan2.
+@pytest.mark.oracle
 @pytest.mark.parametrize(("name", "limit"), [
     ("sin", 1.6), ("cos", 1.6), ("tan", 2.4), ("exp", 1.0), ("log", 1.0), ("tanh", 2.7), ("sqrt", 0.501),
     ("atan", 2.0), ("asin", 2.6), ("acos", 2.6),
@@ -106,6 +109,7 @@ def test_functions_are_right_to_a_few_units_over_all_they_take(name, limit):
     assert limit / 2 < error < limit  # below half, the page claims too little or the points miss what is hard
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize("name", ["sin", "cos"])
 def test_sines_of_angles_too_far_out_lose_places_as_the_page_says(name):
     # the number of quarter turns is rounded to a few percent of one there, so the polynomials leave their range
@@ -113,6 +117,7 @@ def test_sines_of_angles_too_far_out_lose_places_as_the_page_says(name):
     assert 10.0 < greatest_error(name, x) < 100.0
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize(("size_y", "size_x"), [
     ((1e-6, 1e6), (1e-6, 1e6)), ((1e-300, 1e300), (1e-300, 1e300)), ((SMALLEST, TINY), (SMALLEST, TINY)),
     ((1e300, LARGEST), (1e300, LARGEST)), ((SMALLEST, 1e-310), (1.0, 1e10)), ((1e-160, 1e-140), (1e140, 1e160)),
