@@ -152,6 +152,7 @@ def test_what_was_measured_is_not_written_over(met_bed: Met) -> None:
     assert len(batch.open("a.h5").case_id) == 3
 
 
+@pytest.mark.compiler
 def test_a_transcript_of_another_run_is_refused_and_then_the_right_one_is_replayed(met_bed: Met) -> None:
     Path("deck.ic").write_text(SWEEP)
     Path("kept").mkdir()
@@ -165,6 +166,7 @@ def test_a_transcript_of_another_run_is_refused_and_then_the_right_one_is_replay
     assert batch.open("b.h5").q.values.tobytes() == batch.open("a.h5").q.values[:1].tobytes()
 
 
+@pytest.mark.compiler
 def test_a_transcript_that_was_broken_off_is_replayed_to_where_it_ends(met_bed: Met) -> None:
     Path("kept").mkdir()
     assert run(met_bed, "firmware", "--lock-step", "--transcripts", "kept")[0] == cli.YES

@@ -29,6 +29,7 @@ def tools() -> None:
                     f"apt-get install {' '.join(packages[name] for name in missing)}")  # fmt: skip
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("name", ["wired", pytest.param("fast", marks=slow)])
 @pytest.mark.parametrize("port", ["firmware", pytest.param("qemu", marks=on_arm)])
 def test_20_s_in_lock_step_have_the_bits_of_the_bed_in_process(tmp_path: Path, name: str, port: str) -> None:

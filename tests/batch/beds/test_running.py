@@ -57,6 +57,7 @@ def bed(met_bed: Callable[..., tuple[int, str, str]]) -> Callable[..., tuple[int
     return lambda *words: met_bed("run", "deck.ic", *words, "--no-picture")
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize(("port", "more"), [("emulated", ()), ("firmware", ("--lock-step",))])
 def test_a_sweep_in_lock_step_has_the_bits_of_the_simulation(
     bed: Callable[..., tuple[int, str, str]], port: str, more: tuple[str, ...]
@@ -87,6 +88,7 @@ def test_it_is_not_driven_again_unless_it_is_asked_for(bed: Callable[..., tuple[
     assert bed("wired", "--port", "emulated", "-o", "a.h5", "--fresh")[0] == cli.YES
 
 
+@pytest.mark.compiler
 def test_a_transcript_is_replayed_to_the_same_bits(bed: Callable[..., tuple[int, str, str]], here: Path) -> None:
     (here / "kept").mkdir()
     words = ("wired", "--port", "firmware", "--lock-step", "--transcripts", "kept", "-o", "a.h5")

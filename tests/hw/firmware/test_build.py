@@ -83,6 +83,7 @@ def test_what_cannot_be_counted_is_said(change: dict[str, object], said: str) ->
     assert str(found.value) == said
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize(
     ("bed", "reason", "remedy"),
     [
@@ -110,6 +111,7 @@ def test_a_deck_s_bed_that_firmware_cannot_count_is_said(bed: str, reason: str, 
     )
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("bed", ["", "inertia = 1e-9 kg*m^2", "tau_max = 1e9 N*m", "f_c = 0 N*m, f_v = 0 N*m*s/rad"])
 def test_a_deck_s_bed_is_counted_however_light_and_free(bed: str) -> None:
     experiment = compiled(deck(bed=f"emulated({bed})"), "on_bench")
@@ -127,6 +129,7 @@ def test_the_guard_has_as_many_bits_as_there_is_room_for() -> None:
         assert largest < 2**60 and (each["bits"] == 24 or largest >= 2**56)
 
 
+@pytest.mark.compiler
 def test_a_tick_is_the_plant_s_period() -> None:
     for kind in ("host", "library", "arm"):
         with pytest.raises(ValueError, match=r"^a tick of 500 Hz is not the plant's period, 0\.001 s$"):
@@ -163,6 +166,7 @@ def test_the_guard_s_numbers_are_those_of_the_shaft() -> None:
 # The cache
 
 
+@pytest.mark.compiler
 def test_what_was_built_is_there_the_next_time(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = build("library", FREE, PLANT)
     made = first.stat().st_mtime_ns
@@ -173,6 +177,7 @@ def test_what_was_built_is_there_the_next_time(fresh: Path, monkeypatch: pytest.
     assert sorted(path.name for path in first.parent.iterdir()) == ["config.c", "libbed.so", "plant.c"]
 
 
+@pytest.mark.compiler
 def test_another_config_plant_kind_or_flag_is_another_build(fresh: Path) -> None:
     paths = {
         build("library", FREE, PLANT),
@@ -184,6 +189,7 @@ def test_another_config_plant_kind_or_flag_is_another_build(fresh: Path) -> None
     assert len(paths) == 5
 
 
+@pytest.mark.compiler
 def test_the_firmware_of_hello_is_that_of_sources_config_and_plant(fresh: Path) -> None:
     def told(config: Config, plant: str) -> bytes:
         with behind_a_terminal(config, plant=plant) as (line, _):
@@ -202,6 +208,7 @@ def test_a_bed_is_called_what_its_config_says(length: int) -> None:
     assert bytes(int(each, 16) for each in told.split(", ")) == name.encode().ljust(16, b"\0")
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("name", ["b", "bench 1", "bench 12"])
 def test_a_bed_of_a_short_name_tells_name_and_firmware(name: str) -> None:
     with behind_a_terminal(replace(FREE, name=name)) as (line, _):
@@ -209,6 +216,7 @@ def test_a_bed_of_a_short_name_tells_name_and_firmware(name: str) -> None:
     assert (found.name, bytes(8) == found.firmware) == (name.encode().ljust(16, b"\0"), False)
 
 
+@pytest.mark.compiler
 def test_the_longest_unused_are_removed(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(building, "LIMIT", 100_000)
     names = [f"bed {k}" for k in range(8)]
@@ -217,6 +225,7 @@ def test_the_longest_unused_are_removed(fresh: Path, monkeypatch: pytest.MonkeyP
     assert 0 < sum(path.exists() for path in paths) < 8
 
 
+@pytest.mark.compiler
 def test_without_a_cache_it_is_built_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("MET_CACHE_DIR", str(tmp_path / "file"))
@@ -254,6 +263,7 @@ def test_the_compiler_that_cc_names_is_not_there(monkeypatch: pytest.MonkeyPatch
     )
 
 
+@pytest.mark.compiler
 def test_a_compiler_that_does_not_build_it(monkeypatch: pytest.MonkeyPatch, fresh: Path) -> None:
     monkeypatch.setenv("CC", "gcc")
     with pytest.raises(Problem) as found:
@@ -289,6 +299,7 @@ def test_no_emulator(monkeypatch: pytest.MonkeyPatch) -> None:
 # Compilers
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize("level", ["-O0", "-O3"])
 def test_it_builds_without_a_warning(compiler: str, level: str, monkeypatch: pytest.MonkeyPatch, fresh: Path) -> None:
@@ -300,6 +311,7 @@ def test_it_builds_without_a_warning(compiler: str, level: str, monkeypatch: pyt
         assert line.greet().version == 1
 
 
+@pytest.mark.compiler
 def test_a_header_stands_by_itself(tmp_path: Path) -> None:
     for header in sorted(building.FIRMWARE.rglob("*.h")):
         (tmp_path / "one.c").write_text(f'#include "{header.name}"\nextern int some;\n')
@@ -332,6 +344,7 @@ def compiled_alone(name: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.compiler
 def test_the_example_of_the_readme_is_a_bed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copytree(building.FIRMWARE / "core", "core")
@@ -351,6 +364,7 @@ def test_the_example_of_the_readme_is_a_bed(tmp_path: Path, monkeypatch: pytest.
         assert line.greet().name == b"bench 1".ljust(16, b"\0")
 
 
+@pytest.mark.compiler
 def test_the_port_of_the_readme_reads_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     more = "static int v[3], e; uint16_t adc_read(unsigned k) { return (uint16_t)v[k]; }"

@@ -13,6 +13,8 @@ from tests.hw.firmware import wire
 from tests.hw.firmware.device import PLAIN, SENSORS, SHAFT, Device
 from tests.hw.firmware.wire import frame
 
+pytestmark = pytest.mark.compiler
+
 SAFE = [("i", 0), ("v", 0)]
 SENSING = replace(PLAIN, capabilities=SENSORS)
 STEEP = replace(PLAIN, limits=replace(PLAIN.limits, voltage_slew=4e4, current_slew=6e3, heat=10.0))

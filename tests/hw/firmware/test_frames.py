@@ -15,6 +15,8 @@ from tests.hw.firmware import wire
 from tests.hw.firmware.device import LOCK_STEP, PLAIN, SENSORS, Device, library
 from tests.hw.firmware.wire import frame, framed, payloads, told
 
+pytestmark = pytest.mark.compiler
+
 BODIES = {
     wire.HELLO: b"\1", wire.LIMIT: b"\0\1\0\0\0", wire.ARM: b"\xee\xff\xc0\0", wire.DRIVE: bytes(9), wire.STOP: b"",
     wire.CLEAR: b"", wire.READ: b"",

@@ -29,6 +29,7 @@ from tests.substitution.hybrid import compiled, deck
 # Unsafe outputs
 
 
+@pytest.mark.compiler
 def test_a_load_that_is_cleared_and_driven_again_and_again_takes_no_more_than_it_bears() -> None:
     device = Device()
     device.ready()
@@ -47,6 +48,7 @@ def test_a_load_that_is_cleared_and_driven_again_and_again_takes_no_more_than_it
     assert math.sqrt(squares / ticks) * 0.002 < 1.05 * PLAIN.continuous_current
 
 
+@pytest.mark.compiler
 def test_a_current_that_flows_between_two_ticks_is_heat() -> None:
     device = Device()
     device.ready()
@@ -58,6 +60,7 @@ def test_a_current_that_flows_between_two_ticks_is_heat() -> None:
     assert device.read().faults == wire.HEAT
 
 
+@pytest.mark.compiler
 def test_many_commands_in_one_tick_are_no_way_around_a_slew_limit() -> None:
     device = Device()
     device.ready()
@@ -66,6 +69,7 @@ def test_many_commands_in_one_tick_are_no_way_around_a_slew_limit() -> None:
     assert max(abs(counts) for output, counts in device.outputs() if output == "v") <= 2 * 400
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("gap", [3, 8, 14])
 @pytest.mark.parametrize("told", [lambda y: 0.0, lambda y: 3.0], ids=["dead", "stuck"])
 def test_a_dead_tachometer_is_found_under_a_torque_with_gaps(told: object, gap: int) -> None:
@@ -123,6 +127,7 @@ def test_a_deadman_of_20_ms_is_one_that_the_host_takes(hz: int) -> None:
     assert greeting.DEADMAN[0] <= counted(config)[2] <= greeting.DEADMAN[1]
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("value", ["converter_in = 6 rad/s", "converter_current = 10 A", "i_max = 1e6 A"])
 def test_a_deck_s_bed_that_firmware_cannot_count_is_said(value: str) -> None:
     experiment = compiled(deck(bed=f"emulated({value})"), "on_bench")
@@ -139,6 +144,7 @@ def told_hash(config: Config) -> str:
     return next(line for line in text.splitlines() if ".firmware" in line)
 
 
+@pytest.mark.compiler
 def test_another_header_is_another_firmware(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MET_CACHE_DIR", str(tmp_path / "cache"))
     sources = tmp_path / "firmware"
@@ -196,6 +202,7 @@ def test_a_zero_within_a_frame_is_no_frame(frame: bytes) -> None:
 # What no test held before; these pass
 
 
+@pytest.mark.compiler
 def test_frames_dropped_before_an_arming_are_not_noise_after_it() -> None:
     device = Device()
     for _ in range(3):
@@ -204,6 +211,7 @@ def test_frames_dropped_before_an_arming_are_not_noise_after_it() -> None:
         assert device.read().state == wire.ARMED
 
 
+@pytest.mark.compiler
 def test_half_a_frame_of_before_a_boot_is_forgotten() -> None:
     device = Device()
     device.raw(wire.frame(wire.READ, 1)[:5])
@@ -211,6 +219,7 @@ def test_half_a_frame_of_before_a_boot_is_forgotten() -> None:
     assert device.read().status == wire.DISARMED
 
 
+@pytest.mark.compiler
 def test_the_guard_of_the_tachometer_begins_anew_with_an_arming() -> None:
     ticks = Turning(lambda y: 0.0).until_stopped(4.0, 0.0, 200)
     bed = Turning(lambda y: 0.0)

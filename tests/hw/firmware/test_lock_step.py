@@ -10,6 +10,8 @@ import pytest
 from tests.hw.firmware import wire
 from tests.hw.firmware.device import LOCK_STEP, PLAIN, Device
 
+pytestmark = pytest.mark.compiler
+
 SAFE = [("i", 0), ("v", 0)]
 TICK = [("a", 0), ("k", 0)]
 

@@ -16,6 +16,8 @@ from tests.hw.firmware.device import LOCK_STEP, PLAIN, Device
 from tests.hw.firmware.model import Model
 from tests.hw.firmware.wire import Hello, Limits, Sample, framed, payloads, told
 
+pytestmark = pytest.mark.compiler
+
 # near the limits and far from them
 COUNTS = st.one_of(
     st.integers(-2100, 2100), st.integers(-450, 450), st.sampled_from([0, 2000, -2000, 1500, 2**31 - 1, -(2**31)])

@@ -92,6 +92,7 @@ def lock_step(hz: float) -> Config:
     return replace(FREE, tick_hz=hz, scales=SCALES, capabilities=Capability.ENCODER | Capability.LOCK_STEP)
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("faults", ["none", "typical"])
 def test_20_s_of_the_paper_s_test_over_the_wire_are_those_of_the_plant_in_process(faults: str) -> None:
     experiment = compiled(deck(bed=f"emulated(faults = {faults})", duration=20.0), "on_bench")
@@ -113,6 +114,7 @@ def test_so_they_are_from_a_cortex_m3(tmp_path: Path) -> None:
         assert driven(experiment, lambda voltage, current: line.step(voltage, current).rate, 3000) == here
 
 
+@pytest.mark.compiler
 def test_behind_a_terminal_too() -> None:
     experiment = compiled(deck(bed="emulated(faults = typical)", duration=20.0), "on_bench")
     plant = plant_c(experiment, "shoulder")
@@ -122,6 +124,7 @@ def test_behind_a_terminal_too() -> None:
         assert driven(experiment, lambda voltage, current: line.step(voltage, current).rate, 1000) == here
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize(
     ("law", "command"),
     [("velocity_tracking", REVERSING), ("torque_balance_observer", REVERSING), ("torque_balance", "slow"),
@@ -149,6 +152,7 @@ def test_no_guard_speaks_up_in_a_run_however_heavy_the_arm(law: str, command: st
         driven(experiment, exchange, 4000, case=case)
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize(("sign", "fault"), [(0, wire.DEAD), (-1, wire.REVERSED)])
 @pytest.mark.parametrize("law", ["velocity_tracking", "torque_balance_observer"])
 def test_a_wrong_tachometer_is_found_in_the_loop_before_the_shaft_is_fast(law: str, sign: int, fault: int) -> None:

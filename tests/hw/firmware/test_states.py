@@ -10,6 +10,8 @@ import pytest
 from tests.hw.firmware import wire
 from tests.hw.firmware.device import Device
 
+pytestmark = pytest.mark.compiler
+
 SAFE = [("i", 0), ("v", 0)]
 
 

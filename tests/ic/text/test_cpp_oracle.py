@@ -59,6 +59,7 @@ def ours(desk: Desk, text: str) -> list[str] | None:
     return None if refused else [token.text for token in made.tokens[:-1]]
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize(("text", "others"), texts("macros.txt"))
 def test_a_text_is_read_as_gcc_reads_it(desk: Desk, text: str, others: dict[str, str]) -> None:
     expected = theirs(desk, text, others)
@@ -66,12 +67,14 @@ def test_a_text_is_read_as_gcc_reads_it(desk: Desk, text: str, others: dict[str,
     assert ours(desk, text) == expected
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize(("text", "others"), texts("refused.txt"))
 def test_what_gcc_refuses_is_refused(desk: Desk, text: str, others: dict[str, str]) -> None:
     assert theirs(desk, text, others) is None
     assert ours(desk, text) is None
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("condition", TEXTS.joinpath("conditions.txt").read_text().splitlines())
 def test_a_condition_holds_where_gcc_says_so(desk: Desk, condition: str) -> None:
     text = f"{HEAD}#if {condition}\nyes\n#else\nno\n#endif\n"
@@ -129,6 +132,7 @@ DELIBERATE = [
 ]  # fmt: skip
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize(("reason", "text", "made"), DELIBERATE, ids=[text for _, text, _ in DELIBERATE])
 def test_where_a_deck_is_not_c_there_is_a_reason(desk: Desk, reason: str, text: str, made: list[str] | None) -> None:
     others = {"library/c.ic": "c"}
@@ -161,6 +165,7 @@ def _without_gccs_blanks(tokens: list[str] | None) -> list[str] | None:
     return tokens and [token.replace(", ", ",") if token.startswith('"') else token for token in tokens]
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("circles", [True, False])
 @pytest.mark.parametrize("seed", range(10))
 def test_random_macros_expand_as_gcc_expands_them(desk: Desk, seed: int, circles: bool) -> None:

@@ -157,6 +157,7 @@ def program(found: Experiment, period: float | None) -> str:
     return plant_c(found, "shoulder", period=period) + '#include "run_plant.c"\n'
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("faults", ["none", "typical"])
 @pytest.mark.parametrize("words", HERE, ids=" ".join)
 def test_in_c_it_has_the_same_bits(tmp_path: Path, words: tuple[str, ...], faults: str) -> None:
@@ -185,6 +186,7 @@ def test_the_text_is_the_same_each_time_and_another_cases_is_another(tmp_path: P
     assert text != plant_c(found, "shoulder", case=15, period=0.002)
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("level", ["-O0", "-Os", "-O3"])
 @pytest.mark.parametrize("words", [
     ("gcc",), ("clang",),

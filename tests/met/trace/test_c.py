@@ -145,6 +145,7 @@ def same(program: Program, cases: np.ndarray, folder: Path, words: tuple[str, ..
     assert different(expected[1], outputs) == 0
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("words", HERE, ids=" ".join)
 def test_every_operation_has_the_bits_of_kernel_and_definition(tmp_path: Path, words: tuple[str, ...]) -> None:
     program, cases = table(operations), three(4000, 1)
@@ -154,6 +155,7 @@ def test_every_operation_has_the_bits_of_kernel_and_definition(tmp_path: Path, w
     assert different(rows[:, 0].copy(), meant(program, cases)) == 0
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("words", HERE, ids=" ".join)
 def test_elementary_functions_and_noise_have_the_kernels_bits(tmp_path: Path, words: tuple[str, ...]) -> None:
     same(table(elementary), three(2000, 2), tmp_path, words)
@@ -168,12 +170,14 @@ def test_every_compiler_and_level_gives_the_same_bits(
     same(table(make), three(20_000 if words[0] in ("gcc", "clang") else 4000, 3), tmp_path, words)
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("words", HERE[1:3], ids=" ".join)
 def test_a_whole_run_with_friction_has_the_kernels_bits(tmp_path: Path, words: tuple[str, ...]) -> None:
     experiment = ic.compile("two_link.ic", select=["gains"]).experiments[0]
     same(build(experiment), inputs(experiment, np.arange(5)), tmp_path, words, experiment.structure.schedule.ticks)
 
 
+@pytest.mark.compiler
 def test_control_and_memory_are_the_programs(tmp_path: Path) -> None:
     def count(t: Tape) -> None:
         t.write("n", t.read("n") + 1.0)
@@ -206,6 +210,7 @@ def test_control_and_memory_are_the_programs(tmp_path: Path) -> None:
         same(program, np.array([[x, 5.0]]), tmp_path, ("gcc", "-O1"), 20)
 
 
+@pytest.mark.compiler
 def test_the_text_is_the_same_each_time_and_asks_for_no_library(tmp_path: Path) -> None:
     need("gcc")
     assert driver(table(operations)) == driver(table(operations))
@@ -219,6 +224,7 @@ def test_the_text_is_the_same_each_time_and_asks_for_no_library(tmp_path: Path) 
         assert done.stdout == ""
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize(("words", "message"), [
     (("gcc", "-ffast-math"), "build without -ffast-math, for a processor that computes doubles as doubles"),
     (("gcc", "-mfma", "-std=gnu11"), "build with -std=c11 and -ffp-contract=off"),
@@ -231,6 +237,7 @@ def test_a_build_that_would_change_bits_is_refused(tmp_path: Path, words: tuple[
     assert f'#error "{message}"' in done.stderr
 
 
+@pytest.mark.compiler
 def test_the_sanitizers_find_nothing(tmp_path: Path) -> None:
     words = ("gcc", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
     same(table(operations), three(300, 4), tmp_path, words)
