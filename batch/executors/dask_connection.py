@@ -6,14 +6,11 @@ import asyncio
 import json
 import logging
 import os
-import signal
-import sys
 import tempfile
 import warnings
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +18,6 @@ from met.diagnostic import Problem, error
 
 CONNECT_SECONDS = 5.0
 """How long we try to reach a scheduler."""
-
-START_SECONDS = 60.0
-"""How long workers of this machine may take to start."""
 
 LOCAL = "local"
 
@@ -126,46 +120,22 @@ async def _greet(address: str) -> None:
 
 @contextmanager
 def _started(threads: int) -> Iterator[Any]:
-    """A client of a cluster on this machine. Raises Problem."""
+    """A client of a scheduler and a worker inside this process, which no other can reach: whoever reaches a scheduler
+    has it run code. Its tasks are in children of the worker all the same."""
     from distributed import Client, LocalCluster
 
-    unguarded = 'a script has to call batch.run below `if __name__ == "__main__":`, for its processes read it again'
-    if not _guarded():
-        raise Problem(error("E356", f"Dask's workers cannot start on this machine: {unguarded}"))
-    workers = max(1, len(os.sched_getaffinity(0)) // threads)
-    with tempfile.TemporaryDirectory(prefix="met-dask-", ignore_cleanup_errors=True) as scratch:
-        with _interrupts_later():
-            # the memory that tasks take is that of the workers' children, which Dask's limit does not count
-            cluster = LocalCluster(
-                n_workers=0, threads_per_worker=1, processes=True, memory_limit=0, local_directory=scratch,
-                dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL,
-            )  # fmt: skip
-        with cluster, Client(cluster, set_as_default=False) as client:
-            cluster.scale(workers)
-            try:
-                client.wait_for_workers(workers, timeout=START_SECONDS)
-            except TimeoutError:
-                message = f"Dask's workers do not start on this machine within {START_SECONDS:g} s"
-                raise Problem(error("E356", message, help=unguarded)) from None
-            yield client
-
-
-def _guarded() -> bool:
-    """Whether the program that runs may be read again by the processes that it starts, as Python does it."""
-    path = getattr(sys.modules["__main__"], "__file__", None)
-    try:
-        return path is None or "__main__" in Path(path).read_text(encoding="utf-8")
-    except (OSError, ValueError):  # no text: then it is no script of a user's
-        return True
-
-
-@contextmanager
-def _interrupts_later() -> Iterator[None]:
-    """Inside, Ctrl-C waits. Threads that begin here never see one, nor do processes that they start, then or later:
-    a terminal sends it to all of them, but only this one decides what it means."""
-    resource_tracker.ensure_running()  # it would let interrupts through again, when it is started for the first process
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    at_once = max(1, len(os.sched_getaffinity(0)) // threads)
+    nowhere = "127.0.0.1:0"
+    with (
+        tempfile.TemporaryDirectory(prefix="met-dask-", ignore_cleanup_errors=True) as scratch,
+        # the memory that tasks take is that of the worker's children, which Dask's limit does not count
+        LocalCluster(
+            n_workers=1, threads_per_worker=at_once, processes=False, protocol="inproc://", memory_limit=0,
+            local_directory=scratch, dashboard_address=nowhere, worker_dashboard_address=nowhere,
+            scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):  # fmt: skip
+        for each in (cluster.scheduler, *cluster.workers.values()):
+            each.http_server.stop()  # each has one to be looked at with, which cannot be declined
+        yield client

@@ -239,7 +239,23 @@ def poisoned(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dask_worker, "Crew", crew)
 
 
+def listening() -> set[str]:
+    """Sockets of this process to which another may connect."""
+    mine = set()
+    for number in os.listdir("/proc/self/fd"):
+        with contextlib.suppress(OSError):
+            mine.add(os.readlink(f"/proc/self/fd/{number}"))
+    lines = [line.split() for name in ("tcp", "tcp6") for line in Path(f"/proc/net/{name}").read_text().splitlines()]
+    return {words[1] for words in lines if words[3] == "0A" and f"socket:[{words[9]}]" in mine}
+
+
 class TestInThisProcess:
+    def test_a_local_one_can_be_reached_by_nobody_else(self) -> None:
+        before = listening()
+        with dask_connection.connected("local", threads=1) as client:
+            assert client.scheduler.address.startswith("inproc://") and client.submit(abs, -1).result() == 1
+            assert listening() == before
+
     def test_the_same_bytes_as_with_threads(self, here: Path) -> None:
         plan = plans.plan(plans.nominal(), plans.gains(100))
         expected = batch.run(plan, output="t.h5", threads=1).path.read_bytes()
