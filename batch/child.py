@@ -11,7 +11,6 @@ import os
 import select
 import signal
 import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -21,8 +20,9 @@ from typing import Any
 
 from batch.executors import Outcome
 from batch.tasks import Done, Task
+from met import interpreter
 
-COMMAND = (sys.executable, "-m", "batch.worker")
+COMMAND = tuple(interpreter.command("batch.worker"))
 WATCH_SECONDS = 0.2
 
 STILLBORN = 3
@@ -38,11 +38,10 @@ class Child:
     def __init__(self, folder: Path, threads: int, command: Sequence[str] = COMMAND) -> None:
         self.under_way = 0
         self._words = tempfile.TemporaryFile()  # noqa: SIM115 - what it says on stderr, while it lives
-        package = str(Path(__file__).resolve().parents[1])
-        path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
         self._process = subprocess.Popen(
-            [*command, str(folder.resolve()), "--threads", str(threads)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            stderr=self._words, env={**os.environ, "PYTHONPATH": path, "OMP_NUM_THREADS": "1"}, start_new_session=True,
+            [*command, str(folder.resolve()), "--threads", str(threads)], stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, stderr=self._words, env={**interpreter.environment(), "OMP_NUM_THREADS": "1"},
+            start_new_session=True,
         )  # fmt: skip
         self._read = b""
         self._ended = False

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -16,6 +14,7 @@ from batch.campaign import Campaign, values_sections
 from batch.folder import Busy, Folder, beside, gaps, put
 from batch.output import busy, cannot_write, check_room
 from batch.tasks import GRANULE, Task
+from met import interpreter
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 
@@ -124,12 +123,10 @@ def shares(missing: Sequence[Task], count: int) -> list[list[Task]]:
 
 
 def _script(folder: Path, *words: str) -> str:
-    package = Path(__file__).resolve().parents[1]
-    path = os.pathsep.join([str(package), *filter(None, [os.environ.get("PYTHONPATH")])])
-    return "\n".join([
-        "#!/bin/sh", f"export PYTHONPATH={shlex.quote(path)}",
-        f"exec {shlex.quote(sys.executable)} -m batch.job {shlex.quote(str(folder.absolute()))} {' '.join(words)}", "",
-    ])  # fmt: skip
+    """The job's script. words: after the folder, as a shell reads them."""
+    exports = [f"export {name}={shlex.quote(value)}" for name, value in interpreter.packages().items()]
+    job = shlex.join(interpreter.command("batch.job", str(folder.absolute())))
+    return "\n".join(["#!/bin/sh", *exports, f"exec {job} {' '.join(words)}", ""])
 
 
 def _sbatch(command: Sequence[str], script: str, more: bool) -> str:

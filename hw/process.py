@@ -23,6 +23,7 @@ from typing import Any, TypeVar
 
 from hw import realtime
 from hw.bed import About, Bed
+from met import interpreter
 from met.diagnostic import Problem, error
 from met.render import to_json
 
@@ -105,8 +106,8 @@ def talk(
              is raised in the end
     """
     process = subprocess.Popen(
-        [sys.executable, "-m", module], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        env={**os.environ, _STARTED_BY: str(os.getpid())},
+        interpreter.command(module), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        env={**interpreter.environment(), _STARTED_BY: str(os.getpid())},
     )  # fmt: skip
     assert process.stdin is not None and process.stdout is not None
     interrupted: KeyboardInterrupt | None = None

@@ -21,6 +21,7 @@ from typing import Any
 
 from hw import records, ring
 from hw.ring import Full, Ring
+from met import interpreter
 from met.diagnostic import Problem, error
 
 RING_BYTES = 64 << 20
@@ -58,10 +59,10 @@ class Writer:
         self._ring, self._path, self._count = through, path, 0
         read, self._alive = os.pipe()
         os.set_inheritable(self._alive, False)
-        command = [sys.executable, "-m", "hw.writer", str(through.file), str(through.room), str(read), str(path)]
+        command = interpreter.command("hw.writer", str(through.file), str(through.room), str(read), str(path))
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, pass_fds=[through.file, read],
-            start_new_session=True,
+            start_new_session=True, env=interpreter.environment(),
         )  # fmt: skip
         os.close(read)
         assert self._process.stdin is not None

@@ -8,12 +8,12 @@ works at once, without installing anew.
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from met import interpreter
 from met.frozen import frozen
 
 PACKAGE = "met_arm"
@@ -60,10 +60,11 @@ def offered(group: str) -> list[EntryPoint]:
 
 
 def _tables() -> Iterator[tuple[str, str]]:
-    """Every installed package's name and the file that may list its entry points, in the order of sys.path."""
-    for directory in dict.fromkeys(sys.path):
+    """Every installed package's name and the file that may list its entry points, in the order of sys.path. A package
+    that merely lies in the working folder is not installed."""
+    for directory in interpreter.looked_in():
         try:
-            names = os.listdir(directory or ".")
+            names = os.listdir(directory)
         except OSError:
             continue
         for name in names:

@@ -185,7 +185,7 @@ def install(root: Path, venv: Path, purpose: str) -> None:
 
 def pip(venv: Path, *arguments: str) -> list[str]:
     quiet = ("--disable-pip-version-check", "--no-input", "--retries", "2")
-    return [str(venv / "bin" / "python"), "-m", "pip", "install", *quiet, *arguments]
+    return [str(venv / "bin" / "python"), "-I", "-m", "pip", "install", *quiet, *arguments]
 
 
 def step(command: list[str], log: Path, failure: str) -> None:

@@ -37,8 +37,8 @@ def _fetch(wanted: Path) -> None:
     HOME.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory(dir=HOME) as work:
         wheels, files = Path(work) / "wheels", Path(work) / "files"
-        command = [sys.executable, "-m", "pip", "download", "--disable-pip-version-check", "--no-input", "--no-deps",
-                   "--only-binary", ":all:", *WHEEL, "--require-hashes", "--requirement", str(LOCK),
+        command = [sys.executable, "-P", "-m", "pip", "download", "--disable-pip-version-check", "--no-input",
+                   "--no-deps", "--only-binary", ":all:", *WHEEL, "--require-hashes", "--requirement", str(LOCK),
                    "--dest", str(wheels)]  # fmt: skip
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True)
         if done.returncode != 0:

@@ -179,7 +179,8 @@ def test_a_driver_that_is_killed_leaves_nothing_on_the_workers_of_others(archive
 
 def test_a_script_needs_no_guard_for_it_is_not_run_again(tmp_path: Path) -> None:
     plan_file.write(plans.plan(plans.gains(9)), tmp_path / "p.json")
-    (tmp_path / "script.py").write_text('import batch\nbatch.run("p.json", output="a.h5", dask="local")\nprint("once")\n')
+    text = 'import batch\nbatch.run("p.json", output="a.h5", dask="local")\nprint("once")\n'
+    (tmp_path / "script.py").write_text(text)
     environment = {**os.environ, "PYTHONPATH": f"{whole.ROOT}"}
     done = subprocess.run(
         [sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, env=environment,
