@@ -182,11 +182,15 @@ class Folder:
         return plan_file.read(self.path / "plan.json")
 
     def sections(self) -> dict[int, Section]:
-        """The sections by their numbers, for a worker."""
+        """The sections by their numbers, for a worker. Raises Problem E353 where the code here is not that of the
+        campaign, as after an update of MET or of models while jobs waited: what it gave would count for nothing."""
         experiments = [engine.prepare(experiment) for experiment in self.plan().experiments]
         out = {}
-        for told in self.described()["sections"]:
+        described = self.described()
+        for told in described["sections"]:
             number, prepared = told["number"], experiments[told["experiment"]]
+            if told["code"] != prepared.code_key:
+                raise Problem(_other_code(prepared.experiment.name, self.path, described))
             count = prepared.experiment.cases.count
             rows = np.arange(count) if told["rows"] is None else np.load(self.path / told["rows"])
             out[number] = Section(number, told["experiment"], prepared, rows, told["recorded"], told["single"])
@@ -253,6 +257,15 @@ class Folder:
         """Remove what workers that were killed had begun to write; there are none at work."""
         for path in self.shards.glob(".*.tmp"):
             path.unlink(missing_ok=True)
+
+
+def _other_code(name: str, path: Path, described: dict[str, Any]) -> Any:
+    message = f"the code of `{name}` here is not that with which {path} was begun: nothing of it is run"
+    helps = [
+        f"MET or a package of models has changed since; it was begun by MET {described['met']}, this is MET {VERSION}",
+        "bring the former code back, and submit or run the same again; `--fresh` starts over with this one",
+    ]
+    return error("E353", message, help=helps)
 
 
 def beside(archive: Path) -> Path:

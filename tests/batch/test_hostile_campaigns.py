@@ -28,6 +28,7 @@ from batch.replaying import differences
 from met import cli
 from met.diagnostic import Problem
 from met.plan import Plan
+from met.version import VERSION
 from tests.batch import plans, whole
 from tests.batch.begun import begin, plan, short_tasks
 from tests.batch.door import ARM
@@ -244,6 +245,24 @@ def test_a_merge_that_comes_too_late_gives_the_verdict(submitted: Path, capsys: 
     assert run_job(submitted, "together") == (0 if archive.ok else 1)
     said = capsys.readouterr()
     assert "40 of 40 cases reached their end" in said.out and "E350" not in said.err
+
+
+@pytest.mark.parametrize("words", [("share", "0", "jobs.json"), ("together",)], ids=" ".join)
+def test_a_job_with_other_code_than_was_submitted_computes_nothing(
+    submitted: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...]
+) -> None:
+    told = json.loads((submitted / "campaign.json").read_text())
+    told["sections"][0]["code"] = "0" * 64
+    (submitted / "campaign.json").write_text(json.dumps(told))
+    verb, *rest = words
+    assert run_job(submitted, verb, *(str(submitted / each) if "." in each else each for each in rest)) == 1
+    assert capsys.readouterr().err == (
+        f"error[E353]: the code of `gains` here is not that with which {submitted} was begun: nothing of it is run\n"
+        f" = help: MET or a package of models has changed since; it was begun by MET {VERSION}, this is MET {VERSION}\n"
+        " = help: bring the former code back, and submit or run the same again; `--fresh` starts over with this one\n"
+        "\n1 error\n\n"
+    )
+    assert not list((submitted / "shards").iterdir())
 
 
 @pytest.mark.parametrize("cores, number", [("", 0), ("2(x3)", 0), ("1", 9)])
