@@ -435,19 +435,20 @@ def _fused() -> tuple[str, ...]:
 
 
 def _kept(name: str, product: str, make: Callable[[Path], None]) -> Path:
-    """A product by the hash of what makes it; made, and kept, where it is not there.
+    """A product by the hash of what makes it; made, and kept, where it is not there as it was made.
 
     Folders are made under another name and renamed, so that any number of processes may share them. Where the cache
-    cannot be written, the product is in a folder that lasts as long as this process.
+    cannot be used, the product is in a folder that lasts as long as this process.
     """
-    root = cache.folder() / "firmware"
-    found = root / name[:32] / product
-    if found.is_file():
-        with contextlib.suppress(OSError):
-            os.utime(found.parent)
-        return found
+    root = cache.within("firmware")
     try:
-        root.mkdir(parents=True, exist_ok=True)
+        if root is None:
+            raise OSError
+        found = root / name[:32] / product
+        if _is_sound(found, name):
+            with contextlib.suppress(OSError):
+                os.utime(found.parent)
+            return found
         made = Path(tempfile.mkdtemp(dir=root, prefix=".new-"))
     except OSError:
         made = Path(tempfile.mkdtemp(prefix="met-firmware-"))
@@ -456,12 +457,37 @@ def _kept(name: str, product: str, make: Callable[[Path], None]) -> Path:
         return made / product
     try:
         make(made)
+        (made / _SUM).write_bytes(cache.digest_of(name, (made / product).read_bytes()))
+        for each in (made / product, made / _SUM):  # whatever the umask lets others do
+            each.chmod(0o700)
         with contextlib.suppress(OSError):  # another process was faster
             made.rename(found.parent)
     finally:
         shutil.rmtree(made, ignore_errors=True)
     _trim(root, keep=found.parent)
     return found
+
+
+_SUM = "sum"
+"""The file beside a product by which it is known again."""
+
+
+def _is_sound(found: Path, name: str) -> bool:
+    """Whether a product is there as it was made; one that is not is taken away."""
+    if not found.parent.exists():
+        return False
+    data, told = cache.read(found), cache.read(found.with_name(_SUM))
+    if data is not None and told == cache.digest_of(name, data) and cache.within("firmware", name[:32]):
+        return True
+    # away under a name of its own, for another process may be at it too
+    leaving = Path(tempfile.mkdtemp(dir=found.parents[1], prefix=".old-"))
+    try:
+        found.parent.rename(leaving / "was")
+    except FileNotFoundError:
+        pass
+    finally:
+        shutil.rmtree(leaving, ignore_errors=True)
+    return False
 
 
 def _trim(root: Path, keep: Path) -> None:

@@ -1,15 +1,20 @@
 """Compiled objects on disk, each under the hash of everything that made it.
 
-A file is a hash of its object and the object; what does not agree with its hash is made anew. Files are written
-under another name and renamed, so that any number of processes may share the folder. It is a cache: whatever goes
-wrong with it, the object is made and the run goes on.
+A file is a hash of its name and its object, and the object; what does not agree with its hash is made anew, and so is
+what another user may have written: it would run as us. Files are written under another name and renamed, so that any
+number of processes may share the folder. It is a cache: whatever goes wrong with it, the object is made and the run
+goes on.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import os
+import pwd
+import stat
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -17,15 +22,62 @@ from pathlib import Path
 # bytes above which the files longest unused are removed
 LIMIT = 1 << 30
 
-_MARK = b"met object 1\n"
+_MARK = b"met object 2\n"
 
 
-def folder() -> Path:
-    """Where objects are kept: $MET_CACHE_DIR, else ~/.cache/met (under $XDG_CACHE_HOME where that is set)."""
+def folder() -> Path | None:
+    """Where objects are kept: $MET_CACHE_DIR, else ~/.cache/met (under $XDG_CACHE_HOME where that is set). None for who
+    has no home; HOME counts only where it names one whole."""
     own = os.environ.get("MET_CACHE_DIR")
     if own:
         return Path(own)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "met"
+    home = os.environ.get("HOME", "")
+    if not os.path.isabs(home):
+        try:
+            home = pwd.getpwuid(os.getuid()).pw_dir
+        except KeyError:
+            home = ""
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    if not os.path.isabs(base):
+        base = os.path.join(home, ".cache")
+    return Path(base) / "met" if os.path.isabs(base) else None
+
+
+def within(*parts: str) -> Path | None:
+    """A folder of the cache, made where it is not there. None where there can be none, or where another user could have
+    put something into it, which is told."""
+    path = folder()
+    for part in ("", *parts):
+        if path is None:
+            return None
+        path = path / part
+        try:
+            path.mkdir(mode=0o700, parents=True, exist_ok=True)
+            status = path.lstat() if part else path.stat()
+        except OSError:
+            return None
+        if not stat.S_ISDIR(status.st_mode) or not _is_ours(path, status):
+            return None
+    return path
+
+
+def _is_ours(path: Path, status: os.stat_result) -> bool:
+    """Whether nobody but this user, and the machine's administrator, can have written what has this status; it is told
+    where not."""
+    if status.st_uid != os.geteuid():
+        _tell(path, "it is another user's")
+        return False
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        _tell(path, "others may write it")
+        return False
+    return True
+
+
+@functools.cache
+def _tell(path: Path, why: str) -> None:
+    """Say once that something of the cache is not used."""
+    print(f"met: {path} of the cache is not used: {why}; what is in it is compiled anew (MET_CACHE_DIR names another "
+          "cache)", file=sys.stderr)  # fmt: skip
 
 
 def key(*parts: str) -> str:
@@ -40,7 +92,10 @@ def key(*parts: str) -> str:
 
 def kept(name: str, make: Callable[[], bytes]) -> tuple[bytes, bool]:
     """The object of that name and whether it was there; made, and kept, where it was not."""
-    path = folder() / name[:2] / f"{name}.o"
+    place = within(name[:2])
+    if place is None:
+        return make(), False
+    path = place / f"{name}.o"
     code = _read(path)
     if code is not None:
         with contextlib.suppress(OSError):
@@ -49,27 +104,40 @@ def kept(name: str, make: Callable[[], bytes]) -> tuple[bytes, bool]:
     code = make()
     with contextlib.suppress(OSError):
         _write(path, code)
-        _trim(path.parent.parent)
+        _trim(place.parent)
     return code, False
 
 
-def _read(path: Path) -> bytes | None:
+def digest_of(name: str, data: bytes) -> bytes:
+    """By which an object is known again as what was kept under that name."""
+    return hashlib.sha256(name.encode() + b"\0" + data).digest()
+
+
+def read(path: Path) -> bytes | None:
+    """A file of the cache, where it is there, one of ours."""
     try:
-        data = path.read_bytes()
+        with open(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
+            status = os.fstat(file.fileno())
+            if stat.S_ISREG(status.st_mode) and _is_ours(path, status):
+                return file.read()
     except OSError:
+        pass
+    return None
+
+
+def _read(path: Path) -> bytes | None:
+    data = read(path)
+    if data is None or not data.startswith(_MARK):
         return None
     digest, code = data[len(_MARK):len(_MARK) + 32], data[len(_MARK) + 32:]
-    if not data.startswith(_MARK) or hashlib.sha256(code).digest() != digest:
-        return None
-    return code
+    return code if digest_of(path.stem, code) == digest else None
 
 
 def _write(path: Path, code: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=".new-")
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(_MARK + hashlib.sha256(code).digest() + code)
+            file.write(_MARK + digest_of(path.stem, code) + code)
         os.replace(name, path)
     except BaseException:
         with contextlib.suppress(OSError):

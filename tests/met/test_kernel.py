@@ -9,6 +9,8 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ from met.diagnostic import Problem
 from met.trace import (
     atan2,
     both,
+    cache,
     clip,
     cos,
     either,
@@ -479,6 +482,81 @@ def test_a_cache_that_cannot_be_written_is_done_without(monkeypatch, tmp_path):
     (tmp_path / "file").write_text("not a folder")
     monkeypatch.setenv("MET_CACHE_DIR", str(tmp_path / "file"))
     assert outcome(answer(1.0)) == (2.0, False)
+    assert outcome(answer(1.0)) == (2.0, False)
+
+
+def by_another_user(entry, monkeypatch):
+    fstat = os.fstat
+    monkeypatch.setattr(os, "fstat", lambda file: os.stat_result([*fstat(file)[:4], 12345, *fstat(file)[5:]]))
+
+
+def others_may_write_it(entry, monkeypatch):
+    entry.chmod(0o622)
+
+
+def others_may_write_its_folder(entry, monkeypatch):
+    entry.parent.chmod(0o777)
+
+
+@pytest.mark.parametrize("spoil, told, why", [
+    (by_another_user, "*/*.o", "it is another user's"), (others_may_write_it, "*/*.o", "others may write it"),
+    (others_may_write_its_folder, "*", "others may write it"),
+])
+def test_what_another_user_may_have_written_is_not_run_and_told(empty_cache, monkeypatch, capsys, spoil, told, why):
+    cache._tell.cache_clear()
+    assert outcome(answer(1.0)) == (2.0, False)
+    (entry,) = folder().glob("*/*.o")
+    (place,) = folder().glob(told)
+    with monkeypatch.context() as patch:
+        spoil(entry, patch)
+        assert outcome(answer(1.0)) == (2.0, False)
+    assert capsys.readouterr().err == (
+        f"met: {place} of the cache is not used: {why}; what is in it is compiled anew (MET_CACHE_DIR names another "
+        "cache)\n"
+    )
+
+
+def test_a_cache_of_another_user_is_not_used(empty_cache, monkeypatch, capsys):
+    cache._tell.cache_clear()
+    monkeypatch.setattr(os, "geteuid", lambda: 12345)
+    assert outcome(answer(1.0)) == outcome(answer(1.0)) == (2.0, False)
+    assert capsys.readouterr().err == (
+        f"met: {empty_cache} of the cache is not used: it is another user's; what is in it is compiled anew "
+        "(MET_CACHE_DIR names another cache)\n"
+    )
+    assert not list(empty_cache.iterdir())
+
+
+def test_an_entry_under_another_name_is_made_anew(empty_cache):
+    outcome(answer(1.0))
+    (one,) = folder().glob("*/*.o")
+    outcome(answer(2.0))
+    (other,) = set(folder().glob("*/*.o")) - {one}
+    other.write_bytes(one.read_bytes())
+    assert outcome(answer(2.0)) == (3.0, False)
+
+
+@pytest.mark.parametrize("home, base, expected", [
+    ("/h", "", "/h/.cache/met"), ("/h", "/x", "/x/met"), ("/h", "x", "/h/.cache/met"), ("", "/x", "/x/met"),
+    ("", "", "/own/.cache/met"), ("h", "", "/own/.cache/met"),
+])
+def test_where_the_cache_is(monkeypatch, home, base, expected):
+    monkeypatch.delenv("MET_CACHE_DIR")
+    monkeypatch.setenv("HOME", home)
+    monkeypatch.setenv("XDG_CACHE_HOME", base)
+    monkeypatch.setattr(cache.pwd, "getpwuid", lambda _: SimpleNamespace(pw_dir="/own"))
+    assert folder() == Path(expected)
+
+
+def test_who_has_no_home_has_no_cache(monkeypatch):
+    def unknown(_):
+        raise KeyError
+
+    monkeypatch.delenv("MET_CACHE_DIR")
+    monkeypatch.setenv("HOME", "")
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(cache.pwd, "getpwuid", unknown)
+    assert folder() is None
     assert outcome(answer(1.0)) == (2.0, False)
 
 

@@ -7,6 +7,7 @@ import math
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from hw.build import Config, build, config_c, counted, guard, qemu
 from hw.ports import Port, opened
 from met.diagnostic import Problem
 from met.render import render
+from met.trace import cache
 from tests.hw.firmware.device import PLAIN, SHAFT, Sensors
 from tests.hw.firmware.line import FREE, PLANT, STEPPED, behind_a_terminal
 from tests.substitution.hybrid import compiled, deck
@@ -174,7 +176,43 @@ def test_what_was_built_is_there_the_next_time(fresh: Path, monkeypatch: pytest.
     again = build("library", FREE, PLANT)
     assert again == first and again.stat().st_mtime_ns == made
     assert [path.name for path in fresh.iterdir()] == [first.parent.name]
-    assert sorted(path.name for path in first.parent.iterdir()) == ["config.c", "libbed.so", "plant.c"]
+    assert sorted(path.name for path in first.parent.iterdir()) == ["config.c", "libbed.so", "plant.c", "sum"]
+
+
+def emptied(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def others_may_write_it(path: Path) -> None:
+    path.chmod(0o722)
+
+
+def others_may_write_its_folder(path: Path) -> None:
+    path.parent.chmod(0o777)
+
+
+def of_another_name(path: Path) -> None:
+    other = path.parent.with_name("0" * 32)
+    path.parent.rename(other)
+    shutil.copytree(other, path.parent)
+    (path.parent / "sum").write_bytes(cache.digest_of("another", path.read_bytes()))
+
+
+@pytest.mark.parametrize("spoil", [emptied, cut, Path.unlink, others_may_write_it, others_may_write_its_folder,
+                                   of_another_name])  # fmt: skip
+def test_what_is_not_as_it_was_built_is_built_anew(fresh: Path, spoil: Callable[[Path], None]) -> None:
+    first = build("library", FREE, PLANT)
+    built = first.read_bytes()
+    spoil(first)
+    before = (first.parent / "sum").stat().st_ino
+    again = build("library", FREE, PLANT)
+    assert again == first and again.read_bytes() == built and (again.parent / "sum").stat().st_ino != before
+    assert again.stat().st_mode & 0o077 == again.parent.stat().st_mode & 0o077 == 0
+    assert not list(fresh.glob(".*"))
 
 
 @pytest.mark.compiler
