@@ -2,6 +2,9 @@
 
 import json
 import math
+import os
+import shutil
+import subprocess
 import time
 from pathlib import Path
 from typing import Any
@@ -12,6 +15,7 @@ import pytest
 import batch
 from batch import tasks
 from batch.archive import limits
+from batch.archive.provenance import UNKNOWN, Revision
 from batch.archive.read import ArchiveFile
 from met import keys, plan_file
 from met.diagnostic import Problem
@@ -19,6 +23,7 @@ from tests.batch import plans
 
 pytestmark = pytest.mark.usefixtures("engine")
 
+ROOT = Path(__file__).parents[2]
 ENGINES = ("h5netcdf", pytest.param("netcdf4", marks=pytest.mark.oracle))
 
 
@@ -496,3 +501,16 @@ def test_what_may_be_written_over_is_seen_without_hdf5(here: Path, monkeypatch: 
     assert not read.is_archive(Path("other.h5"))
     Path("a.h5").write_bytes(Path("a.h5").read_bytes()[:5000])
     assert read.is_archive(Path("a.h5"))  # a damaged one may be replaced
+
+
+def test_whose_the_checkout_is_does_not_show_in_the_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = Revision().read()
+    if plain == (UNKNOWN, UNKNOWN):
+        pytest.skip("no git, or no checkout")
+    git = shutil.which("git")
+    (tmp_path / "git").write_text(f'#!/bin/sh\nexport GIT_TEST_ASSUME_DIFFERENT_OWNER=1\nexec {git} "$@"\n')
+    (tmp_path / "git").chmod(0o755)
+    refused = subprocess.run([tmp_path / "git", "describe", "--always"], cwd=ROOT, capture_output=True, text=True)
+    assert "dubious ownership" in refused.stderr
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    assert Revision().read() == plain
