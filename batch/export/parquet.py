@@ -7,6 +7,8 @@ too large (170 MB) to come with MET unasked.
 from __future__ import annotations
 
 import json
+import shlex
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -89,7 +91,8 @@ def pyarrow_here() -> tuple[Any, Any]:
         import pyarrow
         from pyarrow import parquet
     except ImportError as reason:
-        helps = ("`pip install pyarrow`, or `pip install 'met-arm[parquet]'`", "`-o FILE.csv` writes the same as text")
+        install = f"`{shlex.quote(sys.executable)} -m pip install pyarrow` brings it to the Python that runs MET"
+        helps = (install, "`-o FILE.csv` writes the same as text")
         raise Problem(error("E373", "Parquet files are written by pyarrow, which is not here", help=helps)) from reason
     return pyarrow, parquet
 

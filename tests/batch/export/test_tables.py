@@ -176,7 +176,7 @@ def test_without_pyarrow_it_is_said_where_it_comes_from(here: Path, monkeypatch:
         export("a.h5", "a.parquet")
     assert said(caught.value) == (
         "error[E373]: Parquet files are written by pyarrow, which is not here\n"
-        " = help: `pip install pyarrow`, or `pip install 'met-arm[parquet]'`\n"
+        f" = help: `{sys.executable} -m pip install pyarrow` brings it to the Python that runs MET\n"
         " = help: `-o FILE.csv` writes the same as text\n"
         "\n1 error\n"
     )
