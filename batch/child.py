@@ -6,6 +6,7 @@ is a kernel, {"progress": cases}, and {"done": [seconds, failed]} or {"broken": 
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import select
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from batch.executors import Outcome
+from batch.output import more_files
 from batch.tasks import Done, Task
 from met import interpreter
 
@@ -38,11 +40,15 @@ class Child:
     def __init__(self, folder: Path, threads: int, command: Sequence[str] = COMMAND) -> None:
         self.under_way = 0
         self._words = tempfile.TemporaryFile()  # noqa: SIM115 - what it says on stderr, while it lives
-        self._process = subprocess.Popen(
-            [*command, str(folder.resolve()), "--threads", str(threads)], stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE, stderr=self._words, env={**interpreter.environment(), "OMP_NUM_THREADS": "1"},
-            start_new_session=True,
-        )  # fmt: skip
+        try:
+            self._process = subprocess.Popen(
+                [*command, str(folder.resolve()), "--threads", str(threads)], stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE, stderr=self._words, env={**interpreter.environment(), "OMP_NUM_THREADS": "1"},
+                start_new_session=True,
+            )  # fmt: skip
+        except OSError:
+            self._words.close()
+            raise
         self._read = b""
         self._ended = False
         self.begun = False
@@ -122,6 +128,14 @@ class Child:
         return Outcome(task, "broken", why=f"a worker ended with status {status}" + (f": {last[0]}" if last else ""))
 
 
+def _no_start(reason: OSError) -> str:
+    why = (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
+    if reason.errno in (errno.EMFILE, errno.ENFILE):
+        return f"a worker cannot be started: {why}; {more_files()}"
+    fewer = "; fewer processes may do" if reason.errno in (errno.ENOMEM, errno.EAGAIN) else ""
+    return f"a worker cannot be started: {why}{fewer}"
+
+
 class Crew:
     """Children that are taken for one task after the other; whoever calls waits. Several may call at once."""
 
@@ -141,7 +155,10 @@ class Crew:
 
     def carry_out(self, task: Task) -> Outcome:
         """Have a task run by an idle child, or by a new one."""
-        child = self._take()
+        try:
+            child = self._take()
+        except OSError as reason:
+            return Outcome(task, "broken", why=_no_start(reason))
         try:
             outcome = child.carry_out(task, self._timeout)
         except BaseException:

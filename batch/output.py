@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import resource
 import shlex
 import shutil
 from collections.abc import Sequence
@@ -85,6 +87,9 @@ def _check_output(output: Path, plan: Plan) -> None:
             inside = quoted(target / default_output(plan))
             helps = f"name a file in it: `-o {inside}`" if target == output else ()
             raise Problem(error("E305", f"cannot write {target}: it is a folder", help=helps))
+    if beside(output).exists() and not beside(output).is_dir():
+        message = f"cannot write {output}: {beside(output)} is no folder, and a campaign's has to be there"
+        raise Problem(error("E305", message, help="give another name with `-o`, or move the file"))
     if foreign := Folder(beside(output)).foreign():
         message = f"cannot write {output}: {beside(output)} is no campaign's folder, and holds {', '.join(foreign[:3])}"
         raise Problem(error("E305", message, help="give another name with `-o`, or move the folder"))
@@ -119,8 +124,21 @@ def check_room(output: Path, needed: int) -> None:
 def cannot_write(output: Path, reason: OSError, kept: str = "") -> Any:
     """kept: what of the work is kept, and where; nothing is without it."""
     why = (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
+    if reason.errno in (errno.EMFILE, errno.ENFILE):  # whatever it was that could not be opened
+        return error("E305", f"cannot write {output}: {why}", help=f"{kept or 'nothing was kept'}; {more_files()}")
+    where = str(reason.filename) if isinstance(reason.filename, str | os.PathLike) else ""
+    if where and Path(where).is_relative_to(beside(output)):  # the archive itself is in nobody's way
+        why = f"{where}: {why}"
     helps = kept or "nothing was kept; `-o FILE` names another place"
+    if reason.errno in (errno.EEXIST, errno.EISDIR, errno.ENOTDIR):
+        helps = f"{kept or 'nothing was kept'}; move away what is in the way, or give another name with `-o`"
     return error("E305", f"cannot write {output}: {why}", help=helps)
+
+
+def more_files() -> str:
+    """The remedy where no more files can be opened."""
+    most = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    return f"`ulimit -n` allows {most:,} open files: allow more in the shell that runs it, or use fewer processes"
 
 
 def busy(output: Path) -> Any:

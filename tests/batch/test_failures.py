@@ -3,7 +3,9 @@ listed by cause."""
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -349,6 +351,27 @@ class TestWorkers:
         batch.run(plan, output=path, executor=rest)
         assert held and not held.keys() & set(rest.names)
         assert path.read_bytes() == batch.run(plan, output=here / "b.h5", threads=1).path.read_bytes()
+
+    @pytest.mark.parametrize(("number", "why"), [
+        (errno.ENOMEM, "cannot allocate memory; fewer processes may do"),
+        (errno.EAGAIN, "resource temporarily unavailable; fewer processes may do"),
+        (errno.EMFILE, "too many open files; `ulimit -n` allows 77 open files: allow more in the shell that runs it, "
+                       "or use fewer processes"),
+        (errno.EACCES, "permission denied"),
+    ])  # fmt: skip
+    def test_a_process_that_cannot_be_had_is_no_fault_of_the_archive(
+        self, here: Path, monkeypatch: pytest.MonkeyPatch, number: int, why: str
+    ) -> None:
+        def refuse(*_: Any, **__: Any) -> Any:
+            raise OSError(number, os.strerror(number))
+
+        monkeypatch.setattr("batch.child.subprocess.Popen", refuse)
+        monkeypatch.setattr("batch.output.resource.getrlimit", lambda _: (77, 77))
+        assert stopped(plans.plan(plans.gains(4)), here / "a.h5", executor=Processes(2)) == (
+            f"error[E354]: the campaign cannot go on: a worker cannot be started: {why}\n"
+            " = help: nothing was kept\n"
+            "\n1 error\n"
+        )
 
     def test_a_worker_that_cannot_start_is_told(self, here: Path) -> None:
         executor = Processes(2, command=("sh", "-c", "echo no such thing >&2; exit 9", "sh"))

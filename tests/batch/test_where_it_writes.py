@@ -1,5 +1,6 @@
 """Where a campaign writes: what is refused before anything runs, and what an end leaves."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -70,6 +71,14 @@ class TestRefusedBeforeAnythingRuns:
     def test_a_file_where_a_folder_should_be(self, here: Path) -> None:
         (here / "file").write_text("x")
         assert self.run("file/a.h5") == "error[E305]: cannot write file/a.h5: file is a file, not a folder\n\n1 error\n"
+
+    def test_a_file_where_the_campaigns_folder_should_be(self, here: Path) -> None:
+        (here / "a.h5.campaign").touch()
+        assert self.run("a.h5") == (
+            "error[E305]: cannot write a.h5: a.h5.campaign is no folder, and a campaign's has to be there\n"
+            " = help: give another name with `-o`, or move the file\n"
+            "\n1 error\n"
+        )
 
     def test_somebody_elses_file_is_not_written_over(self, here: Path) -> None:
         (here / "two_link.ic").write_text("run nominal { }")
@@ -205,6 +214,38 @@ class TestHowItEnds:
         assert output("#7", 2) == "two_link.gains.case2-7.h5"
         assert output(*range(8)) == "two_link.gains.cases.h5"
         assert output(*range(9)) == "two_link.gains.h5"
+
+
+@pytest.mark.usefixtures("engine")
+@pytest.mark.parametrize(("name", "why"), [
+    ("lock/x", "lock: is a directory"), ("shards", "shards: file exists"), ("plan.json/x", "plan.json: is a directory"),
+])  # fmt: skip
+def test_what_is_in_the_way_in_the_campaigns_folder_is_named(here: Path, name: str, why: str) -> None:
+    there = here / "a.h5.campaign" / name
+    there.parent.mkdir(parents=True)
+    there.touch()
+    with pytest.raises(Problem) as caught:
+        batch.run(plans.plan(plans.gains(3)), output="a.h5")
+    said = refused(caught)
+    assert said.startswith(f"error[E305]: cannot write a.h5: a.h5.campaign/{why}\n = help: ")
+    assert said.endswith("; move away what is in the way, or give another name with `-o`\n\n1 error\n")
+
+
+@pytest.mark.usefixtures("engine")
+def test_where_no_more_files_can_be_opened_it_is_said(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE), "a.h5.campaign/lock")
+
+    monkeypatch.setattr("batch.folder.os.open", refuse)
+    monkeypatch.setattr("batch.output.resource.getrlimit", lambda _: (77, 77))
+    with pytest.raises(Problem) as caught:
+        batch.run(plans.plan(plans.gains(3)), output="a.h5")
+    assert refused(caught) == (
+        "error[E305]: cannot write a.h5: too many open files\n"
+        " = help: nothing was kept; `ulimit -n` allows 77 open files: allow more in the shell that runs it, or use "
+        "fewer processes\n"
+        "\n1 error\n"
+    )
 
 
 @pytest.mark.parametrize("room", [2_000, 60_000, 200_000, 700_000])  # full at the head, the layout, the histories
