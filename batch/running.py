@@ -11,10 +11,12 @@ from typing import Any
 from batch.archive.read import ArchiveFile
 from batch.campaign import Campaign, prepare
 from batch.executors.choose import choose
+from batch.executors.threads import Threads
 from batch.export.straight import check, later, parted, written
 from batch.output import quoted
 from batch.performing import TooMany, perform
 from batch.progress import Bar
+from batch.rehearsal import rehearse
 from batch.replaying import Replay, differences, replay
 from batch.structures import structures
 from batch.summary import summarise
@@ -54,6 +56,9 @@ def run_and_tell(
         helps = "`met run ARCHIVE.h5 --failed` runs those again that failed"
         raise Problem(error("E357", f"`--failed` is of an archive, and {source} is none", help=helps))
     executor = choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
+    if not isinstance(executor, Threads):
+        rehearse(timeout, source=source, names=names, everything=everything, defines=defines,
+                 include_dirs=include_dirs, settings=settings)  # fmt: skip
     archive, target = parted(output)
     again = None
     if names_archive(source):

@@ -136,7 +136,9 @@ def available(kind: Kind) -> dict[str, Any]:
         found_at = f"entry point `{point.name} = {point.value}` of {point.package} in group `{group.entry_points}`"
         try:
             loaded = point.load()
-        except Exception as reason:  # another package's code: whatever it raises is its user's to read
+        except KeyboardInterrupt:
+            raise
+        except BaseException as reason:  # another package's code: whatever it raises, `sys.exit` too, is its user's
             message = f"cannot load the {kind} of {found_at}: {type(reason).__name__}: {reason}"
             raise Problem(error("E215", message, help="mend or uninstall the package that offers it")) from reason
         if not isinstance(loaded, declaration):

@@ -74,5 +74,7 @@ def _tried(function: Callable[..., T], *arguments: Any) -> T | None:
     """What a model gives back; None of one that raises anything, for it is its author's code."""
     try:
         return function(*arguments)
-    except Exception:
+    except KeyboardInterrupt:
+        raise
+    except BaseException:
         return None

@@ -67,7 +67,7 @@ class Revision:
 
 def version(package: str) -> str:
     try:
-        return metadata.version(package)
+        return metadata.version(package) or UNKNOWN  # None where its metadata is missing
     except metadata.PackageNotFoundError:
         return UNKNOWN
 

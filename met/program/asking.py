@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.integrators.integrator import Integrator, Motion, Slope
-from met.program.values import answer
+from met.program.values import Passing, answer
 from met.trace import Graph, Real, Scalar
 
 
@@ -103,5 +103,5 @@ def _wrong(y: object, like: Motion) -> str:
     return f"a Motion of {told[0]}; the arm has {told[1]}"
 
 
-class _Open(BaseException):
+class _Open(Passing):
     """A question has no answer yet. No Exception: a model that catches those is not to catch this."""

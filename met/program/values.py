@@ -53,14 +53,19 @@ def parameters(owner: str, prefix: str, declared: Iterable[Parameter], read: Rea
     return Values(owner, numbers)
 
 
+class Passing(BaseException):
+    """What the engine raises in the midst of a model's function, to be out of it: no mistake of the model's."""
+
+
 def answer(owner: str, function: Callable[..., T], *arguments: Any) -> T:
-    """What a model's function gives back. Whatever it raises is said at the model's own line, Problem E213."""
+    """What a model's function gives back. Whatever it raises is said at the model's own line, Problem E213: `sys.exit`
+    too, but for an interrupt, which is the user's."""
     try:
         with np.errstate(all="ignore"):  # what comes of constants is in the program, as what comes of a run is
             return function(*arguments)
-    except Problem:
+    except (Problem, Passing, KeyboardInterrupt):
         raise
-    except Exception as reason:  # a model is its author's code: whatever it raises is for the author to read
+    except BaseException as reason:  # a model is its author's code: whatever it raises is for the author to read
         frames = traceback.extract_tb(reason.__traceback__)
         # the first frame is this function's own, the next one the model's, unless it called nothing written in Python
         own = [frame for frame in frames[1:] if frame.filename == frames[1].filename] or frames
@@ -69,7 +74,7 @@ def answer(owner: str, function: Callable[..., T], *arguments: Any) -> T:
         if frame.end_colno is not None and frame.colno is not None and frame.end_lineno == frame.lineno:
             place = replace(place, length=max(frame.end_colno - frame.colno, 1))
         name = getattr(getattr(function, "func", function), "__name__", type(function).__name__)
-        message = f"{owner}: `{name}` raises {type(reason).__name__}: {reason}"
+        message = f"{owner}: `{name}` raises {type(reason).__name__}{f': {reason}' if str(reason) else ''}"
         sources = {frame.filename: "".join(linecache.getlines(frame.filename))}
         raise Problem(error("E213", message, place, help="mend the model, or tell its author"), sources) from reason
 
