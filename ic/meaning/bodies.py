@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ic.meaning.checks import in_pieces
 from ic.meaning.merge import Item
 from ic.meaning.owner import Owner
 from ic.meaning.scope import Scope
@@ -37,7 +38,7 @@ def check_body(scope: Scope, owner: Owner, kind: str, name: str, item: Item | No
             helps.append(f"in the arm's block: `{name} {{ {entry} }}`")
     scope.checks.hold(
         (*inertia, 1.0 if mass is None else mass),
-        lambda values: _not_a_body(values, kind),
+        lambda values: in_pieces(lambda rows: _not_a_body(rows, kind), values),
         code="D087",
         needs=(f"{owner.path}.mass", f"{owner.path}.shape"),
         message=f"the inertia of {kind} `{name}` is no body's",

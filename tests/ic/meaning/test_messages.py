@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
+from ic.meaning import checks
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, told
 
 # ruff: noqa: E501 - messages are as wide as they are
@@ -120,6 +123,18 @@ error[D087]: the inertia of link `bar` is no body's
   = help: inertia is about the centre of mass, in link axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2
   = help: products have the sign of -sum(m x y)
 """
+
+
+@pytest.mark.parametrize("at_once", [1, 3, 100])
+def test_an_inertia_that_some_cases_have_is_told_by_the_first_of_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: int
+) -> None:
+    monkeypatch.setattr(checks, "PIECE", at_once)
+    arm = changed(ARM, ("shape = rod(length = 1 m, along = x)", "inertia = [1, 1, turned] kg*m^2"))
+    sweep = "default sweep many of hold { vary turned = linspace(1.5, 3, 7); }\n"
+    said = shown(tmp_path, "let turned = 1;\n", arm, SERVO, RUN, sweep)
+    assert "the inertia of link `bar` is no body's; case #3 breaks it, and 3 more\n" in said
+    assert "principal moments 1, 1 and 2.25 kg*m^2; no body has one above the sum of the others\n" in said
 
 
 def test_a_link_in_the_air(tmp_path: Path) -> None:
