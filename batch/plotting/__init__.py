@@ -78,7 +78,10 @@ def draw(
     place.check(target)
     [pool] = [pool for pool in pools(groups) if group in pool.groups]
     wanted = asked(group, pool, names, cases, over)
-    with _matplotlib().rc_context(sheet.style):
+    matplotlib = _matplotlib()
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()  # a matplotlibrc of the working folder decides nothing: it may have TeX run
+        matplotlib.rcParams.update(sheet.style)
         if wanted.histories:
             found = None if against is None else beside(archive, [group], against)[0]
             figure = histories.Histories(archive, group, wanted.signals, cases, sheet, found).draw()

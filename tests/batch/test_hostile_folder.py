@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -66,6 +67,7 @@ def folder(tmp_path: Path) -> Path:
     (info / "entry_points.txt").write_text(offered)
     plan_file.write(plans.plan(plans.gains(9)), here / "p.json")
     (here / "deck.ic").write_text(DECK)
+    (here / "matplotlibrc").write_text("text.usetex: True\nfont.size: 30\nbackend: module://hostile\n")
     return here
 
 
@@ -105,6 +107,17 @@ def test_a_campaign_runs_nothing_of_the_folder(
     done = met("run", "p.json", "-o", "a.h5", "--no-picture", "--quiet", *way)
     assert (done.stdout, done.stderr) == ("", "")
     assert (folder / "a.h5").exists()
+
+
+@pytest.mark.slow
+def test_a_picture_takes_nothing_of_the_folder(
+    met: Callable[..., subprocess.CompletedProcess[str]], folder: Path
+) -> None:
+    met("run", "p.json", "-o", "a.h5", "--quiet")
+    assert met("plot", "a.h5", "settle", "-o", "a.svg").returncode == 0
+    (folder / "matplotlibrc").unlink()
+    met("plot", "a.h5", "settle", "-o", "b.svg")
+    assert (folder / "a.png").exists() and (folder / "a.svg").read_bytes() == (folder / "b.svg").read_bytes()
 
 
 @pytest.mark.slow
@@ -152,3 +165,11 @@ def test_a_package_that_lies_in_the_working_folder_is_not_installed(
     assert "hostile" not in {point.package for point in entry_points.offered("met.servos")}
     monkeypatch.setattr(sys, "path", [*sys.path, str(folder)])  # but where the user names it, it is
     assert "hostile" in {point.package for point in entry_points.offered("met.servos")}
+
+
+def test_one_file_says_how_a_python_is_started() -> None:
+    names = re.compile(r"sys\.executable|multiprocessing|processes=True|ProcessPool")
+    paths = [path for room in ("batch", "hw", "ic", "met") for path in (ROOT / room).rglob("*.py")]
+    found = {str(path.relative_to(ROOT)) for path in paths if names.search(path.read_text(encoding="utf-8"))}
+    # the last two only tell a user what to type
+    assert found == {"met/interpreter.py", "batch/export/parquet.py", "ic/cli_new.py"}
