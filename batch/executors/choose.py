@@ -17,7 +17,7 @@ def choose(
             raise ValueError(f"{name}={count}: at least 1")
     if dask is not None:
         if processes is not None:
-            helps = "Dask's workers are its own; `--dask local` starts as many as there are cores"
+            helps = "Dask's processes are its own; `--dask local` has as many at work as there are cores"
             raise Problem(error("E356", "`--processes` and `--dask` are two ways to run a campaign", help=helps))
         from batch.executors.dask import Dask
 

@@ -74,7 +74,7 @@ class TestWhatItIsCalled:
             choose(dask="local", processes=2)
         assert refused(caught) == (
             "error[E356]: `--processes` and `--dask` are two ways to run a campaign\n"
-            " = help: Dask's workers are its own; `--dask local` starts as many as there are cores\n"
+            " = help: Dask's processes are its own; `--dask local` has as many at work as there are cores\n"
             "\n1 error\n"
         )  # fmt: skip
 
