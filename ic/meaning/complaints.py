@@ -20,6 +20,7 @@ class Complaints:
     def __init__(self, found: Iterable[Diagnostic] = ()) -> None:
         self._found: dict[Diagnostic, None] = dict.fromkeys(found)
         self._remarks: dict[Diagnostic, None] = {}
+        self.faults = 0  # errors so far, with those that are not told again: to see whether something brought one
         self.lacking: set[tuple[Place, str]] = set()  # definitions, and entries that they lack, as was told
 
     @property
@@ -36,6 +37,7 @@ class Complaints:
 
     def add(self, *diagnostics: Diagnostic) -> None:
         for diagnostic in diagnostics:
+            self.faults += diagnostic.severity == "error"
             if len(self._found) < MOST and not self._told_of_another_user(diagnostic):
                 self._found.setdefault(diagnostic)
 

@@ -167,9 +167,9 @@ class Scope:
             if isinstance(found.number, Scalar):
                 raise Problem(error("D122", f"`{wanted.name}` of {owner.label} varies with the sweep", found.place,
                                     help=f"it decides the program: vary `{path}` itself"))
-            before = len(self.complaints.all)
+            before = self.complaints.faults
             self._check_range(owner, wanted, found.number, found.place)
-            number = float(found.number) if len(self.complaints.all) == before else None
+            number = float(found.number) if self.complaints.faults == before else None
             if number is not None:
                 self.beside[path] = Settled(number, self.unit(owner, wanted)[0], _origin(item, found.place),
                                             wanted.doc, item.value)

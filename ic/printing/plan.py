@@ -47,15 +47,15 @@ class _Values:
         return quantity(low, unit) if low == high else f"{number(low)} to {quantity(high, unit)}"
 
     def vector(self, path: str) -> tuple[float, ...] | None:
-        """Three numbers `.x .y .z`; None where one of them varies."""
+        """Three numbers `.x .y .z`; None where one of them differs between the cases."""
         return self.numbers(path, ("x", "y", "z"))
 
     def numbers(self, path: str, names: tuple[str, ...]) -> tuple[float, ...] | None:
-        """The numbers of these names below the path; None where one of them varies."""
+        """The numbers of these names below the path; None where one of them differs between the cases."""
         parts = [self.array(f"{path}.{name}") for name in names]
-        if any(part is None or part.size != 1 for part in parts):
+        if any(part is None or part.size == 0 or (part != part.flat[0]).any() for part in parts):
             return None
-        return tuple(float(part) for part in parts if part is not None)
+        return tuple(float(part.flat[0]) for part in parts if part is not None)
 
 
 def print_plan(plan: Plan, *, verbose: bool = False) -> Iterator[str]:

@@ -152,7 +152,7 @@ class _Reader:
 
     def zip(self, group: Group) -> None:
         columns: list[Column] = []
-        before = len(self.complaints.errors)
+        before = self.complaints.faults
         for entry in group.body:
             with self.complaints.gather():
                 words = [word.text for word in entry.words] if isinstance(entry, Setting) else None
@@ -169,7 +169,7 @@ class _Reader:
                     "D135", f"`{columns[0].path}` has {len(columns[0])} values and `{other.path}` has {len(other)}",
                     other.place, also=[Label(columns[0].place, f"{len(columns[0])} values")],
                     help="what is zipped goes in step: as many values each"))
-        if columns and len(self.complaints.errors) == before:
+        if columns and self.complaints.faults == before:
             check_equal(columns, self.places.get(columns[0].path, ()))
             self.axes.append(Axis(tuple(columns)))
 

@@ -152,7 +152,7 @@ def read_sample(definitions: Definitions, complaints: Complaints, statement: Sta
     names = Names(definitions, {}, watched=set(paths))
     count = _count(evaluate_number(call.positional[0], names.find))
     parts = []
-    before = len(complaints.errors)
+    before = complaints.faults
     for entry in call.body:
         with complaints.gather():
             if not isinstance(entry, Setting) or entry.words or entry.operator != "=":
@@ -160,7 +160,7 @@ def read_sample(definitions: Definitions, complaints: Complaints, statement: Sta
                 raise Problem(error("D224", "a sample holds `PATH = DISTRIBUTION(...);` and nothing else", entry.place,
                                     help=[*other, known_words("distributions", DISTRIBUTIONS)]))
             parts.append(_part(entry, names, paths))
-    if len(complaints.errors) > before:
+    if complaints.faults > before:
         raise Problem(())
     if not parts:
         raise Problem(error("D224", "this sample is empty", statement.place,

@@ -87,10 +87,10 @@ class _Sweep:
         self.read_so_far: dict[tuple[str, ...], _Read] = {}
 
     def groups(self) -> list[Group]:
-        before = len(self.complaints.errors)
+        before = self.complaints.faults
         read = self._read(self.definitions, self.definition)
         sweep = read.sweep
-        if len(self.complaints.errors) > before:
+        if self.complaints.faults > before:
             resolve_run(Scope(read.definitions, self.complaints), read.base)
             return []
         self.read_so_far[()] = read
@@ -102,7 +102,7 @@ class _Sweep:
         made: list[tuple[Group, np.ndarray]] = []
         dropped: dict[Place, int] = {}  # by each `exclude when`, of which a macro may bring other ones
         for choices, rows in found:
-            errors = len(self.complaints.errors)
+            faults = self.complaints.faults
             noted = len(self.complaints.all)
             with self.complaints.gather():
                 one = self._group(sweep, choices, rows)
@@ -111,7 +111,7 @@ class _Sweep:
                         dropped[place] = dropped.get(place, 0) + count
                     if one[0] is not None:
                         made.append(one[0])
-            if len(self.complaints.errors) > errors:
+            if self.complaints.faults > faults:
                 self.complaints.mark(noted, *(Label(option.place, f"where `{column.path}` is `{option.text}`")
                                               for column, option in choices))
                 return []

@@ -5,13 +5,14 @@ from __future__ import annotations
 import resource
 import signal
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
 from types import FrameType
 
 import ic
+from ic.meaning.lower import Compiled, Select
 from met.render import render, to_json
 
 MOST_SECONDS = 20.0  # of processor time
@@ -24,11 +25,18 @@ class Hung(BaseException):
     """The deck has taken its time."""
 
 
-def fault_of(path: Path) -> tuple[str, str] | None:
-    """What is wrong with MET as this deck shows it: a short name of it, and its traceback; None if nothing is."""
+def fault_of(
+    path: Path, select: Select = "all", also: Callable[[Compiled], None] | None = None
+) -> tuple[str, str] | None:
+    """What is wrong with MET as this deck shows it: a short name of it, and its traceback; None if nothing is.
+
+    also  what else to try with the deck, once it has compiled
+    """
     try:
         with _limited_time():
-            _all_of_it(path)
+            compiled = _all_of_it(path, select)
+            if also is not None and compiled.plan is not None:
+                also(compiled)
     except (Exception, Hung, RecursionError) as fault:
         frames = traceback.extract_tb(fault.__traceback__)
         own = [frame for frame in frames if "/ic/" in frame.filename or "/met/" in frame.filename] or frames
@@ -38,8 +46,8 @@ def fault_of(path: Path) -> tuple[str, str] | None:
     return None
 
 
-def _all_of_it(path: Path) -> None:
-    compiled = ic.check(path, select="all")
+def _all_of_it(path: Path, select: Select) -> Compiled:
+    compiled = ic.check(path, select=select)
     errors = [d for d in compiled.diagnostics if d.severity == "error"]
     assert (compiled.plan is None) == bool(errors), "a plan and errors, or neither"
     text = render(compiled.diagnostics, compiled.sources)
@@ -47,7 +55,7 @@ def _all_of_it(path: Path) -> None:
     assert all(d.at is not None or _of_a_file(d.code) for d in errors), "an error without a place"
     to_json(compiled.diagnostics)
     if compiled.plan is None:
-        return
+        return compiled
     from ic.printing.cases import print_cases
     from ic.printing.check import notes, verdict
     from ic.printing.plan import print_plan
@@ -56,14 +64,15 @@ def _all_of_it(path: Path) -> None:
     verdict(compiled.plan, compiled.diagnostics)
     experiments = compiled.plan.experiments
     if not experiments:
-        return
+        return compiled
     for lines in (notes(compiled.plan), print_plan(compiled.plan, verbose=True), print_cases(experiments)):
         for _ in islice(lines, MOST_LINES):
             pass
     if any(each.cases.count > MOST_CASES for each in experiments):
-        return
+        return compiled
     written = plan_file.dumps(compiled.plan)
     assert plan_file.dumps(plan_file.loads(written)) == written, "a plan that is not read as it was written"
+    return compiled
 
 
 def _of_a_file(code: str) -> bool:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import ic
-from tests.ic.fuzz import mutations, one, worker
+from tests.ic.fuzz import mutations, one, sweeps, worker
 from tests.ic.fuzz.__main__ import ROOT, Fault, Findings, fuzz, told
 
 ARM = """\
@@ -114,3 +114,16 @@ Traceback ...
 
 --- the deck
 x = 1;"""
+
+
+def test_some_random_sweeps_show_no_fault(tmp_path: Path) -> None:
+    """All kinds of axes, with one case and with several, over one deck; the test below tries many more of all."""
+    decks = ("two_link.ic",)
+    told = [sweeps.fault_of(f"some/{n}", tmp_path, rough=0.0 if n % 3 else 0.1, decks=decks) for n in range(20)]
+    assert [f"{text}\n{fault}" for text, fault, _ in told if fault] == []
+    assert sum(compiled for _, _, compiled in told) > 5
+
+
+@pytest.mark.slow
+def test_two_thousand_random_sweeps_show_no_fault(tmp_path: Path) -> None:
+    assert sweeps.main("many", 2000, tmp_path) == 0

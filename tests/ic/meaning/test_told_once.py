@@ -102,3 +102,11 @@ error[D104]: servo `slide` is unstable with modified_euler at this rate of the d
    |                        ^^^^^ h * lambda = 10; the slowest rate that fits is 60 Hz
    = help: h * lambda must stay below 2; lambda is the servo's fastest rate constant, on any arm
 """
+
+
+def test_a_duration_that_is_out_of_range_is_used_by_no_run_like_the_one_that_writes_it(tmp_path: Path) -> None:
+    """What was told of the one is not told of the other, whose sensor's filter is reckoned with its duration."""
+    felt = "sensor g = gyroscope { link = bar; along = [0, 0, 1]; filter = butterworth; cutoff = 5 Hz; rate = 1 kHz; }"
+    run = changed(RUN, ("duration = 1 s;", f"duration = -1e305 s; {felt}"), ("lift = slide;", ""))
+    more = "run again like hold { seed = 1; }\nsweep seeds of again { vary links.bar.mass = [1] kg; }\n"
+    assert codes(tmp_path, ARM, SERVO, SLIDE, run, more, select="all") == ["D077"]

@@ -575,3 +575,14 @@ Base: moves freely, at the start with
   velocity  [0.1, -0.2, 0.3] m/s
   rate      [40, 20, -60] deg/s
 """ in said
+
+
+def test_a_sweep_of_one_case_shows_the_vectors_that_follow_from_what_varies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("swing.ic").write_text(DECK + "sweep one of free { vary links.slider.mass = [6] kg; }\n", encoding="utf-8")
+    assert cli.main(["plan", "swing.ic", "one", "-v", "-q"]) == 0
+    assert cli.main(["plan", "swing.ic", "one", "-v"]) == 0
+    shown = capsys.readouterr().out
+    assert "  slider  6 kg    [0, 0, 0.05] m  [0.01, 0.01, 0.01, 0, 0, 0] kg*m^2\n" in shown
