@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from types import MappingProxyType
@@ -48,23 +49,84 @@ class Dimension(NamedTuple):
         return text(self)
 
 
+# pi to 75 places: a product with it is rounded once, as one with a fraction is
+_PI = 3141592653589793238462643383279502884197169399375105820974944592307816406286
+_PI_BELOW = 10**75
+
+
 @frozen
 class Measure:
-    """What a unit means: its dimension, and how many SI units one of it is."""
+    """What a unit means: its dimension, and how many SI units one of it is, exactly: over / under * pi^turns.
+
+    hertz  the exponent of the hertz in it: Hz and 1/s are one dimension, but only Hz says that it counts cycles
+    """
 
     dimension: Dimension
-    scale: float
+    over: int = 1
+    under: int = 1
+    turns: int = 0
+    hertz: int = 0
+
+    @property
+    def scale(self) -> float:
+        """SI units in one of it, as a double. Raises OverflowError where that is too large."""
+        return _divided(self.over, self.under, self.turns)
 
     def __mul__(self, other: Measure) -> Measure:
-        return Measure(self.dimension * other.dimension, self.scale * other.scale)
+        over, under = self.over * other.over, self.under * other.under
+        common = math.gcd(over, under)
+        return Measure(self.dimension * other.dimension, over // common, under // common,
+                       self.turns + other.turns, self.hertz + other.hertz)  # fmt: skip
 
     def __pow__(self, exponent: int) -> Measure:
-        return Measure(self.dimension**exponent, self.scale**exponent)
+        over, under = (self.over, self.under) if exponent >= 0 else (self.under, self.over)
+        size = abs(exponent)
+        return Measure(self.dimension**exponent, over**size, under**size, self.turns * exponent, self.hertz * exponent)
 
-    def to_si(self, number: float) -> float:
-        """So many of this unit, in SI. 700 ms is 700/1000 s, the float that 0.7 is, and not 700 * 0.001."""
-        parts = round(1.0 / self.scale) if 0.0 < self.scale < 1.0 else 1
-        return number / parts if parts > 1 and 1.0 / parts == self.scale else number * self.scale
+    def to_si(self, number: float, decimal: str = "") -> float:
+        """So many of this unit in SI, rounded once: 64.1 km is 64100 m, and 700 ms the float that 0.7 is.
+
+        decimal  how the number is written, its sign aside. Without it a number that prints with 15 digits or less is
+                 the decimal that it prints as, and any other the double that it is.
+
+        A recorded number is divided or multiplied as it is. What is too large is infinite.
+        """
+        if not isinstance(number, float | int):
+            return number * self.scale if self.turns or self.over != 1 else number / self.under
+        if (self.over, self.under, self.turns) == (1, 1, 0) or number == 0.0 or not math.isfinite(number):
+            return float(number)
+        above, below = _exactly(number, decimal)
+        try:
+            size = _divided(above * self.over, below * self.under, self.turns)
+        except OverflowError:
+            size = math.inf
+        return math.copysign(size, number)
+
+
+def fraction(decimal: str) -> tuple[int, int]:
+    """The number that a decimal says, such as `-1.5e-3`, over and under the line; neither is made small."""
+    digits, _, power = decimal.lower().partition("e")
+    whole, _, rest = digits.partition(".")
+    exponent = int(power or 0) - len(rest)
+    return int(whole + rest) * 10 ** max(exponent, 0), 10 ** max(-exponent, 0)
+
+
+def _exactly(number: float, decimal: str) -> tuple[int, int]:
+    """The size of a number over and under the line (`Measure.to_si`)."""
+    shortest = repr(abs(float(number)))
+    digits = shortest.partition("e")[0].replace(".", "").strip("0")
+    if decimal or len(digits) <= sys.float_info.dig:
+        return fraction(decimal.lstrip("+-") or shortest)
+    return abs(number).as_integer_ratio()
+
+
+def _divided(over: int, under: int, turns: int) -> float:
+    """over / under * pi^turns, the nearest double. (Python divides whole numbers of any size and rounds once.)"""
+    if turns > 0:
+        over, under = over * _PI**turns, under * _PI_BELOW**turns
+    elif turns < 0:
+        over, under = over * _PI_BELOW**-turns, under * _PI**-turns
+    return over / under
 
 
 @frozen
@@ -77,7 +139,7 @@ class NamedUnit:
 
 
 PURE = Dimension()
-ONE = Measure(PURE, 1.0)
+ONE = Measure(PURE)
 
 _LENGTH = Dimension(m=1)
 _MASS = Dimension(kg=1)
@@ -93,56 +155,60 @@ _INDUCTANCE = _RESISTANCE * _TIME
 _CAPACITANCE = _TIME / _RESISTANCE
 _PRESSURE = _FORCE / _LENGTH**2
 
-_ROWS: tuple[tuple[str, str, Dimension, float], ...] = (
-    ("m", "metre", _LENGTH, 1.0),
-    ("km", "kilometre", _LENGTH, 1e3),
-    ("cm", "centimetre", _LENGTH, 1e-2),
-    ("mm", "millimetre", _LENGTH, 1e-3),
-    ("um", "micrometre", _LENGTH, 1e-6),
-    ("kg", "kilogram", _MASS, 1.0),
-    ("g", "gram", _MASS, 1e-3),
-    ("t", "tonne", _MASS, 1e3),
-    ("s", "second", _TIME, 1.0),
-    ("ms", "millisecond", _TIME, 1e-3),
-    ("us", "microsecond", _TIME, 1e-6),
-    ("min", "minute", _TIME, 60.0),
-    ("h", "hour", _TIME, 3600.0),
-    ("rad", "radian", _ANGLE, 1.0),
-    ("mrad", "milliradian", _ANGLE, 1e-3),
-    ("deg", "degree", _ANGLE, math.pi / 180),
-    ("arcmin", "minute of arc", _ANGLE, math.pi / 10800),
-    ("arcsec", "second of arc", _ANGLE, math.pi / 648000),
-    ("cycle", "cycle", _ANGLE, 2 * math.pi),
-    ("rpm", "cycle a minute", _ANGLE / _TIME, 2 * math.pi / 60),
-    ("Hz", "hertz", _TIME**-1, 1.0),
-    ("kHz", "kilohertz", _TIME**-1, 1e3),
-    ("N", "newton", _FORCE, 1.0),
-    ("mN", "millinewton", _FORCE, 1e-3),
-    ("kN", "kilonewton", _FORCE, 1e3),
-    ("J", "joule", _ENERGY, 1.0),
-    ("W", "watt", _POWER, 1.0),
-    ("kW", "kilowatt", _POWER, 1e3),
-    ("Pa", "pascal", _PRESSURE, 1.0),
-    ("A", "ampere", _CURRENT, 1.0),
-    ("mA", "milliampere", _CURRENT, 1e-3),
-    ("V", "volt", _VOLTAGE, 1.0),
-    ("mV", "millivolt", _VOLTAGE, 1e-3),
-    ("kV", "kilovolt", _VOLTAGE, 1e3),
-    ("ohm", "ohm", _RESISTANCE, 1.0),
-    ("mohm", "milliohm", _RESISTANCE, 1e-3),
-    ("kohm", "kiloohm", _RESISTANCE, 1e3),
-    ("H", "henry", _INDUCTANCE, 1.0),
-    ("mH", "millihenry", _INDUCTANCE, 1e-3),
-    ("uH", "microhenry", _INDUCTANCE, 1e-6),
-    ("F", "farad", _CAPACITANCE, 1.0),
-    ("uF", "microfarad", _CAPACITANCE, 1e-6),
-    ("K", "kelvin", Dimension(K=1), 1.0),
-    ("%", "per cent", PURE, 0.01),
+_ROWS: tuple[tuple[str, str, Dimension, int, int], ...] = (
+    ("m", "metre", _LENGTH, 1, 1),
+    ("km", "kilometre", _LENGTH, 1000, 1),
+    ("cm", "centimetre", _LENGTH, 1, 100),
+    ("mm", "millimetre", _LENGTH, 1, 1000),
+    ("um", "micrometre", _LENGTH, 1, 1_000_000),
+    ("kg", "kilogram", _MASS, 1, 1),
+    ("g", "gram", _MASS, 1, 1000),
+    ("t", "tonne", _MASS, 1000, 1),
+    ("s", "second", _TIME, 1, 1),
+    ("ms", "millisecond", _TIME, 1, 1000),
+    ("us", "microsecond", _TIME, 1, 1_000_000),
+    ("min", "minute", _TIME, 60, 1),
+    ("h", "hour", _TIME, 3600, 1),
+    ("rad", "radian", _ANGLE, 1, 1),
+    ("mrad", "milliradian", _ANGLE, 1, 1000),
+    ("deg", "degree", _ANGLE, 1, 180),
+    ("arcmin", "minute of arc", _ANGLE, 1, 10800),
+    ("arcsec", "second of arc", _ANGLE, 1, 648_000),
+    ("cycle", "cycle", _ANGLE, 2, 1),
+    ("rpm", "cycle a minute", _ANGLE / _TIME, 1, 30),
+    ("Hz", "hertz", _TIME**-1, 1, 1),
+    ("kHz", "kilohertz", _TIME**-1, 1000, 1),
+    ("N", "newton", _FORCE, 1, 1),
+    ("mN", "millinewton", _FORCE, 1, 1000),
+    ("kN", "kilonewton", _FORCE, 1000, 1),
+    ("J", "joule", _ENERGY, 1, 1),
+    ("W", "watt", _POWER, 1, 1),
+    ("kW", "kilowatt", _POWER, 1000, 1),
+    ("Pa", "pascal", _PRESSURE, 1, 1),
+    ("A", "ampere", _CURRENT, 1, 1),
+    ("mA", "milliampere", _CURRENT, 1, 1000),
+    ("V", "volt", _VOLTAGE, 1, 1),
+    ("mV", "millivolt", _VOLTAGE, 1, 1000),
+    ("kV", "kilovolt", _VOLTAGE, 1000, 1),
+    ("ohm", "ohm", _RESISTANCE, 1, 1),
+    ("mohm", "milliohm", _RESISTANCE, 1, 1000),
+    ("kohm", "kiloohm", _RESISTANCE, 1000, 1),
+    ("H", "henry", _INDUCTANCE, 1, 1),
+    ("mH", "millihenry", _INDUCTANCE, 1, 1000),
+    ("uH", "microhenry", _INDUCTANCE, 1, 1_000_000),
+    ("F", "farad", _CAPACITANCE, 1, 1),
+    ("uF", "microfarad", _CAPACITANCE, 1, 1_000_000),
+    ("K", "kelvin", Dimension(K=1), 1, 1),
+    ("%", "per cent", PURE, 1, 100),
 )
+"""Name, word, dimension, and what one is in SI units: over and under the line. Some angles are that many times pi."""
 
-UNITS: Mapping[str, NamedUnit] = MappingProxyType(
-    {name: NamedUnit(name, word, Measure(dimension, scale)) for name, word, dimension, scale in _ROWS}
-)
+_OF_PI = frozenset({"deg", "arcmin", "arcsec", "cycle", "rpm"})
+
+UNITS: Mapping[str, NamedUnit] = MappingProxyType({
+    name: NamedUnit(name, word, Measure(dimension, over, under, int(name in _OF_PI), int(name in ("Hz", "kHz"))))
+    for name, word, dimension, over, under in _ROWS
+})
 
 # what people write for what the table has; for messages only
 _OTHER_WORDS: Mapping[str, str] = MappingProxyType({

@@ -86,11 +86,14 @@ class Table:
         made = []
         for line, row in self.rows:
             cell = _stripped(row.split(",")[column.number])[0]
-            number = measure.to_si(float(cell)) if _NUMBER.fullmatch(cell) else math.inf
-            if not math.isfinite(number):
+            number = measure.to_si(float(cell), cell) if _NUMBER.fullmatch(cell) else math.inf
+            lost = number == 0.0 and any(digit in "123456789" for digit in cell.lower().partition("e")[0])
+            if lost or not math.isfinite(number):
                 found = f"`{cell[:40]}` is not a number" if cell else "there is no number here"
                 if _NUMBER.fullmatch(cell):
                     found = "this number is too large: the largest is 1.8e308"
+                if lost:
+                    found = "this number is too small: it would become 0"
                 raise Problem(error("D194", found, self._cell(line, row, column.number),
                                     also=[Label(column.place, f"column `{column.name}`")],
                                     help="a number is written as 12.5 or -1e-3, with a point and without a unit"))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 
 from met.frozen import frozen
+from met.units import fraction
 
 
 @frozen
@@ -49,10 +50,7 @@ def even(a: float, b: float, n: int) -> Iterable[float]:
 
 def _shortest(x: float) -> tuple[int, int]:
     """The shortest decimal that reads back as x, as a fraction. (Not a `Fraction`: importing them takes 2 ms.)"""
-    digits, _, power = repr(x).partition("e")
-    whole, _, rest = digits.partition(".")
-    exponent = int(power or 0) - len(rest)
-    return int(whole + rest) * 10 ** max(exponent, 0), 10 ** max(-exponent, 0)
+    return fraction(repr(x))
 
 
 def by_ratio(a: float, b: float, n: int) -> Iterable[float]:

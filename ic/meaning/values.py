@@ -44,13 +44,17 @@ CONSTANTS = {"pi": math.pi}
 
 @frozen
 class Value:
-    """A quantity: number in SI, dimension. bare: a number written with no unit. unit: the one it was written in."""
+    """A quantity: number in SI, dimension. bare: a number written with no unit. unit: the one it was written in.
+
+    decimal  of a bare number that is written out, its digits as written
+    """
 
     number: Real
     dimension: Dimension
     place: Place
     bare: bool = False
     unit: Unit | None = None
+    decimal: str = ""
 
 
 @frozen
@@ -110,10 +114,17 @@ def _leaf(expression: Expression, lookup: Lookup) -> Value | Values:
 
 def _number(number: Number) -> Value:
     if number.unit is None:
-        return Value(_sound(number.value, number.place), PURE, number.place, bare=True)
-    measure = measure_of(number.unit)
+        return Value(_sound(number.value, number.place), PURE, number.place, bare=True, decimal=number.text)
     place = spanned(number.place, number.unit.place)
-    return Value(_sound(measure.to_si(number.value), place), measure.dimension, place, unit=number.unit)
+    return _in_unit(Value(number.value, PURE, place, decimal=number.text), number.unit)
+
+
+def _in_unit(value: Value, unit: Unit) -> Value:
+    """A pure number in a unit, rounded once. Raises D067 where it is too large in SI, or so small that it would be 0.
+    """
+    measure = measure_of(unit)
+    number = measure.to_si(cast(float, value.number), value.decimal)  # a scalar divides and multiplies too
+    return Value(_sound(number, value.place, value.number), measure.dimension, value.place, unit=unit)
 
 
 def measure_of(unit: Unit) -> units.Measure:
@@ -125,8 +136,9 @@ def measure_of(unit: Unit) -> units.Measure:
                                 help=f"did you mean `{near}`?" if near else ()))
     try:
         measure = units.measure((word.text, exponent) for word, exponent in unit.factors)
-        _sound(measure.scale, unit.place)
-    except (OverflowError, ZeroDivisionError):
+        if measure.scale == 0.0:
+            raise OverflowError
+    except OverflowError:
         raise Problem(error("D067", "this unit is beyond what a number can hold", unit.place)) from None
     return measure
 
@@ -138,7 +150,7 @@ def _with_unit(expression: WithUnit, lookup: Lookup) -> Value | Values:
             "D062", f"a unit inside brackets that have one after them, `{expression.unit.text}`", inner,
             also=[Label(expression.unit.place, "this one is for all the bare numbers inside")],
             help="give each number its own unit, or none of them"))
-    measure = measure_of(expression.unit)
+    measure_of(expression.unit)
 
     def apply(value: Value | Values) -> Value | Values:
         if isinstance(value, Values):
@@ -148,8 +160,7 @@ def _with_unit(expression: WithUnit, lookup: Lookup) -> Value | Values:
                 "D062", f"a value in {units.text(value.dimension)} inside brackets that have a unit after them",
                 value.place, also=[Label(expression.unit.place, "this unit is for pure numbers")],
                 help="leave the unit after the brackets out, and give each bare number its own"))
-        number = _sound(measure.to_si(cast(float, value.number)), value.place)  # a scalar divides and multiplies too
-        return Value(number, measure.dimension, value.place, unit=expression.unit)
+        return _in_unit(value, expression.unit)
 
     return apply(evaluate(expression.inner, lookup))
 
@@ -195,12 +206,14 @@ def _binary(node: Binary, left: Value | Values, lookup: Lookup) -> Value:
         return Value(_sound(number, place), left.dimension, place, bare, left.unit)
     if operator == "*":
         unit = left.unit if right.dimension == PURE else right.unit if left.dimension == PURE else None
-        return Value(_sound(left.number * right.number, place), left.dimension * right.dimension, place, bare, unit)
+        product = _sound(left.number * right.number, place, left.number, right.number)
+        return Value(product, left.dimension * right.dimension, place, bare, unit)
     if operator == "/":
         if not isinstance(right.number, Scalar) and right.number == 0.0:
             raise Problem(error("D066", "division by zero", Label(right.place, "this is zero")))
         unit = left.unit if right.dimension == PURE else None
-        return Value(_sound(left.number / right.number, place), left.dimension / right.dimension, place, bare, unit)
+        quotient = _sound(left.number / right.number, place, left.number)
+        return Value(quotient, left.dimension / right.dimension, place, bare, unit)
     return replace(_power(node, left, right), place=place, bare=bare)
 
 
@@ -232,7 +245,7 @@ def _power(node: Binary, base: Value, exponent: Value) -> Value:
         raise _too_large(node.place) from None
     if isinstance(result, complex):
         raise Problem(error("D068", "a negative number to a broken power", node.place))
-    return Value(_sound(result, node.place), dimension, base.place)
+    return Value(_sound(result, node.place, base.number), dimension, base.place)
 
 
 def _items(written: List, lookup: Lookup) -> Iterable[Value | Values]:
@@ -406,9 +419,15 @@ def _plain(number: Real) -> Real:
     return number if isinstance(number, Scalar) else float(number)
 
 
-def _sound(number: Real, place: Place) -> Real:
-    if not isinstance(number, Scalar) and not math.isfinite(number):
+def _sound(number: Real, place: Place, *factors: Real) -> Real:
+    """The number. Raises D067 where it is too large to be one, or is 0 although none of its factors is."""
+    if isinstance(number, Scalar):
+        return number
+    if not math.isfinite(number):
         raise _too_large(place)
+    if factors and number == 0.0 and all(not isinstance(each, Scalar) and each != 0.0 for each in factors):
+        raise Problem(error("D067", "this number is too small: it would become 0", place,
+                            help="the smallest is 4.9e-324, in SI units; for nothing at all write 0"))
     return number
 
 

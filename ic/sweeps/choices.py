@@ -173,11 +173,14 @@ def _number(value: Value, unit: Unit | None) -> Option:
     if isinstance(value.number, Scalar):
         raise Problem(error("D121", "this value depends on what the sweep varies", value.place,
                             help="write numbers that stand still"))
-    scale = measure_of(unit).scale if unit is not None else 1.0
-    number = float(value.number) / scale
+    measure = measure_of(unit) if unit is not None else units.ONE
+    number = float(value.number) / measure.scale
     text = f"{number:.12g}"
     shown = f"{text} {unit.text}" if unit is not None else text
-    return Option(shown, Number(number, unit, value.place, text), value.place)
+    if measure.to_si(float(text), text) == value.number:
+        number = float(text)
+    return Option(shown, Number(number, unit, value.place, text if number == float(text) else repr(number)),
+                  value.place)
 
 
 # A run with its choices put in

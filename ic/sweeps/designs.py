@@ -55,11 +55,9 @@ class Part:
         """Quantiles at these points of (0, 1), SI, rounded in the deck's unit."""
         scale = measure_of(self.unit).scale if self.unit is not None else 1.0
         exact = QUANTILES[self.distribution](points, *(x / scale for x in self.arguments))
-        rounded = np.array([float(f"{x:.{DIGITS}g}") for x in exact])
-        if self.distribution != "normal":
-            low, high = (x / scale for x in self.arguments[-2:])
-            rounded = np.clip(rounded, low, high)
-        return rounded * scale
+        to_si = (measure_of(self.unit) if self.unit is not None else units.ONE).to_si
+        found = np.array([to_si(float(f"{x:.{DIGITS}g}")) for x in exact])
+        return found if self.distribution == "normal" else np.clip(found, *self.arguments[-2:])
 
 
 @frozen

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import random
+from fractions import Fraction
 
 import pytest
 
@@ -117,3 +119,51 @@ def test_a_product_with_a_name_that_is_no_unit_is_refused():
     assert units.measure([("N", 1), ("m", 1), ("A", -1)]) == parse_unit("N*m/A")
     with pytest.raises(ValueError, match="foo"):
         units.measure([("foo", 1)])
+
+
+PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459230781640628620899862803")
+_IN_SI = {
+    "m": "1", "km": "1000", "cm": "0.01", "mm": "0.001", "um": "0.000001", "kg": "1", "g": "0.001", "t": "1000",
+    "s": "1", "ms": "0.001", "us": "0.000001", "min": "60", "h": "3600", "rad": "1", "mrad": "0.001", "Hz": "1",
+    "kHz": "1000", "N": "1", "mN": "0.001", "kN": "1000", "J": "1", "W": "1", "kW": "1000", "Pa": "1", "A": "1",
+    "mA": "0.001", "V": "1", "mV": "0.001", "kV": "1000", "ohm": "1", "mohm": "0.001", "kohm": "1000", "H": "1",
+    "mH": "0.001", "uH": "0.000001", "F": "1", "uF": "0.000001", "K": "1", "%": "0.01",
+}  # fmt: skip
+EXACT = {
+    **{name: Fraction(each) for name, each in _IN_SI.items()},
+    "deg": PI / 180, "arcmin": PI / 10800, "arcsec": PI / 648000, "cycle": 2 * PI, "rpm": PI / 30,
+}  # fmt: skip
+
+
+def test_a_number_in_a_unit_is_the_double_nearest_to_the_product_of_what_is_written():
+    """46,000 products against fractions, pi to 86 places; as they are written, and by what the number prints as."""
+    assert set(EXACT) == set(UNITS)
+    rng = random.Random(7)
+    made = [f"{rng.uniform(0.0, 1000.0):.{rng.randrange(1, 7)}g}" for _ in range(1000)]
+    literals = ["64.1", "0.7", "1e-3", "5.E2", ".25", "700", "0.30000000000000001", "9007199254740993", *made]
+    for name, unit in UNITS.items():
+        for literal in literals:
+            wanted = float(Fraction(literal.rstrip(".")) * EXACT[name])
+            assert unit.measure.to_si(float(literal), literal) == wanted, (literal, name)
+            assert unit.measure.to_si(-float(literal), literal) == -wanted, (literal, name)
+            if len(literal) < 16:
+                assert unit.measure.to_si(float(literal)) == wanted, (literal, name)
+
+
+def test_products_that_were_a_last_place_off():
+    assert UNITS["km"].measure.to_si(64.1) == 64100.0
+    assert UNITS["ms"].measure.to_si(700.0) == 0.7
+    assert UNITS["deg"].measure.to_si(180.0) == math.pi
+    assert parse_unit("g/cm^3").to_si(1.1) == 1100.0
+    assert parse_unit("mV*s/rad").to_si(50.0) == 0.05
+
+
+def test_a_computed_number_of_many_digits_is_the_double_that_it_is():
+    third = 1.0 / 3.0
+    assert UNITS["km"].measure.to_si(third) == float(Fraction(third) * 1000)
+
+
+def test_what_no_double_holds_in_si_is_infinite_or_nothing():
+    assert UNITS["km"].measure.to_si(-1e308) == -math.inf
+    assert UNITS["mm"].measure.to_si(4.9e-324) == 0.0
+    assert math.copysign(1.0, UNITS["mm"].measure.to_si(-0.0)) == -1.0

@@ -158,6 +158,15 @@ error[D194]: this number is too large: the largest is 1.8e308
  ::: moves.csv:1:11  column `hinge`
   = help: a number is written as 12.5 or -1e-3, with a point and without a unit
 """)
+mistake("a number that would become nothing", MOVES.replace("30", "4.9e-324"), """\
+error[D194]: this number is too small: it would become 0
+ --> moves.csv:3:11
+  |
+3 | 0.5,      4.9e-324,          2
+  |           ^^^^^^^^
+ ::: moves.csv:1:11  column `hinge`
+  = help: a number is written as 12.5 or -1e-3, with a point and without a unit
+""")
 mistake("brackets without a unit", MOVES.replace("hinge [deg]", "hinge []"), """\
 error[D193]: column `hinge` has no unit
  --> moves.csv:1:11

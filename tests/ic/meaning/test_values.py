@@ -164,3 +164,29 @@ def test_no_let_may_bear_the_name_of_a_unit_or_function(tmp_path: Path, name: st
     except Problem:
         return  # the parser knows units too
     assert [problem.diagnostics[0].code for problem in Names(definitions, {}).check_lets()] == ["D079"]
+
+
+@pytest.mark.parametrize("written", [
+    "64.1 km", "(64.1) km", "+64.1 km", "[64.1] km", "[64.1 km]", "(64.1 .. 64.1 by 1) km", "linspace(64.1, 65, 2) km",
+    "[linspace(64.1, 65, 2)] km", "min(64.1, 65) km", "(64 + 0.1) km", "(half * 2) km", "64.10000000000000000 km",
+])  # fmt: skip
+def test_a_number_in_a_unit_is_rounded_once_however_the_unit_comes_to_it(tmp_path: Path, written: str) -> None:
+    found = value(tmp_path, written, "let half = 32.05;")
+    assert (found.items[0] if isinstance(found, Values) else found).number == 64100.0  # type: ignore[union-attr]
+
+
+def test_a_number_below_zero_in_a_unit_is_rounded_once_too(tmp_path: Path) -> None:
+    assert numbers(tmp_path, "[-64.1, -(64.1)] km") == [-64100.0, -64100.0]
+    assert number(tmp_path, "(-0.7) ms") == -0.0007
+
+
+@pytest.mark.parametrize("written", [
+    "4.9e-324 mm", "(4.9e-324) mm", "[1, 4.9e-324] mm", "-4.9e-324 mm", "1e-200 m * 1e-200 m", "1e-200 m / 1e200 s",
+    "(1e-200 m)^2",
+])  # fmt: skip
+def test_a_number_that_would_become_nothing_is_refused(tmp_path: Path, written: str) -> None:
+    assert code(tmp_path, written) == "D067"
+
+
+def test_nothing_in_a_unit_is_nothing(tmp_path: Path) -> None:
+    assert numbers(tmp_path, "[0, -0, 0e-999999999, 0 * 1e-300] mm") == [0.0, 0.0, 0.0, 0.0]
