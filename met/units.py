@@ -18,7 +18,6 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
-from met.diagnostic import nearest
 from met.frozen import frozen
 
 BIGGEST_EXPONENT = 9
@@ -210,18 +209,6 @@ UNITS: Mapping[str, NamedUnit] = MappingProxyType({
     for name, word, dimension, over, under in _ROWS
 })
 
-# what people write for what the table has; for messages only
-_OTHER_WORDS: Mapping[str, str] = MappingProxyType({
-    "sec": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us", "hr": "h", "hour": "h", "hours": "h",
-    "minute": "min", "minutes": "min", "meter": "m", "metre": "m", "meters": "m", "metres": "m", "micron": "um",
-    "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad", "rev": "cycle", "revs": "cycle",
-    "turn": "cycle", "turns": "cycle", "cycles": "cycle", "RPM": "rpm", "hz": "Hz", "HZ": "Hz", "khz": "kHz",
-    "KHz": "kHz", "Ohm": "ohm", "ohms": "ohm", "Ohms": "ohm", "kOhm": "kohm", "mOhm": "mohm", "volt": "V", "volts": "V",
-    "amp": "A", "amps": "A", "ampere": "A", "newton": "N", "newtons": "N", "watt": "W", "watts": "W", "joule": "J",
-    "kgs": "kg", "KG": "kg", "Kg": "kg", "gram": "g", "grams": "g", "tonne": "t", "ton": "t", "percent": "%",
-    "pct": "%", "v": "V", "mv": "mV", "n": "N", "M": "m", "MM": "mm", "S": "s", "k": "K",
-})  # fmt: skip
-
 # how a dimension is said, where base units would be hard to read; the first that matches
 _SPOKEN = (
     "N*m/A", "V*s/rad", "V/rad", "N*m*s/rad", "kg*m^2", "N", "N*m", "W", "V", "ohm", "H", "F", "Pa", "N/m", "N*s/m",
@@ -268,24 +255,6 @@ def text(dimension: Dimension) -> str:
         return "*".join(above) or "1"
     divisor = below[0] if len(below) == 1 else f"({'*'.join(below)})"
     return f"{'*'.join(above) or '1'}/{divisor}"
-
-
-def suggest(name: str) -> str | None:
-    """What was probably meant by a name that is no unit: `sec` -> `s`, `Nm` -> `N*m`; None where nothing is near."""
-    if name in _OTHER_WORDS:
-        return _OTHER_WORDS[name]
-    if len(name) > 16:
-        return None
-    for cut in range(1, len(name)):
-        if name[:cut] in UNITS and name[cut:] in UNITS:
-            return f"{name[:cut]}*{name[cut:]}"
-    whole = {unit.word: unit.name for unit in UNITS.values()}
-    if name.lower() in whole:
-        return whole[name.lower()]
-    folded = {unit.lower(): unit for unit in UNITS}
-    if name.lower() in folded:
-        return folded[name.lower()]
-    return nearest(name, UNITS, cutoff=0.75)
 
 
 def parse_unit(written: str, names: Mapping[str, Measure] = MappingProxyType({})) -> Measure:
@@ -363,6 +332,8 @@ class _Reader:
         elif piece in UNITS:
             result = UNITS[piece].measure
         else:
+            from met.other_units import suggest  # for a message alone
+
             near = suggest(piece)
             raise ValueError(f"unit `{self.written}`: `{piece}` is not a unit" + (f"; `{near}`?" if near else ""))
         if self.next_is("^"):

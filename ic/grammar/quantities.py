@@ -12,7 +12,7 @@ from ic.grammar.cursor import Cursor, span
 from ic.grammar.syntax import Expression, Number, Unit, Word
 from ic.text.lexer import NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import LONGEST_NUMBER
-from met import units
+from met import other_units, units
 
 _POWERED = re.compile(r"([A-Za-z]+)([2-9])")
 _UNIT_DEPTH = 8
@@ -134,7 +134,7 @@ class Quantities(Cursor):
             self.fail(
                 "D028", f"`{named.text}` is not a unit", named, help=f"write `{powered.group(1)}^{powered.group(2)}`"
             )
-        near = units.suggest(named.text)
+        near = other_units.suggest(named.text)
         if (
             near
             and named.text not in ("n", "k", "v", "M", "S")
@@ -153,12 +153,12 @@ class Quantities(Cursor):
         ):
             return
         powered = _POWERED.fullmatch(token.text)
-        near = units.suggest(token.text)
+        before = self.previous
+        number = before.text if before.kind in NUMBERS else ""
+        helps = other_units.remedy(token.text, number, alone=self.following.text not in ("^", "*", "/"))
         if powered and units.is_unit(powered.group(1)):
-            near = f"{powered.group(1)}^{powered.group(2)}"
-        self.fail(
-            "D028", f"`{token.text}` is not a unit", token, help=f"did you mean `{near}`?" if near else _units_known()
-        )
+            helps = (f"did you mean `{powered.group(1)}^{powered.group(2)}`?",)
+        self.fail("D028", f"`{token.text}` is not a unit", token, help=helps or _units_known())
 
 
 def _units_known() -> str:

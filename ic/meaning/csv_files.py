@@ -24,6 +24,7 @@ from ic.text.limits import MOST_CSV_BYTES, MOST_CSV_ROWS
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
+from met.other_units import suggest
 from met.units import PURE, Dimension, Measure
 
 LONGEST_NAME = 40  # characters of a column's name that a message shows
@@ -202,7 +203,7 @@ def _meaning(column: Column, remedy: str, also: Iterable[Label], dimension: Dime
     try:
         return units.parse_unit(column.unit)
     except (ValueError, OverflowError, ZeroDivisionError):
-        near = units.suggest(column.unit)
+        near = suggest(column.unit)
         if near is not None and (dimension is None or units.same(units.parse_unit(near).dimension, dimension)):
             remedy = f"did you mean `{column.name} [{near}]`?"
         known = remedy or f"the units: {', '.join(units.UNITS)}"

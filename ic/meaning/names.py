@@ -8,7 +8,7 @@ from ic.grammar.syntax import Expression, Name
 from ic.meaning.complaints import known_words
 from ic.meaning.resolve import Definitions
 from ic.meaning.values import CONSTANTS, FUNCTIONS, Value, Values, evaluate
-from met import units
+from met import other_units, units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 
 DEEPEST = 64  # lets that need lets: far more than a deck has, far less than Python's recursion bears
@@ -115,7 +115,8 @@ class Names:
         elif not helps and rest:
             helps = ["a value names a `let`, or what a servo's definition writes, such as `SERVO.kp`"]
         elif not helps:
-            helps = [f"define it: `let {first} = ...;`"]
+            unit = other_units.remedy(first) if len(first) > 1 else ()
+            helps = [f"define it: `let {first} = ...;`", *(f"if a unit is meant: {each}" for each in unit)]
         raise Problem(error("D065", f"no value `{name.text}`", name.place, help=helps))
 
     def check_lets(self) -> list[Problem]:

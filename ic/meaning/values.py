@@ -28,7 +28,7 @@ from ic.grammar.syntax import (
 from ic.meaning import series
 from ic.meaning.complaints import known_words
 from ic.meaning.unit_words import in_deck
-from met import units
+from met import other_units, units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.trace import Real, Scalar, cos, maximum, minimum, sin, sqrt
@@ -131,9 +131,8 @@ def measure_of(unit: Unit) -> units.Measure:
     """What a unit means. Raises D074 where a factor is no unit."""
     for word, _ in unit.factors:
         if not units.is_unit(word.text):
-            near = units.suggest(word.text)
             raise Problem(error("D074", f"`{word.text}` is not a unit", word.place,
-                                help=f"did you mean `{near}`?" if near else ()))
+                                help=other_units.remedy(word.text)))
     try:
         measure = units.measure((word.text, exponent) for word, exponent in unit.factors)
         if measure.scale == 0.0:

@@ -57,7 +57,10 @@ class Part:
         exact = QUANTILES[self.distribution](points, *(x / scale for x in self.arguments))
         to_si = (measure_of(self.unit) if self.unit is not None else units.ONE).to_si
         found = np.array([to_si(float(f"{x:.{DIGITS}g}")) for x in exact])
-        return found if self.distribution == "normal" else np.clip(found, *self.arguments[-2:])
+        if self.distribution == "normal":
+            return found
+        low, high = self.arguments[-2:]
+        return np.clip(found, low, high)
 
 
 @frozen

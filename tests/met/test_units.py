@@ -9,7 +9,7 @@ from fractions import Fraction
 import pytest
 
 from met import units
-from met.units import UNITS, Dimension, parse_unit, same, suggest, text
+from met.units import UNITS, Dimension, parse_unit, same, text
 from tests.oracles.package import Package
 
 pint = Package("pint")
@@ -104,15 +104,6 @@ def test_the_text_of_a_dimension_reads_back_as_that_dimension(name):
     for exponent in (1, -1, 2):
         dimension = UNITS[name].measure.dimension ** exponent / Dimension(s=1)
         assert parse_unit(text(dimension)).dimension == dimension
-
-
-@pytest.mark.parametrize(
-    ("wrong", "right"),
-    [("sec", "s"), ("Nm", "N*m"), ("Ohm", "ohm"), ("degrees", "deg"), ("RPM", "rpm"), ("kgs", "kg"), ("Metre", "m"),
-     ("hz", "Hz"), ("radd", "rad"), ("elephant", None), ("x" * 500, None)],
-)  # fmt: skip
-def test_a_word_that_is_no_unit_gets_the_unit_that_was_meant(wrong, right):
-    assert suggest(wrong) == right
 
 
 def test_a_product_with_a_name_that_is_no_unit_is_refused():
