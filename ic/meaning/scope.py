@@ -17,13 +17,14 @@ import numpy as np
 from ic.grammar.syntax import Call, Expression, Name, Setting, String
 from ic.meaning.checks import Checks, Varied
 from ic.meaning.complaints import Complaints
+from ic.meaning.cycles import doubt
 from ic.meaning.given import GIVEN, Given, evaluated, is_given, written_origin
 from ic.meaning.merge import Item
 from ic.meaning.names import Names
 from ic.meaning.owner import XYZ, Owner, Settled
 from ic.meaning.remedies import components, mended
 from ic.meaning.resolve import Definitions
-from ic.meaning.unit_words import either, in_deck, in_degrees, unit_here
+from ic.meaning.unit_words import either, in_deck, in_degrees, measure_here, unit_here
 from ic.meaning.values import Value, Values, place_of
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
@@ -458,6 +459,7 @@ class Scope:
         """Raises D060 for a bare number where there is a dimension, D061 for a wrong one."""
         text, dimension = self.unit(owner, wanted)
         if units.same(value.dimension, dimension):
+            self._remark_cycles(owner, wanted, value, text)
             return
         what = owner.what(wanted)
         also = self.names.label(value)
@@ -477,6 +479,13 @@ class Scope:
         other = self._other(owner, wanted, value) if dimension == PURE else []
         raise Problem(error("D061", message, value.place, also=also,
                             help=apart or [*other, mended(value, text, dimension)]))
+
+    def _remark_cycles(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> None:
+        """Tells of a unit that may mean cycles where radians count, or the reverse."""
+        found = doubt(value, text, measure_here(wanted.unit, owner.joint, owner.command, owner.of))
+        if found is not None:
+            self.complaints.remark("D305", f"{owner.what(wanted)} is {found.taken}", value.place,
+                                   also=self.names.label(value), help=found.helps)
 
     def _other(self, owner: Owner, wanted: Parameter, value: Value) -> list[str]:
         """The one optional parameter of the model that a number with this unit may be meant for."""

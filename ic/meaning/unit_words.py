@@ -34,12 +34,19 @@ def units_of(dimension: Dimension) -> list[str]:
 
 
 @lru_cache(maxsize=4096)
+def measure_here(written: str, joint: JointKind, command: str | None, of: str | None) -> units.Measure:
+    """What a declared unit means where `joint`, `effort`, `command` and `of` mean this."""
+    names = {} if of is None else {"of": units.parse_unit(of)}
+    return units.parse_unit(joint_unit(written, Joint("", joint, "", ""), command), names)
+
+
+@lru_cache(maxsize=4096)
 def unit_here(written: str, joint: JointKind, command: str | None, of: str | None) -> tuple[str, Dimension]:
     """A declared unit where `joint`, `effort`, `command` and `of` mean this: in SI, as text and as dimension."""
     text = joint_unit(written, Joint("", joint, "", ""), command)
-    names = {} if of is None else {"of": units.parse_unit(of)}
-    measure = units.parse_unit(text, names)
+    measure = measure_here(written, joint, command, of)
     if measure.dimension == PURE:
         return "1", PURE
-    simple = measure.scale == 1.0 and not names.keys() & set(text.replace("*", " ").replace("/", " ").split())
+    names = {"of"} if of is not None else set()
+    simple = measure.scale == 1.0 and not names & set(text.replace("*", " ").replace("/", " ").split())
     return (text if simple else of if text == "of" and of else units.text(measure.dimension)), measure.dimension

@@ -47,6 +47,7 @@ class Value:
     """A quantity: number in SI, dimension. bare: a number written with no unit. unit: the one it was written in.
 
     decimal  of a bare number that is written out, its digits as written
+    hertz    the exponent of the hertz in its unit; None where a factor of pi may be there to change cycles to radians
     """
 
     number: Real
@@ -55,6 +56,7 @@ class Value:
     bare: bool = False
     unit: Unit | None = None
     decimal: str = ""
+    hertz: int | None = 0
 
 
 @frozen
@@ -95,7 +97,7 @@ def _leaf(expression: Expression, lookup: Lookup) -> Value | Values:
             return _number(expression)
         case Name():
             if expression.text in CONSTANTS:
-                return Value(CONSTANTS[expression.text], PURE, expression.place)
+                return Value(CONSTANTS[expression.text], PURE, expression.place, hertz=None)
             return replace(lookup(expression), place=expression.place)
         case List():
             return Values(tuple(_items(expression, lookup)), expression.place)
@@ -124,7 +126,8 @@ def _in_unit(value: Value, unit: Unit) -> Value:
     """
     measure = measure_of(unit)
     number = measure.to_si(cast(float, value.number), value.decimal)  # a scalar divides and multiplies too
-    return Value(_sound(number, value.place, value.number), measure.dimension, value.place, unit=unit)
+    number = _sound(number, value.place, value.number)
+    return Value(number, measure.dimension, value.place, unit=unit, hertz=measure.hertz)
 
 
 def measure_of(unit: Unit) -> units.Measure:
@@ -202,18 +205,21 @@ def _binary(node: Binary, left: Value | Values, lookup: Lookup) -> Value:
                 help=f"write `{bare_one.number:g} {in_deck(units.text(other.dimension))}`"
                 if bare_one.bare and not isinstance(bare_one.number, Scalar) else "both must be of one dimension"))
         number = left.number + right.number if operator == "+" else left.number - right.number
-        return Value(_sound(number, place), left.dimension, place, bare, left.unit)
+        return Value(_sound(number, place), left.dimension, place, bare, left.unit, hertz=left.hertz)
+    sign = 1 if operator == "*" else -1
+    hertz = None if left.hertz is None or right.hertz is None else left.hertz + sign * right.hertz
     if operator == "*":
         unit = left.unit if right.dimension == PURE else right.unit if left.dimension == PURE else None
         product = _sound(left.number * right.number, place, left.number, right.number)
-        return Value(product, left.dimension * right.dimension, place, bare, unit)
+        return Value(product, left.dimension * right.dimension, place, bare, unit, hertz=hertz)
     if operator == "/":
         if not isinstance(right.number, Scalar) and right.number == 0.0:
             raise Problem(error("D066", "division by zero", Label(right.place, "this is zero")))
         unit = left.unit if right.dimension == PURE else None
         quotient = _sound(left.number / right.number, place, left.number)
-        return Value(quotient, left.dimension / right.dimension, place, bare, unit)
-    return replace(_power(node, left, right), place=place, bare=bare)
+        return Value(quotient, left.dimension / right.dimension, place, bare, unit, hertz=hertz)
+    hertz = None if left.hertz is None or isinstance(right.number, Scalar) else int(left.hertz * right.number)
+    return replace(_power(node, left, right), place=place, bare=bare, hertz=hertz)
 
 
 def _power(node: Binary, base: Value, exponent: Value) -> Value:
@@ -279,7 +285,7 @@ def _range(expression: Range, lookup: Lookup) -> Values:
     a, b, by = (float(value.number) for value in (first, last, step))
     points = _steps(a, b, by, expression, first)
     bare = first.bare and last.bare and step.bare
-    made = (Value(x, first.dimension, place, bare, first.unit) for x in points)
+    made = (Value(x, first.dimension, place, bare, first.unit, hertz=first.hertz) for x in points)
     return Values(tuple(made), place, first.unit)
 
 
@@ -335,7 +341,8 @@ def _call(call: Call, lookup: Lookup) -> Value | Values:
                 raise Problem(error("D063", f"`{name}` of {_named(first)} and {_named(other)}", other.place,
                                     help="both must be of one dimension"))
             number = minimum(result.number, other.number) if name == "min" else maximum(result.number, other.number)
-            result = Value(_plain(number), first.dimension, call.place, result.bare and other.bare, first.unit)
+            bare = result.bare and other.bare
+            result = Value(_plain(number), first.dimension, call.place, bare, first.unit, hertz=first.hertz)
         return replace(result, place=call.place)
     if first.dimension not in (PURE, Dimension(rad=1)):
         raise Problem(error("D061", f"`{name}` of {_named(first)}", first.place, help="an angle is needed, as 30 deg"))
@@ -352,7 +359,8 @@ def _sqrt(call: Call, value: Value) -> Value:
     if not isinstance(value.number, Scalar) and value.number < 0.0:
         raise Problem(error("D066", "the root of a negative number", value.place))
     dimension = Dimension(*(exponent // 2 for exponent in value.dimension))
-    return Value(_plain(sqrt(value.number)), dimension, call.place)
+    hertz = None if value.hertz is None else value.hertz // 2
+    return Value(_plain(sqrt(value.number)), dimension, call.place, hertz=hertz)
 
 
 def _spaced(call: Call, arguments: list[Value]) -> Values:
@@ -376,7 +384,8 @@ def _spaced(call: Call, arguments: list[Value]) -> Values:
         raise Problem(error("D072", "the ends of a logspace are both above or both below zero", call.place,
                             help="linspace(...) has no such limit"))
     points = series.even(a, b, n) if name == "linspace" else series.by_ratio(a, b, n)
-    made = (Value(x, start.dimension, call.place, start.bare and end.bare, start.unit) for x in points)
+    bare = start.bare and end.bare
+    made = (Value(x, start.dimension, call.place, bare, start.unit, hertz=start.hertz) for x in points)
     return Values(tuple(made), call.place, start.unit)
 
 

@@ -253,14 +253,14 @@ class _Reader:
         bare = all(value.bare for value in values)
         self.places[path] = [value.place for value in values]
         return self.varied(path, path_place(entry), np.array([value.number for value in values], dtype=float),
-                           Value(0.0, first.dimension, first.place, bare, unit), unit)
+                           Value(0.0, first.dimension, first.place, bare, unit, hertz=first.hertz), unit)
 
     def varied(self, path: str, place: Place, numbers: np.ndarray, like: Value, unit) -> Varied:  # type: ignore[no-untyped-def]
         """A column of numbers in SI. like: a value of its dimension; unit: the one that the deck wrote."""
         scale = 1.0
         if unit is not None and measure_of(unit).dimension == like.dimension:
             scale = measure_of(unit).scale
-        value = Value(self.graph.input(path), like.dimension, like.place, like.bare, unit)
+        value = Value(self.graph.input(path), like.dimension, like.place, like.bare, unit, hertz=like.hertz)
         return Varied(path, place, numbers, value, unit, scale)
 
 

@@ -32,7 +32,8 @@ def columns_of(definitions: Definitions, named: String, graph: Graph) -> tuple[l
             continue
         numbers, measure = table.quantities(column)
         unit = Unit((), column.place, column.unit) if column.unit is not None else None
-        value = Value(graph.input(column.name), measure.dimension, column.place, column.unit is None)
+        value = Value(graph.input(column.name), measure.dimension, column.place, column.unit is None,
+                      hertz=measure.hertz)
         made.append(Varied(column.name, column.place, np.array(numbers), value, unit, measure.scale))
     if not table.rows:
         raise Problem(error("D223", f"`{table.file}` has no rows: no case is in it", named.place,

@@ -141,6 +141,11 @@ class _Truths:
                     helps = f"write `{one.number:g} {units.text(other.dimension)}`"
             raise Problem(error("D063", f"`{expression.operator}` of {named(sides[0])} and {named(sides[1])}",
                                 expression.place, also=[Label(side.place, named(side)) for side in sides], help=helps))
+        if None not in (hertz := [side.hertz for side in sides]) and hertz[0] != hertz[1]:
+            scope.complaints.remark(
+                "D305", f"`{expression.operator}` of Hz and 1/s, which are taken for one", expression.place,
+                help=["if that is meant, write both sides in the same of the two",
+                      "if cycles a second are meant, write 2 pi times the number of Hz, in `s^-1`"])
         formulas = Formulas.of(scope.graph, [side.number for side in sides])
         left, right = (np.broadcast_to(np.asarray(x, dtype=float), count) for x in formulas.replay(self.values))
         lost = asked & (np.isnan(left) | np.isnan(right))
@@ -184,7 +189,8 @@ class _Truths:
                                 help=f"say which is meant: write {choice}"))
         for settled in found.values():
             if isinstance(settled.value, (float, int, Scalar)):
-                return Value(settled.value, units.parse_unit(settled.unit).dimension, name.place)
+                measure = units.parse_unit(settled.unit)
+                return Value(settled.value, measure.dimension, name.place, hertz=measure.hertz)
         try:
             return scope.names.find(name)
         except Problem as problem:

@@ -1,0 +1,133 @@
+"""A hertz where radians or decays count, and the reverse: told, with what to write for each thing that may be meant."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.ic.small_decks import check, codes, told
+
+DECK = """\
+arm swing {
+    link bar  { mass = 2 kg; shape = rod(length = 1 m, along = x); }
+    link tool { mass = 1 kg; shape = sphere(radius = 1 cm); }
+    joint hinge revolute  { parent = base; child = bar; axis = z; }
+    joint lift  prismatic { parent = bar;  child = tool; axis = z; at = [1 m, 0 m, 0 m]; }
+}
+servo still { model = ideal; bandwidth = 5 s^-1; command = position(sine(amplitude = 1 rad, frequency = 1 Hz)); }
+servo drive {
+    model = rigid_gearbox; ratio = 10 cycle/m; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm;
+    kt = 0.05 N*m/A; tau_max = 1 N*m; j_m = 1e-2 kg*m^2; command = rate(0.1 m/s);
+}
+let quick = 5 s^-1;
+run hold {
+    arm = swing;
+    servos { hinge = still; lift = drive; }
+    rates { dynamics = 1 kHz; servos = 1 kHz; record = 100 Hz; }
+    duration = 1 s;
+    record = [q];
+    metric most = max { of = hinge.q; }
+}
+"""
+
+
+def deck(*changes: tuple[str, str]) -> str:
+    text = DECK
+    for before, after in changes:
+        assert text.count(before) == 1, before
+        text = text.replace(before, after)
+    return text
+
+
+def found(folder: Path, *changes: tuple[str, str], **options: object) -> tuple[list[str], list[tuple[str, ...]]]:
+    """Codes of what is told of the deck, and the help of each."""
+    compiled = check(folder, deck(*changes), select="all", **options)  # type: ignore[arg-type]
+    assert compiled.plan is not None, told(compiled)
+    return [each.code for each in compiled.diagnostics], [each.help for each in compiled.diagnostics]
+
+
+def test_the_deck_that_the_next_tests_change_is_plain(tmp_path: Path) -> None:
+    assert found(tmp_path)[0] == []
+
+
+HZ = ("bandwidth = 5 s^-1", "bandwidth = 5 Hz")
+
+
+def test_hertz_for_a_rate_constant(tmp_path: Path) -> None:
+    assert told(check(tmp_path, deck(HZ))) == """\
+warning[D305]: `bandwidth` of servo `still` is in 1/s, and 5 Hz is taken as 5 1/s
+ --> deck.ic:7:42
+  |
+7 | servo still { model = ideal; bandwidth = 5 Hz; command = position(sine(amplitude = 1 rad, frequency = 1 Hz)); }
+  |                                          ^^^^
+  = help: if that is meant, write `5 s^-1`
+  = help: if cycles a second are meant, write `(2*pi*5) s^-1`
+
+1 warning
+"""
+
+
+DOUBTS = {
+    "hertz for 1/s": (("bandwidth = 5 s^-1", "bandwidth = {}"), "5 Hz", "still.bandwidth", (5.0, 10 * math.pi)),
+    "kilohertz for 1/s": (("bandwidth = 5 s^-1", "bandwidth = {}"), "0.05 kHz", "", (50.0, 100 * math.pi)),
+    "1/s for hertz": (("frequency = 1 Hz", "frequency = {}"), "10 1/s", "", (10.0, 5 / math.pi)),
+    "volts a hertz": (("kp = 0.1 V*s/rad", "kp = {}"), "0.05 V/Hz", "", (0.05, 0.025 / math.pi)),
+    "1/mm for an angle over a length": (("ratio = 10 cycle/m", "ratio = {}"), "0.1 1/mm", "", (100.0, 200 * math.pi)),
+    "a quotient": (("ratio = 10 cycle/m", "ratio = {}"), "1/(10 mm)", "", (100.0, 200 * math.pi)),
+    "a rate of steps": (("dynamics = 1 kHz", "dynamics = {}"), "1000 1/s", "", ()),
+}
+PATHS = {"bandwidth": "hinge.servo.bandwidth", "frequency": "hinge.servo.command.frequency", "kp": "lift.servo.kp",
+         "ratio": "lift.servo.ratio"}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DOUBTS)
+def test_each_remedy_followed_as_it_is_written_is_what_it_says_and_is_plain(tmp_path: Path, name: str) -> None:
+    (before, after), written, _, meant = DOUBTS[name]
+    seen, helps = found(tmp_path, (before, after.format(written)))
+    assert seen == ["D305"]
+    remedies = [re.findall("`(.*)`", each)[0] for each in helps[0]]
+    for remedy, number in zip(remedies, meant, strict=False):
+        compiled = check(tmp_path, deck((before, after.format(remedy))))
+        assert codes(tmp_path, deck((before, after.format(remedy)))) == [], remedy
+        assert compiled.plan is not None
+        value = compiled.plan.experiments[0].parameters[PATHS[before.partition(" ")[0]]].value
+        assert value == pytest.approx(number, rel=1e-11), remedy  # the help shows 12 digits
+
+
+PLAIN = [
+    ("bandwidth = 5 s^-1", "bandwidth = 1/(0.2 s)"), ("bandwidth = 5 s^-1", "bandwidth = 2*pi*5 Hz"),
+    ("frequency = 1 Hz", "frequency = 1/(2 s)"), ("kp = 0.1 V*s/rad", "kp = 0.1 N*m/A"),
+    ("kp = 0.1 V*s/rad", "kp = 0.1 V/rpm"), ("kp = 0.1 V*s/rad", "kp = 0.1 V*s"), ("ki = 1 V/rad", "ki = 1 V"),
+    ("kt = 0.05 N*m/A", "kt = 0.05 V*s/rad"), ("kt = 0.05 N*m/A", "kt = 0.01 V/rpm"),
+    ("dynamics = 1 kHz", "dynamics = 1/(1 ms)"), ("ratio = 10 cycle/m", "ratio = 1 cycle / 5 mm"),
+    ("ratio = 10 cycle/m", "ratio = 100 rad/m"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("change", PLAIN, ids=lambda change: change[1])
+def test_what_is_plain_is_not_told(tmp_path: Path, change: tuple[str, str]) -> None:
+    assert "D305" not in found(tmp_path, change)[0]
+
+
+@pytest.mark.parametrize("written", ["quick", "2 * quick", "quick / 2", "-(-quick)", "min(quick, 9 Hz)"])
+def test_hertz_that_come_by_a_let_are_told_where_they_are_used(tmp_path: Path, written: str) -> None:
+    text = deck(("bandwidth = 5 s^-1", f"bandwidth = {written}"), ("let quick = 5 s^-1", "let quick = 5 Hz"))
+    assert codes(tmp_path, text) == ["D305"]
+
+
+@pytest.mark.parametrize("axis", [
+    "vary still.bandwidth = [5, 6] Hz;", "vary still.bandwidth = linspace(5, 6, 3) Hz;",
+    "vary still.bandwidth = (5 .. 6 by 1) Hz;", "zip { still.bandwidth = [5, 6] Hz; }",
+    "sample random(3) { still.bandwidth = uniform(5, 6) Hz; }", 'from "cases.csv";',
+    "vary still.bandwidth = [5, 6] 1/s; exclude when still.bandwidth > 5.5 Hz;",
+])  # fmt: skip
+def test_hertz_of_a_sweep_are_told_once(tmp_path: Path, axis: str) -> None:
+    (tmp_path / "cases.csv").write_text("still.bandwidth [Hz]\n5\n6\n", encoding="utf-8")
+    assert codes(tmp_path, deck() + f"sweep bands of hold {{ {axis} }}\n", select="all") == ["D305"]
+
+
+def test_hertz_set_on_the_command_line_are_told(tmp_path: Path) -> None:
+    assert found(tmp_path, set=("still.bandwidth=6 Hz",))[0] == ["D305"]
