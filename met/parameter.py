@@ -46,6 +46,7 @@ class Parameter:
     direction    of a vector: its length does not count, so it may not be nothing
     less_than    of a number: the parameter that it is less than, in every case
     rises        of a list: its numbers rise, and there is one at least
+    share        of a number: part of a whole, which is seldom above 1; a bare number above that is warned of
     as_many_as   of a list: the list that it has a number for each of; it may be empty where that is its default
     """
 
@@ -70,6 +71,7 @@ class Parameter:
     direction: bool = False
     less_than: str = ""
     rises: bool = False
+    share: bool = False
     as_many_as: str = ""
     only: Only | None = None
 

@@ -9,9 +9,9 @@ from met.diagnostic import Diagnostic, Label, Place, Problem, error, meant
 
 MOST = 200  # a deck with more mistakes than this is told the first ones: the rest seldom say more
 
-ONCE = ("D060", "D061", "D076", "D077", "D087", "D104", "D125", "D141", "D305")
+ONCE = ("D060", "D061", "D076", "D077", "D087", "D104", "D125", "D141", "D305", "D307")
 """What is told once of a place, whoever finds it: a bare number, a wrong unit, no such word, out of range, no body's
-inertia, a rate too slow, no channel, no such key, a unit that may mean cycles."""
+inertia, a rate too slow, no channel, no such key, a unit that may mean cycles, a share above 1."""
 
 
 class Complaints:

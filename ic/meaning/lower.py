@@ -13,6 +13,7 @@ from ic.grammar.settings import command_line, read_settings
 from ic.grammar.syntax import Deck, Setting
 from ic.meaning.arm import check_arm, resolve_arm
 from ic.meaning.complaints import Complaints, known_words
+from ic.meaning.degrees import remark_degrees
 from ic.meaning.resolve import Definition, Definitions
 from ic.meaning.scope import Scope
 from ic.meaning.servos import check_servo_definition
@@ -68,6 +69,7 @@ def compile_deck(deck: Deck, *, select: Select = None, defines: Iterable[str] = 
         complaints.add(
             *(d for problem in Scope(definitions, complaints).names.check_lets() for d in problem.diagnostics)
         )
+        remark_degrees(deck, definitions, complaints)
         for kind in ("arm", "servo", "run"):
             for definition in definitions.of_kind(kind).values():
                 definitions.block(definition)

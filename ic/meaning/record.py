@@ -270,12 +270,13 @@ def _is_metric(expression: Expression, metrics: set[str]) -> bool:
 def resolve_requirements(scope: Scope, read: list[Comparison], structure: Structure) -> tuple[Requirement, ...]:
     """The requirements with their limits in SI."""
     metrics = metric_units(structure)
+    shares = {use.name for use in structure.metrics if models.find("metric", use.model, use.place).unit == "1"}
     found = []
     for each in read:
         if each.metric not in metrics:
             continue  # the metric failed, which was told
         owner = Owner("", each.statement.place, "require", called=f"the limit on `{each.metric}`")
-        wanted = Parameter(name="limit", unit=metrics[each.metric], doc="limit")
+        wanted = Parameter(name="limit", unit=metrics[each.metric], doc="limit", share=each.metric in shares)
         number = _limit(scope, owner, wanted, each.limit)
         if number is not None:
             text = spell(each.statement.value)

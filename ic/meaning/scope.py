@@ -460,6 +460,12 @@ class Scope:
         text, dimension = self.unit(owner, wanted)
         if units.same(value.dimension, dimension):
             self._remark_cycles(owner, wanted, value, text)
+            if wanted.share and value.bare and not isinstance(value.number, Scalar) and abs(value.number) > 1.0:
+                number = f"{value.number:.12g}"
+                self.complaints.remark(
+                    "D307", f"{owner.what(wanted)} is a share, and {number} is {100.0 * value.number:.12g} %",
+                    value.place, help=[f"if per cent are meant, write `{number} %`",
+                                       f"if that is meant, write `{100.0 * value.number:.12g} %`"])
             return
         what = owner.what(wanted)
         also = self.names.label(value)

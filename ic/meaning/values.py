@@ -125,9 +125,9 @@ def _in_unit(value: Value, unit: Unit) -> Value:
     """A pure number in a unit, rounded once. Raises D067 where it is too large in SI, or so small that it would be 0.
     """
     measure = measure_of(unit)
-    number = measure.to_si(cast(float, value.number), value.decimal)  # a scalar divides and multiplies too
-    number = _sound(number, value.place, value.number)
-    return Value(number, measure.dimension, value.place, unit=unit, hertz=measure.hertz)
+    made = measure.to_si(cast(float, value.number), value.decimal)  # a scalar divides and multiplies too
+    sound = _sound(made, value.place, value.number)
+    return Value(sound, measure.dimension, value.place, unit=unit, hertz=measure.hertz)
 
 
 def measure_of(unit: Unit) -> units.Measure:
@@ -382,11 +382,20 @@ def _spaced(call: Call, arguments: list[Value]) -> Values:
     a, b = float(start.number), float(end.number)
     if name == "logspace" and not a * b > 0.0:
         raise Problem(error("D072", "the ends of a logspace are both above or both below zero", call.place,
-                            help="linspace(...) has no such limit"))
+                            help=[*_not_exponents(start, end, n), "linspace(...) has no such limit"]))
     points = series.even(a, b, n) if name == "linspace" else series.by_ratio(a, b, n)
     bare = start.bare and end.bare
     made = (Value(x, start.dimension, call.place, bare, start.unit, hertz=start.hertz) for x in points)
     return Values(tuple(made), call.place, start.unit)
+
+
+def _not_exponents(start: Value, end: Value, count: int) -> list[str]:
+    """The remedy where the ends of a logspace look like exponents."""
+    ends = [float(cast(float, value.number)) for value in (start, end)]
+    if not (start.bare and end.bare) or any(not x.is_integer() or abs(x) > 300 for x in ends):
+        return []
+    shown = ", ".join(f"{10.0**x:g}" for x in ends)
+    return [f"it takes the ends themselves, not their exponents: `logspace({shown}, {count})`"]
 
 
 # Places and numbers

@@ -28,6 +28,7 @@ from met.frozen import frozen
 from met.trace import Graph, Scalar
 
 MOST_CASES = 10_000_000
+MOST_COUNTED = 16  # axes that are read of a sweep that has too many cases
 KNOWN = ("vary", "zip", "from", "sample", "repeat", "exclude when", "seed", "seeds")
 
 Column = Varied | Chosen
@@ -83,7 +84,7 @@ def read_sweep(definitions: Definitions, complaints: Complaints, definition: Def
     for entry in definition.group.body:
         with complaints.gather():
             reader.enter(entry)
-        if math.prod((*(axis.size for axis in reader.axes), reader.repeat)) > MOST_CASES:
+        if len(reader.axes) >= MOST_COUNTED and _product(reader) > MOST_CASES:
             break
     sweep = Sweep(definition.name, tuple(reader.axes), tuple(reader.excludes), reader.seed, reader.independent,
                   reader.repeat, reader.repeated, definition.place)
@@ -92,9 +93,15 @@ def read_sweep(definitions: Definitions, complaints: Complaints, definition: Def
                          help="write `vary PATH = [...] UNIT;`")
     if math.prod(sweep.sizes) > MOST_CASES:
         sizes = [str(size) for size in sweep.sizes[: None if sweep.repeated else -1]]
-        complaints.error("D134", f"sweep `{definition.name}` has {math.prod(sweep.sizes):.3g} cases", definition.place,
-                         help=f"{MOST_CASES} are possible: {' x '.join(sizes)} is more")
+        more = "more than " if len(sweep.axes) >= MOST_COUNTED else ""
+        complaints.error("D134", f"sweep `{definition.name}` has {more}{math.prod(sweep.sizes)} cases",
+                         definition.place, help=f"{MOST_CASES} are possible: {' x '.join(sizes)} is more")
     return sweep
+
+
+def _product(reader: _Reader) -> int:
+    """The cases of what is read so far."""
+    return math.prod((*(axis.size for axis in reader.axes), reader.repeat))
 
 
 class _Reader:

@@ -1,6 +1,7 @@
 """How far the channel goes beyond its target, as a share of the way from its first value to the target.
 
-Zero where it never passes the target; not a number where it starts on it.
+Zero where it comes within 2 % of the way and never passes the target, infinite where it does not come so near: what
+has not arrived has not overshot. Not a number where it starts on the target.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from met.metrics.metric import Metric
 from met.parameter import Memory, Parameter
 from met.trace import Real, absolute, maximum, where
 
+NEAR = 0.02  # of the way: what comes so near has reached the target, as a settling time's band is by default
+
 
 def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
     first = where(held.count == 0.0, x, held.first)
@@ -22,7 +25,8 @@ def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
 
 def result(p: Any, held: Any, t: Real) -> Real:
     way = absolute(p.target - held.first)
-    return where(way > 0.0, held.beyond / way, math.nan)
+    over = held.beyond / way
+    return where(way > 0.0, where(over >= -NEAR, maximum(over, 0.0), math.inf), math.nan)
 
 
 METRIC = Metric(
@@ -34,7 +38,7 @@ METRIC = Metric(
     ),
     memory=(
         Memory(name="first", unit="of", doc="first value"),
-        Memory(name="beyond", unit="of", doc="furthest beyond the target so far"),
+        Memory(name="beyond", unit="of", doc="furthest beyond the target so far, below 0 short of it", start=-math.inf),
         Memory(name="count", unit="1", doc="samples"),
     ),
     update=update,

@@ -1,4 +1,5 @@
-"""A hertz where radians or decays count, and the reverse: told, with what to write for each thing that may be meant."""
+"""Numbers that may mean something else, each told with what to write for every thing that may be meant: a hertz where
+radians or decays count, and the reverse; bare numbers of degrees; bare numbers of per cent."""
 
 from __future__ import annotations
 
@@ -131,3 +132,45 @@ def test_hertz_of_a_sweep_are_told_once(tmp_path: Path, axis: str) -> None:
 
 def test_hertz_set_on_the_command_line_are_told(tmp_path: Path) -> None:
     assert found(tmp_path, set=("still.bandwidth=6 Hz",))[0] == ["D305"]
+
+
+@pytest.mark.parametrize("written", ["sin(90)", "cos(-45)", "sin(ninety)", "cos(2 * ninety)", "-sin(90) + 1"])
+def test_a_sine_of_more_than_a_turn_of_bare_radians(tmp_path: Path, written: str) -> None:
+    text = f"let ninety = 90;\nlet it = {written};\n" + deck()
+    compiled = check(tmp_path, text)
+    assert [each.code for each in compiled.diagnostics] == ["D306"]
+    for help in compiled.diagnostics[0].help:
+        call = re.search(r"(?:sin|cos)\([^()]*\)", written)
+        assert call is not None
+        instead = re.findall("`(.*)`", help)[0]
+        assert codes(tmp_path, text.replace(call[0], instead)) == [], instead
+
+
+@pytest.mark.parametrize("written", [
+    "sin(90 deg)", "sin(6)", "cos(2*pi*9)", "sin(100 rad)", "(sin(0.5) * 90) deg", "sqrt(90)",
+])  # fmt: skip
+def test_a_sine_that_is_plain(tmp_path: Path, written: str) -> None:
+    assert codes(tmp_path, f"let it = {written};\n" + deck()) == []
+
+
+def test_a_sine_inside_blocks_of_a_run_and_a_call(tmp_path: Path) -> None:
+    change = ("amplitude = 1 rad", "amplitude = (sin(90)) rad")
+    assert found(tmp_path, change)[0] == ["D306"]
+
+
+SHARES = "    metric over = overshoot { of = hinge.q; target = 1 rad; }\n"
+LAST = ("    metric most = max { of = hinge.q; }\n", SHARES + "    require over < {};\n")
+
+
+@pytest.mark.parametrize(("limit", "seen"), [
+    ("2", ["D307"]), ("150", ["D307"]), ("2 %", []), ("0.02", []), ("1", []), ("200 %", []), ("(4/2)", ["D307"]),
+])  # fmt: skip
+def test_a_share_above_1_without_its_per_cent(tmp_path: Path, limit: str, seen: list[str]) -> None:
+    assert found(tmp_path, (LAST[0], LAST[1].replace("{}", limit)))[0] == seen
+
+
+def test_the_band_of_a_settling_time_is_a_share_too(tmp_path: Path) -> None:
+    metric = "    metric done = settling_time { of = hinge.q; target = 1 rad; band = 2; }\n"
+    seen, helps = found(tmp_path, (LAST[0], metric))
+    assert seen == ["D307"]
+    assert helps == [("if per cent are meant, write `2 %`", "if that is meant, write `200 %`")]

@@ -190,3 +190,21 @@ def test_a_number_that_would_become_nothing_is_refused(tmp_path: Path, written: 
 
 def test_nothing_in_a_unit_is_nothing(tmp_path: Path) -> None:
     assert numbers(tmp_path, "[0, -0, 0e-999999999, 0 * 1e-300] mm") == [0.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("written", "instead"), [
+    ("logspace(-2, 1, 20)", "logspace(0.01, 10, 20)"), ("logspace(0, 3, 4)", "logspace(1, 1000, 4)"),
+    ("logspace(-2, 0, 3)", "logspace(0.01, 1, 3)"),
+])  # fmt: skip
+def test_a_logspace_of_exponents_is_told_its_ends(tmp_path: Path, written: str, instead: str) -> None:
+    with pytest.raises(Problem) as caught:
+        value(tmp_path, f"{written} kg")
+    assert caught.value.diagnostics[0].help[0] == f"it takes the ends themselves, not their exponents: `{instead}`"
+    assert numbers(tmp_path, f"{instead} kg")
+
+
+def test_a_logspace_with_units_or_broken_ends_has_no_exponents(tmp_path: Path) -> None:
+    for written in ("logspace(-2 kg, 1 kg, 20)", "logspace(-0.5, 1, 20) kg"):
+        with pytest.raises(Problem) as caught:
+            value(tmp_path, written)
+        assert caught.value.diagnostics[0].help == ("linspace(...) has no such limit",)

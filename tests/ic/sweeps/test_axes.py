@@ -273,3 +273,16 @@ def test_a_sweep_has_a_seed_of_its_own(tmp_path: Path) -> None:
     assert swept(tmp_path, "seed = 7; vary drive.kp = [1, 2] V*s/rad;").cases.seed == 7
     assert experiment(tmp_path, ARM, SERVO, changed(RUN, ("duration", "seed = 5; duration"))).cases.seed == 5
     assert swept_codes(tmp_path, "seed = 7.5; vary drive.kp = [1, 2] V*s/rad;") == ["D113"]
+
+
+def test_the_cases_of_a_sweep_that_is_too_large_are_all_counted(tmp_path: Path) -> None:
+    axes = "".join(f"vary {path} = linspace(1, 2, 10000) {unit}; " for path, unit in (
+        ("drive.kp", "V*s/rad"), ("drive.ki", "V/rad"), ("drive.ratio", "")))
+    compiled = check(tmp_path, ARM, SERVO, RUN, f"sweep all of hold {{ {axes}}}\n", select="all")
+    assert [each.message for each in compiled.diagnostics] == ["sweep `all` has 1000000000000 cases"]
+
+
+def test_a_sweep_of_very_many_axes_is_read_no_further_than_it_takes(tmp_path: Path) -> None:
+    axes = "".join(f"vary hinge.axis.a{n} = [1, 2, 3, 4]; " for n in range(200))
+    compiled = check(tmp_path, ARM, SERVO, RUN, f"sweep all of hold {{ {axes}}}\n", select="all")
+    assert compiled.diagnostics[0].message == f"sweep `all` has more than {4**16} cases"
