@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ic.grammar.syntax import Call, Expression, Name, Unary
+from ic.meaning.addresses import in_arm
 from ic.meaning.bodies import check_moved
 from ic.meaning.complaints import belongs, known_words
 from ic.meaning.dh import use_dh
@@ -95,10 +96,10 @@ def _stray(scope: Scope, item: Item, block: Block) -> None:
                                help=[*did_you_mean(item.kind, ("link", "joint")), *belongs(item.kind),
                                      "an arm holds links and joints"])
     else:
-        scope.complaints.error(
-            "D083", f"nothing named `{item.name}` to change in this arm", item.place,
-            help=[*did_you_mean(item.name, known), f"`link {item.name} {{ ... }}` or `joint {item.name} revolute "
-                  "{ ... }` would add one"])
+        adds = f"`link {item.name} {{ ... }}` or `joint {item.name} revolute {{ ... }}` would add one"
+        helps = [*did_you_mean(item.name, known), adds if "." not in item.name else known_words("it has", known)]
+        scope.complaints.error("D083", f"nothing named `{item.name}` to change in this arm", item.place,
+                               help=in_arm(item, known) or helps)
 
 
 # Links

@@ -10,12 +10,14 @@ from typing import Any, Final
 
 import numpy as np
 
+from ic.grammar.spell import spell
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import find_model, refuse_values, use_model, value_at, word_of
 from ic.meaning.owner import Owner
 from ic.meaning.relations import check_names
+from ic.meaning.remedies import components
 from ic.meaning.schedule import Rate
 from ic.meaning.scope import Scope
 from ic.meaning.servos import Use, course_named, fixed_rate, use_course
@@ -209,8 +211,17 @@ def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any]
 def _of_joints(scope: Scope, owner: Owner, guide: Any, body: Block, arm: Arm, joints: Iterable[str]) -> None:
     """The parameters of each joint: as written for it, else as written for all, whom a path without a joint reaches."""
     kinds = {joint.name: joint.kind for joint in arm.moving}
+    joints = list(joints)
     for wanted in guide.of_joint:
         general = body.get(wanted.name)
+        parts = [part for part in components(general, len(joints)) if part is not None]
+        if general is not None and len(joints) > 1 and len(parts) == len(joints):
+            each = "  ".join(f"{joint}.{wanted.name} = {spell(part)};"
+                             for joint, part in zip(joints, parts, strict=True))
+            scope.complaints.error("D071", f"`{wanted.name}` of {owner.label} is one number for each joint, and this "
+                                   "is a list", value_at(general), help=f"write `{each}`")
+            scope.checks.fail(owner.join(wanted.name))
+            continue
         for joint in joints:
             own = body.get(f"{joint}.{wanted.name}")
             all_of_them = () if own is not None else (owner.path,)

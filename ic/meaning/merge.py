@@ -282,4 +282,7 @@ def twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnostic:
     helps = ["remove one of the two"]
     if (place.file, place.line, place.column) == (earlier.file, earlier.line, earlier.column):
         helps = ["its file is included twice: begin that file with `#pragma once`"]
+        if place.expansions and place.expansions != earlier.expansions:
+            helps = [f"macro `{place.expansions[-1].macro}` is used twice here: give it the name as an argument, "
+                     "another one each time, or use it once"]
     return error("D040", f"{what} is written twice", Label(place, "again"), also=[Label(earlier, "first")], help=helps)

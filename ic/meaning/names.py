@@ -8,10 +8,21 @@ from ic.grammar.syntax import Expression, Name
 from ic.meaning.complaints import known_words
 from ic.meaning.resolve import Definitions
 from ic.meaning.values import CONSTANTS, FUNCTIONS, Value, Values, evaluate
+from ic.text.lexer import COMMAND_LINE
 from met import other_units, units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 
 DEEPEST = 64  # lets that need lets: far more than a deck has, far less than Python's recursion bears
+
+
+def _uses(place: Place) -> list[Place]:
+    """Where the macros were used that a place came through."""
+    return [each.use for each in place.expansions]
+
+
+def _macro(place: Place) -> str:
+    """The macro whose body a place is in."""
+    return place.expansions[0].macro if place.expansions else "NAME"
 
 
 class Names:
@@ -114,6 +125,11 @@ class Names:
             helps = [f"`{first}` is a unit: it follows a number, or closing brackets"]
         elif not helps and rest:
             helps = ["a value names a `let`, or what a servo's definition writes, such as `SERVO.kp`"]
+        elif first.lower() in ("nan", "inf", "infinity"):
+            helps = ["every number of a deck is finite: leave the entry out where its default is endless, or write one"]
+        elif not helps and any(use.file == COMMAND_LINE for use in (name.place, *_uses(name.place))):
+            helps = [f"it comes from `-D`: write a number there, as in `-D {_macro(name.place)}=2`, or define "
+                     f"`let {first} = ...;` in the deck"]
         elif not helps:
             unit = other_units.remedy(first) if len(first) > 1 else ()
             helps = [f"define it: `let {first} = ...;`", *(f"if a unit is meant: {each}" for each in unit)]

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ic.grammar.syntax import Call, Name, Word
+from ic.meaning.addresses import in_run
 from ic.meaning.arm import Arm, resolve_arm
 from ic.meaning.base import INITIAL, check_base, held_by, initial_base, remark_ground, resolve_base
 from ic.meaning.bodies import check_moved
@@ -217,11 +218,10 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
                 "D109", f"nothing named `{item.name}` in run `{definition.name}` to change", item.place,
                 help=belongs(item.name) or [*did_you_mean(item.name, (*metrics, *KEYS)), adds])
         else:
-            block_name, _, rest = item.name.partition(".")
-            helps = [*did_you_mean(item.name, (*KEYS, *metrics)), known_words("a run has", KEYS)]
+            near = did_you_mean(item.name, (*KEYS, *metrics)) if "." not in item.name else ()
+            helps = in_run(scope.definitions, block, item, RATES) or [*near, known_words("a run has", KEYS)]
             scope.complaints.taken_for(definition.place, item.name, (*KEYS, *metrics))
-            scope.complaints.error("D109", f"a run has no `{item.name}`", item.place,
-                                   help=f"write `{block_name} {{ {rest} = ...; }}`" if block_name in BLOCKS else helps)
+            scope.complaints.error("D109", f"a run has no `{item.name}`", item.place, help=helps)
     for statement in block.statements:
         words = " ".join(word.text for word in statement.words)
         if words != "require":

@@ -469,11 +469,11 @@ class Scope:
             return
         what = owner.what(wanted)
         also = self.names.label(value)
-        apart = self._of_its_own(owner, wanted, value, text)
+        apart: str | list[str] = self._of_its_own(owner, wanted, value, text)
         if value.dimension == PURE:
             shown = f"a number in {text}"
             if not isinstance(value.number, Scalar):
-                shown = either(f"{value.number:g} {in_deck(each)}" for each in in_degrees(text))
+                shown = either(f"{value.number:.12g} {in_deck(each)}" for each in in_degrees(text))
             if value.bare and any(source.name == value.place.file for source in self.definitions.csv_files.sources):
                 shown = f"the unit in square brackets behind the column's name: `[{in_deck(text)}]`"
             raise Problem(error(
@@ -481,10 +481,21 @@ class Scope:
                 also=also,
                 help=apart or (f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}")))
         found = units.text(value.dimension)
+        apart = apart or self._of_another_command(owner, wanted, value, text)
         message = f"{what} is " + ("a pure number" if dimension == PURE else f"in {text}") + f", and this is in {found}"
         other = self._other(owner, wanted, value) if dimension == PURE else []
         raise Problem(error("D061", message, value.place, also=also,
                             help=apart or [*other, mended(value, text, dimension)]))
+
+    def _of_another_command(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> list[str]:
+        """The remedy where a course's parameter has the unit that it has under another kind of command."""
+        if owner.command is None:
+            return []
+        fits = [kind for kind in ("position", "rate", "acceleration") if kind != owner.command and units.same(
+            value.dimension, unit_here(wanted.unit, owner.joint, kind, owner.of)[1])]
+        course = owner.label.strip("`")
+        return [f"of a `{owner.command}` command it is in {in_deck(text)}; with `{kind}({course}(...))` it would be in "
+                f"{units.text(value.dimension)}, like all of that course" for kind in fits]
 
     def _remark_cycles(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> None:
         """Tells of a unit that may mean cycles where radians count, or the reverse."""

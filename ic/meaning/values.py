@@ -198,12 +198,10 @@ def _binary(node: Binary, left: Value | Values, lookup: Lookup) -> Value:
     bare = left.bare and right.bare
     if operator in ("+", "-"):
         if not units.same(left.dimension, right.dimension):
-            other, bare_one = (right, left) if left.bare else (left, right)
             raise Problem(error(
                 "D063", f"`{operator}` of {_named(left)} and {_named(right)}", node.place,
                 also=[Label(left.place, _named(left)), Label(right.place, _named(right))],
-                help=f"write `{bare_one.number:g} {in_deck(units.text(other.dimension))}`"
-                if bare_one.bare and not isinstance(bare_one.number, Scalar) else "both must be of one dimension"))
+                help=_made_alike(node, left, right)))
         number = left.number + right.number if operator == "+" else left.number - right.number
         return Value(_sound(number, place), left.dimension, place, bare, left.unit, hertz=left.hertz)
     sign = 1 if operator == "*" else -1
@@ -220,6 +218,19 @@ def _binary(node: Binary, left: Value | Values, lookup: Lookup) -> Value:
         return Value(quotient, left.dimension / right.dimension, place, bare, unit, hertz=hertz)
     hertz = None if left.hertz is None or isinstance(right.number, Scalar) else int(left.hertz * right.number)
     return replace(_power(node, left, right), place=place, bare=bare, hertz=hertz)
+
+
+def _made_alike(node: Binary, left: Value, right: Value) -> str:
+    """What to write where a bare number is added to a quantity, or two quantities are."""
+    of_macro = [each.macro for each in node.place.expansions]
+    outside = [each for each in (node.left, node.right) if not place_of(each).expansions]
+    if of_macro and (outside or any(place_of(each).expansions != node.place.expansions for each in children(node))):
+        return f"`{node.operator}` comes from macro `{of_macro[0]}`: put brackets around the macro's body"
+    other, bare_one, written = (right, left, node.left) if left.bare else (left, right, node.right)
+    if not bare_one.bare or isinstance(bare_one.number, Scalar):
+        return "both must be of one dimension"
+    unit = in_deck(units.text(other.dimension))
+    return f"write `{written.text} {unit}`" if isinstance(written, Number) else f"write `({spell(written)}) {unit}`"
 
 
 def _power(node: Binary, base: Value, exponent: Value) -> Value:

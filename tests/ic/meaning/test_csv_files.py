@@ -65,11 +65,11 @@ error[D193]: `degree` is not a unit
  ::: deck.ic:9:42  read here for joint `hinge`
   = help: did you mean `hinge [deg]`?
 """)
-mistake("a unit that is none and like none", MOVES.replace("[deg]", "[degs]"), """\
-error[D193]: `degs` is not a unit
+mistake("a unit that is none and like none", MOVES.replace("[deg]", "[lots]"), """\
+error[D193]: `lots` is not a unit
  --> moves.csv:1:11
   |
-1 | time [s], hinge [degs], other [rad]
+1 | time [s], hinge [lots], other [rad]
   |           ^^^^^^^^^^^^
  ::: deck.ic:9:42  read here for joint `hinge`
   = help: write `hinge [deg]` or `hinge [rad]`

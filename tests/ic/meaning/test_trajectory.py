@@ -13,8 +13,11 @@ import ic
 from met import models, plan_file
 from met import run as engine
 from met.plan import Experiment
+from met.units import parse_unit
 from tests.ic.meaning.trajectories import MOVES, servo
 from tests.ic.small_decks import ARM, RUN, changed, check, experiment, told
+
+DEGREES = parse_unit("deg")  # rounded once, which numpy's radians are not
 
 # ruff: noqa: E501 - messages are as wide as they are
 
@@ -34,7 +37,7 @@ def read(folder: Path, text: str | bytes, course: str = 'trajectory(file = "move
 def test_the_column_of_the_joints_name_is_taken_in_si(tmp_path: Path) -> None:
     found = parameters(read(tmp_path, MOVES))
     assert found["times"] == (0.0, 0.5, 1.0)
-    assert found["values"] == tuple(np.radians([0.0, 30.0, 45.0]))
+    assert found["values"] == tuple(map(DEGREES.to_si, (0.0, 30.0, 45.0)))
     assert (found["interpolation"], found["begin"]) == ("linear", 0.0)
     assert set(found) == {"times", "values", "interpolation", "begin"}  # the file's name is none of the plan's
 
@@ -64,7 +67,7 @@ def test_another_column_is_taken_by_its_name(tmp_path: Path, written: str) -> No
 ])  # fmt: skip
 def test_a_file_is_read_however_it_was_saved(tmp_path: Path, text: str) -> None:
     found = parameters(read(tmp_path, text))
-    assert found["times"] == (0.0, 0.5, 1.0) and found["values"] == tuple(np.radians([0.0, 30.0, 45.0]))
+    assert found["times"] == (0.0, 0.5, 1.0) and found["values"] == tuple(map(DEGREES.to_si, (0.0, 30.0, 45.0)))
 
 
 def test_a_file_is_looked_for_beside_the_deck_that_names_it_then_where_i_says(tmp_path: Path) -> None:
@@ -75,11 +78,11 @@ def test_a_file_is_looked_for_beside_the_deck_that_names_it_then_where_i_says(tm
     (tmp_path / "deck.ic").write_text(ARM + '#include "parts/drive.ic"\n' + RUN)
     (library / "moves.csv").write_text(MOVES)
     only = parameters(ic.compile(tmp_path / "deck.ic", include_dirs=[library]).experiments[0])
-    assert only["values"][-1] == np.radians(45.0)
+    assert only["values"][-1] == DEGREES.to_si(45.0)
     (beside / "moves.csv").write_text(MOVES.replace("45", "60"))
     (tmp_path / "moves.csv").write_text(MOVES.replace("45", "90"))
     nearer = parameters(ic.compile(tmp_path / "deck.ic", include_dirs=[library]).experiments[0])
-    assert nearer["values"][-1] == np.radians(60.0)
+    assert nearer["values"][-1] == DEGREES.to_si(60.0)
 
 
 def test_a_file_that_a_macro_of_the_command_line_names_is_beside_the_deck(tmp_path: Path) -> None:
