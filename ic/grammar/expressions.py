@@ -182,14 +182,14 @@ class Expressions(Quantities):
                     f"`{name.text}` is the unit {units.UNITS[name.text].word}, and stands here without a number",
                     parts[0],
                 )
+            unit = self.unit()
+            text = token.text if unit is None else unit.text
             if name.text == "pi":
-                unit = self.unit()
-                text = token.text if unit is None else unit.text
                 turn = f"; a whole turn is `1 cycle{text.removeprefix('rad')}`" if token.text == "rad" else ""
                 self.fail("D030", "a unit follows a number or brackets, and `pi` is neither", token,
                           help=f"put brackets around the number, as in `(2*pi) {text}`{turn}")  # fmt: skip
             known = name.text[:LONGEST_NUMBER]
-            helps = ("what it names has its unit already", f"if it is a bare number, write `({known}) {token.text}`")
+            helps = ("what it names has its unit already", f"if it is a bare number, write `({known}) {text}`")
             self.fail("D030", f"`{known}` is a name, and only a number takes a unit", token, help=helps)
         return name
 
