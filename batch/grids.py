@@ -1,9 +1,11 @@
-"""Two numbers that cases differ in, as a grid: its levels, whether cases fill it, and which case stands for a cell."""
+"""Two numbers that cases differ in, as a grid: how their values are spaced, its levels, whether cases fill it,
+and which case stands for a cell. Pictures and reports take the same from here."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
@@ -12,24 +14,36 @@ from met.distinct import distinct
 from met.frozen import frozen
 
 MOST_LEVELS = 48
-"""Rows and columns of a map; more values share them, in equal stretches."""
+"""Rows and columns of a map; more values share them, in stretches."""
 
 FULL = 0.5
 """A grid has cases in more than this share of its cells: two parameters that go in step make none."""
+
+
+Scale = Literal["linear", "log", "place"]
+
+EVEN, EVEN_LOG = 0.05, 0.15
+"""How much steps may differ, against their mean, that values are said to rise evenly: 0.33, 0.67, 1 do; and of their
+logarithms: 1, 3, 10 do, 1, 2, 5, 10 do not."""
+
+SPAN, METRIC_SPAN = 100.0, 1000.0
+"""Largest value against the smallest, from which on an axis of points is logarithmic: of a parameter, of a metric."""
 
 
 @frozen
 class Levels:
     """Where cases lie along a side of a grid.
 
-    values  the different values, rising; of more than MOST_LEVELS the edges of equal stretches, one more than `texts`
+    values  the different values, rising; of too many the edges of stretches of them, one more than `texts`
     texts   each level in words
     places  of each case which level it has; -1 where its value is no number
+    scale   how the levels are spaced; `place`: neither evenly nor by factors, so that all are as wide
     """
 
     values: np.ndarray
     texts: tuple[str, ...]
     places: np.ndarray
+    scale: Scale
 
     @property
     def stretches(self) -> bool:
@@ -42,18 +56,82 @@ def levels(values: np.ndarray) -> np.ndarray:
     return distinct(values[np.isfinite(values)])
 
 
-def levelled(values: np.ndarray, words: Sequence[str] = ()) -> Levels:
-    """The levels of a column. words: of a choice, what its numbers stand for."""
+def spacing(found: np.ndarray) -> Scale:
+    """How different, rising values follow one another: by equal steps, by equal factors, or neither."""
+    if len(found) < 2:
+        return "place"
+    if _even(found, EVEN):
+        return "linear"
+    return "log" if found[0] > 0.0 and _even(np.log(found), EVEN_LOG) else "place"
+
+
+def is_log(found: np.ndarray) -> bool:
+    """Whether points at these different, rising values lie on a logarithmic axis: they rise by factors, or span so many
+    that the small ones would be one on another."""
+    if len(found) < 3 or found[0] <= 0.0:
+        return False
+    scale = spacing(found)
+    return scale == "log" or (scale == "place" and spans(found, SPAN))
+
+
+def spans(values: np.ndarray, ratio: float) -> bool:
+    """Whether values are all above zero and the largest is so many times the smallest."""
+    finite = values[np.isfinite(values)]
+    low, high = finite.min(initial=np.inf), finite.max(initial=-np.inf)
+    return bool(0.0 < low < np.inf and high / ratio >= low)
+
+
+def levelled(values: np.ndarray, words: Sequence[str] = (), most: int = MOST_LEVELS) -> Levels:
+    """The levels of a column.
+
+    words  of a choice, what its numbers stand for
+    most   so many levels of values that come again and again, as in a grid; samples share MOST_LEVELS at most
+    """
     found = levels(values)
     finite = np.isfinite(values)
+    scale: Scale = "place" if words else spacing(found)
+    again = scale != "place" or 2 * len(found) <= int(finite.sum())
+    if not again:
+        most = min(most, MOST_LEVELS)
     places = np.full(len(values), -1)
-    if len(found) <= MOST_LEVELS:
+    if len(found) <= most:
         places[finite] = np.searchsorted(found, values[finite])
-        return Levels(found, tuple(words[int(v)] if words else number_text(float(v)) for v in found), places)
-    edges = np.linspace(found[0], found[-1], MOST_LEVELS + 1)
-    places[finite] = np.clip(np.searchsorted(edges, values[finite], side="right") - 1, 0, MOST_LEVELS - 1)
+        texts = [words[int(v)] if words else number_text(float(v)) for v in found]
+        return Levels(found, tuple(texts), places, scale)
+    if again:
+        return _neighbours(found, values, most, scale)
+    scale = "log" if is_log(found) else "linear"
+    edges = (np.geomspace if scale == "log" else np.linspace)(found[0], found[-1], most + 1)
+    places[finite] = np.clip(np.searchsorted(edges, values[finite], side="right") - 1, 0, most - 1)
     texts = [f"{number_text(float(a))} … {number_text(float(b))}" for a, b in pairwise(edges)]
-    return Levels(edges, tuple(texts), places)
+    return Levels(edges, tuple(texts), places, scale)
+
+
+def _neighbours(found: np.ndarray, values: np.ndarray, most: int, scale: Scale) -> Levels:
+    """Stretches of neighbouring values, as many in each, so that none is empty; they meet half way between values."""
+    stretch = np.arange(len(found)) * most // len(found)
+    first = np.searchsorted(stretch, np.arange(most))
+    last = np.append(first[1:], len(found)) - 1
+    edges = edges_of(found, scale)[np.append(first, len(found))]
+    texts = [number_text(float(a)) if a == b else f"{number_text(float(a))} … {number_text(float(b))}"
+             for a, b in zip(found[first], found[last], strict=True)]  # fmt: skip
+    finite = np.isfinite(values)
+    places = np.full(len(values), -1)
+    places[finite] = stretch[np.searchsorted(found, values[finite])]
+    return Levels(edges, tuple(texts), places, scale)
+
+
+def edges_of(found: np.ndarray, scale: Scale) -> np.ndarray:
+    """Half way between values, and as far beyond the first and the last; of a logarithmic scale by factors."""
+    if scale == "log":
+        return np.asarray(np.exp(edges_of(np.log(found), "linear")))
+    middles = (found[1:] + found[:-1]) / 2
+    return np.concatenate([[1.5 * found[0] - 0.5 * found[1]], middles, [1.5 * found[-1] - 0.5 * found[-2]]])
+
+
+def _even(values: np.ndarray, share: float) -> bool:
+    steps = np.diff(values)
+    return bool(np.ptp(steps) <= share * steps.mean())
 
 
 def is_grid(x: np.ndarray, y: np.ndarray) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from batch import requirements
 from batch.archive.read import Group, Stored
 from batch.failures import STATUS
-from batch.grids import levels
+from batch.grids import METRIC_SPAN, is_log, levels, spans
 from batch.signals import deck_unit, number_text
 from met.distinct import distinct
 from met.frozen import frozen
@@ -39,6 +39,7 @@ class Column:
 
     before  of a metric, what it is in the other archive, where one is compared with; not a number where it has no such
             case. A column of role "change" holds values less before; its key is that of the metric after "change:"
+    log     whether an axis of its values is logarithmic
     """
 
     key: str
@@ -50,6 +51,7 @@ class Column:
     limits: tuple[Limit, ...] = ()
     about: str = ""
     before: np.ndarray | None = None
+    log: bool = False
 
 
 class Pool:
@@ -174,7 +176,10 @@ class Pool:
         scale, unit = deck_unit(variable)
         limits = tuple(Limit(each.text, each.value / scale, each.sense) for each in self.limits.get(variable.name, ()))
         values = self.gathered(variable.name) / scale
-        return Column(f"{role}:{variable.name}", variable.path, unit, role, values, (), limits, variable.long_name)
+        return Column(
+            f"{role}:{variable.name}", variable.path, unit, role, values, (), limits, variable.long_name,
+            log=is_log(levels(values)) if role == "parameter" else spans(values, METRIC_SPAN),
+        )  # fmt: skip
 
     def _choice(self, variable: Stored) -> Column:
         """Its values number the words, in the order in which groups have them."""

@@ -2,7 +2,8 @@
 values of a third parameter.
 
 A colour says what a metric is, rising in lightness, so that it reads in grey; stripes, which cases miss what is
-required; grey, that there is no number. Against another archive: own less theirs, in colours that part at zero.
+required; greys, that there is no number (`cells`). Against another archive: own less theirs, in colours that part at
+zero. How far colours reach is of `batch.colours`: what lies beyond has a colour of its own, and the bar says how much.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from batch.grids import FULL, cells_of, levelled, standing
-from batch.plotting import layout, sides
+from batch.colours import Reach, reach
+from batch.grids import FULL, cells_of, levelled
+from batch.plotting import cells, layout, sides
+from batch.plotting.cells import DOTTED, STRIPES, infinity
 from batch.plotting.measured import Measured
 from batch.plotting.points import RASTERED
 from batch.plotting.sheet import FAINT, INK, Sheet
@@ -23,11 +26,12 @@ from met.distinct import distinct
 from met.frozen import frozen
 
 RISING, PARTING = "viridis", "RdBu_r"
-GREY = "#c9ced3"
-STRAY = 5.0
-"""Colours go to the extremes unless these lie so many times further apart than nine in ten of the values."""
+BELOW, ABOVE = "#8f7ff0", "#f4724d"
+"""Of values beyond the rising colours, and of the bar's pointed ends."""
 
-STRIPES, DOTTED = "/////", "....."
+NOWHERE = "#c9ced3"
+"""Behind the cells of a difference, where white is no change."""
+
 RINGS = {STRIPES: "o", DOTTED: "s"}
 """What is around a point in their stead."""
 
@@ -68,31 +72,27 @@ def plan(x: Column, y: Column, third: Column | None, other: tuple[str, str] | No
 
 def draw(sheet: Sheet, found: Plan, metrics: Sequence[Measured], third: Column | None) -> tuple[Any, list[list[Any]]]:
     """The figure and its axes; what is written above it is left to the caller."""
+    every = np.ones(len(found.cells), bool)
     if third is None:
         wide = int(sheet.width / WIDEST) if sheet.width else 2 if len(metrics) < 5 else 3
         columns = max(1, min(len(metrics), wide))
         rows = -(-len(metrics) // columns)
         figure, axes = layout.figure(sheet, columns, [1.0] * rows, tall=True, share_y=True)
-        every = np.ones(len(found.cells), bool)
         flat = [ax for row in axes for ax in row]
         for ax in flat[len(metrics) :]:
             ax.set_visible(False)
         for ax, each in zip(flat, metrics, strict=False):
             layout.head(ax, _about(each, found), sheet, columns)
-            _bar(figure, _map(ax, each, found, every, _norm(each, found)), [ax], each, found, sheet)
+            _maps(figure, [ax], each, found, [every], sheet)
     else:
         named = sides.side(third).levels
         columns = len(named.texts)
         figure, axes = layout.figure(sheet, columns, [1.0] * len(metrics), tall=True, share_y=True)
+        for index, ax in enumerate(axes[0]):
+            value = f"{named.texts[index]} {third.unit}".rstrip()
+            layout.head(ax, value if third.words else f"{third.label} = {value}", sheet, columns)
         for row, each in zip(axes, metrics, strict=True):
-            norm, mapped = _norm(each, found), None
-            for index, ax in enumerate(row):
-                mapped = _map(ax, each, found, named.places == index, norm)
-                if row is axes[0]:
-                    value = f"{named.texts[index]} {third.unit}".rstrip()
-                    text = value if third.words else f"{third.label} = {value}"
-                    layout.head(ax, text, sheet, columns)
-            _bar(figure, mapped, row, each, found, sheet)
+            _maps(figure, row, each, found, [named.places == index for index in range(columns)], sheet)
     _sides(axes, found, sheet)
     layout.legend(figure, _marks(metrics, found), sheet, below=True)
     return figure, axes
@@ -119,7 +119,17 @@ def _stands(metrics: Sequence[Measured], found: Plan) -> str:
 
 
 def _about(each: Measured, found: Plan) -> str:
-    return each.column.about or each.column.label if found.other is not None else each.about
+    if found.other is not None:
+        return each.column.about or each.column.label
+    return " · ".join(part for part in (each.about, _lost(each)) if part)
+
+
+def _lost(each: Measured) -> str:
+    """How many cases have no finite number."""
+    infinite, failed = int(np.isinf(each.values).sum()), int(each.failed.sum())
+    lacking = int((np.isnan(each.values) & ~each.failed).sum())
+    named = ((infinite, "infinite in {:,}"), (failed, "failed: {:,}"), (lacking, "no value in {:,}"))
+    return ", ".join(text.format(count) for count, text in named if count)
 
 
 # Colours
@@ -129,152 +139,90 @@ def _shown(each: Measured, found: Plan) -> np.ndarray:
     return each.values if found.other is None else each.difference
 
 
-def _norm(each: Measured, found: Plan) -> tuple[Any, str]:
-    """What has which colour, and at which ends values go beyond."""
-    from matplotlib.colors import Normalize
+@frozen
+class Tones:
+    """Which value has which colour; how far the colours reach, None where no value is finite."""
 
-    shown = _shown(each, found)
-    finite = shown[np.isfinite(shown)]
-    if not len(finite):
-        return Normalize(0.0, 1.0), "neither"
-    low, five, ninety_five, high = np.percentile(finite, (0, 5, 95, 100)).tolist()
-    if found.other is not None:
-        far, usual = max(-low, high), max(-five, ninety_five)
-        top = usual if far > STRAY * usual > 0.0 else far or 1.0
-        ends = (low < -top, high > top)
-        return Normalize(-top, top), _ends(*ends)
-    usual = ninety_five - five
-    if high - low > STRAY * usual > 0.0:
-        bottom, top = max(low, five - usual), min(high, ninety_five + usual)
-        return Normalize(bottom, top), _ends(low < bottom, high > top)
-    if low == high:
-        return Normalize(low - abs(low or 1.0) * 0.05, high + abs(high or 1.0) * 0.05), "neither"
-    return Normalize(low, high), "neither"
+    norm: Any
+    reach: Reach | None
 
 
-def _ends(low: bool, high: bool) -> str:
-    return "both" if low and high else "min" if low else "max" if high else "neither"
+def _tones(each: Measured, found: Plan, values: np.ndarray) -> Tones:
+    from matplotlib.colors import LogNorm, Normalize
+
+    limits = [limit.value for limit in each.column.limits] if found.other is None else []
+    far = reach(values, limits, parting=found.other is not None)
+    if far is None:
+        return Tones(Normalize(0.0, 1.0), None)
+    if far.low == far.high:
+        room = 0.05 * (abs(far.low) or 1.0)
+        return Tones(Normalize(far.low - room, far.high + room), far)
+    return Tones((LogNorm if far.log else Normalize)(far.low, far.high), far)
 
 
 def _colours(found: Plan) -> Any:
     import matplotlib
 
-    return matplotlib.colormaps[RISING if found.other is None else PARTING]
+    if found.other is not None:
+        return matplotlib.colormaps[PARTING]
+    return matplotlib.colormaps[RISING].with_extremes(under=BELOW, over=ABOVE)
 
 
-def _bar(figure: Any, mapped: Any, axes: Sequence[Any], each: Measured, found: Plan, sheet: Sheet) -> None:
-    shown = _shown(each, found)
-    if not np.isfinite(shown).any():
+def _bar(
+    figure: Any, mapped: Any, axes: Sequence[Any], each: Measured, found: Plan, sheet: Sheet, tones: Tones
+) -> None:
+    """The colour bar; pointed where values lie beyond it, and how many."""
+    far = tones.reach
+    if far is None:
         return
-    bar = figure.colorbar(mapped, ax=list(axes), pad=0.02, aspect=16, extend=mapped.extend)
+    ends = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+    extend = ends[far.below > 0, far.above > 0]
+    bar = figure.colorbar(mapped, ax=list(axes), pad=0.02, aspect=16, extend=extend, extendfrac=0.05)
     label = each.label
     if found.other is not None:
         unit = f"  ({each.column.unit})" if each.column.unit else ""
         label = f"{each.column.label}: {found.other[0]} − {found.other[1]}{unit}"
-    bar.set_label(layout.broken(label, 26), fontsize=sheet.small)
+    lines = [layout.broken(label, 26), *(text for text in reversed(far.said) if text)]
+    bar.set_label("\n".join(lines), fontsize=sheet.small)
     bar.outline.set_visible(False)
     if found.other is None:
         for limit in each.column.limits:
-            if mapped.norm.vmin < limit.value < mapped.norm.vmax:
+            if mapped.norm.vmin <= limit.value <= mapped.norm.vmax:
                 bar.ax.axhline(limit.value, color="white", linewidth=2.4)
                 bar.ax.axhline(limit.value, color=INK, linewidth=1.0)
 
 
-# One map
+# The maps of one metric
 
 
-def _map(ax: Any, each: Measured, found: Plan, here: np.ndarray, norm: tuple[Any, str]) -> Any:
-    """Cells or points of one metric, of some of the cases. Gives what the colour bar is of."""
-    ax.grid(False)
-    if found.other is not None:  # where white is no change
-        ax.set_facecolor(GREY)
-    for name, one in (("x", found.x), ("y", found.y)):
-        if one.scale == "log":
-            getattr(ax, f"set_{name}scale")("log")
-        getattr(ax, f"set_{name}lim")(one.edges[0], one.edges[-1])
-    mapped = (_cells if found.filled else _points)(ax, each, found, here, norm[0])
-    mapped.extend = norm[1]
-    return mapped
-
-
-def _cells(ax: Any, each: Measured, found: Plan, here: np.ndarray, norm: Any) -> Any:
-    from matplotlib.patheffects import withStroke
-
-    rows, columns = found.shape
-    count = rows * columns
-    cells = np.where(here, found.cells, -1)
-    shown = _shown(each, found)
-    ranked, worse = (shown, each.worse) if found.other is None else (np.abs(shown), "<")
-    chosen = standing(ranked, cells, count, worse)
-    values = np.where(chosen >= 0, shown[chosen], np.nan)
-    there = _any(cells >= 0, cells, count)
-    x, y = np.meshgrid(found.x.edges, found.y.edges)
-    finite = np.isfinite(values)
-    plain = np.ma.masked_invalid(values).reshape(found.shape)
-    colours = _colours(found)
-    mapped = ax.pcolormesh(x, y, plain, cmap=colours, norm=norm, edgecolors="face", linewidth=0.5)
-    _fill(ax, found, there & ~finite, facecolors=GREY, edgecolors=GREY, linewidth=0.5)
-    light = np.zeros(count, bool)
-    light[finite] = _lightness(colours(norm(values[finite]))) > 0.5
-    light |= ~finite
-    for marked, hatch in _striped(each, found):
-        wanted = _any(marked, cells, count)
-        for tone, among in (("white", ~light), (INK, light)):
-            _fill(ax, found, wanted & among, facecolors="none", edgecolors=tone, linewidth=0.0, hatch=hatch)
-    size = _glyph(ax, found)
-    centre_x, centre_y = (each_axis.ravel() for each_axis in np.meshgrid(found.x.centres, found.y.centres))
-    failed = _any(each.failed, cells, count)
-    if failed.any():
-        ax.scatter(centre_x[failed], centre_y[failed], s=size, marker="x", color=INK, linewidths=0.8, zorder=3)
-    for infinite, text in ((np.isposinf(values), "∞"), (np.isneginf(values), "−∞")):
-        if infinite.any():
-            ax.scatter(centre_x[infinite], centre_y[infinite], s=4.0 * len(text) ** 2 * size, marker=_infinity(text),
-                       color=INK, linewidths=0.0, zorder=3,
-                       path_effects=[withStroke(linewidth=2.5, foreground=GREY)])  # fmt: skip
-    return mapped
-
-
-def _any(cases: np.ndarray, cells: np.ndarray, count: int) -> np.ndarray:
-    """Which cells hold some of these cases."""
-    out = np.zeros(count, bool)
-    out[cells[cases & (cells >= 0)]] = True
-    return out
-
-
-def _fill(ax: Any, found: Plan, which: np.ndarray, **style: Any) -> None:
-    from matplotlib.collections import PolyCollection
-
-    if not which.any():
-        return
-    up, across = np.divmod(np.flatnonzero(which), found.shape[1])
-    left, right = found.x.edges[across], found.x.edges[across + 1]
-    low, high = found.y.edges[up], found.y.edges[up + 1]
-    corners = np.stack([np.stack([left, low], 1), np.stack([right, low], 1), np.stack([right, high], 1),
-                        np.stack([left, high], 1)], axis=1)  # fmt: skip
-    ax.add_collection(PolyCollection(list(corners), **style), autolim=False)
-
-
-def _lightness(colours: np.ndarray) -> np.ndarray:
-    """Luma of RGBA colours, 0 to 1 (ITU-R BT.601)."""
-    return np.asarray(colours[:, :3] @ np.array([0.299, 0.587, 0.114]))
-
-
-def _glyph(ax: Any, found: Plan) -> float:
-    """Area of a mark in a cell, in square points."""
-    width, height = ax.figure.get_size_inches() * 72
-    columns, rows = ax.get_gridspec().ncols, ax.get_gridspec().nrows
-    cell = min(0.6 * width / columns / found.shape[1], 0.6 * height / rows / found.shape[0])
-    return float(np.clip(0.5 * cell, 1.2, 5.0) ** 2)
-
-
-def _infinity(text: str = "∞") -> Any:
-    """A marker."""
-    from matplotlib.textpath import TextPath
-    from matplotlib.transforms import Affine2D
-
-    drawn = TextPath((0, 0), text, size=1)
-    box = drawn.get_extents()
-    return drawn.transformed(Affine2D().translate(-(box.x0 + box.x1) / 2, -(box.y0 + box.y1) / 2))
+def _maps(
+    figure: Any, axes: Sequence[Any], each: Measured, found: Plan, parts: Sequence[np.ndarray], sheet: Sheet
+) -> None:
+    """A map for each of some parts of the cases, in the same colours."""
+    shown, count = _shown(each, found), found.shape[0] * found.shape[1]
+    striped = _striped(each, found)
+    if found.filled:
+        picked = [
+            cells.picked(shown, each.worse, each, np.where(here, found.cells, -1), count, striped,
+                         differs=found.other is not None) for here in parts
+        ]  # fmt: skip
+        tones = _tones(each, found, np.concatenate([one.values for one in picked]))
+    else:
+        tones = _tones(each, found, shown)
+    mapped = None
+    for number, (ax, here) in enumerate(zip(axes, parts, strict=True)):
+        ax.grid(False)
+        if found.other is not None:
+            ax.set_facecolor(NOWHERE)
+        for name, one in (("x", found.x), ("y", found.y)):
+            if one.scale == "log":
+                getattr(ax, f"set_{name}scale")("log")
+            getattr(ax, f"set_{name}lim")(one.edges[0], one.edges[-1])
+        if found.filled:
+            mapped = cells.draw(ax, picked[number], found.x, found.y, _colours(found), tones.norm, sheet)
+        else:
+            mapped = _points(ax, each, found, here, tones.norm)
+    _bar(figure, mapped, axes, each, found, sheet, tones)
 
 
 def _striped(each: Measured, found: Plan) -> list[tuple[np.ndarray, str]]:
@@ -294,8 +242,8 @@ def _points(ax: Any, each: Measured, found: Plan, here: np.ndarray, norm: Any) -
     for marked, hatch in _striped(each, found):
         rings = finite & marked
         ax.scatter(x[rings], y[rings], marker=RINGS[hatch], facecolors="none", edgecolors=INK, linewidths=0.8, **style)
-    for marked, marker in ((here & np.isnan(shown), "x"), (here & np.isposinf(shown), _infinity()),
-                           (here & np.isneginf(shown), _infinity("−∞"))):  # fmt: skip
+    for marked, marker in ((here & np.isnan(shown), "x"), (here & np.isposinf(shown), infinity()),
+                           (here & np.isneginf(shown), infinity("−∞"))):  # fmt: skip
         if marked.any():
             ax.scatter(x[marked], y[marked], marker=marker, color=FAINT, linewidths=0.8, **style)
     return mapped
@@ -320,7 +268,7 @@ def _sides(axes: Sequence[Sequence[Any]], found: Plan, sheet: Sheet) -> None:
 
 
 def _marks(metrics: Sequence[Measured], found: Plan) -> dict[str, Any]:
-    """What stripes, grey and signs stand for, of those that are there."""
+    """What stripes, greys and signs stand for, of those that are there."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -332,6 +280,10 @@ def _marks(metrics: Sequence[Measured], found: Plan) -> dict[str, Any]:
     def dot(marker: Any, **style: Any) -> Any:
         return Line2D([], [], linestyle="", marker=marker, color=INK, **style)
 
+    def signed(tone: str, marker: Any, **style: Any) -> Any:
+        sign = dot(marker, **style)
+        return (Patch(facecolor=tone), sign) if found.filled else sign
+
     stripes = [marked for each in metrics for marked in _striped(each, found)]
     texts = ["misses what is required"] if found.other is None else [f"missed in {name} alone" for name in found.other]
     for hatch, text in zip((STRIPES, DOTTED), texts, strict=False):
@@ -340,15 +292,15 @@ def _marks(metrics: Sequence[Measured], found: Plan) -> dict[str, Any]:
     shown = [_shown(each, found) for each in metrics]
     if any(np.isinf(each).any() for each in shown):
         down = not any(np.isposinf(each).any() for each in shown)
-        out["infinite"] = dot(_infinity("−∞" if down else "∞"), markersize=9, markeredgewidth=0.0)
+        out["infinite"] = signed(cells.INFINITE, infinity("−∞" if down else "∞"), markersize=9, markeredgewidth=0.0)
     if any(each.failed.any() for each in metrics):
-        out["failed"] = dot("x", markersize=4.5)
+        out["failed"] = signed(cells.FAILED, "x", markersize=4.5)
     both = metrics[0].both if metrics else True
     empty = len(distinct(found.cells[both & (found.cells >= 0)])) < np.prod(found.shape)
     if found.filled and any(_lacking(values, each) for values, each in zip(shown, metrics, strict=True)):
-        out["no value"] = Patch(facecolor=GREY)
+        out["no value"] = Patch(facecolor=cells.LACKING)
     if found.filled and empty:
-        tone = "white" if found.other is None else GREY
+        tone = "white" if found.other is None else NOWHERE
         out["no case" if found.other is None else "not in both"] = Patch(facecolor=tone, edgecolor=FAINT, linewidth=0.6)
     return out
 

@@ -5,24 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from batch.grids import Levels, levelled, levels
+from batch import grids
+from batch.grids import Levels, Scale, edges_of, levelled, levels
 from batch.plotting.layout import LETTER
 from batch.plotting.sheet import Sheet
 from batch.pool import Column
 from batch.signals import number_text
 from met.frozen import frozen
 
-EVEN, EVEN_LOG = 0.02, 0.15
-"""How much steps may differ, against their mean, that values are said to rise evenly; of their logarithms: 1, 2, 5, 10
-does not, 1, 3, 10 does."""
-
-
-SPAN = 100.0
-"""Largest value against the smallest, from which on an axis is logarithmic."""
+MOST_CELLS = 300
+"""Columns and rows of cells in a picture: of more, a cell would be no wider than a dot."""
 
 SHORT = 5
 """Letters of values that are written rather than round numbers between them."""
@@ -45,7 +41,7 @@ class Side:
     column: Column
     levels: Levels
     edges: np.ndarray
-    scale: Literal["linear", "log", "place"]
+    scale: Scale
 
     @property
     def label(self) -> str:
@@ -69,15 +65,13 @@ class Side:
 
 
 def side(column: Column) -> Side:
-    found = levelled(column.values, column.words)
-    values = found.values
-    if found.stretches:
-        return Side(column, found, values, "linear")
-    if not column.words and len(values) > 1 and _even(values, EVEN):
-        return Side(column, found, _edges(values), "linear")
-    if not column.words and len(values) > 2 and values[0] > 0 and _even(np.log(values), EVEN_LOG):
-        return Side(column, found, np.exp(_edges(np.log(values))), "log")
-    return Side(column, found, np.arange(len(values) + 1) - 0.5, "place")
+    """The side of a map of cells."""
+    found = levelled(column.values, column.words, MOST_CELLS)
+    if found.scale == "place":
+        edges = np.arange(len(found.texts) + 1) - 0.5
+    else:
+        edges = found.values if found.stretches else edges_of(found.values, found.scale)
+    return Side(column, found, edges, found.scale)
 
 
 def line(column: Column) -> Side:
@@ -95,22 +89,8 @@ def line(column: Column) -> Side:
 
 
 def is_log(column: Column) -> bool:
-    """Whether a parameter's values rise by factors, or span so many that the small ones would be one on another."""
-    values = levels(column.values)
-    if column.role != "parameter" or len(values) < 3 or values[0] <= 0 or _even(values, EVEN):
-        return False
-    return _even(np.log(values), EVEN_LOG) or bool(values[-1] >= SPAN * values[0])
-
-
-def _even(values: np.ndarray, share: float) -> bool:
-    steps = np.diff(values)
-    return bool(np.ptp(steps) <= share * steps.mean())
-
-
-def _edges(values: np.ndarray) -> np.ndarray:
-    """Half way between values, and as far beyond the first and the last."""
-    middles = (values[1:] + values[:-1]) / 2
-    return np.concatenate([[1.5 * values[0] - 0.5 * values[1]], middles, [1.5 * values[-1] - 0.5 * values[-2]]])
+    """Whether a parameter has a logarithmic axis (`grids.is_log`)."""
+    return column.role == "parameter" and grids.is_log(levels(column.values))
 
 
 def write(axis: Any, found: Side, inches: float, sheet: Sheet, *, upright: bool, cells: bool = True) -> None:
@@ -118,7 +98,7 @@ def write(axis: Any, found: Side, inches: float, sheet: Sheet, *, upright: bool,
     from matplotlib.ticker import NullLocator
 
     axis.set_minor_locator(NullLocator())
-    texts = found.levels.texts
+    texts = [text.partition(" … ")[0] for text in found.levels.texts]
     room = max(2, int(inches / (1.9 * sheet.normal / 72 if upright else _wide(texts, sheet) + APART)))
     every = -(-len(texts) // room)
     whole = cells and every == 1 and max(map(len, texts)) <= SHORT and not found.levels.stretches

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from batch import grids
-from batch.plotting import asked, histories, output, points, sheet
+from batch.plotting import asked, histories, output, points, sheet, sides
 from met import cli
 from tests.batch.plotting import figures
 from tests.batch.plotting.figures import PAGE
@@ -33,7 +33,8 @@ def test_the_options_are_those_of_the_command(capsys: pytest.CaptureFixture[str]
 def test_the_limits_are_those_of_the_code() -> None:
     assert (asked.MAPPED, asked.MOST_BESIDE, histories.OVERLAID) == (5, 6, 8)
     for said in (
-        f"than {grids.MOST_LEVELS} values", f"up to {asked.MOST_BESIDE} values", f"than {points.RASTERED:,} points",
+        f"than {sides.MOST_CELLS} values", f"than {grids.MOST_LEVELS} values",
+        f"up to {asked.MOST_BESIDE} values", f"than {points.RASTERED:,} points",
         f"{sheet.SCREEN_DPI}, with `--size` {sheet.PAPER_DPI}",
     ):  # fmt: skip
         assert said in PAGE

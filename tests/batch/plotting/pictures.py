@@ -36,11 +36,15 @@ def mesh(ax: Any) -> np.ndarray:
 
 
 def cells(ax: Any, *, hatch: str | None = None, face: str = "") -> int:
-    """How many cells are marked so."""
+    """How many cells are marked so: a mark goes over neighbours in a row."""
     from matplotlib.colors import to_hex
 
+    [drawn] = [each for each in ax.collections if isinstance(each, QuadMesh)]
+    edges = drawn.get_coordinates()[0, :, 0]
     return sum(
-        len(each.get_paths()) for each in ax.collections
+        int(np.diff(np.searchsorted(edges, path.get_extents().intervalx * (1 + 1e-12)))[0])
+        for each in ax.collections
         if isinstance(each, PolyCollection) and not isinstance(each, QuadMesh) and each.get_hatch() == hatch
         and (not face or to_hex(each.get_facecolor()[0]) == face)
+        for path in each.get_paths()
     )  # fmt: skip

@@ -9,13 +9,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.collections import PathCollection
+from matplotlib.collections import PathCollection, QuadMesh
+from matplotlib.colors import to_hex
 
 from batch.archive.read import ArchiveFile
 from batch.plotting import draw, plot
-from batch.plotting.maps import GREY, STRIPES
+from batch.plotting.cells import FAILED, INFINITE, STRIPES
+from batch.plotting.maps import ABOVE
 from batch.plotting.points import NAMED
 from batch.plotting.sheet import COLOURS
+from batch.plotting.sides import MOST_CELLS
+from met import run as engine
+from tests.batch import plans
 from tests.batch.plotting.pictures import archive, cells, mesh, said, shown
 from tests.batch.report import archives
 
@@ -126,7 +131,9 @@ class TestMaps:
             expected = np.where(np.array(KP) < 0.011, np.nan, 0.1 / np.array(KP))
         np.testing.assert_allclose(mesh(settle), np.tile(expected, (5, 1)), rtol=1e-14)
         assert said(figures[0]) == "25 cases: a cell a case"
-        assert settle.get_title("left") == "settling_time of shoulder.qd\nsettle < 10 s: missed by 5 of 25"
+        assert settle.get_title("left") == (
+            "settling_time of shoulder.qd\nsettle < 10 s: missed by 5 of 25\ninfinite in 5"
+        )
 
     def test_stripe_what_misses_and_mark_what_has_no_number(
         self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
@@ -136,7 +143,9 @@ class TestMaps:
         plot("a.h5")
         settle, volts = shown(figures[0])[:2]
         assert cells(settle, hatch=STRIPES) == 5 and cells(volts, hatch=STRIPES) == 24
-        assert cells(settle, face=GREY) == 6 and cells(volts, face=GREY) == 1  # one failed, five are infinite
+        assert (cells(settle, face=INFINITE), cells(settle, face=FAILED)) == (5, 1)
+        assert (cells(volts, face=INFINITE), cells(volts, face=FAILED)) == (0, 1)
+        assert settle.get_title("left").endswith("\ninfinite in 5, failed: 1")
         marks = [len(each.get_offsets()) for each in settle.collections if isinstance(each, PathCollection)]
         assert marks == [1, 5]
         assert [text.get_text() for text in figures[0].legends[0].get_texts()] == [
@@ -152,17 +161,28 @@ class TestMaps:
         archives.made(Path("a.h5"), replace(one, cases=cases), histories="none")
         plot("a.h5", names=["volts"])
         ax, _ = shown(figures[0])
-        assert np.isnan(mesh(ax)).sum() == 1 and cells(ax, face=GREY) == 0
+        assert np.isnan(mesh(ax)).sum() == 1 and cells(ax, face=INFINITE) == cells(ax, face=FAILED) == 0
         assert [text.get_text() for text in figures[0].legends[0].get_texts()] == ["misses what is required", "no case"]
 
     def test_show_the_worst_of_several_cases_and_say_so(self, here: Path, figures: list[Any]) -> None:
-        steps = np.linspace(0.02, 0.05, 96).tolist()
+        steps = np.linspace(0.02, 0.05, 2 * MOST_CELLS).tolist()
         made(kps=steps)
         plot("a.h5")
         [ax] = shown(figures[0])[:1]
-        assert mesh(ax).shape == (5, 48)
+        assert mesh(ax).shape == (5, MOST_CELLS)
         np.testing.assert_allclose(mesh(ax)[0], 0.1 / np.array(steps[::2]), rtol=1e-14)  # the longest of each two
-        assert said(figures[0]) == "480 cases: up to 2 cases in a cell, which shows the worst by what is required"
+        assert said(figures[0]) == "3,000 cases: up to 2 cases in a cell, which shows the worst by what is required"
+
+    @pytest.mark.parametrize("count", [49, 60, MOST_CELLS, MOST_CELLS + 1])
+    def test_of_a_dense_logarithmic_sweep_have_a_logarithmic_axis_and_no_gaps(
+        self, count: int, here: Path, figures: list[Any]
+    ) -> None:
+        made(kps=np.geomspace(0.02, 2.0, count).tolist())
+        plot("a.h5", names=["settle"])
+        ax = shown(figures[0])[0]
+        assert ax.get_xscale() == "log" and mesh(ax).shape == (5, min(count, MOST_CELLS))
+        assert np.isfinite(mesh(ax)).all()
+        assert not figures[0].legends
 
     def test_of_cases_that_fill_no_grid_are_points(self, here: Path, figures: list[Any]) -> None:
         with archive(40, "none") as file:
@@ -200,22 +220,30 @@ class TestMaps:
         assert ax.get_ylim() == (-0.5, 4.5)
         assert [text.get_text() for text in ax.get_yticklabels()] == ["1000", "2000", "30000", "31000", "90000"]
 
-    def test_have_colours_for_the_many_where_a_few_stray(self) -> None:
-        from batch.plotting import maps
-        from batch.plotting.measured import Measured
-        from batch.pool import Column
+    def test_have_colours_for_the_many_where_a_few_stray(
+        self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        real = plans.answer
 
-        values = np.concatenate([np.linspace(1.0, 2.0, 99), [1e6]])
-        every = np.zeros(100, bool)
-        each = Measured(Column("metric:a", "a", "s", "metric", values), values, every, every)
-        side = Column("parameter:x", "x", "", "parameter", np.arange(100.0))
-        norm, ends = maps._norm(each, maps.plan(side, side, None, None))
-        assert ends == "max" and norm.vmin == 1.0 and 2.0 < norm.vmax < 4.0
+        def answer(*args: Any, **options: Any) -> Any:
+            found = real(*args, **options)
+            volts = np.where(np.isin(found.case, (3, 9)), 1e9, found.metrics["volts"])
+            return replace(found, metrics={**found.metrics, "volts": volts})
+
+        monkeypatch.setattr(engine, "run", answer)
+        made()
+        plot("a.h5", names=["volts"])
+        ax, bar = shown(figures[0])
+        [found] = [each for each in ax.collections if isinstance(each, QuadMesh)]
+        assert found.norm.vmax < 10.0
+        assert bar.get_ylabel() == "volts  (V)\n2 above, up to 1e+09"
+        assert to_hex(found.cmap.get_over()) == ABOVE
 
     def test_read_in_grey(self) -> None:
         import matplotlib
 
-        from batch.plotting.maps import RISING, _lightness
+        from batch.plotting.cells import _lightness
+        from batch.plotting.maps import RISING
 
         light = _lightness(matplotlib.colormaps[RISING](np.linspace(0, 1, 50)))
         assert (np.diff(light) > 0).all() and light[-1] - light[0] > 0.6

@@ -1,0 +1,154 @@
+"""The cells of a map: which value each shows, in which colour, and what is marked on it.
+
+Stripes and greys are drawn as stretches of a row, and signs so far apart that they are read, so that a map of many
+cells is as clear, and nearly as fast, as one of few.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from batch.grids import standing
+from batch.plotting.measured import Measured
+from batch.plotting.sheet import INK, Sheet
+from batch.plotting.sides import Side
+from met.frozen import frozen
+
+INFINITE, FAILED, LACKING = "#c9ced3", "#828c95", "#e9ecee"
+"""Greys of cells without a finite number; colours of numbers are no greys."""
+
+STRIPES, DOTTED = "/////", "....."
+FINE = 60 * 60
+"""Cells from which on they have no edges, and lie as an image within an SVG or a PDF."""
+
+LEAST_SIGN, MOST_SIGN = 4.0, 5.0
+"""Points: a sign in a cell is no smaller, and no larger."""
+
+SIGN_ROOM = 5.0
+"""A sign stands so many times its size from the next."""
+
+
+@frozen
+class Picked:
+    """What the cells show, row by row from the lowest. there: that a case is in it; failed: one that failed."""
+
+    values: np.ndarray
+    there: np.ndarray
+    failed: np.ndarray
+    striped: tuple[tuple[np.ndarray, str], ...]
+
+
+def picked(
+    shown: np.ndarray, worse: str, each: Measured, cells: np.ndarray, count: int, striped: list[tuple[np.ndarray, str]],
+    *, differs: bool,
+) -> Picked:  # fmt: skip
+    """The case that stands for each cell. cells: of each case its cell, -1 for none; differs: changes are shown."""
+    chosen = standing(np.abs(shown) if differs else shown, cells, count, "<" if differs else worse)
+    values = np.where(chosen >= 0, shown[chosen], np.nan)
+    return Picked(
+        values, any_in(cells >= 0, cells, count), any_in(each.failed, cells, count),
+        tuple((any_in(marked, cells, count), hatch) for marked, hatch in striped),
+    )  # fmt: skip
+
+
+def any_in(cases: np.ndarray, cells: np.ndarray, count: int) -> np.ndarray:
+    """Which cells hold some of these cases."""
+    out = np.zeros(count, bool)
+    out[cells[cases & (cells >= 0)]] = True
+    return out
+
+
+def draw(ax: Any, found: Picked, x: Side, y: Side, colours: Any, norm: Any, sheet: Sheet) -> Any:
+    """Colours, greys, stripes and signs. Gives what a colour bar is of."""
+    shape = (len(y.levels.texts), len(x.levels.texts))
+    values = found.values
+    finite = np.isfinite(values)
+    fine = len(values) > FINE
+    plain = np.ma.masked_invalid(values).reshape(shape)
+    edges = {} if fine else {"edgecolors": "face", "linewidth": 0.5}
+    mapped = ax.pcolormesh(*np.meshgrid(x.edges, y.edges), plain, cmap=colours, norm=norm, rasterized=fine, **edges)
+    infinite = np.isinf(values)
+    failed = found.failed & np.isnan(values)
+    lacking = found.there & np.isnan(values) & ~failed
+    for which, grey in ((infinite, INFINITE), (failed, FAILED), (lacking, LACKING)):
+        _fill(ax, x, y, which, facecolors=grey, edgecolors=grey, linewidth=0.5)
+    light = np.ones(len(values), bool)
+    light[finite] = _lightness(colours(norm(values[finite]))) > 0.5
+    for wanted, hatch in found.striped:
+        for tone, among in (("white", ~light), (INK, light)):
+            _fill(ax, x, y, wanted & among, facecolors="none", edgecolors=tone, linewidth=0.0, hatch=hatch)
+    size, room = _sign(ax, shape)
+    for which, text in ((found.failed, "x"), (np.isposinf(values), "∞"), (np.isneginf(values), "−∞")):
+        _signs(ax, x, y, _spaced(which.reshape(shape), room), text, size, INK)
+    return mapped
+
+
+def _fill(ax: Any, x: Side, y: Side, which: np.ndarray, **style: Any) -> None:
+    """Rectangles over these cells, one for each stretch of neighbours in a row."""
+    from matplotlib.collections import PolyCollection
+
+    if not which.any():
+        return
+    rows = which.reshape(len(y.levels.texts), len(x.levels.texts))
+    steps = np.diff(np.pad(rows, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    up, first = np.nonzero(steps > 0)
+    end = np.nonzero(steps < 0)[1]
+    left, right, low, high = x.edges[first], x.edges[end], y.edges[up], y.edges[up + 1]
+    corners = np.stack([np.stack([left, low], 1), np.stack([right, low], 1), np.stack([right, high], 1),
+                        np.stack([left, high], 1)], axis=1)  # fmt: skip
+    ax.add_collection(PolyCollection(list(corners), rasterized=which.size > FINE, **style), autolim=False)
+
+
+def _lightness(colours: np.ndarray) -> np.ndarray:
+    """Luma of RGBA colours, 0 to 1 (ITU-R BT.601)."""
+    return np.asarray(colours[:, :3] @ np.array([0.299, 0.587, 0.114]))
+
+
+def _sign(ax: Any, shape: tuple[int, int]) -> tuple[float, tuple[int, int]]:
+    """How large a sign is, in points, and how many rows and columns of cells it needs for itself."""
+    width, height = ax.figure.get_size_inches() * 72
+    columns, rows = ax.get_gridspec().ncols, ax.get_gridspec().nrows
+    cell = (0.6 * height / rows / shape[0], 0.6 * width / columns / shape[1])
+    size = float(np.clip(0.5 * min(cell), LEAST_SIGN, MOST_SIGN))
+    return size, (max(1, round(SIGN_ROOM * size / cell[0])), max(1, round(SIGN_ROOM * size / cell[1])))
+
+
+def _spaced(which: np.ndarray, room: tuple[int, int]) -> np.ndarray:
+    """Of these cells one in each block of so many rows and columns: the one nearest to its middle."""
+    if room == (1, 1) or not which.any():
+        return which
+    up, across = np.nonzero(which)
+    blocks = (up // room[0]) * (which.shape[1] // room[1] + 1) + across // room[1]
+    far = np.hypot(up % room[0] - (room[0] - 1) / 2, across % room[1] - (room[1] - 1) / 2)
+    order = np.lexsort((far, blocks))
+    kept = order[np.unique(blocks[order], return_index=True)[1]]
+    out = np.zeros(which.shape, bool)
+    out[up[kept], across[kept]] = True
+    return out
+
+
+def _signs(ax: Any, x: Side, y: Side, which: np.ndarray, text: str, size: float, tone: str) -> None:
+    if not which.any():
+        return
+    up, across = np.nonzero(which)
+    style: dict[str, Any] = {"color": tone, "zorder": 3}
+    if text == "x":
+        style |= {"s": size**2, "marker": "x", "linewidths": 0.8}
+    else:
+        from matplotlib.patheffects import withStroke
+
+        style |= {"s": 4.0 * len(text) ** 2 * size**2, "marker": infinity(text), "linewidths": 0.0,
+                  "path_effects": [withStroke(linewidth=2.5, foreground=INFINITE)]}  # fmt: skip
+    ax.scatter(x.centres[across], y.centres[up], **style)
+
+
+def infinity(text: str = "∞") -> Any:
+    """A marker."""
+    from matplotlib.textpath import TextPath
+    from matplotlib.transforms import Affine2D
+
+    drawn = TextPath((0, 0), text, size=1)
+    box = drawn.get_extents()
+    return drawn.transformed(Affine2D().translate(-(box.x0 + box.x1) / 2, -(box.y0 + box.y1) / 2))
