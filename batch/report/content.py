@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from batch.colours import Reach
 from batch.pool import Column
 from met.frozen import frozen
 
@@ -199,6 +200,8 @@ class Map:
     cases    by metric's key: (y, x), which case that is; -1 where there is none
     counts   (y, x): cases in the cell
     missed   by metric's key: (y, x), cases of the cell that miss a requirement of this metric
+    failed   (y, x): cases of the cell that did not reach their end
+    reaches  by metric's key: how far its colours reach; None where no cell has a number
     """
 
     x: str
@@ -209,6 +212,8 @@ class Map:
     values: dict[str, np.ndarray]
     cases: dict[str, np.ndarray]
     missed: dict[str, np.ndarray]
+    failed: np.ndarray
+    reaches: dict[str, Reach | None]
 
 
 @frozen

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from batch.colours import Reach, reach
 from batch.pool import ENDED, Column
 from batch.report.changes import Comparison
 from batch.report.content import History, Map, Overview, Section, Signals, Stability
@@ -75,6 +76,8 @@ def _column(column: Column) -> dict[str, Any]:
         "role": column.role,
         "about": visible(column.about),
         "words": [visible(word) for word in column.words],
+        "log": column.log,
+        "reach": _reach(reach(column.values, [e.value for e in column.limits], parting=column.role == "change")),
         "values": packed(column.values),
         "before": None if column.before is None else packed(column.before),
         "limits": [{"text": visible(e.text), "value": e.value, "sense": e.sense}
@@ -102,13 +105,23 @@ def _map(each: Map) -> dict[str, Any]:
         "xLevels": [visible(level) for level in each.x_levels],
         "yLevels": [visible(level) for level in each.y_levels],
         "counts": packed(each.counts),
+        "failed": packed(each.failed),
         "of": {
             visible(key): {
-                "values": packed(each.values[key]), "cases": packed(each.cases[key]), "missed": packed(each.missed[key])
+                "values": packed(each.values[key]), "cases": packed(each.cases[key]),
+                "missed": packed(each.missed[key]), "reach": _reach(each.reaches[key]),
             }
             for key in each.values
         },
     }  # fmt: skip
+
+
+def _reach(found: Reach | None) -> dict[str, Any] | None:
+    """How far colours reach, and how many values lie beyond."""
+    if found is None:
+        return None
+    return {"low": found.low, "high": found.high, "log": found.log, "below": found.below, "above": found.above,
+            "least": found.least, "most": found.most}  # fmt: skip
 
 
 def _signals(signals: Signals) -> dict[str, Any]:

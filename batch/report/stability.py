@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def stability(
         return None
     places = np.array(sorted(found))
     joints = list(dict.fromkeys(one.joint for place in places.tolist() for one in found[place]))
-    columns = [Column(c.key, c.label, c.unit, c.role, c.values[places], c.words) for c in pool.varied()]
+    columns = [replace(c, values=c.values[places]) for c in pool.varied()]
     columns.append(Column("case", "case", "", "case", pool.cases[places].astype(float)))
     spans = any(one.lower > 0.0 for case in found.values() for one in case)
     beds = tuple(_bed(joint, [_of(found[place], joint) for place in places.tolist()], spans) for joint in joints)

@@ -108,6 +108,20 @@ const MET = (() => {
     return `rgb(${mixed.join(",")})`;
   }
 
+  // Where a value lies in a range of colours, 0 to 1; of one value alone in its middle.
+  function share(value, { low, high, log }) {
+    if (!(high > low)) return 0.5;
+    return log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+  }
+
+  // Its colour; what lies beyond the range has one of its own, as in `met plot`.
+  const [BELOW, ABOVE] = ["#8f7ff0", "#f4724d"];
+  const ROUNDED = 1e-6;  // numbers come in four bytes
+  function tone(value, reach) {
+    const at = share(value, reach);
+    return at < -ROUNDED ? BELOW : at > 1 + ROUNDED ? ABOVE : ramp(at);
+  }
+
   // A colour for a share from -1 to 1: blue below, the paper's at 0, orange above; both darker the further from it.
   function diverging(share) {
     const ends = dark() ? ["#2b2f34", "#6fb4f0", "#f0a56a"] : ["#f1f2f3", "#1f5f9e", "#b3510f"];
@@ -116,9 +130,14 @@ const MET = (() => {
     return `rgb(${[1, 3, 5].map((c) => Math.round(channel(ends[0], c) + (channel(end, c) - channel(ends[0], c)) * far)).join(",")})`;
   }
 
-  // Black or white, whichever is read on a colour of the ramp.
+  // What stands for a cell without a number, and why; while it is printed, as on light paper.
+  const GREYS = { infinite: ["#c9ced3", "#4b545d"], failed: ["#828c95", "#8a949d"], lacking: ["#e9ecee", "#2a3036"] };
+  const grey = (kind) => GREYS[kind][dark() ? 1 : 0];
+
+  // Black or white, whichever is read on a colour.
   function over(colour) {
-    const [r, g, b] = colour.match(/\d+/g).map((c) => {
+    const parts = colour[0] === "#" ? [1, 3, 5].map((at) => channel(colour, at)) : colour.match(/\d+/g);
+    const [r, g, b] = parts.map((c) => {
       const s = c / 255;
       return s <= 0.04045 ? s / 12.92 : ((s + 0.055) / 1.055) ** 2.4;
     });
@@ -179,6 +198,6 @@ const MET = (() => {
     return made;
   }
 
-  return { unpack, number, ticks, span, quantity, titled, node, palette, ramp, diverging, signed, over, drawn, width, print, tip, pairs, model,
+  return { unpack, number, ticks, span, quantity, titled, node, palette, ramp, share, tone, BELOW, ABOVE, diverging, signed, grey, over, drawn, width, print, tip, pairs, model,
     dark, isPrinting: () => printing };
 })();

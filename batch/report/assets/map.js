@@ -1,9 +1,9 @@
-// Two parameters that make a grid, as a table whose cells are coloured by a metric.
+// Two parameters that make a grid, coloured by a metric: few cells as a table with their numbers, many as a drawing.
 "use strict";
 
 MET.map = (() => {
   const { node, number, titled, unpack } = MET;
-  const MANY = 14;
+  const MANY = [14, 24];  // columns, rows: of more, no number has room in a cell
 
   function make(root, model) {
     const maps = model.data.overview.maps;
@@ -17,57 +17,84 @@ MET.map = (() => {
     root.append(node("h4", null, "Two parameters at once"), node("div", { class: "controls" },
       MET.overview.chooser("Metric", metrics, metric, (key) => { metric = key; draw(); }),
       maps.length > 1 ? node("label", null, "over", pick) : null), box, scale);
+    let drawn = null;
 
     function draw() {
       const map = maps[which];
       const [x, y, m] = [model.column(map.x), model.column(map.y), model.column(metric)];
-      const [values, cases, missed] = ["values", "cases", "missed"].map((part) => unpack(map.of[metric][part]));
-      const counts = unpack(map.counts);
-      const finite = values.filter(Number.isFinite);
-      const far = m.role === "change" ? finite.reduce((a, b) => Math.max(a, Math.abs(b)), 0) || 1 : 0;
-      const low = finite.reduce((a, b) => Math.min(a, b), Infinity);
-      const high = finite.reduce((a, b) => Math.max(a, b), -Infinity);
-      const across = map.xLevels.length;
-      const many = across > MANY || map.yLevels.length > 24;
-      const every = many ? Math.ceil(across / 8) : 1;
-      const heads = map.xLevels.map((level, n) => node("th", { scope: "col" }, n % every ? "" : level.split(" … ")[0]));
-      const rows = map.yLevels.map((level, row) => node("tr", null, node("th", { scope: "row" }, many && row % 3 ? "" : level.split(" … ")[0]),
-        map.xLevels.map((_, column) => cell(row * across + column))));
-      const longest = Array.from(values, (v) => (far ? MET.signed(v) : number(v)).length).reduce((a, b) => Math.max(a, b), 0);
-      const wide = many ? 0.85 : Math.max(3.6, 0.62 * longest);
-      const table = node("table", { class: many ? "grid many" : "grid", style: { minWidth: `${11 + across * wide}rem` } },
-        node("thead", null, node("tr", null, node("th", { class: "axis" }, `${titled(y)} ↓`), node("th", { colspan: across }, `${titled(x)} →`)),
-          node("tr", null, node("td", { class: "corner" }), heads)), node("tbody", null, rows.reverse()));
-      box.replaceChildren(table);
-      const rule = m.limits.length ? `the worst of its cases by ${m.limits[0].text}` : "the middle one of its cases";
-      const judged = far ? model.column(metric.slice("change:".length)).limits.map((l) => `${l.text} asks for ${l.sense === "<" ? "less" : "more"}`) : [];
-      const most = counts.reduce((a, b) => Math.max(a, b), 0);
-      scale.replaceChildren(...[node("span", null, `${titled(m)}:`), !(low <= high) ? "no value" : far ? MET.overview.divide(far) : MET.overview.gradient(low, high),
-        ...judged.map((words) => node("span", null, words)), most > 1 ? node("span", null, `each cell shows ${rule}`) : null,
-        missed.some((n) => n > 0) ? node("span", { class: "bad-text" }, many ? "a corner: a case misses" : "✗ a case misses") : null].filter(Boolean));
+      const of = map.of[metric];
+      const found = { map, x, y, m, reach: of.reach, across: map.xLevels.length, up: map.yLevels.length,
+        values: unpack(of.values), cases: unpack(of.cases), missed: unpack(of.missed), counts: unpack(map.counts), failed: unpack(map.failed) };
+      found.kind = (n) => kind(found, n);
+      found.colour = (n) => (m.role === "change" ? MET.diverging(found.values[n] / found.reach.high) : MET.tone(found.values[n], found.reach));
+      found.tell = (n) => tell(found, n);
+      const many = found.across > MANY[0] || found.up > MANY[1];
+      box.classList.toggle("drawn", many);
+      drawn = (many ? MET.cells : table)(box, found, model);
+      legend(found, many);
+    }
 
-      function cell(n) {
-        if (!counts[n]) return node("td", { class: "void", "aria-label": "no case" });
-        const value = values[n];
-        const share = high > low ? (value - low) / (high - low) : 0.5;
-        const colour = !Number.isFinite(value) ? null : far ? MET.diverging(value / far) : MET.ramp(share);
-        const text = `${far ? MET.signed(value) : number(value)}${missed[n] ? " ✗" : ""}`;
-        const style = colour ? { background: colour, color: MET.over(colour) } : {};
-        if (many && missed[n]) style.backgroundImage = `linear-gradient(225deg, ${MET.over(colour || "rgb(255,255,255)")} 28%, transparent 29%)`;
-        const tell = () => [node("p", null, node("b", null, titled(m))), MET.pairs([
-          [x.label, `${map.xLevels[n % across]} ${x.unit}`], [y.label, `${map.yLevels[Math.floor(n / across)]} ${y.unit}`],
-          [m.label, MET.quantity(value, m)], ["cases", String(counts[n])],
-          ...(missed[n] ? [["missed by", String(missed[n]), "bad-text"]] : []), ...(cases[n] >= 0 ? [["shown", `#${cases[n]}`]] : [])])];
-        const choose = () => { if (cases[n] >= 0) model.choose(cases[n]); };
-        return node("td", { style, tabindex: many ? null : 0, class: cases[n] >= 0 && cases[n] === model.chosen ? "chosen" : null, "data-case": cases[n],
-          mousemove: (event) => MET.tip.show(event.pageX, event.pageY, ...tell()), mouseleave: MET.tip.hide,
-          click: choose, keydown: (event) => { if (event.key === "Enter") choose(); } }, text);
-      }
+    function legend({ m, map, reach, counts, values, missed, kind: of }, many) {
+      const change = m.role === "change";
+      const judged = change ? model.column(metric.slice("change:".length)).limits.map((l) => `${l.text} asks for ${l.sense === "<" ? "less" : "more"}`) : [];
+      const rule = m.limits.length ? `the worst of its cases by ${m.limits[0].text}` : "the middle one of its cases";
+      const several = counts.some((count) => count > 1);
+      const kinds = Array.from(values, (_, n) => of(n));
+      const greys = [["infinite", "infinite"], ["failed", "failed"], ["lacking", "no value"], ["void", "no case"]].map(([key, words]) => {
+        const count = kinds.filter((each) => each === key).length;
+        return count ? node("span", { class: "item tight" }, node("span", { class: `patch ${key}` }), `${words} (${count.toLocaleString("en")})`) : null;
+      });
+      const bad = missed.reduce((sum, n) => sum + (n > 0), 0);
+      scale.replaceChildren(...[node("span", null, `${titled(m)}:`), ...(reach ? MET.overview.scale(reach, change) : ["no value"]),
+        ...judged.map((words) => node("span", null, words)), ...greys,
+        bad ? node("span", { class: "item tight bad-text" }, many ? node("span", { class: "patch striped" }) : "✗ ", `a case misses (${bad.toLocaleString("en")})`) : null,
+        several ? node("span", null, `each cell shows ${rule}`) : null].filter(Boolean));
     }
 
     draw();
     MET.drawn.push(draw);
-    model.watch((chosen) => box.querySelectorAll("td").forEach((td) => td.classList.toggle("chosen", td.dataset.case === String(chosen))));
+    model.watch((chosen) => drawn.choose(chosen));
+    new ResizeObserver(() => { if (drawn.wide && drawn.wide !== MET.width(box)) draw(); }).observe(root);
+  }
+
+  // What a cell holds: a number, or why it has none.
+  function kind({ counts, values, failed }, n) {
+    if (!counts[n]) return "void";
+    if (Number.isFinite(values[n])) return "number";
+    return Number.isNaN(values[n]) ? (failed[n] ? "failed" : "lacking") : "infinite";
+  }
+
+  function tell({ map, x, y, m, across, values, cases, missed, counts, failed }, n) {
+    return [node("p", null, node("b", null, titled(m))), MET.pairs([
+      [x.label, `${map.xLevels[n % across]} ${x.unit}`], [y.label, `${map.yLevels[Math.floor(n / across)]} ${y.unit}`],
+      [m.label, MET.quantity(values[n], m)], ["cases", String(counts[n])],
+      ...(missed[n] ? [["missed by", String(missed[n]), "bad-text"]] : []), ...(failed[n] ? [["failed", String(failed[n]), "bad-text"]] : []),
+      ...(cases[n] >= 0 ? [["shown", `#${cases[n]}`]] : [])])];
+  }
+
+  // Few cells, each with its number.
+  function table(box, found, model) {
+    const { map, x, y, m, across, values, missed, cases } = found;
+    const text = (n) => (found.kind(n) === "failed" ? "failed" : (m.role === "change" ? MET.signed : number)(values[n])) + (missed[n] ? " ✗" : "");
+    const longest = Array.from(values, (_, n) => text(n).length).reduce((a, b) => Math.max(a, b), 0);
+    const heads = map.xLevels.map((level) => node("th", { scope: "col" }, level));
+    const rows = map.yLevels.map((level, row) => node("tr", null, node("th", { scope: "row" }, level),
+      map.xLevels.map((_, column) => cell(row * across + column))));
+    box.replaceChildren(node("table", { class: "grid", style: { minWidth: `${11 + across * Math.max(3.6, 0.62 * longest)}rem` } },
+      node("thead", null, node("tr", null, node("th", { class: "axis" }, `${titled(y)} ↓`), node("th", { colspan: across }, `${titled(x)} →`)),
+        node("tr", null, node("td", { class: "corner" }), heads)), node("tbody", null, rows.reverse())));
+
+    function cell(n) {
+      if (found.kind(n) === "void") return node("td", { class: "void", "aria-label": "no case" });
+      const colour = found.kind(n) === "number" ? found.colour(n) : null;
+      const choose = () => { if (cases[n] >= 0) model.choose(cases[n]); };
+      return node("td", { style: colour ? { background: colour, color: MET.over(colour) } : {}, tabindex: 0,
+        class: [found.kind(n), cases[n] >= 0 && cases[n] === model.chosen ? "chosen" : ""].join(" ").trim(), "data-case": cases[n],
+        mousemove: (event) => MET.tip.show(event.pageX, event.pageY, ...found.tell(n)), mouseleave: MET.tip.hide,
+        click: choose, keydown: (event) => { if (event.key === "Enter") choose(); } }, text(n));
+    }
+
+    return { choose: (chosen) => box.querySelectorAll("td").forEach((td) => td.classList.toggle("chosen", td.dataset.case === String(chosen))) };
   }
 
   return { make };

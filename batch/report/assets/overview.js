@@ -89,13 +89,12 @@ MET.overview = (() => {
     const levels = [...new Set(Array.from(column.values).filter(Number.isFinite))].sort((a, b) => a - b);
     const discrete = levels.length <= FEW;
     const place = new Map(levels.map((level, n) => [level, n]));
-    const [low, high] = [levels[0], levels[levels.length - 1]];
-    if (column.role === "change") {
-      const far = Math.max(Math.abs(low), Math.abs(high)) || 1;
-      return { levels, discrete: false, far, of: (value, palette) => (Number.isFinite(value) ? MET.diverging(visible(value / far)) : palette.muted) };
+    const reach = column.reach;
+    if (column.role === "change" && reach) {
+      return { levels, discrete: false, reach, parting: true, of: (value, palette) => (Number.isFinite(value) ? MET.diverging(visible(value / reach.high)) : palette.muted) };
     }
-    const share = (value) => (discrete ? place.get(value) / Math.max(1, levels.length - 1) : (value - low) / (high - low || 1));
-    return { levels, discrete, share, of: (value, palette) => (Number.isFinite(value) ? MET.ramp(share(value)) : palette.muted) };
+    const share = (value) => (discrete ? place.get(value) / Math.max(1, levels.length - 1) : MET.share(value, reach));
+    return { levels, discrete, reach, share, of: (value, palette) => (Number.isFinite(value) ? (discrete ? MET.ramp(share(value)) : MET.tone(value, reach)) : palette.muted) };
   }
 
   // A point of no change is not to be lost on the paper.
@@ -110,8 +109,7 @@ MET.overview = (() => {
           const dot = node("span", { class: "dot", style: { background: MET.ramp(colour.share(level)) } });
           items.push(node("span", { class: "item tight" }, dot, column.words.length ? column.words[level] : number(level)));
         }
-      } else if (colour.far) items.push(divide(colour.far));
-      else items.push(gradient(colour.levels[0], colour.levels[colour.levels.length - 1]));
+      } else if (colour.reach) items.push(...scale(colour.reach, colour.parting));
     }
     if (rings) {
       const filled = node("span", { class: "dot", style: { background: "currentColor" } });
@@ -127,15 +125,15 @@ MET.overview = (() => {
     box.replaceChildren(...items, node("span", { class: "hint" }, "drag to zoom, double click for all, click to choose a case"));
   }
 
-  function gradient(low, high) {
-    const stops = [...Array(9).keys()].map((n) => MET.ramp(n / 8)).join(",");
-    return node("span", { class: "item" }, number(low), node("span", { class: "ramp", style: { background: `linear-gradient(90deg,${stops})` } }), number(high));
-  }
-
-  // Changes, from less to more.
-  function divide(far) {
-    const stops = [...Array(9).keys()].map((n) => MET.diverging(n / 4 - 1)).join(",");
-    return node("span", { class: "item" }, MET.signed(-far), node("span", { class: "ramp", style: { background: `linear-gradient(90deg,${stops})` } }), MET.signed(far));
+  // Colours from end to end, and how many values lie beyond; of changes from less to more.
+  function scale(reach, parting) {
+    const stops = [...Array(9).keys()].map((n) => (parting ? MET.diverging(n / 4 - 1) : MET.ramp(n / 8))).join(",");
+    const beyond = (words, sign, colour) => (words ? node("span", { class: "item tight" }, node("span", { class: "beyond", style: { color: colour } }, sign), words) : null);
+    const [low, high] = [reach.low, reach.high].map(parting ? MET.signed : number);
+    const count = (n, words, value) => n && `${n.toLocaleString("en")} ${words} ${number(value)}`;
+    return [beyond(count(reach.below, "below, down to", reach.least), "◀", parting ? MET.diverging(-1) : MET.BELOW),
+      node("span", { class: "item" }, low, node("span", { class: "ramp", style: { background: `linear-gradient(90deg,${stops})` } }), high),
+      beyond(count(reach.above, "above, up to", reach.most), "▶", parting ? MET.diverging(1) : MET.ABOVE), reach.log ? "logarithmic" : null].filter(Boolean);
   }
 
   // A value, and what it was before.
@@ -185,5 +183,5 @@ MET.overview = (() => {
   const run = (command) => node("div", { class: "command" },
     node("button", { type: "button", class: "copy", "data-copy": command, "aria-label": `Copy ${command}` }, "copy"), " ", node("code", null, command));
 
-  return { make, card, chooser, gradient, divide, colours };
+  return { make, card, chooser, scale };
 })();

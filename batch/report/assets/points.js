@@ -10,7 +10,7 @@ MET.points = (() => {
   const COUNTS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1e3, 2e3, 5e3, 1e4, 2e4, 5e4, 1e5, 2e5, 5e5, 1e6, 2e6, 5e6, 1e7, 1e8, 1e9];
 
   // A plot in `frame`. `plot` has
-  //   x, y     columns: values, words, label, unit; y may have limits
+  //   x, y     columns: values, words, label, unit, log; y may have limits
   //   style    (place, colours) -> { fill, ring, size } of a point
   //   marks    (u, context, colours, at) draws more; at(x, y) is a point of the canvas
   //   told     place -> children of the note beside it;  choose  place -> nothing
@@ -22,8 +22,8 @@ MET.points = (() => {
     const ys = Array.from(kept, (place) => (Number.isFinite(plot.y.values[place]) ? plot.y.values[place] : null));
     const strips = STRIPS.filter(([, is]) => kept.some((place) => is(plot.y.values[place])));
     const at = { x: new Float64Array(kept.length), y: new Float64Array(kept.length) };
-    const logX = spread(xs, 100) && !plot.x.words.length;
-    const logY = plot.logY ?? spread(ys.filter((v) => v !== null), 1000);
+    const logX = Boolean(plot.x.log) && xs.every((v) => v > 0);
+    const logY = plot.logY ?? (Boolean(plot.y.log) && ys.every((v) => v === null || v > 0));
     let hovered = -1;
 
     function options() {
@@ -235,12 +235,6 @@ MET.points = (() => {
     const numbers = values.filter((v) => v > 0);
     return numbers.length ? Math.log10(numbers.reduce((a, b) => Math.max(a, b)) / numbers.reduce((a, b) => Math.min(a, b))) : 0;
   };
-
-  // Whether values are better told apart on a logarithmic axis.
-  function spread(values, ratio) {
-    if (values.length < 3 || values.some((v) => v <= 0)) return false;
-    return Math.max(...values.slice(0, 50000)) > ratio * Math.min(...values.slice(0, 50000));
-  }
 
   // Few values that stand well apart are the ticks themselves; else none.
   function apart(values, width) {
