@@ -63,16 +63,18 @@ def joints_of(group: Group) -> list[str]:
 
 @frozen
 class Command:
-    """A servo's command that belongs over a line; whether the cases share it, and which reaches furthest."""
+    """A servo's command that belongs over a line, in that line's unit; whether the cases share it, and which of them
+    reaches furthest."""
 
     variable: str
     column: int
     shared: bool = True
     longest: int = 0
+    scale: float = 1.0
 
     def values(self, group: Group, position: int) -> np.ndarray:
         values = group.signal(self.variable, position)
-        return values if values.ndim == 1 else values[:, self.column]
+        return (values if values.ndim == 1 else values[:, self.column]) / self.scale
 
 
 def overlaid(
@@ -94,11 +96,13 @@ def overlaid(
     out = {}
     for panel in found:
         for line, name in enumerate(panel.joints):
-            command = commands.get((name, panel.unit))
+            command = commands.get((name, panel.si))
             if panel.variable.rpartition(".")[2] in ("q", "qd", "tau") and command is not None:
                 shared, longest = _shared(group, Command(*command), spread(positions))
                 if shared or apart:
-                    out[panel.name, panel.unit, line] = Command(*command, shared=shared, longest=longest)
+                    out[panel.name, panel.unit, line] = Command(
+                        *command, shared=shared, longest=longest, scale=panel.scale
+                    )  # fmt: skip
     return out
 
 

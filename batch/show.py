@@ -10,6 +10,7 @@ from typing import Any
 
 from batch import braille, cases, ordering
 from batch.archive.read import ArchiveFile, Group
+from batch.deck_units import DeckUnits
 from batch.failures import failure_lines
 from batch.ordering import By
 from batch.output import quoted
@@ -67,7 +68,7 @@ def show(
     for group, position in shown:
         out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, by, width), ""]
         if plots and (signals or position is not None or not all_cases):
-            out += _plots(group, signals, position, width, colour)
+            out += _plots(archive, group, signals, position, width, colour)
         elif signals:
             panels(group, signals)  # a name that is none is told, drawn or not
     return "\n".join(out).rstrip() + "\n"
@@ -238,7 +239,9 @@ def _metric_words(metric: MetricSummary, single: bool) -> str:
     return words
 
 
-def _plots(group: Group, signals: Sequence[str], case: int | None, width: int, colour: bool) -> list[str]:
+def _plots(
+    archive: ArchiveFile, group: Group, signals: Sequence[str], case: int | None, width: int, colour: bool
+) -> list[str]:
     if not group.recorded:
         if signals:
             panels(group, signals)  # says that there are none
@@ -247,7 +250,8 @@ def _plots(group: Group, signals: Sequence[str], case: int | None, width: int, c
     if position not in group.recorded_positions:
         remedy = f"`met run {quoted(group.path)} --case '#{group.values('case')[position]}'` runs it again"
         return [f"its history was not kept: {remedy}"]
-    wanted = panels(group, signals)
+    units = DeckUnits(archive, group)
+    wanted = [units.panel(each) for each in panels(group, signals)]
     drawn = wanted if signals else wanted[:PLOTS]
     out = [case_text(group, position)] if group.count > 1 and case is None else []
     time = group.values("time")

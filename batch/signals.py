@@ -23,6 +23,7 @@ class Panel:
     lines    what each is called: its joint, its component, or nothing where there is no other
     columns  where each lies along the signal's joints and components, counted as one
     joints   the joint that each is of; none for what a link or the arm has. Lines of one joint are components
+    scale    how many SI units one `unit` is, where that is not `si`
     """
 
     name: str
@@ -32,6 +33,13 @@ class Panel:
     lines: tuple[str, ...]
     columns: tuple[int, ...]
     joints: tuple[str, ...] = ("",)
+    scale: float = 1.0
+    in_si: str = ""
+
+    @property
+    def si(self) -> str:
+        """The unit in which the archive holds it."""
+        return self.in_si or self.unit
 
     @property
     def axis(self) -> str:
@@ -125,7 +133,7 @@ def _panels(group: Group, choice: Choice) -> list[Panel]:
 def history(group: Group, panel: Panel, position: int) -> np.ndarray:
     """The panel's lines in the recorded case at this position: (time, line)."""
     values = group.signal(panel.variable, position)
-    return values.reshape(len(values), -1)[:, list(panel.columns)]
+    return values.reshape(len(values), -1)[:, list(panel.columns)] / panel.scale
 
 
 def pretty_unit(unit: str) -> str:

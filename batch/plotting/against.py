@@ -50,16 +50,16 @@ class Beside:
         mine = {column: path for path, (column, _) in _channels(self.drawn, panel.variable).items()}
         out = []
         for column in panel.columns:
-            place, unit = theirs.get(mine[column], (-1, panel.unit))
-            if unit != panel.unit:
-                raise unlike(mine[column], panel.unit, unit, self)
+            place, unit = theirs.get(mine[column], (-1, panel.si))
+            if unit != panel.si:
+                raise unlike(mine[column], panel.si, unit, self)
             out.append(place)
         return out
 
     def history(self, panel: Panel, columns: Sequence[int], place: int) -> np.ndarray:
         """The panel's lines in the other's case at this position: (its time, line); not a number where it has none."""
         values = self.group.signal(panel.variable, place)
-        values = values.reshape(len(values), -1)
+        values = values.reshape(len(values), -1) / panel.scale
         lacking = np.full(len(values), np.nan)
         return np.stack([values[:, column] if column >= 0 else lacking for column in columns], axis=1)
 

@@ -13,8 +13,10 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, Group, Stored
 from batch.arrange import Cell, Command, arranged, joints_of, overlaid, spread
+from batch.deck_units import DeckUnits
+from batch.limits import Mark, limits_of
 from batch.output import quoted
-from batch.plotting import layout
+from batch.plotting import held, layout
 from batch.plotting.against import Beside, lacking
 from batch.plotting.sheet import COLOURS, FAINT, INK, Sheet, sequence
 from batch.signals import Panel, case_text, deck_unit, history, number_text, panels
@@ -30,7 +32,7 @@ LEAST_COLUMN = 1.5
 """Inches of a column of panels on paper."""
 
 COMMAND = "command"
-DASHED: dict[str, Any] = {"linestyle": (0, (4, 3)), "linewidth": 1.0}
+DASHED: dict[str, Any] = {"linestyle": (0, (4, 3))}
 WIDER, PALE = 3.0, 0.35
 """How another archive's lines are drawn: so much wider than the own ones, and so opaque."""
 
@@ -44,7 +46,8 @@ class Histories:
     ) -> None:  # fmt: skip
         self.archive, self.group, self.sheet, self.other = archive, group, sheet, other
         panels(group)  # refuses an archive without histories
-        found = panels(group, signals)
+        self.units = DeckUnits(archive, group)
+        found = [self.units.panel(each) for each in panels(group, signals)]
         chosen = [group.recorded_position(case) for case in cases]
         self.positions: list[int] = chosen or group.recorded_positions.tolist()
         self.single, self.fan = len(self.positions) == 1, len(self.positions) > OVERLAID
@@ -87,8 +90,12 @@ class Histories:
         for cells, row in zip(rows, axes, strict=True):
             for cell, ax in zip(cells, row, strict=True):
                 if cell is not None:
-                    self._cell(ax, cell, by_joint)
+                    self._cell(ax, cell, by_joint, len(cells))
         dress(axes, rows, self.sheet)
+        for cells, row in zip(rows, axes, strict=True):
+            for cell, ax in zip(cells, row, strict=True):
+                if cell is not None:
+                    held.above(ax, self._marks(cell), self.sheet, len(cells))
         self._legend(figure, axes, rows, flat, by_joint)
         layout.title(figure, self.archive, self.group.name, self._below(), self.sheet)
         return figure
@@ -111,16 +118,15 @@ class Histories:
             for cell in cells for position in self.positions
         )  # fmt: skip
 
-    def _cell(self, ax: Any, cell: Cell, by_joint: bool) -> None:
+    def _cell(self, ax: Any, cell: Cell, by_joint: bool, columns: int) -> None:
         panel = cell.panel
         for line in cell.lines:
             colour = self._joint_colour(panel, line)
             self._their_lines(ax, panel, line, colour if by_joint or self.fan else None)
             if self.single:
-                thin = 0.75 if self.sheet.paper else 1.0
-                style = {"linewidth": thin * _width(line, len(panel.lines)), "linestyle": _dashes(line)}
                 y = layout.drawable(history(self.group, panel, self.positions[0])[:, line])
-                _line(ax, self.time, y, color=colour, label=layout.named(panel.lines[line]), **style)
+                _line(ax, self.time, y, color=colour, label=layout.named(panel.lines[line]),
+                      linestyle=_dashes(line))  # fmt: skip
             elif self.fan:
                 self._fan(ax, panel, line, colour)
             else:
@@ -128,6 +134,14 @@ class Histories:
         for line in cell.lines:
             self._draw_command(ax, self.commands.get((panel.name, panel.unit, line)))
         ax.margins(x=0.0)
+        held.draw(ax, self._marks(cell), self.time, self.sheet, columns)
+
+    def _marks(self, cell: Cell) -> list[Mark]:
+        """The limits of a panel's lines, each once."""
+        if self.units.experiment is None:
+            return []
+        found = (limits_of(self.units.experiment, cell.panel, line) for line in cell.lines)
+        return list(dict.fromkeys(mark for marks in found for mark in marks))
 
     def _joint_colour(self, panel: Panel, line: int) -> str:
         """A joint has one colour in all panels, also where a signal is its alone (`shoulder.servo.voltage`); components
@@ -157,7 +171,7 @@ class Histories:
             y = layout.drawable(history(self.group, panel, position)[:, line])
             if colour is not None:
                 label = layout.named(panel.lines[line]) if index == 0 else None
-                _line(ax, self.time, y, color=colour, alpha=_faint(index, count), linewidth=1.0, label=label)
+                _line(ax, self.time, y, color=colour, alpha=_faint(index, count), label=label)
             else:
                 _line(ax, self.time, y, color=sequence(index, count), label=_case_label(self.group, position))
 
@@ -246,12 +260,6 @@ class Histories:
             return {}
         theirs = Line2D([], [], color=INK, linewidth=1.2 + WIDER, alpha=PALE, solid_capstyle="butt")
         return {self.other.own: Line2D([], [], color=INK, linewidth=1.4), self.other.name: theirs}
-
-
-def _width(line: int, count: int) -> float:
-    """The first lines are wider, so that they are seen under those that run over them."""
-    widest = 2.6 if count <= 3 else 2.0
-    return 1.4 if count == 1 else widest - (widest - 1.2) * line / (count - 1)
 
 
 def _dashes(line: int) -> str:
