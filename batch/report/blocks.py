@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from batch.report.content import Demand, Fact, Failing, Flow, MetricRow, Section, Spot, Varied, Verdict
-from batch.report.markup import Child, Html, el, join, lines
+from batch.report.markup import Child, Html, breaking, el, join, lines
 
 Anchors = Mapping[str, tuple[int, int]]
 """Of each file whose text is in the page: its number, and how many of its lines are there."""
@@ -125,12 +125,12 @@ def _flows(found: Sequence[Flow]) -> Html | None:
     heads = ["requirement", "cases in both", *(["met now, and not before"] if gained else []),
              *(["missed now, and not before"] if lost else [])]  # fmt: skip
     rows = [
-        el("tr", el("th", el("code", each.text), scope="row"), el("td", each.met, cls="words"),
+        el("tr", el("th", el("code", breaking(each.text)), scope="row"), el("td", each.met, cls="words"),
            el("td", each.gained or "–", cls="good words" if each.gained else None) if gained else None,
            el("td", each.lost or "–", cls="bad words" if each.lost else None) if lost else None)
         for each in found
     ]  # fmt: skip
-    head = el("tr", [el("th", name, scope="col") for name in heads])
+    head = el("tr", [el("th", head, scope="col") for head in heads])
     return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "Requirements, before and now")
 
 
@@ -160,7 +160,7 @@ def _demands(found: Verdict) -> Html | None:
 
 
 def _demand(each: Demand, single: bool, missed: bool, unknown: bool) -> list[Html | None]:
-    name = el("th", el("code", each.text), scope="row")
+    name = el("th", el("code", breaking(each.text)), scope="row")
     if single:
         word = "met" if each.met else "missed" if each.missed else "not known"
         return [name, el("td", mark(word == "met") if word != "not known" else None, word,
@@ -211,12 +211,13 @@ def varied(found: Sequence[Varied], anchors: Anchors) -> Html | None:
         return None
     decides = any(each.sets for each in found)
     rows = [
-        el("tr", el("th", el("code", each.path), scope="row"), el("td", each.text, cls="words"), el("td", each.unit),
-           el("td", _sets(each.sets)) if decides else None, el("td", spot_link(each.spot, anchors)))
+        el("tr", el("th", el("code", breaking(each.path)), scope="row"), el("td", each.text, cls="words"),
+           el("td", each.unit), el("td", _sets(each.sets)) if decides else None,
+           el("td", spot_link(each.spot, anchors)))
         for each in found
     ]  # fmt: skip
     heads = ("varied", "values", "unit", *(["decides"] if decides else []), "written in")
-    head = el("tr", [el("th", name, scope="col") for name in heads])
+    head = el("tr", [el("th", head, scope="col") for head in heads])
     return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "What was varied")
 
 
@@ -249,7 +250,7 @@ def metrics(section: Section) -> Html | None:
 def _metric(each: MetricRow, single: bool, remarks: bool, compared: bool) -> list[Html]:
     before = [each.before] if compared else []
     values = [*before, each.median] if single else [each.minimum, each.median, each.maximum, *before]
-    cells = [el("th", el("code", each.name), el("span", each.about, cls="under"), scope="row")]
+    cells = [el("th", el("code", breaking(each.name)), el("span", each.about, cls="under"), scope="row")]
     cells += [el("td", value, cls="right") for value in values]
     cells.append(el("td", each.unit))
     if not single:

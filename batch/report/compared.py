@@ -8,7 +8,7 @@ from batch.differences.compare import IDENTICAL
 from batch.differences.words import SAME, WORST
 from batch.report.blocks import case_link, likeness, scrolling
 from batch.report.changes import ChangedCase, Compared, Comparison, EndedAlike, Made, SignalRow
-from batch.report.markup import Child, Html, el, join, lines
+from batch.report.markup import Child, Html, breaking, el, join, lines
 from batch.report.tabular import command, table
 
 SHOWN_LINES, SHOWN_WORST = 12, 5
@@ -80,7 +80,7 @@ def _signals(found: Sequence[SignalRow]) -> Html | None:
     heads = [el("th", head, scope="col") for head in ("signal or metric", "verdict", "cases")]
     heads += [el("th", head, scope="col", cls=cls if cls == "right" else None) for head, _, cls in used]
     rows = [
-        el("tr", el("th", el("code", each.name), scope="row"),
+        el("tr", el("th", el("code", breaking(each.name)), scope="row"),
            el("td", likeness(each.word), each.word, cls=f"is {'same' if each.word == IDENTICAL else 'other'}"),
            el("td", each.cases),
            [el("td", _where(each) if name == "where" else getattr(each, name), cls=cls) for _, name, cls in used])

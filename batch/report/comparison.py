@@ -14,7 +14,6 @@ from batch.pool import Pool, shown
 from batch.report.against import GOOD, Against, Before
 from batch.report.changes import ChangedCase, Compared, Comparison, EndedAlike, EndedCase, Made, SignalRow
 from batch.report.content import Flow, Part, Table, Verdict
-from batch.signals import pretty_unit
 
 MOST_LINES, MOST_ENDED = 200, 20
 """Of one kind of change, and of cases that end otherwise alike."""
@@ -78,13 +77,13 @@ def _samples(experiment: Experiment) -> Table | None:
 
 
 def _worst(found: Diff, experiment: Experiment) -> tuple[ChangedCase, ...]:
-    units = {each.name: "" if each.unit in ("", "1") else pretty_unit(each.unit) for each in experiment.signals}
     out = []
     for each in experiment.worst:
         what, was, now = words.most(each)
+        now = now.removesuffix(f" {each.deck_unit}")  # it has a column of its own
         was, now = (shown(np.nan) if text == "nan" else text for text in (was, now))
         commands = words.again(found, experiment, each)
-        out.append(ChangedCase(each.case_b, each.case_id[:8], what, was, now, units.get(each.signal, ""), commands))
+        out.append(ChangedCase(each.case_b, each.case_id[:8], what, was, now, each.deck_unit, commands))
     return tuple(out)
 
 

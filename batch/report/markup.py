@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Iterable
 
 from batch.visible import visible
@@ -16,7 +17,16 @@ class Html(str):
 
 Child = str | Html | None | Iterable["Child"]
 
-VOID = frozenset({"meta", "link", "input", "br", "rect", "line", "path"})
+RAW = frozenset({"code", "title", "option"})
+"""Elements whose texts are set as they are; in all others backticks set what a program reads."""
+
+QUOTED = re.compile(r"`([^`\n]+)`")
+
+LONG = 24
+"""Letters of a name, from which on it may break after a dot or a `_`."""
+
+DRAWN = frozenset({"rect", "line", "path"})
+VOID = frozenset({"meta", "link", "input", "br", "wbr"}) | DRAWN
 
 
 def text(raw: str) -> Html:
@@ -33,17 +43,35 @@ def el(tag: str, *children: Child, **attributes: str | float | bool | None) -> H
         name = "class" if name == "cls" else name.rstrip("_").replace("_", "-")
         words.append(name if value is True else f'{name}="{text(str(value))}"')
     if tag in VOID:
-        return Html(f"<{' '.join(words)}>" if tag in ("meta", "link", "input", "br") else f"<{' '.join(words)}/>")
-    return Html(f"<{' '.join(words)}>{join(children)}</{tag}>")
+        return Html(f"<{' '.join(words)}{'/' if tag in DRAWN else ''}>")
+    return Html(f"<{' '.join(words)}>{_inner(children, raw=tag in RAW)}</{tag}>")
 
 
 def join(children: Child) -> Html:
     """Children one after the other."""
+    return _inner(children, raw=False)
+
+
+def _inner(children: Child, *, raw: bool) -> Html:
     if children is None:
         return Html("")
     if isinstance(children, str):
-        return text(children)
-    return Html("".join(join(child) for child in children))
+        return text(children) if raw else prose(children)
+    return Html("".join(_inner(child, raw=raw) for child in children))
+
+
+def prose(raw: str) -> Html:
+    """A sentence as HTML: what stands between backticks in it is set as a program's text."""
+    if isinstance(raw, Html):
+        return raw
+    parts = QUOTED.split(raw)
+    return Html("".join(f"<code>{text(each)}</code>" if n % 2 else text(each) for n, each in enumerate(parts)))
+
+
+def breaking(raw: str) -> Html:
+    """A name that may break after a dot or a `_` where it is long."""
+    found = text(raw)
+    return found if len(raw) < LONG else Html(re.sub(r"([._])(?=\w)", r"\1<wbr>", found))
 
 
 def lines(children: Iterable[Child]) -> Html:

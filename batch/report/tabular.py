@@ -7,16 +7,16 @@ from collections.abc import Sequence
 from batch.margin import stable_head
 from batch.report.blocks import Anchors, case_link, scrolling, spot_link
 from batch.report.content import ParameterRow, SourceText, Stability, Table, Worst
-from batch.report.markup import Child, Html, el, join, lines
+from batch.report.markup import Child, Html, breaking, el, join, lines
 
 
 def table(found: Table, label: str, cells: Sequence[Sequence[Child]] = (), more: Sequence[str] = ()) -> Html:
     """A table of texts. cells, more: further cells of each row, and their heads."""
     units = any(found.units)
-    heads = [el("th", el("span", name), el("span", unit, cls="unit") if units else None, scope="col",
+    heads = [el("th", el("span", breaking(head)), el("span", unit, cls="unit") if units else None, scope="col",
                 cls="right" if n in found.right else None)
-             for n, (name, unit) in enumerate(zip(found.heads, found.units, strict=True))]  # fmt: skip
-    heads += [el("th", name, scope="col") for name in more]
+             for n, (head, unit) in enumerate(zip(found.heads, found.units, strict=True))]  # fmt: skip
+    heads += [el("th", head, scope="col") for head in more]
     rows = []
     for number, row in enumerate(found.rows):
         own = [
@@ -44,9 +44,9 @@ def worst(found: Worst) -> Html:
         own.append(el("td", command(found.commands[number]), cls="command"))
         rows.append(el("tr", own, data_case=found.cases[number]))
     heads = [
-        el("th", el("span", name), el("span", unit, cls="unit") if any(columns.units) else None, scope="col",
+        el("th", el("span", breaking(head)), el("span", unit, cls="unit") if any(columns.units) else None, scope="col",
            cls="right" if n in columns.right else None)
-        for n, (name, unit) in enumerate(zip(columns.heads, columns.units, strict=True))
+        for n, (head, unit) in enumerate(zip(columns.heads, columns.units, strict=True))
     ]  # fmt: skip
     heads.append(el("th", "run it again, to the same bits", scope="col", cls="command"))
     made = scrolling(el("table", el("thead", el("tr", heads)), el("tbody", lines(rows)), cls="cases"), found.title)
@@ -81,7 +81,7 @@ def parameters(found: Sequence[ParameterRow], anchors: Anchors) -> Html:
     rows = [
         el(
             "tr",
-            el("th", el("code", row.path), scope="row"),
+            el("th", el("code", breaking(row.path)), scope="row"),
             el("td", row.value, cls="right"),
             el("td", row.unit),
             el("td", row.origin),

@@ -4,7 +4,7 @@
 MET.cells = (() => {
   const { node, titled } = MET;
   const HIGH = 420;
-  const CELL = [4, 16];  // px, the least and the greatest height of a cell
+  const CELL = [4, 26];  // px, the least and the greatest height of a cell
   const APART = 40;  // px from sign to sign
   const LETTER = 6.6;
 

@@ -61,6 +61,19 @@ const MET = (() => {
 
   const titled = (column) => (column.unit ? `${column.label} (${column.unit})` : column.label);
 
+  // A sentence: what stands between backticks is a program's text.
+  const prose = (text) => text.split(/`([^`\n]+)`/).map((part, n) => (n % 2 ? node("code", null, part) : part));
+
+  // A label of an axis that has room: of a long path its end, and its unit.
+  function fitted(text, font, room) {
+    const context = document.createElement("canvas").getContext("2d");
+    context.font = font;
+    let at = 0;
+    const short = () => (at ? `…${text.slice(at)}` : text);
+    while (at < text.length - 1 && context.measureText(short()).width > room) at++;
+    return short();
+  }
+
   // An element. Attributes that are functions are listeners; children are elements or texts.
   function node(tag, attributes, ...children) {
     const svg = tag === "svg" || tag === "path" || tag === "circle" || tag === "line";
@@ -198,6 +211,6 @@ const MET = (() => {
     return made;
   }
 
-  return { unpack, number, ticks, span, quantity, titled, node, palette, ramp, share, tone, BELOW, ABOVE, diverging, signed, grey, over, drawn, width, print, tip, pairs, model,
+  return { unpack, number, ticks, span, prose, fitted, quantity, titled, node, palette, ramp, share, tone, BELOW, ABOVE, diverging, signed, grey, over, drawn, width, print, tip, pairs, model,
     dark, isPrinting: () => printing };
 })();

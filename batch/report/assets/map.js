@@ -28,7 +28,7 @@ MET.map = (() => {
       found.kind = (n) => kind(found, n);
       found.colour = (n) => (m.role === "change" ? MET.diverging(found.values[n] / found.reach.high) : MET.tone(found.values[n], found.reach));
       found.tell = (n) => tell(found, n);
-      const many = found.across > MANY[0] || found.up > MANY[1];
+      const many = found.across > MANY[0] || found.up > MANY[1] || rem(11 + found.across * wide(found)) > MET.width(box) + 12;
       box.classList.toggle("drawn", many);
       drawn = (many ? MET.cells : table)(box, found, model);
       legend(found, many);
@@ -54,7 +54,7 @@ MET.map = (() => {
     draw();
     MET.drawn.push(draw);
     model.watch((chosen) => drawn.choose(chosen));
-    new ResizeObserver(() => { if (drawn.wide && drawn.wide !== MET.width(box)) draw(); }).observe(root);
+    new ResizeObserver(() => { if (drawn.wide !== MET.width(box)) draw(); }).observe(root);
   }
 
   // What a cell holds: a number, or why it has none.
@@ -72,15 +72,19 @@ MET.map = (() => {
       ...(cases[n] >= 0 ? [["shown", `#${cases[n]}`]] : [])])];
   }
 
+  const text = (found, n) => (found.kind(n) === "failed" ? "failed" : (found.m.role === "change" ? MET.signed : number)(found.values[n])) + (found.missed[n] ? " ✗" : "");
+  const rem = (count) => count * parseFloat(getComputedStyle(document.documentElement).fontSize);
+
+  // How wide a cell with its number is, in rem.
+  const wide = (found) => Math.max(3.6, 0.62 * Array.from(found.values, (_, n) => text(found, n).length).reduce((a, b) => Math.max(a, b), 0));
+
   // Few cells, each with its number.
   function table(box, found, model) {
-    const { map, x, y, m, across, values, missed, cases } = found;
-    const text = (n) => (found.kind(n) === "failed" ? "failed" : (m.role === "change" ? MET.signed : number)(values[n])) + (missed[n] ? " ✗" : "");
-    const longest = Array.from(values, (_, n) => text(n).length).reduce((a, b) => Math.max(a, b), 0);
+    const { map, x, y, across, cases } = found;
     const heads = map.xLevels.map((level) => node("th", { scope: "col" }, level));
     const rows = map.yLevels.map((level, row) => node("tr", null, node("th", { scope: "row" }, level),
       map.xLevels.map((_, column) => cell(row * across + column))));
-    box.replaceChildren(node("table", { class: "grid", style: { minWidth: `${11 + across * Math.max(3.6, 0.62 * longest)}rem` } },
+    box.replaceChildren(node("table", { class: "grid", style: { minWidth: `${11 + across * wide(found)}rem` } },
       node("thead", null, node("tr", null, node("th", { class: "axis" }, `${titled(y)} ↓`), node("th", { colspan: across }, `${titled(x)} →`)),
         node("tr", null, node("td", { class: "corner" }), heads)), node("tbody", null, rows.reverse())));
 
@@ -91,10 +95,10 @@ MET.map = (() => {
       return node("td", { style: colour ? { background: colour, color: MET.over(colour) } : {}, tabindex: 0,
         class: [found.kind(n), cases[n] >= 0 && cases[n] === model.chosen ? "chosen" : ""].join(" ").trim(), "data-case": cases[n],
         mousemove: (event) => MET.tip.show(event.pageX, event.pageY, ...found.tell(n)), mouseleave: MET.tip.hide,
-        click: choose, keydown: (event) => { if (event.key === "Enter") choose(); } }, text(n));
+        click: choose, keydown: (event) => { if (event.key === "Enter") choose(); } }, text(found, n));
     }
 
-    return { choose: (chosen) => box.querySelectorAll("td").forEach((td) => td.classList.toggle("chosen", td.dataset.case === String(chosen))) };
+    return { wide: MET.width(box), choose: (chosen) => box.querySelectorAll("td").forEach((td) => td.classList.toggle("chosen", td.dataset.case === String(chosen))) };
   }
 
   return { make };

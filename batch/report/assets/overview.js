@@ -173,7 +173,7 @@ MET.overview = (() => {
       box.replaceChildren(
         node("div", { class: "top" }, node("b", null, `Case #${chosen}`), node("code", null, model.data.overview.ids[place]),
           outcome === "done" ? null : node("span", { class: BAD.includes(outcome) ? "bad" : "good" }, outcome),
-          cause ? node("span", null, cause) : null,
+          cause ? node("span", null, MET.prose(cause)) : null,
           history ? node("a", { href: `#${model.id}-signals`, class: "hint" }, "its signals are below") : null),
         node("dl", { class: "values" }, values), run(command));
     });

@@ -43,9 +43,9 @@ MET.points = (() => {
         },
         series: [{}, { scale: "y", paths: () => null, points: { show: false } }],
         axes: [
-          { ...axis, label: MET.titled(plot.x), size: 34, space: 64, incrs: counts ? COUNTS : undefined, ...(few ? { splits: () => few, values: labels(true) } : words.length ? { splits: () => words.map((_, n) => n),
+          { ...axis, label: (u) => MET.fitted(MET.titled(plot.x), font, u.width - 90), size: 34, space: 64, incrs: counts ? COUNTS : undefined, ...(few ? { splits: () => few, values: labels(true) } : words.length ? { splits: () => words.map((_, n) => n),
             values: () => words.map((word) => (word.length > 18 ? word.slice(0, 17) + "…" : word)) } : { values: labels(logX) }) },
-          { ...axis, label: MET.titled(plot.y), size: 58, values: labels(logY), ...(logY && decades(ys) < 1.3 ? { filter: (u, splits) => splits.map((v) => (round(v) ? v : null)) } : {}) },
+          { ...axis, label: MET.fitted(MET.titled(plot.y), font, plot.height - 50), size: 58, values: labels(logY), ...(logY && decades(ys) < 1.3 ? { filter: (u, splits) => splits.map((v) => (round(v) ? v : null)) } : {}) },
         ],
         hooks: { draw: [draw], setCursor: [hover] },
       };

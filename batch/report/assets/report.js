@@ -48,6 +48,19 @@
     setTimeout(() => { button.textContent = "copy"; }, 1500);
   });
 
+  // On a narrow screen the cells of a row lie under one another, each with its head beside it.
+  document.querySelectorAll(".wide > table:not(.grid)").forEach((table) => {
+    const heads = [...table.querySelectorAll("thead th")].map((head) => [...head.childNodes].map((part) => part.textContent).filter(Boolean).join(", "));
+    table.querySelectorAll("tbody tr").forEach((row) => [...row.children].forEach((cell, n) => {
+      if (heads[n]) cell.dataset.head = heads[n];
+      cell.classList.toggle("empty", !cell.textContent && !cell.querySelector("svg"));
+      const inner = document.createElement("div");
+      inner.append(...cell.childNodes);
+      cell.append(inner);
+    }));
+    table.classList.add("stacks");
+  });
+
   // Rows that have all the words.
   document.querySelectorAll("details.all").forEach((box) => {
     const [input, said] = [box.querySelector("input.search"), box.querySelector(".found")];

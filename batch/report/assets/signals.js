@@ -8,7 +8,7 @@ MET.signals = (() => {
   const MOST = DASHES.length;
   const READ = 8;
   const CLOSEST = 1e-9;  // of all time, what is shown at least
-  const WAS = 5;  // px, how wide a line of before is
+  const [WIDE, WAS] = [1.6, 5];  // px, how wide a line is, and one of before
 
   function make(root, model) {
     const data = model.data.signals;
@@ -101,7 +101,7 @@ MET.signals = (() => {
           sync: { key: sync.key, setSeries: false, filters: { pub: moves, sub: moves } } },
         scales: { x: { time: false }, y: { range: (self, low, high) => (low === null ? [-1, 1] : room(low, high)) } },
         series: [{}, ...found.map((each) => ({
-          stroke: colour(each), width: each.was ? WAS : each.line.command ? 1 : each.nth ? 1.25 : wide(each.at, panel.lines.length), dash: each.line.command ? [3, 3] : DASHES[each.nth],
+          stroke: colour(each), width: each.was ? WAS : WIDE, dash: each.line.command ? [3, 3] : DASHES[each.nth],
           points: { show: false }, spanGaps: false, pxAlign: 0,
         }))],
         axes: [{ ...axis, label: last ? "time (s)" : null, size: 26, values: (self, v) => ticks(v) },
@@ -233,9 +233,6 @@ MET.signals = (() => {
     })).observe(root);
     model.signalPlots = () => plots.map((plot) => plot.u);
   }
-
-  // The first lines are wider, so that they are seen under those that run over them.
-  const wide = (at, count) => (count === 1 ? 1.75 : 2.2 - (0.8 * at) / (count - 1));
 
   function room(low, high) {
     const span = MET.span(low, high);
