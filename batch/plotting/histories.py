@@ -33,6 +33,12 @@ LEAST_COLUMN = 1.5
 
 COMMAND = "command"
 DASHED: dict[str, Any] = {"linestyle": (0, (4, 3))}
+ON, NEARLY_ALWAYS = 0.004, 0.9
+"""Lines lie on one another that are nearer than this, against the span of their panel, for this share of the time."""
+
+ON_ANOTHER: tuple[Any, ...] = ("-", (0, (6, 6)), (0, (3, 9)), (0, (1.5, 10.5)))
+"""A line that lies on others has gaps, through which they are seen."""
+
 WIDER, PALE = 3.0, 0.35
 """How another archive's lines are drawn: so much wider than the own ones, and so opaque."""
 
@@ -120,13 +126,14 @@ class Histories:
 
     def _cell(self, ax: Any, cell: Cell, by_joint: bool, columns: int) -> None:
         panel = cell.panel
+        above = self._above(cell) if self.single else {}
         for line in cell.lines:
             colour = self._joint_colour(panel, line)
             self._their_lines(ax, panel, line, colour if by_joint or self.fan else None)
             if self.single:
                 y = layout.drawable(history(self.group, panel, self.positions[0])[:, line])
                 _line(ax, self.time, y, color=colour, label=layout.named(panel.lines[line]),
-                      linestyle=_dashes(line))  # fmt: skip
+                      linestyle=ON_ANOTHER[above[line]] if above.get(line) else _dashes(line))  # fmt: skip
             elif self.fan:
                 self._fan(ax, panel, line, colour)
             else:
@@ -135,6 +142,18 @@ class Histories:
             self._draw_command(ax, self.commands.get((panel.name, panel.unit, line)))
         ax.margins(x=0.0)
         held.draw(ax, self._marks(cell), self.time, self.sheet, columns)
+
+    def _above(self, cell: Cell) -> dict[int, int]:
+        """By line on how many others it lies."""
+        values = layout.drawable(history(self.group, cell.panel, self.positions[0]))[:, list(cell.lines)]
+        finite = values[np.isfinite(values)]
+        near = ON * float(np.ptp(finite)) if len(finite) else 0.0
+        out = {}
+        for place, line in enumerate(cell.lines):
+            with np.errstate(invalid="ignore"):
+                same = np.abs(values[:, :place] - values[:, place, None]) <= near
+            out[line] = min(int((same.mean(axis=0) > NEARLY_ALWAYS).sum()), len(ON_ANOTHER) - 1)
+        return out
 
     def _marks(self, cell: Cell) -> list[Mark]:
         """The limits of a panel's lines, each once."""

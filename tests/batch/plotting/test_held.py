@@ -38,7 +38,6 @@ run slew like nominal {
 run turning like nominal {
     metric fast = max { of = elbow.qd; }
     require fast < 6 rpm;
-    duration = 1 s;
 }
 """
 
@@ -122,6 +121,15 @@ def test_lines_of_a_panel_are_equally_thick(ran: dict[str, ArchiveFile], figures
     draw(ran["slew"], tmp_path / "a.png")
     for ax in shown(figures[0]):
         assert len({line.get_linewidth() for line in ax.lines if line.get_label() != DOTS["label"]}) == 1
+
+
+def test_a_line_that_lies_on_another_has_gaps(
+    ran: dict[str, ArchiveFile], figures: list[Any], tmp_path: Path
+) -> None:
+    draw(ran["turning"], tmp_path / "a.png", ["q", "tau"])
+    styles = [[line.get_linestyle() for line in ax.lines if line.get_label() != DOTS["label"]]
+              for ax in shown(figures[0])]  # fmt: skip
+    assert styles == [["-", "--"], ["-", "-"]]
 
 
 def test_a_terminal_shows_the_same_units(ran: dict[str, ArchiveFile]) -> None:
