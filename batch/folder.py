@@ -17,10 +17,13 @@ import contextlib
 import errno
 import fcntl
 import glob
+import io
 import json
 import os
 import re
+import shlex
 import shutil
+import stat
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -33,7 +36,9 @@ from batch.tasks import Done, Section, Task
 from met import plan_file
 from met import run as engine
 from met.diagnostic import Problem, error
+from met.files import is_count, read_json, read_regular
 from met.plan import Plan
+from met.program.step import ASTRAY
 from met.version import VERSION
 
 SCHEMA, FORMAT = "met.campaign", 1
@@ -83,7 +88,7 @@ class Folder:
         """Raises Busy where somebody works here, unless both do so `together`; makes the folder where there is none."""
         while self._lock < 0:
             self.path.mkdir(exist_ok=True)
-            self._lock = os.open(self.path / "lock", os.O_RDWR | os.O_CREAT, 0o666)
+            self._lock = _lock_file(self.path / "lock")
             try:
                 fcntl.flock(self._lock, (fcntl.LOCK_SH if together else fcntl.LOCK_EX) | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -110,10 +115,8 @@ class Folder:
     def empty(self) -> None:
         """Take all but the lock out of the folder, which is locked by us."""
         for path in self.path.iterdir():
-            if path.is_dir() and not path.is_symlink():
-                shutil.rmtree(path)
-            elif path.name != "lock":
-                path.unlink()
+            if path.name != "lock":
+                _remove(path)
 
     def remove(self) -> None:
         """Take the folder away, which is locked by us, or of nobody's."""
@@ -168,14 +171,9 @@ class Folder:
         """What was written down. Raises Problem where that is damaged, or of another version of MET."""
         path = self.path / "campaign.json"
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-            if data["schema"] != SCHEMA or data["version"] != FORMAT:
-                raise ValueError
-            assert isinstance(data["key"], str) and isinstance(data["sections"], list)
-        except (OSError, ValueError, LookupError, TypeError, AssertionError) as reason:
-            helps = "`--fresh` starts over, and removes what is in it"
-            raise Problem(error("E350", f"{path} is damaged, or of another version of MET", help=helps)) from reason
-        return data
+            return _checked(read_json(path))
+        except (OSError, ValueError, LookupError, TypeError) as reason:
+            raise self._damaged(path) from reason
 
     def plan(self) -> Plan:
         """The plan that is run here. Raises Problem."""
@@ -188,13 +186,35 @@ class Folder:
         out = {}
         described = self.described()
         for told in described["sections"]:
-            number, prepared = told["number"], experiments[told["experiment"]]
-            if told["code"] != prepared.code_key:
-                raise Problem(_other_code(prepared.experiment.name, self.path, described))
-            count = prepared.experiment.cases.count
-            rows = np.arange(count) if told["rows"] is None else np.load(self.path / told["rows"])
-            out[number] = Section(number, told["experiment"], prepared, rows, told["recorded"], told["single"])
+            number, of = told["number"], told["experiment"]
+            if of >= len(experiments):
+                raise self._damaged(self.path / "campaign.json")
+            if told["code"] != experiments[of].code_key:
+                raise Problem(_other_code(experiments[of].experiment.name, self.path, described))
+            rows = self._rows(told, experiments[of].experiment.cases.count)
+            out[number] = Section(number, of, experiments[of], rows, told["recorded"], told["single"])
         return out
+
+    def _rows(self, told: dict[str, Any], count: int) -> np.ndarray:
+        """The rows of a section of an experiment with so many cases. Raises Problem."""
+        if told["rows"] is None:
+            rows = np.arange(count)
+        else:
+            path = self.path / told["rows"]
+            try:
+                data = io.BytesIO(read_regular(path))
+                rows = np.lib.format.read_array(data, allow_pickle=False)
+            except (OSError, ValueError, TypeError, EOFError, OverflowError) as reason:
+                raise self._damaged(path) from reason
+            if rows.dtype != np.int64 or rows.ndim != 1 or not _rise(rows, count):
+                raise self._damaged(path)
+        if len(rows) != told["cases"]:
+            raise self._damaged(self.path / "campaign.json")
+        return rows
+
+    def _damaged(self, path: Path) -> Problem:
+        helps = "`--fresh` starts over, and removes what is in it"
+        return Problem(error("E350", f"{path} is damaged, or of another version of MET", help=helps))
 
     # What is done
 
@@ -215,6 +235,8 @@ class Folder:
             raise shard.Unsound("holds other cases than its name says")
         if found.key != section.key(task.first, task.last):
             raise shard.Unsound("is of another plan, or of another version of MET's code")
+        if not _fits(section, found):
+            raise shard.Unsound("holds other outputs than the program has")
         return found
 
     def sound(self, section: Section) -> tuple[dict[Task, Done], list[str]]:
@@ -229,7 +251,7 @@ class Folder:
             except (shard.Unsound, OSError) as reason:
                 why = str(reason) if isinstance(reason, shard.Unsound) else f"cannot be read: {reason.strerror}"
                 told.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
-                (self.shards / task.name).unlink(missing_ok=True)
+                _remove(self.shards / task.name)
             else:
                 kept[task] = Done(found.seconds, found.failed_from(at - task.first))  # a case counts once
                 at = max(at, task.last)
@@ -266,6 +288,73 @@ def _other_code(name: str, path: Path, described: dict[str, Any]) -> Any:
         "bring the former code back, and submit or run the same again; `--fresh` starts over with this one",
     ]
     return error("E353", message, help=helps)
+
+
+def _remove(path: Path) -> None:
+    """Take away what has this name, whatever it is."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _lock_file(path: Path) -> int:
+    """The file that is locked, open; made where there is none. A link in its place would lock another's file, and
+    never be the file that was opened. Raises Problem E350, OSError."""
+    helps = f"nobody at work in a campaign has such a lock: remove it, `rm -r {shlex.quote(str(path))}`"
+    try:
+        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    except OSError as reason:
+        if reason.errno in (errno.ELOOP, errno.EISDIR, errno.ENXIO):  # a link, a folder, a socket
+            raise Problem(error("E350", f"{path} is not a regular file", help=helps)) from None
+        raise
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        raise Problem(error("E350", f"{path} is not a regular file", help=helps))
+    return file
+
+
+def _checked(data: Any) -> dict[str, Any]:
+    """What campaign.json says, where it is what one says; all of it but the plan's and the rows' own sizes. Raises
+    ValueError, LookupError, TypeError."""
+    sections = data["sections"]
+    good = (
+        data["schema"] == SCHEMA and data["version"] == FORMAT
+        and all(isinstance(data[name], str) for name in ("key", "archive", "deck"))
+        and Path(data["archive"]).name == data["archive"] != ""
+        and all(isinstance(word, str) or is_count(word) for word in data["histories"])
+        and isinstance(data["float32"], bool)
+        and [each["number"] for each in sections] == list(range(len(sections)))
+    )  # fmt: skip
+    for each in sections if good else ():
+        good = good and (
+            is_count(each["experiment"]) and is_count(each["cases"])
+            and isinstance(each["name"], str) and each["rows"] in (None, f"rows.{each['number']}.npy")
+            and all(isinstance(each[name], bool) for name in ("again", "recorded", "single"))
+        )  # fmt: skip
+    if not good:
+        raise ValueError("it is no description of a campaign")
+    return dict(data)
+
+
+def _rise(rows: np.ndarray, count: int) -> bool:
+    """Whether these are rows of a case table with so many cases, each once and in order."""
+    return len(rows) == 0 or bool(rows[0] >= 0 and rows[-1] < count and (np.diff(rows) > 0).all())
+
+
+def _fits(section: Section, found: shard.Shard) -> bool:
+    """Whether the arrays of a shard are of the program's size, and its failures such as there are."""
+    program, structure = section.prepared.program, section.prepared.experiment.structure
+    if found.outputs.shape[1] != len(program.outputs):
+        return False
+    shape = (len(found.outputs), structure.schedule.rows, program.columns)
+    wanted = shape if section.recorded and program.columns else None
+    if wanted != (None if found.history is None else found.history.shape):
+        return False
+    failed = found.outputs[found.outputs[:, 0] != 0.0, :3]
+    parts = len(structure.moving) + bool(structure.free) + len(structure.payloads) + len(structure.sensors)
+    most = np.array([ASTRAY, parts, structure.schedule.ticks + 1])
+    return bool(((failed >= 0.0) & (failed <= most)).all())
 
 
 def beside(archive: Path) -> Path:

@@ -10,7 +10,6 @@ again.
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from collections.abc import Sequence
@@ -28,6 +27,7 @@ from batch.status import Reporter
 from batch.tasks import Task
 from batch.termination import TERMINATED, Terminated, terminable
 from met.diagnostic import Problem
+from met.files import read_json
 
 
 def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = COMMAND) -> int:
@@ -42,7 +42,7 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
         print(f"met: {path} is in the hands of another run: nothing was done here", file=sys.stderr)
         return 1
     try:
-        asked = json.loads(tasks_file.read_text(encoding="utf-8"))
+        asked = read_json(tasks_file)
         dealt = [[Task(*each) for each in tasks] for tasks in asked["shares"]]
         timeout = asked["timeout"]
     except (OSError, ValueError, LookupError, TypeError):

@@ -12,17 +12,21 @@ from typing import Any
 from batch.archive.read import ArchiveFile
 from batch.campaign import Campaign, prepare
 from batch.changes import changes
-from batch.folder import Busy, Folder
+from batch.folder import Busy, Folder, beside
 from batch.output import sidecar_path
 from batch.progress import duration
 from batch.tasks import Section
 from met import plan_file
 from met.diagnostic import Problem, error
+from met.files import open_regular, read_json
 
 WHOLE, DAMAGED = "whole", "damaged"
 
 GUARDED_SECONDS = 60.0
 """Of computing: a finished archive that took as long is not replaced by another campaign's unless it is asked for."""
+
+MOST_SECONDS = 1e12
+"""Of computing: more has no campaign taken, whatever its sidecar says."""
 
 MOST_CHANGES = 8
 """Changes that a refusal names."""
@@ -44,7 +48,7 @@ def there(campaign: Campaign, key: str) -> str:
     as it was written; else ""."""
     output = campaign.output
     try:
-        told = json.loads(sidecar_path(output).read_text(encoding="utf-8"))
+        told = read_json(sidecar_path(output))
         asked = {"campaign": key, "asked_sha256": _asked_sum(campaign)}
         if not isinstance(told, dict) or any(told.get(name) != value for name, value in asked.items()):
             return ""
@@ -57,11 +61,11 @@ def guard(campaign: Campaign) -> None:
     """Refuse to replace a finished archive of another campaign that took long, or was measured on motor beds. Raises
     Problem E353."""
     try:
-        told = json.loads(sidecar_path(campaign.output).read_text(encoding="utf-8"))
-        seconds = sum(float(each["seconds"]) for each in told["experiments"])
-    except (OSError, ValueError, LookupError, TypeError):
+        told = read_json(sidecar_path(campaign.output))
+        seconds = min(MOST_SECONDS, sum(float(each["seconds"]) for each in told["experiments"]))
+        measured = bool(told.get("beds"))
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return
-    measured = bool(told.get("beds"))
     if (seconds < GUARDED_SECONDS and not measured) or not campaign.output.exists():
         return
     try:
@@ -133,6 +137,9 @@ def describe(folder: Folder, campaign: Campaign, sections: Iterable[Section], ke
 def described(folder: Folder) -> Campaign:
     """The campaign of a folder, as it was written down. Raises Problem."""
     told = folder.described()
+    if beside(folder.path.with_name(told["archive"])).name != folder.path.name:
+        message = f"{folder.path} says that it fills {told['archive']}, which has another folder"
+        raise Problem(error("E350", message, help="give the folder the name back that it had"))
     plan = folder.plan()
     first = sorted((section for section in folder.sections().values()), key=lambda section: section.number)
     selected = [(each.prepared.experiment, each.rows) for each in first[: len(plan.experiments)]]
@@ -185,7 +192,7 @@ def _asked_sum(campaign: Campaign) -> str:
 
 
 def _file_sum(path: Path) -> str:
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

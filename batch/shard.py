@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import socket
 from collections.abc import Mapping
@@ -24,7 +25,9 @@ from typing import Any
 
 import numpy as np
 
+from met.files import is_count, open_regular, parse_json
 from met.frozen import frozen
+from met.run import FAILED, LOST, TIMED_OUT
 
 MAGIC = b"MET shard 1\n"
 SUM = hashlib.sha256
@@ -93,11 +96,9 @@ def write(path: Path, shard: Shard) -> None:
 
 def read(path: Path) -> Shard:
     """The shard in a file; its arrays may be written to. Raises Unsound, OSError."""
-    data = bytearray(path.stat().st_size)
-    with path.open("rb", buffering=0) as file:
-        got = 0
-        while got < len(data) and (more := file.readinto(memoryview(data)[got:])):
-            got += more
+    with open_regular(path) as file:
+        data = bytearray(os.fstat(file.fileno()).st_size)
+        got = file.readinto(data)
     if got < len(data) or len(data) < len(MAGIC) + 8 + SUM_BYTES:
         raise Unsound("is cut short")
     if not data.startswith(MAGIC):
@@ -107,14 +108,36 @@ def read(path: Path) -> Shard:
         raise Unsound("is not what was written: its checksum differs")
     at = len(MAGIC) + 8
     end = at + int.from_bytes(data[len(MAGIC) : at], "little")
-    head = json.loads(bytes(body[at:end]))
+    try:
+        return _made(parse_json(bytes(body[at:end])), data, end)
+    except (ValueError, LookupError, TypeError, AttributeError) as reason:
+        raise Unsound("has a head that does not go with what follows it") from reason
+
+
+def _made(head: Any, data: bytearray, at: int) -> Shard:
+    """The shard with this head, whose arrays begin at a place of its file. Raises ValueError and its like for a head
+    that is none, though its sum is right: whoever can write a file can sum it."""
     arrays = {}
     for name, kind, shape in head["arrays"]:
-        size = int(np.prod(shape, dtype=np.int64))
-        arrays[name] = np.frombuffer(data, TYPES[kind], size, end).reshape(shape)
-        end += size * TYPES[kind].itemsize
+        if not all(map(is_count, shape)):
+            raise ValueError(shape)
+        size = math.prod(shape)
+        if at + size * TYPES[kind].itemsize > len(data) - SUM_BYTES:
+            raise ValueError(shape)
+        arrays[name] = np.frombuffer(data, TYPES[kind], size, at).reshape(shape)
+        at += size * TYPES[kind].itemsize
+    outputs, history, seconds = arrays.pop("outputs"), arrays.pop("history", None), float(head["seconds"])
+    if arrays or at != len(data) - SUM_BYTES or outputs.ndim != 2 or outputs.dtype != TYPES["f8"] or seconds < 0.0:
+        raise ValueError(head)
+    if history is not None and (history.ndim != 3 or len(history) != len(outputs)):
+        raise ValueError(head)
     fates = {case: (status, why) for case, status, why in head["fates"]}
-    return Shard(head["key"], arrays["outputs"], arrays.get("history"), head["seconds"], fates)
+    for case, (status, why) in fates.items():
+        if not is_count(case, len(outputs) - 1) or status not in (FAILED, TIMED_OUT, LOST) or not isinstance(why, str):
+            raise ValueError(case)
+    if not isinstance(head["key"], str):
+        raise ValueError(head)
+    return Shard(head["key"], outputs, history, seconds, fates)
 
 
 def cannot_keep(folder: Path, reason: OSError) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import socket
 import time
@@ -15,7 +14,7 @@ from batch.drive import Progress
 from batch.folder import ENDING, Folder, beside, gaps, put
 from batch.output import sidecar_path
 from batch.progress import duration
-from met.diagnostic import Problem
+from met.files import is_count, read_json
 
 WRITE_SECONDS = 1.0
 
@@ -87,8 +86,8 @@ def told(folder: Folder) -> list[dict[str, Any]]:
     found = []
     for path in folder.path.glob("status*.json"):
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError):
+            data = read_json(path)
+        except (OSError, ValueError):
             continue
         if isinstance(data, dict) and all(isinstance(data.get(name), kind) for name, kind in TYPES.items()):
             found.append({**data, "name": path.name.removeprefix("status").removesuffix(".json").strip(".")})
@@ -96,7 +95,8 @@ def told(folder: Folder) -> list[dict[str, Any]]:
 
 
 def found(name: str) -> Folder | None:
-    """The folder that a user means: its own name, or its archive's; None where there is none."""
+    """The folder that a user means: its own name, or its archive's; None where there is none. Raises
+    Problem for what is no sound archive."""
     path = Path(name)
     for each in (path, beside(path) if path.name else path):
         if Folder(each).exists():
@@ -161,18 +161,18 @@ def lines(data: dict[str, Any]) -> list[str]:
 
 
 def whole(archive: Path) -> dict[str, Any] | None:
-    """What is beside a finished archive: its cases, and when it was begun; None where there is none."""
+    """What is beside a finished archive: its cases, and when it was begun; None where there is none. Raises
+    Problem for what is no sound archive."""
     try:
-        told = json.loads(sidecar_path(archive).read_text(encoding="utf-8"))
-        cases = sum(each["cases"] for each in told["experiments"])
+        told = read_json(sidecar_path(archive))
+        cases = sum(each["cases"] for each in told["experiments"] if is_count(each["cases"]))
         return {"archive": str(archive), "cases": cases, "began": str(told["began"])} if archive.is_file() else None
     except (OSError, ValueError, LookupError, TypeError):
         pass
-    try:
-        with ArchiveFile(archive) as file:
-            return {"archive": str(archive), "cases": sum(group.count for group in file.groups), "began": "unknown"}
-    except Problem:
+    if not archive.exists():
         return None
+    with ArchiveFile(archive) as file:
+        return {"archive": str(archive), "cases": sum(group.count for group in file.groups), "began": "unknown"}
 
 
 def here(folder: Path) -> list[str]:

@@ -24,6 +24,7 @@ from hw.protocol.frames import unframed
 from hw.protocol.messages import Step
 from hw.transcript import MAGIC, SENT, File, read
 from met.diagnostic import Problem, error
+from met.files import open_regular
 from met.frozen import frozen
 from met.plan import Experiment
 from met.program.plant import Plant, bed_values, plant_c
@@ -92,7 +93,7 @@ def is_transcript(name: str) -> bool:
     """Whether a port is a file that a run wrote."""
     if not os.path.isfile(name):
         return False
-    with open(name, "rb") as file:
+    with open_regular(name) as file:
         return file.read(len(MAGIC)) == MAGIC
 
 

@@ -20,6 +20,7 @@ from typing import IO, Any
 import numpy as np
 
 from hw.bed import Sample
+from met.files import parse_json, read_regular
 from met.frozen import frozen
 
 MAGIC = b"MET bed records 1\n"
@@ -85,7 +86,7 @@ class Unsound(Exception):
 def read(path: Path) -> Records:
     """All records up to the first that is not sound; none, and no head, of a file that ends before the first. Raises
     Unsound, OSError."""
-    data = path.read_bytes()
+    data = read_regular(path)
     if not data.startswith(MAGIC[: len(data)]):
         raise Unsound("holds no records of a bed")
     at = len(MAGIC) + 8
@@ -93,7 +94,9 @@ def read(path: Path) -> Records:
     if len(data) < max(at, end):
         return Records({}, np.empty(0, LAYOUT), len(data))
     try:
-        head = json.loads(data[at:end])
+        head = parse_json(data[at:end])
+        if not isinstance(head, dict):
+            raise ValueError
     except ValueError as reason:
         raise Unsound("has a head that is damaged") from reason
     count = (len(data) - end) // SIZE

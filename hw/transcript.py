@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import struct
 import zlib
@@ -21,6 +22,7 @@ from typing import Any
 
 from hw.line import Line
 from met.diagnostic import Problem, error
+from met.files import parse_json, read_regular
 from met.frozen import frozen
 
 MAGIC = b"MET bed transcript 1\n"
@@ -143,7 +145,7 @@ class Recorded:
 def read(path: str | Path) -> Transcript:
     """All records up to the first that is not sound. Raises Problem E409."""
     try:
-        data = Path(path).read_bytes()
+        data = read_regular(path)
     except OSError as reason:
         helps = "give the file that a run with a bed wrote"
         raise Problem(error("E409", f"{path} cannot be read: {reason.strerror}", help=helps)) from None
@@ -153,14 +155,18 @@ def read(path: str | Path) -> Transcript:
         kind, time, length = _HEAD.unpack_from(data, at)
         end = at + _HEAD.size + length
         crc = zlib.crc32(data[at:end], crc)
-        if end + 4 > len(data) or crc != int.from_bytes(data[end : end + 4], "little") or kind > LOST:
+        if end + 4 > len(data) or crc != int.from_bytes(data[end : end + 4], "little"):
+            break
+        if kind > LOST or not math.isfinite(time):
             break
         records.append(Record(kind, time, data[at + _HEAD.size : end]))
         at = end + 4
     try:
         if not data.startswith(MAGIC) or not records or records[0].kind != HEADER:
             raise ValueError
-        header = json.loads(records[0].data)
+        header = parse_json(records[0].data)
+        if not isinstance(header, dict):
+            raise ValueError
     except ValueError:
         helps = "give the file that a run with a bed wrote"
         raise Problem(error("E409", f"{path} is no transcript of a bed", help=helps)) from None

@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 
 from met.diagnostic import Problem, error
+from met.files import open_regular, read_regular
 from met.plan import Experiment, Formula, Plan
 from met.plan_codec import Damaged, decode, encode
 
@@ -65,7 +66,7 @@ def read(path: str | os.PathLike[str]) -> Plan:
     """The plan in a file. Raises Problem E301 (no file), E302 (damaged), E303 (newer), E304 (a model's parameter)."""
     path = Path(path)
     try:
-        text = path.read_bytes().decode("utf-8")
+        text = read_regular(path).decode("utf-8")
     except OSError as reason:
         raise Problem(error("E301", f"cannot read the plan {path}: {_why(reason)}")) from reason
     except UnicodeDecodeError as reason:
@@ -194,7 +195,7 @@ def _read_table(plan: Path, name: str) -> tuple[np.ndarray, str]:
     if Path(name).name != name or not name:
         raise Damaged("", f"it names a case table outside its folder: {name}")
     try:
-        data = plan.with_name(name).read_bytes()
+        data = read_regular(plan.with_name(name))
     except OSError as reason:
         raise Damaged(
             "", f"its case table {name}, which should lie beside it, cannot be read: {_why(reason)}"
@@ -212,7 +213,7 @@ def _check_targets(path: Path, files: dict[Path, bytes]) -> None:
     """Nothing is written over but a plan of MET's, and the tables that it names."""
     before = _plan_there(path)
     for target, data in files.items():
-        if target == path or not target.exists() or f'"{target.name}"' in before or target.read_bytes() == data:
+        if target == path or not target.exists() or f'"{target.name}"' in before or read_regular(target) == data:
             continue
         message = f"cannot write {target}: it exists, and is no case table of {path}; it is not written over"
         raise Problem(error("E300", message, help="give another name with `-o`, or remove the file"))
@@ -224,7 +225,7 @@ def _plan_there(path: Path) -> str:
     try:
         if not path.is_file() and path.exists() and not path.is_dir():
             raise Problem(error("E300", f"cannot write {path}: it is not a regular file"))
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             begins = file.read(1)
             text = (begins + file.read()).decode("utf-8") if begins == b"{" else ""
         document = json.loads(text) if begins else {"schema": SCHEMA}

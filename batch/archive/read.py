@@ -19,6 +19,7 @@ from batch.archive.layout import SCHEMA, VERSION
 from batch.rows import row_of
 from met.diagnostic import Problem, error
 from met.distinct import distinct
+from met.files import open_regular
 from met.frozen import frozen
 from met.plan import Plan
 
@@ -332,7 +333,7 @@ class ArchiveFile:
 def check_signature(path: Path) -> None:
     """Refuse kindly what is no HDF5 file at all."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             begins = file.read(len(SIGNATURE))
     except OSError as reason:
         why = (reason.strerror or str(reason)).lower()
@@ -353,7 +354,7 @@ def is_archive(path: Path) -> bool:
 
     HDF5 does not open it: over a damaged file it may never come back.
     """
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         head = file.read(HEAD_BYTES)
     return head.startswith(SIGNATURE) and SCHEMA.encode() in head
 

@@ -28,6 +28,7 @@ from hw.ports import kind
 from hw.process import talk
 from met import plan_file
 from met.diagnostic import Problem, error
+from met.files import read_json
 from met.frozen import frozen
 from met.plan import Plan
 from met.run import FAILED
@@ -152,8 +153,8 @@ class OnBeds:
             raise Problem(error("E413", message, help="is the disk full? who may write there?")) from None
         self.known.add(section.experiment, row, found.head, found.exchanges)
         why = "" if found.whole else "the host was gone"
-        with contextlib.suppress(OSError, ValueError, KeyError):
-            why = str(json.loads(told.read_text(encoding="utf-8"))["why"]) or why
+        with contextlib.suppress(OSError, ValueError, LookupError, TypeError):
+            why = str(read_json(told)["why"]) or why
         if not why:
             return found, ""
         ticks = section.prepared.experiment.structure.schedule

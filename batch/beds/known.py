@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from batch.beds.made import check_head
 from hw import records
 from met.frozen import frozen
 
@@ -36,18 +37,21 @@ class Known:
         by_joint = dict(zip(head["joints"], exchanges, strict=True))
         self.cases[experiment, row] = Case(float(head["tick_hz"]), by_joint)
         for joint, about in zip(head["joints"], head["beds"], strict=True):
-            if about not in self.beds[joint]:
+            if about not in self.beds.setdefault(joint, []):
                 self.beds[joint].append(about)
 
     def add_all(self, folder: Path) -> None:
         """Those in a folder that are not known yet."""
         for path in sorted(folder.glob("*.records")):
             experiment, _, row = path.stem.partition("-")
+            if not (experiment.isdecimal() and row.isdecimal()):
+                continue
             if (int(experiment), int(row)) in self.cases:
                 continue
             with contextlib.suppress(records.Unsound, OSError):
                 found = records.read(path)
                 if found.head:
+                    check_head(found)
                     rows = [found.rows[found.rows["bed"] == bed] for bed in range(len(found.head["joints"]))]
                     self.add(int(experiment), int(row), found.head, rows)
 

@@ -14,6 +14,7 @@ import numpy as np
 from hw import records
 from hw.driven import Driven
 from hw.records import ANSWERED
+from met.files import is_count
 from met.frozen import frozen
 from met.program.build import OUTPUTS
 from met.run import STOPPED, Prepared
@@ -49,13 +50,31 @@ def read_rates(found: records.Records, beds: int) -> np.ndarray:
     return rates[::repeats]
 
 
+def check_head(found: records.Records) -> None:
+    """Raises records.Unsound where the head of a case's records is none, or goes not with what follows."""
+    head = found.head
+    if HEAD - set(head):
+        raise records.Unsound("was written by another version of MET")
+    joints, beds, hz = head["joints"], head["beds"], head["tick_hz"]
+    good = (
+        isinstance(joints, list) and isinstance(beds, list) and len(joints) == len(beds) > 0
+        and all(isinstance(joint, str) for joint in joints)
+        and all(isinstance(bed, dict) and all(isinstance(word, str) for word in bed.values()) for bed in beds)
+        and isinstance(hz, int | float) and hz > 0 and is_count(head["repeats"]) and head["repeats"] > 0
+        and bool((found.rows["bed"] < len(joints)).all())
+    )  # fmt: skip
+    if not good:
+        raise records.Unsound("has a head that is damaged")
+
+
 def made(path: Path, prepared: Prepared, row: int) -> Made:
     """What a case's records say. prepared: with its wires open. Raises records.Unsound, OSError."""
     found = records.read(path)
-    if HEAD - set(found.head):
-        raise records.Unsound("was written by another version of MET")
+    check_head(found)
     driven = Driven(prepared, row)
     beds = len(driven.joints)
+    if found.head["joints"] != list(driven.joints):
+        raise records.Unsound("is of other joints")
     rows, outputs, done = driven.again(read_rates(found, beds))
     whole = done == driven.ticks
     if not whole and outputs[FAILURE] == 0.0:

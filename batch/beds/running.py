@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,6 +20,7 @@ from batch.verdict import announcement, told, worst_cases, writing
 from hw.case import pace_of
 from hw.ports import SIMULATED, in_lock_step
 from met.diagnostic import Problem, error
+from met.files import read_json
 from met.margin import margins
 from met.plan import Experiment, Plan
 
@@ -128,9 +128,7 @@ def run_and_tell(
         say=telling.say, more=lambda: beside(executor),
     )  # fmt: skip
     if performed.whole:
-        sidecar = json.loads(sidecar_path(campaign.output).read_text(encoding="utf-8"))
-        before = {each["joint"]: each["port"] for each in sidecar.get("beds", ())}
-        executor.check(before, f"{campaign.output} holds this campaign")
+        executor.check(_ports_before(campaign.output), f"{campaign.output} holds this campaign")
         say(f"nothing is missing: {campaign.output} has all of it (`--fresh` drives it again)")
     with ArchiveFile(campaign.output) as file:
         summaries, worst = summarise(file), worst_cases(file)
@@ -140,3 +138,13 @@ def run_and_tell(
     ok = all(summary.ok for summary in summaries)
     say("\n".join(told(source, campaign, summaries, worst, picture, excuse, None, performed.seconds, ok, ())))
     return ok
+
+
+def _ports_before(archive: Path) -> dict[str, str]:
+    """Where the beds were that an archive was driven on, by joint, as its sidecar says. Raises Problem E302."""
+    path = sidecar_path(archive)
+    try:
+        return {str(each["joint"]): str(each["port"]) for each in read_json(path).get("beds", ())}
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as reason:
+        helps = "`--fresh` drives it again"
+        raise Problem(error("E302", f"{path} is damaged: on which beds it was is not known", help=helps)) from reason

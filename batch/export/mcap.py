@@ -31,6 +31,7 @@ from batch.export.said import Line, lines, result, varied
 from batch.export.wire import plain
 from batch.output import quoted
 from met.diagnostic import Diagnostic, Problem, error
+from met.files import open_regular
 from met.frozen import frozen
 from met.version import VERSION
 
@@ -56,7 +57,7 @@ Message = tuple[int, int, int, bytes]
 
 def own(path: Path) -> bool:
     """Whether a file is an export of MET's, whole or in part."""
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         head = file.read(HEAD_BYTES)
     return head.startswith(MAGIC) and ABOUT.encode() in head
 

@@ -22,6 +22,7 @@ from batch.export.csv import united
 from batch.export.output import whole
 from batch.export.picking import Case, Column
 from met.diagnostic import Problem, error
+from met.files import open_regular
 from met.version import VERSION
 
 MAGIC = b"PAR1"
@@ -33,7 +34,7 @@ GROUP_ROWS = 100_000
 
 def own(path: Path) -> bool:
     """Whether a file is an export of MET's: its last bytes describe it."""
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         size = file.seek(0, 2)
         file.seek(max(0, size - 8))
         end = file.read()

@@ -8,6 +8,7 @@ from typing import Any
 
 from batch.output import quoted
 from met.diagnostic import Problem, error
+from met.files import open_regular
 
 SOFTWARE = "MET"
 MOST_DOTS = 200_000_000
@@ -55,7 +56,7 @@ def _check(output: Path) -> None:
 
 def own(output: Path) -> bool:
     """Whether a picture says that MET drew it."""
-    with output.open("rb") as file:
+    with open_regular(output) as file:
         text = file.read(HEAD_BYTES)
         file.seek(max(len(text), output.stat().st_size - TAIL_BYTES))
         return MARKS[output.suffix.lower()] in text + file.read()

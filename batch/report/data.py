@@ -23,6 +23,7 @@ from batch.report.verdicts import metric_rows, verdict
 from batch.show import chosen
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem
+from met.files import open_regular
 from met.plan import Experiment
 
 MOST_LINES, MOST_LETTERS = 2000, 200_000
@@ -220,5 +221,5 @@ def _compared_with(against: Against) -> tuple[Fact, ...]:
 
 
 def _digest(path: Path) -> str:
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -8,6 +8,7 @@ from pathlib import Path
 from batch.output import quoted
 from batch.report.page import GENERATOR
 from met.diagnostic import Problem, error
+from met.files import open_regular
 
 ENDINGS = (".html", ".htm")
 HEAD_BYTES = 400
@@ -49,7 +50,7 @@ def _check(output: Path) -> None:
 
 def is_report(path: Path) -> bool:
     """Whether a file says that it is a page of ours."""
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return f'<meta name="generator" content="{GENERATOR}">'.encode() in file.read(HEAD_BYTES)
 
 

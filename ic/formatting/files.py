@@ -15,6 +15,7 @@ from ic.formatting.strings import making_strings
 from ic.text.files import Files, FoundFile, decode
 from ic.text.limits import MOST_BYTES
 from met.diagnostic import Problem, error
+from met.files import open_regular
 from met.frozen import frozen
 
 STDIN = "-"
@@ -86,7 +87,7 @@ def lay_out(path: str) -> LaidOut:
         raise Problem(error("E342", f"`{path}` is a plan, and plans are written by `met plan`", help=help))
     file = FoundFile(path, os.path.normpath(path))
     Files().text(file)  # complains as every reader of decks does
-    with open(path, "rb") as stream:
+    with open_regular(path) as stream:
         return _laid_out(file, stream.read(MOST_BYTES + 1))
 
 

@@ -3,13 +3,13 @@ lines of a use are left as they are."""
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator
 
 from ic.text.files import Files, FoundFile
 from ic.text.lexer import Text, Token, logical_lines
 from ic.text.limits import MOST_BYTES, MOST_INCLUDES
+from met.files import open_regular
 
 _INCLUDE = re.compile(r'\s*#\s*include\s*(?:"([^"\n]*)"|<([^>\n]*)>)')
 
@@ -55,9 +55,8 @@ def _included(text: str, file: FoundFile, files: Files) -> Iterator[FoundFile]:
 def _text(file: FoundFile) -> str:
     """What can be read of a file; `met check` says what is wrong with it."""
     try:
-        if os.path.isfile(file.path):
-            with open(file.path, encoding="utf-8", errors="replace") as stream:
-                return stream.read(MOST_BYTES)
+        with open_regular(file.path) as stream:
+            return stream.read(MOST_BYTES).decode("utf-8", "replace")
     except OSError:
         pass
     return ""

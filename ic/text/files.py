@@ -18,6 +18,7 @@ from pathlib import Path
 from ic.grammar.syntax import SourceText
 from ic.text.limits import MOST_BYTES
 from met.diagnostic import Diagnostic, Place, Problem, error
+from met.files import open_regular
 from met.frozen import frozen
 
 LIBRARY = Path(__file__).parents[1] / "decks"
@@ -176,7 +177,7 @@ def _read_bytes(file: FoundFile, kind: str, most: int) -> bytes:
             raise Problem(error("D001", f"`{file.name}` is not a regular file", help="copy what it gives to a file"))
         if about.st_size > most:
             raise Problem(_too_large(file, kind, f"{about.st_size / 2**20:.1f} MiB", most))
-        with open(file.path, "rb") as stream:
+        with open_regular(file.path) as stream:
             data = stream.read(most + 1)
         if len(data) > most:  # a file that does not say its size, or grows
             raise Problem(_too_large(file, kind, "no end", most))

@@ -1,0 +1,97 @@
+"""Files that somebody else may have written: opened only where they are regular files, and JSON read as data.
+
+A named pipe makes whoever opens it wait for ever, and a device may do anything. So what is read goes through here:
+archives, plans, shards, sidecars, transcripts, decks. Whatever is refused is an OSError (the file) or a ValueError
+(what is in it), never a wait and never an error of another kind.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import math
+import os
+import stat
+from typing import Any, BinaryIO
+
+MOST_JSON_BYTES = 64 << 20
+"""A sidecar or a description of a campaign has some kilobytes."""
+
+WHOLE_BITS = 64
+"""Whole numbers of more bits are nothing that MET writes, and overflow where they are computed with."""
+
+KINDS = {
+    stat.S_IFIFO: "a named pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
+}  # fmt: skip
+
+
+def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
+    """A regular file, open for reading. Raises OSError, at once, where it is none."""
+    name = os.fspath(path)
+    if "\0" in name:
+        raise OSError(errno.EINVAL, "its name holds a null character", name)
+    _check_regular(os.stat(name), name)
+    # the file may have been exchanged since: then it is not waited for, and closed again
+    file = os.open(name, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+    try:
+        _check_regular(os.fstat(file), name)
+        return open(file, "rb")
+    except BaseException:
+        os.close(file)
+        raise
+
+
+def read_regular(path: str | os.PathLike[str], most: int | None = None) -> bytes:
+    """All of a regular file. most: bytes that it may have. Raises OSError."""
+    with open_regular(path) as file:
+        data = file.read() if most is None else file.read(most + 1)
+    if most is not None and len(data) > most:
+        raise OSError(errno.EFBIG, f"it has more than {most >> 20} MiB", os.fspath(path))
+    return data
+
+
+def read_json(path: str | os.PathLike[str], most: int = MOST_JSON_BYTES) -> Any:
+    """What is in a file of JSON. Raises OSError; ValueError as `parse_json`."""
+    return parse_json(read_regular(path, most))
+
+
+def parse_json(text: str | bytes) -> Any:
+    """Data from JSON, all of whose numbers are finite and fit into 64 bits. Raises ValueError for all else, however
+    deep it is nested."""
+    try:
+        if isinstance(text, bytes):
+            text = text.decode("utf-8")
+        return json.loads(text, parse_constant=_no_number, parse_float=_finite, parse_int=_whole)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
+def is_count(value: Any, most: float = math.inf) -> bool:
+    """Whether it is a whole number from 0 on, `most` at most."""
+    return type(value) is int and 0 <= value <= most
+
+
+def _check_regular(about: os.stat_result, name: str) -> None:
+    if stat.S_ISDIR(about.st_mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), name)
+    if not stat.S_ISREG(about.st_mode):
+        kind = KINDS.get(stat.S_IFMT(about.st_mode), "something else")
+        raise OSError(errno.EINVAL, f"it is {kind}, not a regular file", name)
+
+
+def _no_number(word: str) -> Any:
+    raise ValueError(f"{word} is not JSON")
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text} is too large a number")
+    return number
+
+
+def _whole(text: str) -> int:
+    number = int(text) if len(text) < WHOLE_BITS else 1 << WHOLE_BITS
+    if number.bit_length() > WHOLE_BITS:
+        raise ValueError(f"{text[:20]}... is too large a whole number")
+    return number

@@ -1,0 +1,70 @@
+"""Files that others wrote are opened where they are regular files, at once or not at all; JSON is data."""
+
+from __future__ import annotations
+
+import os
+import socket
+from pathlib import Path
+
+import pytest
+
+from met import files
+
+
+def test_a_regular_file_is_read_also_through_a_link(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(b"words")
+    (tmp_path / "link").symlink_to("a")
+    assert files.read_regular(tmp_path / "link") == b"words"
+
+
+def test_a_named_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OSError, match="it is a named pipe, not a regular file"):
+        files.open_regular(tmp_path / "pipe")
+
+
+def test_a_pipe_that_takes_a_files_place_after_the_look_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a").touch()
+    os.mkfifo(tmp_path / "pipe")
+    before = os.stat(tmp_path / "a")
+    monkeypatch.setattr(files.os, "stat", lambda _: before)
+    with pytest.raises(OSError, match="it is a named pipe, not a regular file"):
+        files.open_regular(tmp_path / "pipe")
+
+
+def test_a_socket_a_device_and_a_folder_are_no_files(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as made:
+        made.bind(str(tmp_path / "socket"))
+        with pytest.raises(OSError, match="it is a socket, not a regular file"):
+            files.open_regular(tmp_path / "socket")
+    with pytest.raises(OSError, match="it is a device, not a regular file"):
+        files.open_regular("/dev/zero")
+    with pytest.raises(IsADirectoryError):
+        files.open_regular(tmp_path)
+
+
+def test_a_name_with_a_null_character_is_refused_as_a_file_is() -> None:
+    with pytest.raises(OSError, match="its name holds a null character"):
+        files.open_regular("a\0b")
+
+
+def test_no_more_is_read_than_was_allowed(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(bytes(3 << 20))
+    with pytest.raises(OSError, match="it has more than 2 MiB"):
+        files.read_regular(tmp_path / "a", most=2 << 20)
+
+
+@pytest.mark.parametrize("text", [
+    "[" * 100_000, '{"a":' * 100_000, "1" * 30, "-" + "9" * 5000, "NaN", "-Infinity", "1e999", "{", b"\xff", "",
+])  # fmt: skip
+def test_json_that_no_program_of_ours_wrote_is_a_value_error(text: str | bytes) -> None:
+    with pytest.raises(ValueError):
+        files.parse_json(text)
+
+
+def test_json_is_read_as_it_was_written() -> None:
+    assert files.parse_json('{"a": [1, -2.5, null, true, 18446744073709551615]}') == {
+        "a": [1, -2.5, None, True, (1 << 64) - 1]
+    }
