@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from batch.archive import plain
 from batch.archive.hdf5 import SIGNATURE, h5py
 from batch.archive.layout import SCHEMA, VERSION
 from batch.rows import row_of
@@ -262,6 +263,7 @@ class ArchiveFile:
             self._file = h5py().File(self.path, "r")
         try:
             with reading(self.path):
+                plain.check(self._file, self.path)
                 attributes = {name: _plain(value) for name, value in self._file.attrs.items()}
                 self._check(attributes)
                 self.deck: str = attributes["deck"]

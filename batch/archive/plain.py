@@ -1,0 +1,123 @@
+"""That an archive is one file and leads to no other: looked at before anything that is in it is read.
+
+HDF5 follows what a file says. External storage makes any file of this machine a dataset's values, and so would come out
+of `met export`; external links and virtual datasets open other files, filters load other people's code, and a named
+pipe in the place of one of these is waited for. MET writes none of them, and refuses them all, whoever asks for the
+archive. Nothing is opened by looking: HDF5 follows only when values or sizes are asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from batch.archive.hdf5 import h5py
+from met.diagnostic import Problem, error
+
+PACKED = 1100
+"""Bytes that a byte of a file may hold, at most: what deflate makes of zeros, 1032, and a little."""
+
+SMALL = 1 << 20
+"""Bytes that a dataset may have in any file."""
+
+SCALES = ("DIMENSION_LIST", "REFERENCE_LIST")
+"""Attributes by which HDF5 itself says what a dataset's dimensions are: references to datasets of the same file."""
+
+
+def check(file: Any, path: Path) -> None:
+    """Refuse an open file (h5py.File) that is not all in itself, or holds what no archive does. Raises Problem E308."""
+    most = max(SMALL, PACKED * path.stat().st_size)
+    for where, why in _wrong(file.id, most):
+        message = f"the archive {path} holds what MET writes into none: `{where}` {why}"
+        helps = (
+            "nothing of it was read: an archive is one file, leads to no other, and runs nothing",
+            "ask whoever made it for the archive as `met run` wrote it",
+        )
+        raise Problem(error("E308", message, help=helps))
+
+
+def _wrong(root: Any, most: int) -> Iterator[tuple[str, str]]:
+    """What is wrong with the things in a file: the name of each, and why."""
+    module = h5py()
+    seen = set()
+    waiting = [("", root)]
+    while waiting:
+        where, node = waiting.pop()
+        about = module.h5o.get_info(node)
+        if (about.fileno, about.addr) in seen:
+            continue
+        seen.add((about.fileno, about.addr))
+        yield from _attributes(where or "/", node)
+        if isinstance(node, module.h5d.DatasetID):
+            why = _dataset(node, most)
+            if why:
+                yield where, why
+        elif isinstance(node, module.h5g.GroupID):
+            for name, kind in _links(node):
+                inside = f"{where}/{name.decode('utf-8', 'replace')}".removeprefix("/")
+                if kind != module.h5l.TYPE_HARD:
+                    yield inside, "is a link to elsewhere"
+                    return
+                waiting.append((inside, module.h5o.open(node, name)))
+        else:
+            yield where, "is a type of numbers by itself"
+
+
+def _links(group: Any) -> list[tuple[bytes, int]]:
+    """Names of a group's links, and their kinds."""
+    found: list[tuple[bytes, int]] = []
+
+    def take(name: bytes, about: Any) -> None:
+        found.append((name, about.type))
+
+    group.links.iterate(take, info=True)
+    return found
+
+
+def _dataset(node: Any, most: int) -> str:
+    """Why a dataset is none of an archive's; empty where it may be one. Its values and its size are not asked for
+    before it is known where they are."""
+    module = h5py()
+    made = node.get_create_plist()
+    if made.get_layout() == module.h5d.VIRTUAL:
+        return "is put together from other files (a virtual dataset)"
+    if made.get_external_count():
+        return "has its values in another file (external storage)"
+    own = (module.h5z.FILTER_DEFLATE, module.h5z.FILTER_SHUFFLE, module.h5z.FILTER_FLETCHER32)
+    for code in (made.get_filter(number)[0] for number in range(made.get_nfilters())):
+        if code not in own:
+            return f"is packed by other people's code (HDF5's filter {code})"
+    kind = node.get_type()
+    if kind.get_class() not in (module.h5t.INTEGER, module.h5t.FLOAT, module.h5t.STRING):
+        return "is neither of numbers nor of strings"
+    if math.prod(node.shape or ()) * kind.get_size() > most:
+        return "has more values than the file has room for"
+    return ""
+
+
+def _attributes(where: str, node: Any) -> Iterator[tuple[str, str]]:
+    """The attributes of a thing that are neither numbers nor strings, nor what HDF5 itself writes."""
+    module = h5py()
+    plain = (module.h5t.INTEGER, module.h5t.FLOAT, module.h5t.STRING, module.h5t.ENUM)
+    for number in range(module.h5a.get_num_attrs(node)):
+        attribute = module.h5a.open(node, index=number)
+        kind = attribute.get_type()
+        if kind.get_class() in plain:
+            continue
+        name = attribute.name.decode("utf-8", "replace")
+        if name not in SCALES or not _refers(kind):
+            yield f"{where}:{name}", "is neither of numbers nor of strings"
+
+
+def _refers(kind: Any) -> bool:
+    """Whether a type is that of HDF5's attributes of dimension scales, whose references stay in the file."""
+    module = h5py()
+    if kind.get_class() == module.h5t.VLEN:
+        kind = kind.get_super()
+    elif kind.get_class() == module.h5t.COMPOUND:
+        if any(kind.get_member_class(n) != module.h5t.INTEGER for n in range(1, kind.get_nmembers())):
+            return False
+        kind = kind.get_member_type(0)
+    return bool(kind.equal(module.h5t.STD_REF_OBJ))
