@@ -7,8 +7,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from met.visible import line
+
 DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 """Bit of each dot of a character, by row and column (Unicode, "Braille Patterns")."""
+
+LARGEST = 1e300
+"""What is larger has no place on an axis: sums and ranges of such numbers are no numbers any more."""
+
+SMALLEST = 1e-290
+"""Ranges that are smaller are none: a tenth of them may be 0."""
 
 COLOURS = (33, 208, 36, 170, 220, 74, 166)
 """Terminal colours of the lines: blue, orange, green and so on, told apart by colour-blind eyes as well."""
@@ -29,8 +37,10 @@ def draw(
 
     The scale is that of the finite values; a line that breaks off (not-a-number) simply ends.
     """
+    title, labels = line(title), [line(label) for label in labels]
+    lines = [np.where(np.abs(values) <= LARGEST, values, np.nan) for values in lines]
     right = max((len(label) for label in labels), default=0)
-    finite = np.concatenate([line[np.isfinite(line)] for line in lines]) if lines else np.empty(0)
+    finite = np.concatenate([values[np.isfinite(values)] for values in lines]) if lines else np.empty(0)
     if len(finite) == 0 or len(time) == 0:
         return [title, "  (no finite values)"]
     low, high = _range(float(finite.min()), float(finite.max()))
@@ -42,8 +52,8 @@ def draw(
     cells = np.zeros((height, across), dtype=int)
     owner = np.zeros((height, across), dtype=int)
     ends: list[tuple[float, int]] = []
-    for index, line in enumerate(lines):
-        span = _spans(time, line, 2 * across)
+    for index, values in enumerate(lines):
+        span = _spans(time, values, 2 * across)
         for column, bottom, top in span:
             first = _dot(top, low, high, 4 * height)
             last = _dot(bottom, low, high, 4 * height)
@@ -51,7 +61,7 @@ def draw(
                 cells[dot // 4, column // 2] |= DOTS[dot % 4, column % 2]
                 owner[dot // 4, column // 2] = index
         if span:
-            ends.append((_dot(float(line[np.isfinite(line)][-1]), low, high, 4 * height) / 4, index))
+            ends.append((_dot(float(values[np.isfinite(values)][-1]), low, high, 4 * height) / 4, index))
 
     at = {
         min(height - 1, _dot(tick, low, high, 4 * height) // 4): number
@@ -73,8 +83,8 @@ def draw(
 def _range(low: float, high: float) -> tuple[float, float]:
     """Room around the values; a constant gets some too."""
     spread = high - low
-    if spread <= 1e-12 * max(abs(low), abs(high)):
-        spread = abs(high) * 0.2 or 1.0
+    if spread <= max(1e-12 * max(abs(low), abs(high)), SMALLEST):
+        spread = abs(high) * 0.2 if abs(high) > SMALLEST else 1.0
         return low - spread / 2, high + spread / 2
     return low - 0.03 * spread, high + 0.03 * spread
 

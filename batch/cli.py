@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from met.cli import NO, YES, check_options, deck_options, format_option
+from met.visible import say
 
 if TYPE_CHECKING:
     from met.plan import Experiment
@@ -55,7 +56,7 @@ def show(
             file, signals, experiments=experiments, case=case, all_cases=all_cases, by=by, width=width, colour=colour,
             plots=not no_plots,
         )  # fmt: skip
-        click.echo(text, nl=False, color=colour)
+        click.echo(text, nl=False, color=colour)  # made visible where it was made, but for our own colours
     return YES
 
 
@@ -129,5 +130,4 @@ def _say(form: str, data: Sequence[Any], texts: Sequence[Iterable[str]]) -> None
     """Prints data for programs, or texts for people with a line between each two."""
     import json
 
-    said = json.dumps(data, indent=1) if form == "json" else "\n\n".join("\n".join(lines) for lines in texts)
-    click.echo(said)
+    say(json.dumps(data, indent=1) if form == "json" else "\n\n".join("\n".join(lines) for lines in texts))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from met.cli import NO, YES, format_option
+from met.visible import line, say
 
 
 @click.command(short_help="Say what changed between two archives, case by case.")
@@ -39,7 +40,7 @@ def diff(
     found = diff(a, b, read(tolerances), distributions=distributions)
     options = [*(f"--tol {quoted(each)}" for each in tolerances), *(["--distributions"] if distributions else [])]
     cut = Cut(every, f"`{' '.join(['met diff', quoted(a), quoted(b), *options, '--all'])}`")
-    click.echo(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(told(found, cut)))
+    say(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(map(line, told(found, cut))))
     enough = VERDICTS.index(found.verdict) <= VERDICTS.index(require)
     if form != "json" and found.verdict == EQUIVALENT and not enough:
         click.echo("exit 1: `--require identical` asks for the same bits")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from met.cli import YES, format_option, loudness_options
+from met.visible import say
 
 if TYPE_CHECKING:
     from batch.export import Rows
@@ -54,5 +55,5 @@ def export(
         click.echo(json.dumps(told, indent=1))
     elif not quiet:
         for path in written:
-            click.echo(f"{path}  ({size(path.stat().st_size)}){what(done) if path == done.path else ''}")
+            say(f"{path}  ({size(path.stat().st_size)}){what(done) if path == done.path else ''}")
     return YES

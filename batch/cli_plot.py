@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from met.cli import YES, loudness_options
+from met.visible import say
 
 
 @click.command(short_help="Draw signals, metrics and maps of an archive: PNG, SVG, PDF.")
@@ -38,5 +39,5 @@ def plot(
         archive, output, names, run=run, cases=cases, over=parameters, against=against, size=size, dpi=dpi
     )  # fmt: skip
     if not quiet:
-        click.echo(f"{target}")
+        say(f"{target}")
     return YES

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from met.cli import YES, loudness_options
+from met.visible import say
 
 
 @click.command(short_help="Make one HTML page of an archive, to open anywhere and to send.")
@@ -36,5 +37,5 @@ def report(
         archive, output, experiments=experiments, title=title, against=against, tolerances=tolerances, progress=told
     )
     if not quiet:
-        click.echo(f"{target}  ({size(target.stat().st_size)})")
+        say(f"{target}  ({size(target.stat().st_size)})")
     return YES

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
+from met.visible import line, say
 
 MOST_NAMED = 5
 """Archives that are named where none was meant."""
@@ -152,8 +153,8 @@ def status(where: str, form: str) -> int:
             raise Problem(error("E359", f"no campaign fills {where}", help=helps))
         since = f", begun at {data['began']}" if data["began"] != "unknown" else ""
         said = f"{data['archive']} is whole: {data['cases']:,} case{'s' if data['cases'] != 1 else ''}{since}"
-        click.echo(json.dumps(data, indent=1) if form == "json" else said)
+        say(json.dumps(data, indent=1) if form == "json" else line(said))
         return YES
     data = report(folder, time.time())
-    click.echo(json.dumps(data, indent=1) if form == "json" else "\n".join(lines(data)))
+    say(json.dumps(data, indent=1) if form == "json" else "\n".join(map(line, lines(data))))
     return NO  # its folder is there, and so its archive is not, whatever is done of it

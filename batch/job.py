@@ -28,29 +28,30 @@ from batch.tasks import Task
 from batch.termination import TERMINATED, Terminated, terminable
 from met.diagnostic import Problem
 from met.files import read_json
+from met.visible import say
 
 
 def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = COMMAND) -> int:
     """Run the stretches of this share that have no shard. Exit status 0 where all of it is done."""
     folder = Folder(path)
     if not folder.exists():
-        print(f"met: {path} is gone: the campaign is whole, or was begun again elsewhere")
+        say(f"met: {path} is gone: the campaign is whole, or was begun again elsewhere")
         return 0
     try:
         folder.lock(together=True)
     except Busy:
-        print(f"met: {path} is in the hands of another run: nothing was done here", file=sys.stderr)
+        say(f"met: {path} is in the hands of another run: nothing was done here", err=True)
         return 1
     try:
         asked = read_json(tasks_file)
         dealt = [[Task(*each) for each in tasks] for tasks in asked["shares"]]
         timeout = asked["timeout"]
     except (OSError, ValueError, LookupError, TypeError):
-        print(f"met: {tasks_file} is gone or damaged: submit again", file=sys.stderr)
+        say(f"met: {tasks_file} is gone or damaged: submit again", err=True)
         return 1
     sections = folder.sections()
     if not 0 <= number < len(dealt):
-        print(f"met: {tasks_file} has no share {number}: it was submitted again since", file=sys.stderr)
+        say(f"met: {tasks_file} has no share {number}: it was submitted again since", err=True)
         return 0
     mine = dealt[number]
     executor = Processes(1, threads=cores(), timeout=timeout, command=command)
@@ -67,7 +68,7 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
         reporter.state("done")
     except (Stopped, Problem) as reason:
         reporter.state("stopped")
-        print(f"met: {reason}", file=sys.stderr)
+        say(f"met: {reason}", err=True)
         return 1
     except BaseException:
         reporter.state("interrupted")
@@ -101,13 +102,13 @@ def together(path: Path) -> int:
 
     if not Folder(path).exists():
         archive = look(path.with_name(path.name.removesuffix(".campaign")))  # somebody else was first
-        print("\n".join(brief(archive)))
+        say("\n".join(brief(archive)))
         return 0 if archive.ok else 1
     campaign = described(Folder(path))
     threads = cores()
-    performed = perform(campaign, executor=Threads(threads), together=True, say=print)
+    performed = perform(campaign, executor=Threads(threads), together=True, say=say)
     archive = look(campaign.output, performed.notes)
-    print("\n".join(brief(archive)))
+    say("\n".join(brief(archive)))
     return 0 if archive.ok else 1
 
 
@@ -118,12 +119,12 @@ def main(arguments: Sequence[str]) -> int:
         with terminable():
             return share(Path(path), int(rest[0]), Path(rest[1])) if verb == "share" else together(Path(path))
     except Terminated:
-        print("met: terminated; what is done is kept", file=sys.stderr)
+        say("met: terminated; what is done is kept", err=True)
         return TERMINATED
     except Problem as problem:
         from met.render import render
 
-        print(render(problem.diagnostics, problem.sources), file=sys.stderr)
+        say(render(problem.diagnostics, problem.sources), err=True)
         return 1
 
 

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TextIO
 
+from met.visible import line
+
 FIRST_SECONDS = 0.3
 """What is over sooner needs no bar."""
 
@@ -35,7 +37,7 @@ class Bar:
 
     def begin(self, name: str, cases: int, done: int = 0, failed: int = 0, workers: str = "") -> None:
         """A new experiment starts, of which some cases are done already."""
-        self._name, self._cases, self._first, self._workers = name, cases, done, workers
+        self._name, self._cases, self._first, self._workers = line(name), cases, done, line(workers)
         self._began = self._now()
         self._next = self._began + (FIRST_SECONDS if self._live else LINE_SECONDS)
         self._drawn = False
@@ -47,15 +49,15 @@ class Bar:
             return
         elapsed = now - self._began
         self._next = now + (BAR_SECONDS if self._live else min(max(LINE_SECONDS, 0.2 * elapsed), SELDOM))
-        line = status(
+        said = status(
             self._name, done, self._cases, elapsed, bar=self._live, first=self._first, failed=failed,
             workers=self._workers, more=more,
         )  # fmt: skip
         if self._live:
             width = shutil.get_terminal_size().columns
-            self.stream.write(f"\r{line[: width - 1]}\x1b[K")
+            self.stream.write(f"\r{said[: width - 1]}\x1b[K")
         else:
-            self.stream.write(line + "\n")
+            self.stream.write(said + "\n")
         self.stream.flush()
         self._drawn = True
 

@@ -21,6 +21,7 @@ from batch.replaying import Replay, differences, replay
 from batch.structures import structures
 from batch.summary import summarise
 from batch.verdict import announcement, told, verdict_json, worst_cases, writing
+from met import visible
 from met.diagnostic import Problem, error
 from met.plan import Plan
 from met.sources import names_archive, names_plan
@@ -51,7 +52,7 @@ def run_and_tell(
     json: bool = False,
 ) -> bool:
     """Run a deck, a plan, or cases of an archive; True where every case reached its end and met its requirements."""
-    say = (lambda *_: None) if quiet or json else print
+    say = (lambda *_: None) if quiet or json else visible.say
     if failed and not names_archive(source):
         helps = "`met run ARCHIVE.h5 --failed` runs those again that failed"
         raise Problem(error("E357", f"`--failed` is of an archive, and {source} is none", help=helps))
@@ -91,7 +92,7 @@ def run_and_tell(
         return False
     except KeyboardInterrupt as interrupt:
         if str(interrupt) and not json:
-            print(f"\n{interrupt}", file=sys.stderr)
+            visible.say(f"\n{interrupt}", err=True)
         raise
     if performed.whole:
         say(f"nothing is missing: {campaign.output} has all of it (`--fresh` runs it again)")
@@ -159,7 +160,7 @@ def submit_and_tell(
 
     from batch.submitting import submit
 
-    say = (lambda *_: None) if quiet or json else print
+    say = (lambda *_: None) if quiet or json else visible.say
     campaign = _of_deck(
         source, names, everything, output, cases, histories, float32, defines, include_dirs, settings, quiet or json
     )

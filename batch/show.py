@@ -21,9 +21,13 @@ from batch.summary import MetricSummary, Summary, summary_of
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem, error
 from met.distinct import distinct
+from met.visible import line
 
 MOST_GROUPS = 4
 """So many structures of a sweep are shown in full unless they are named; of more, their table alone."""
+
+NARROWEST = 40
+"""Characters of a line beside a name, however long that is."""
 
 PLOTS = 4
 """Signals that are drawn unless some are asked for."""
@@ -48,11 +52,12 @@ def show(
     A plot is of one case, the first recorded unless `case` names another; under the table of all cases there is none
     unless `signals` are asked for.
     """
-    out = [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
+    out = _Lines()
+    out += [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
     shown = picked(archive, experiments, case)
     ordering.check([group for group, _ in shown], by)
     if not experiments and case is None and not signals:
-        out += [line for table in structures(archive) for line in ("", *table)]
+        out += [row for table in structures(archive) for row in ("", *table)]
         counts = Counter(group.sweep for group, _ in shown if group.sweep)
         hidden = [group.name for group, _ in shown if counts[group.sweep] > MOST_GROUPS and not all_cases]
         if hidden and by is None:
@@ -68,10 +73,24 @@ def show(
     for group, position in shown:
         out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, by, width), ""]
         if plots and (signals or position is not None or not all_cases):
-            out += _plots(archive, group, signals, position, width, colour)
+            out.drawn(_plots(archive, group, signals, position, width, colour))
         elif signals:
             panels(group, signals)  # a name that is none is told, drawn or not
-    return "\n".join(out).rstrip() + "\n"
+    return "\n".join(out.lines).rstrip() + "\n"
+
+
+class _Lines:
+    """Lines of text, visible, among them drawings, which are so already and may have colours."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def __iadd__(self, lines: Sequence[str]) -> _Lines:
+        self.lines += map(line, lines)
+        return self
+
+    def drawn(self, lines: Sequence[str]) -> None:
+        self.lines += lines
 
 
 def _about(
@@ -115,11 +134,12 @@ def as_json(
             said = {"case": {**about, "parameters": outcomes.finite(cases.parameters(archive, group, position))}}
         variables = [{"name": v.name, "role": v.role, "dims": v.dims, "unit": v.unit} for v in group.variables.values()]
         groups.append({
-            **outcomes.as_json(summary_of(group, position)), **said, "attributes": group.attributes,
+            **outcomes.as_json(summary_of(group, position)), **said, "attributes": outcomes.finite(group.attributes),
             "variables": variables,
         })  # fmt: skip
-    data = {"archive": str(archive.path), "deck": archive.deck, "provenance": archive.provenance, "experiments": groups}
-    return json.dumps(data, indent=1)
+    provenance = outcomes.finite(archive.provenance)
+    data = {"archive": str(archive.path), "deck": archive.deck, "provenance": provenance, "experiments": groups}
+    return json.dumps(data, indent=1, allow_nan=False)
 
 
 def chosen(archive: ArchiveFile, names: Sequence[str]) -> tuple[Group, ...]:
@@ -160,8 +180,12 @@ def heading(group: Group, width: int) -> list[str]:
         f"{count}, {a['duration_s']:g} s, {a['integrator']} at {a['dynamics_hz']:g} Hz, recorded at "
         f"{a['record_hz']:g} Hz, arm {a['arm']}, velocity products {a['velocity_products']}"
     )
-    lines = textwrap.wrap(text, width - len(group.name) - 2)
-    out = [f"{group.name}  {lines[0]}", *(" " * (len(group.name) + 2) + line for line in lines[1:])]
+    indent = len(group.name) + 2
+    if width - indent < NARROWEST:  # a name that leaves no room stands on a line of its own
+        lines = ["", *textwrap.wrap(text, width - (indent := 4))]
+    else:
+        lines = textwrap.wrap(text, width - indent)
+    out = [f"{group.name}  {lines[0]}".rstrip(), *(" " * indent + rest for rest in lines[1:])]
     for variable in group.role("choice"):
         out.append(f"  {variable.path} = {group.at(variable.name, [0])[0]}")
     for variable in group.role("coordinate"):
@@ -249,11 +273,11 @@ def _plots(
     position = int(group.recorded_positions[0]) if case is None else case
     if position not in group.recorded_positions:
         remedy = f"`met run {quoted(group.path)} --case '#{group.values('case')[position]}'` runs it again"
-        return [f"its history was not kept: {remedy}"]
+        return [line(f"its history was not kept: {remedy}")]
     units = DeckUnits(archive, group)
     wanted = [units.panel(each) for each in panels(group, signals)]
     drawn = wanted if signals else wanted[:PLOTS]
-    out = [case_text(group, position)] if group.count > 1 and case is None else []
+    out = [line(case_text(group, position))] if group.count > 1 and case is None else []
     time = group.values("time")
     for panel in drawn:
         values = history(group, panel, position)
@@ -262,5 +286,5 @@ def _plots(
         out += [*plot, ""]
     if len(drawn) < len(wanted):
         rest = dict.fromkeys(panel.name for panel in wanted[len(drawn) :])
-        out.append(f"also recorded: {', '.join(rest)}")
+        out.append(line(f"also recorded: {', '.join(rest)}"))
     return out

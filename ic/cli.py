@@ -12,6 +12,7 @@ import click
 
 from met.cli import BAD_INPUT, YES, check_options, complain, deck_options, format_option, loudness_options
 from met.diagnostic import Problem, did_you_mean
+from met.visible import say
 
 if TYPE_CHECKING:
     from ic.meaning.lower import Compiled
@@ -53,7 +54,7 @@ def check(
 
         if verbose:
             _print(notes(compiled.plan))
-        click.echo(verdict(compiled.plan, compiled.diagnostics))
+        say(verdict(compiled.plan, compiled.diagnostics))
     return YES
 
 
@@ -66,7 +67,7 @@ def _check_plan(path: str, form: str, quiet: bool) -> int:
     if form == "json":
         complain((), {}, json=True)
     elif not quiet:
-        click.echo(f"{path}: plan of {verdict(made, ())}")
+        say(f"{path}: plan of {verdict(made, ())}")
     return YES
 
 
@@ -102,9 +103,9 @@ def plan(
     if output is not None:
         plan_file.write(made, output)
         if not quiet and form == "text":
-            click.echo(f"wrote {output}")
+            say(f"wrote {output}")
     elif form == "json":
-        click.echo(plan_file.dumps(made), nl=False)
+        say(plan_file.dumps(made), end="", exact=True)
     elif not quiet:
         from ic.printing.plan import print_plan
 
@@ -318,7 +319,7 @@ def _plan_in_file(path: str, names: tuple[str, ...]) -> Plan:
 
 def _print(lines: Iterable[str]) -> None:
     for line in lines:
-        click.echo(line)
+        say(line)
 
 
 def _print_json(told: object) -> None:

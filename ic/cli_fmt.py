@@ -6,6 +6,7 @@ import click
 
 from met.cli import BAD_INPUT, NO, YES, complain, loudness_options
 from met.diagnostic import Problem
+from met.visible import say
 
 
 @click.command()
@@ -39,13 +40,13 @@ def fmt(paths: tuple[str, ...], check: bool, diff: bool, quiet: bool, verbose: b
             continue
         changed += deck.changes
         if diff:
-            click.echo("".join(deck.diff()), nl=False)
+            say("".join(deck.diff()), end="", exact=True)
         if path == STDIN and not (check or diff):
-            click.echo(deck.after, nl=False)
+            say(deck.after, end="", exact=True)
         if path != STDIN and not quiet and (verbose or deck.changes) and (check or not diff):
             told = "as it should be" if not deck.changes else "would be formatted" if check else "formatted"
             ends = "; its lines end with a newline alone" if deck.changes and deck.ends else ""
-            click.echo(f"{deck.name}: {told}{ends}", err=diff)
+            say(f"{deck.name}: {told}{ends}", err=diff)
     if broken:
         return BAD_INPUT
     return NO if check and changed else YES

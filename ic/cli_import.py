@@ -8,6 +8,7 @@ import click
 
 from met.cli import loudness_options
 from met.diagnostic import Problem, error
+from met.visible import say
 
 
 @click.command("import", short_help="Make a deck of a robot's URDF file.")
@@ -31,7 +32,7 @@ def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet
         raise click.UsageError("--force is for -o: nothing is written without it")
     text = imported(file, mimic)  # type: ignore[arg-type]  # click has seen to it
     if output is None:
-        click.echo(text, nl=False)
+        say(text, end="", exact=True)
         return
     if not output or os.path.isdir(output):
         raise Problem(error("D216", f"`{output}` is no name of a file", help="name the deck: `-o arm.ic`"))
@@ -41,4 +42,4 @@ def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet
         raise Problem(error("D216", f"`{output}` is there already", help="--force writes over it, -o names another"))
     put(output, text)
     if not quiet:
-        click.echo(f"wrote {output}")
+        say(f"wrote {output}")

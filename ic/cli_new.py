@@ -9,6 +9,7 @@ import sys
 import click
 
 from met.cli import loudness_options
+from met.visible import say
 
 KINDS = ["deck", "servo", "sensor", "environment", "command", "guide", "metric", "integrator"]
 
@@ -34,7 +35,7 @@ def new(kind: str, name: str, output: str | None, force: bool, quiet: bool, verb
     if quiet:
         return
     for path in texts:
-        click.echo(f"wrote {path}")
+        say(f"wrote {path}")
     click.echo()
     for line in columns(_next(kind, name, list(texts))):
         click.echo(line)

@@ -20,6 +20,7 @@ from met.diagnostic import Diagnostic, Problem, error, nearest
 from met.entry_points import EntryPoint, offered
 from met.sources import names_archive, names_plan
 from met.version import VERSION
+from met.visible import say, visible
 
 YES, NO, BAD_INPUT = 0, 1, 2
 INTERRUPTED, PIPE_CLOSED = 130, 141  # 128 + the signal, as a shell counts
@@ -188,6 +189,7 @@ def _run(arguments: list[str]) -> int:
         if json:
             complain([error("U001", mistake.format_message())], {}, json=True)
         else:
+            mistake.message = visible(mistake.message)
             mistake.show()
         return BAD_INPUT
     except (KeyboardInterrupt, click.Abort):
@@ -237,17 +239,17 @@ def _confess(defect: Exception, arguments: Sequence[str], verbose: bool) -> None
             file.write(f"{command}\nmet {VERSION}, Python {platform.python_version()}, {platform.platform()}\n\n")
             traceback.print_exception(defect, file=file)
         where = f"The traceback is in {path}."
-    print(
+    say(
         f"met: this is a defect of MET, not of what you gave it: {type(defect).__name__}: {defect}. {where} "
         f"Please report it together with the deck and the command, `{command}`.",
-        file=sys.stderr,
+        err=True,
     )
 
 
 def _show_traceback() -> None:
     import traceback
 
-    traceback.print_exc()
+    say(traceback.format_exc(), end="", err=True)
 
 
 if __name__ == "__main__":

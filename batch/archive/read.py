@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive import plain
+from batch.archive import plain, sound
 from batch.archive.hdf5 import SIGNATURE, h5py
 from batch.archive.layout import SCHEMA, VERSION
+from batch.archive.sound import Unlike, of_joints
 from batch.rows import row_of
 from met.diagnostic import Problem, error
 from met.distinct import distinct
@@ -52,21 +53,6 @@ def reading(path: Path) -> Iterator[None]:
         raise Problem(_damaged(path, str(reason) if isinstance(reason, Unlike) else "")) from reason
 
 
-class Unlike(ValueError):
-    """An archive lacks something that all archives have: what."""
-
-
-NUMBERS, WORDS = "iuf", "O"
-"""Kinds of numpy's types: of numbers, and of strings as h5py has them."""
-
-ATTRIBUTES: dict[str, tuple[type, ...]] = {
-    "experiment": (str,), "arm": (str,), "integrator": (str,), "velocity_products": (str,), "duration_s": (float,),
-    "dynamics_hz": (float,), "record_hz": (float,), "cases_in_table": (int,),
-}  # fmt: skip
-VARIABLES = {"case": "iu", "case_id": WORDS, "cause": WORDS, "status": "iu", "n_valid": "iu"}
-"""What every experiment's group has, and of which type."""
-
-
 FEW = 100
 """So many values at most are read one by one."""
 
@@ -78,35 +64,9 @@ class Group:
         self._node, self.path = node, path
         with reading(path):
             self.attributes: dict[str, Any] = {name: _plain(value) for name, value in node.attrs.items()}
-            self._check()
+            sound.check(self)
         self.name: str = self.attributes["experiment"]
         self.sweep: str = str(self.attributes.get("sweep", ""))
-
-    def _check(self) -> None:
-        """That the variables are those of an experiment, and that their sizes are those of their dimensions."""
-        for name, types in ATTRIBUTES.items():
-            if not isinstance(self.attributes.get(name), types):
-                raise Unlike(f"attribute `{name}` is missing or of another type")
-        variables = self.variables
-        shapes = {name: self._node[name].shape for name in variables}
-        for name, kinds in VARIABLES.items():
-            if name not in variables or self._node[name].dtype.kind not in kinds or variables[name].dims != ("case",):
-                raise Unlike(f"variable `{name}` is missing or of another type")
-        for name, variable in variables.items():
-            if any(dim not in shapes for dim in variable.dims):
-                raise Unlike(f"variable `{name}` lacks a dimension")
-            if shapes[name] != tuple(shapes[dim][0] for dim in variable.dims):
-                raise Unlike(f"variable `{name}` is not of the size of its dimensions")
-            numbers = variable.role in ("coordinate", "metric", "signal") or name in ("time", "met", "recorded_case")
-            words = name == "requirement" or variable.role == "choice"
-            if self._node[name].dtype.kind not in (NUMBERS if numbers else WORDS if words else NUMBERS + WORDS):
-                raise Unlike(f"variable `{name}` is of another type")
-            if variable.role == "signal" and variable.dims[:2] != ("recorded_case", "time"):
-                raise Unlike(f"variable `{name}` is not over cases and time")
-            if variable.role == "signal" and len(variable.dims) > (4 if _of_joints(variable) else 3):
-                raise Unlike(f"variable `{name}` has more dimensions than joints and components")
-            if not float(variable.attributes.get("deck_scale", 1.0)):
-                raise Unlike(f"variable `{name}` has no scale")
 
     @cached_property
     def variables(self) -> dict[str, Stored]:
@@ -116,6 +76,14 @@ class Group:
 
     def role(self, role: str) -> tuple[Stored, ...]:
         return tuple(variable for variable in self.variables.values() if variable.role == role)
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        """Sizes of a variable along its dimensions."""
+        return tuple(self._node[name].shape)
+
+    def type(self, name: str) -> str:
+        """A variable's type, as numpy writes it: `<f8`; `|O` of strings."""
+        return str(self._node[name].dtype.str)
 
     def values(self, name: str) -> np.ndarray:
         """All of a variable; strings as an array of str."""
@@ -187,11 +155,11 @@ class Group:
 
     def joints(self, variable: Stored) -> tuple[str, ...]:
         """Names along a signal's joint dimension; none where it has no such dimension."""
-        return self._along(variable.dims[2:3]) if _of_joints(variable) else ()
+        return self._along(variable.dims[2:3]) if of_joints(variable) else ()
 
     def components(self, variable: Stored) -> tuple[str, ...]:
         """Names of a signal's components; none where it is no vector."""
-        return self._along(variable.dims[3:4] if _of_joints(variable) else variable.dims[2:3])
+        return self._along(variable.dims[3:4] if of_joints(variable) else variable.dims[2:3])
 
     def _along(self, dims: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(map(str, self.values(dims[0]))) if dims else ()
@@ -236,11 +204,6 @@ def found_cases(wanted: str, rows: np.ndarray, ids: np.ndarray, name: str) -> np
     return found
 
 
-def _of_joints(variable: Stored) -> bool:
-    """Whether a signal's third dimension holds joints."""
-    return any(dim == "joint" or dim.startswith("joint_of_") for dim in variable.dims[2:3])
-
-
 def _cases_here(rows: np.ndarray) -> str:
     """Which cases an archive has: all of a table, or some of it."""
     if not len(rows):
@@ -258,6 +221,7 @@ class ArchiveFile:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
+        self._arithmetic = np.errstate(over="ignore", invalid="ignore")
         check_signature(self.path)
         with reading(self.path):
             self._file = h5py().File(self.path, "r")
@@ -287,9 +251,12 @@ class ArchiveFile:
             raise Unlike("it does not say where it comes from")
 
     def __enter__(self) -> ArchiveFile:
+        """Numbers of an archive may be as large as doubles are: what becomes too large for one is infinite, unsaid."""
+        self._arithmetic.__enter__()
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._arithmetic.__exit__()
         self._file.close()
 
     def _groups(self) -> tuple[Group, ...]:
@@ -299,7 +266,10 @@ class ArchiveFile:
         nodes = [node for node in self._file.values() if node.name != "/provenance"]
         if not nodes:
             raise Unlike("it holds no run and no sweep")
-        return tuple(Group(node, self.path) for node in nodes)
+        groups = tuple(Group(node, self.path) for node in nodes)
+        if len({group.name for group in groups}) < len(groups):
+            raise Unlike("it holds two runs of one name")
+        return groups
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -314,6 +284,8 @@ class ArchiveFile:
             if "source" not in node:
                 return {}
             names, texts = node["source"].asstr()[...], node["source_text"].asstr()[...]
+            if names.ndim != 1 or names.shape != texts.shape:
+                raise Unlike("its sources are not a text each")
             return dict(zip(names.tolist(), texts.tolist(), strict=True))
 
     def plan(self, *, as_written: bool = False) -> Plan:
@@ -329,7 +301,22 @@ class ArchiveFile:
 
         with reading(self.path):
             node = self._file["provenance"]
-            return plan_file.loads(node["plan"].asstr()[()], str(self.path), fetch, as_written=as_written)
+            plan = plan_file.loads(node["plan"].asstr()[()], str(self.path), fetch, as_written=as_written)
+            self._check_plan(plan)
+            return plan
+
+    def _check_plan(self, plan: Plan) -> None:
+        """That the plan is that of the groups: the same experiments, with their cases and what is varied in them."""
+        known = {experiment.name: experiment for experiment in plan.experiments}
+        if len(known) != len(plan.experiments) or known.keys() != {group.name for group in self.groups}:
+            raise Unlike("its plan is of other runs than it holds")
+        for group in self.groups:
+            cases = known[group.name].cases
+            varied = {coordinate.path for coordinate in cases.coordinates}
+            if varied != {variable.path for variable in group.role("coordinate")}:
+                raise Unlike(f"the plan of `{group.name}` varies something else")
+            if not np.isin(group.values("case"), cases.table).all():
+                raise Unlike(f"the plan of `{group.name}` has not its cases")
 
 
 def check_signature(path: Path) -> None:
@@ -373,8 +360,9 @@ def _stored(name: str, node: Any) -> Stored:
     else:
         dims = tuple(axis[0].name.rpartition("/")[2] if len(axis) else "" for axis in node.dims)
     by_joint = attributes.pop("units_by_joint", ())
+    by_joint = by_joint if isinstance(by_joint, list) else [by_joint] if by_joint else []
     return Stored(
-        name, dims, str(attributes.pop("role", "")), str(attributes.pop("units", "")), tuple(by_joint),
+        name, dims, str(attributes.pop("role", "")), str(attributes.pop("units", "")), tuple(map(str, by_joint)),
         str(attributes.pop("long_name", "")), attributes,
     )  # fmt: skip
 
@@ -390,4 +378,6 @@ def _plain(value: Any) -> Any:
         return value.item()
     if isinstance(value, np.ndarray):
         return [_plain(part) for part in value.tolist()]
+    if isinstance(value, h5py().Empty):
+        return ""
     return value

@@ -11,6 +11,7 @@ from hw.bed import About, Fault
 from hw.beds import latch
 from hw.ports import SIMULATED, Port, opened
 from met.diagnostic import Problem, error
+from met.visible import say
 
 
 def clear_and_tell(word: str, *, baud: int, form: str, quiet: bool = False, verbose: bool = False) -> None:
@@ -18,11 +19,11 @@ def clear_and_tell(word: str, *, baud: int, form: str, quiet: bool = False, verb
     about, faults = clear(word, baud)
     if form == "json":
         names = [str(fault.name).lower() for fault in Fault if fault in faults]
-        print(json.dumps({"name": about.name, "cleared": names}))
+        say(json.dumps({"name": about.name, "cleared": names}))
     elif not quiet:
-        print(f"bed `{about.name}` at {word}: {told(faults)}")
+        say(f"bed `{about.name}` at {word}: {told(faults)}")
         for each in refusals.remedies(faults):
-            print(f"  = help: {each}")
+            say(f"  = help: {each}")
 
 
 def clear(word: str, baud: int) -> tuple[About, Fault]:

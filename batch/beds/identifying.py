@@ -14,7 +14,7 @@ from hw.bed import About, Capability, Limits, Scales
 from hw.identify.driving import Asked
 from hw.process import talk
 from ic.printing.columns import columns, quantity
-from met import models, plan_file
+from met import models, plan_file, visible
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Experiment, Formula, Plan, Substitution
@@ -72,7 +72,7 @@ def identify_and_tell(
     form: str, quiet: bool = False, verbose: bool = False, **options: Any,
 ) -> None:  # fmt: skip
     """The command. Raises Problem."""
-    say: Callable[[str], None] = (lambda _: None) if quiet or form == "json" else print
+    say: Callable[[str], None] = (lambda _: None) if quiet or form == "json" else visible.say
     which = meant(word, source, names, quiet=quiet, **options)
     assert which.experiment is not None
     sheet = sheet_of(which.experiment, which.joint, kt_load)
@@ -97,7 +97,7 @@ def identify_and_tell(
     origin = origin_of(about, ended, estimates)
     deck.write_text(included(deck, which.experiment, which.joint, estimates, origin), encoding="utf-8")
     if form == "json":
-        print(json.dumps(as_data(found, estimates, sheet, deck, records), indent=2))
+        visible.say(json.dumps(as_data(found, estimates, sheet, deck, records), indent=2))
         return
     for line in told(found, estimates, sheet):
         say(line)

@@ -17,6 +17,7 @@ from ic.printing.columns import columns
 from met import plan_file
 from met.diagnostic import Problem, error
 from met.plan import Plan
+from met.visible import say
 
 HZ, SECONDS = 1000.0, 10.0
 """What is measured where nothing else is asked for, nor a deck has a rate."""
@@ -62,9 +63,9 @@ def jitter_and_tell(
     asked = meant(word, source, names, quiet=quiet, **options)
     data, said = measured(asked, baud, rate, duration, joints)
     if form == "json":
-        print(json.dumps({**data, "warnings": said}, indent=2))
+        say(json.dumps({**data, "warnings": said}, indent=2))
     elif not quiet:
-        print("\n".join([*lines(data), *(f"  {each}" for each in said)]))
+        say("\n".join([*lines(data), *(f"  {each}" for each in said)]))
     return not data["stops"]
 
 

@@ -20,6 +20,7 @@ from hw.ports import Port, opened
 from ic.printing.columns import columns, number, quantity
 from met.diagnostic import Diagnostic
 from met.frozen import frozen
+from met.visible import say
 
 ASKED = 32
 """Times that the sensors are read, for the time that an answer takes."""
@@ -71,9 +72,9 @@ def probe_and_tell(
     """The command. Raises Problem."""
     found = probe(meant(word, source, names, quiet=quiet, **options), baud)
     if form == "json":
-        print(json.dumps(data(found), indent=2))
+        say(json.dumps(data(found), indent=2))
     elif not quiet:
-        print("\n".join(lines(found)))
+        say("\n".join(lines(found)))
 
 
 def lines(found: Found) -> list[str]:

@@ -19,6 +19,7 @@ from batch.summary import summarise
 from batch.verdict import announcement, told, worst_cases, writing
 from hw.case import pace_of
 from hw.ports import SIMULATED, in_lock_step
+from met import visible
 from met.diagnostic import Problem, error
 from met.files import read_json
 from met.margin import margins
@@ -110,7 +111,7 @@ def run_and_tell(
     verbose: bool = False,
 ) -> bool:
     """Drive a deck's run or sweep; True where every case reached its end and met its requirements."""
-    say: Callable[[str], None] = (lambda _: None) if quiet else print
+    say: Callable[[str], None] = (lambda _: None) if quiet else visible.say
     plan = read_plan(
         source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=quiet
     )

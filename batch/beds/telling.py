@@ -14,6 +14,7 @@ from batch.beds.jitter import duration, off
 from batch.progress import Bar
 from hw.records import ANSWERED
 from hw.timing import Spread, Timing, timing
+from met.visible import say
 
 
 class Telling:
@@ -45,7 +46,7 @@ class Telling:
         """A line, where the bar was."""
         if not self._quiet:
             self._bar.end()
-            print(line)
+            say(line)
 
 
 def timings(executor: OnBeds) -> dict[str, Timing]:

@@ -10,7 +10,7 @@ from batch.differences.samples import LEVEL, Sample
 from batch.failures import STATUS, ranges
 from batch.output import quoted
 from batch.signals import number_text
-from batch.visible import visible
+from met.visible import visible
 from met.frozen import frozen
 
 SAME = "made from the same: deck, parameters, models and versions"

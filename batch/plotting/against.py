@@ -12,9 +12,9 @@ from batch.archive.read import ArchiveFile, Group
 from batch.differences import matching
 from batch.output import quoted
 from batch.signals import Panel, pretty_unit
-from batch.visible import visible
 from met.channel import channel_paths
 from met.diagnostic import Problem, error
+from met.visible import line
 
 LONGEST = 40
 """Letters of a file's name in a picture: of more, those in the middle are left out."""
@@ -115,7 +115,7 @@ def file_names(a: Path, b: Path) -> tuple[str, str]:
 
 def _labelling(name: str) -> str:
     """matplotlib leaves out of a legend what begins with `_`, and cannot draw every letter that a file may have."""
-    name = visible(name).replace("\n", "\\n").replace("\t", "\\t")
+    name = line(name)
     if len(name) > LONGEST:
         name = f"{name[: LONGEST // 2]}…{name[-LONGEST // 2 :]}"
     return f"./{name}" if name.startswith("_") else name

@@ -11,8 +11,8 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile
 from batch.plotting.sheet import FAINT, INK, Sheet
-from batch.visible import visible
 from met.diagnostic import Problem, error
+from met.visible import visible
 
 T = TypeVar("T")
 

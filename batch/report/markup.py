@@ -6,7 +6,7 @@ import html
 import re
 from collections.abc import Iterable
 
-from batch.visible import visible
+from met.visible import visible
 
 
 class Html(str):

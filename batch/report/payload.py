@@ -14,7 +14,7 @@ from batch.report.changes import Comparison
 from batch.report.content import History, Map, Overview, Section, Signals, Stability
 from batch.report.markup import Html
 from batch.signals import pretty_unit
-from batch.visible import visible
+from met.visible import visible
 
 PRECISE = 1e-6
 """Numbers are kept in four bytes where the error of that is smaller than this share of their range."""

@@ -1,0 +1,189 @@
+"""Whether an experiment's group holds what MET writes into one: checked once, when an archive is opened.
+
+Who reads an archive may rely on it: cases rise and are there once, a status is one that a case can have, times rise,
+sizes are those of the dimensions. Values of signals, metrics and coordinates may be any number.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from met.run import DONE, LOST
+from met.visible import line
+
+if TYPE_CHECKING:
+    from batch.archive.read import Group, Stored
+
+
+class Unlike(ValueError):
+    """An archive lacks something that all archives have: what."""
+
+
+NUMBERS, WHOLE, WORDS = "iuf", "iu", "O"
+"""Kinds of numpy's types: of numbers, of whole ones, and of strings as h5py has them."""
+
+ATTRIBUTES: dict[str, tuple[type, ...]] = {
+    "experiment": (str,), "arm": (str,), "integrator": (str,), "velocity_products": (str,), "duration_s": (float,),
+    "dynamics_hz": (float,), "record_hz": (float,), "cases_in_table": (int,),
+}  # fmt: skip
+"""What every experiment's group says, and of which type; numbers are above 0."""
+
+WORDED = ("sweep", "structure_key", "code_key", "frame", "coordinates")
+"""What one may say besides, in words."""
+
+VARIABLES = {"case": WHOLE, "case_id": WORDS, "cause": WORDS, "status": WHOLE, "n_valid": WHOLE}
+"""What every experiment's group has along its cases, and of which type."""
+
+OTHERS: dict[str, tuple[tuple[str, ...], str]] = {
+    "case_key": (("case",), WORDS), "repeat": (("case",), WHOLE), "seed": (("case",), WHOLE),
+    "bed_limited": (("case",), WHOLE), "recorded_case": (("recorded_case",), WHOLE), "time": (("time",), "f"),
+    "requirement": (("requirement",), WORDS), "met": (("case", "requirement"), WHOLE),
+}  # fmt: skip
+"""What one may have besides under these names: its dimensions and type."""
+
+OF_ROLES: dict[str, str | tuple[str, ...]] = {
+    "coordinate": ("<f8",), "metric": ("<f8",), "signal": ("<f8", "<f4"), "choice": WORDS,
+}  # fmt: skip
+"""Types by what a variable is for: kinds, or types as numpy writes them."""
+
+MOST = 1e15
+"""Seconds, hertz and cases that no run has; nor one by it of seconds and hertz."""
+
+MOST_CASE = 1 << 53
+"""Numbers of cases are exact as doubles, too."""
+
+
+def check(group: Group) -> None:
+    """Raises Unlike; what HDF5 says of bytes that are damaged passes through."""
+    _attributes(group.attributes)
+    variables = group.variables
+    shapes = {name: group.shape(name) for name in variables}
+    types = {name: group.type(name) for name in variables}
+    wanted = {**OTHERS, **{name: (("case",), kind) for name, kind in VARIABLES.items()}}
+    for name in VARIABLES:
+        if name not in variables:
+            raise Unlike(f"variable `{name}` is missing or of another type")
+    for name, variable in variables.items():
+        dims, kinds = wanted.get(name, (variable.dims, NUMBERS + WORDS))
+        if variable.dims != dims or types[name][1] not in kinds:
+            raise Unlike(f"variable `{name}` is missing or of another type")
+        if any(dim not in shapes for dim in variable.dims):
+            raise Unlike(f"variable `{name}` lacks a dimension")
+        if shapes[name] != tuple(shapes[dim][0] for dim in variable.dims):
+            raise Unlike(f"variable `{name}` is not of the size of its dimensions")
+        _of_its_role(variable, types)
+    _names(group)
+    _requirements(group)
+    _values(group)
+
+
+def of_joints(variable: Stored) -> bool:
+    """Whether a signal's third dimension holds joints."""
+    return any(dim == "joint" or dim.startswith("joint_of_") for dim in variable.dims[2:3])
+
+
+def _names(group: Group) -> None:
+    """That what a deck calls things are names: of letters, numbers and marks that can be seen, in one line."""
+    attributes = group.attributes
+    names = [attributes["experiment"], attributes.get("sweep", ""), *group.variables]
+    for variable in group.role("signal"):
+        for dim in variable.dims[2:]:
+            names += group.values(dim).tolist()
+    for name in names:
+        if line(name) != name:
+            raise Unlike(f"a name in it has characters that no name has: {name}")
+
+
+def _attributes(attributes: dict[str, Any]) -> None:
+    for name, types in ATTRIBUTES.items():
+        value = attributes.get(name)
+        if not isinstance(value, types) or isinstance(value, bool):
+            raise Unlike(f"attribute `{name}` is missing or of another type")
+        if not isinstance(value, str) and not 1 / MOST < value < MOST:
+            raise Unlike(f"attribute `{name}` is {value}")
+    for name in WORDED:
+        if not isinstance(attributes.get(name, ""), str):
+            raise Unlike(f"attribute `{name}` is missing or of another type")
+
+
+def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
+    """That what a variable is for goes with its type and dimensions. types: of all variables, as numpy writes them."""
+    kinds = {name: each[1] for name, each in types.items()}
+    name, dims = variable.name, variable.dims
+    wanted = OF_ROLES.get(variable.role, NUMBERS + WORDS)
+    if kinds[name] not in wanted and types[name] not in wanted:
+        raise Unlike(f"variable `{name}` is of another type")
+    if variable.role in ("coordinate", "metric", "choice", "case") and dims != ("case",):
+        raise Unlike(f"variable `{name}` is not over cases")
+    if variable.role == "signal":
+        if dims[:2] != ("recorded_case", "time"):
+            raise Unlike(f"variable `{name}` is not over cases and time")
+        if len(dims) > (4 if of_joints(variable) else 3):
+            raise Unlike(f"variable `{name}` has more dimensions than joints and components")
+        if any(kinds[dim] not in WORDS for dim in dims[2:]):
+            raise Unlike(f"variable `{name}` has a dimension without names")
+    scale = variable.attributes.get("deck_scale", 1.0)
+    if not isinstance(scale, int | float) or not math.isfinite(scale) or not scale:
+        raise Unlike(f"variable `{name}` has no scale")
+
+
+def _requirements(group: Group) -> None:
+    """That what is required is said of each requirement, where it is said; and whether each case met it."""
+    if "requirement" not in group.variables:
+        return
+    count = group.shape("requirement")[0]
+    if count and "met" not in group.variables:
+        raise Unlike("variable `met` is missing or of another type")
+    told = group.variables["requirement"].attributes
+    for name, types in (("metric", str), ("comparison", str), ("limit", float)):
+        values = told.get(name, [])
+        values = values if isinstance(values, list) else [values]
+        if name in told and (len(values) != count or not all(isinstance(value, types) for value in values)):
+            raise Unlike(f"attribute `{name}` of `requirement` is not of each")
+
+
+def _values(group: Group) -> None:
+    """That cases, how they ended, times and names are such as there can be."""
+    cases, valid = group.values("case"), group.values("n_valid")
+    if not _rises(cases) or (len(cases) and not (cases[0] >= 0 and cases[-1] <= MOST_CASE)):
+        raise Unlike("its cases do not rise")
+    if not len(cases):
+        raise Unlike("it has no case")
+    _within(group, "status", DONE, LOST)
+    if "met" in group.variables:
+        _within(group, "met", -1, 1)
+    rows = None
+    if "time" in group.variables:
+        times = group.values("time")
+        rows = len(times)
+        if not rows or not (np.diff(times) > 1 / MOST).all() or not 0.0 <= times[0] <= times[-1] < MOST:
+            raise Unlike("its times do not rise")
+    if valid.min() < 0 or (rows is not None and valid.max() > rows):
+        raise Unlike("variable `n_valid` is not of its times")
+    if "recorded_case" in group.variables:
+        recorded = group.values("recorded_case")
+        if not _rises(recorded) or not np.isin(recorded, cases).all():
+            raise Unlike("its recorded cases are none of its cases")
+    for variable in group.role("signal"):
+        for dim in variable.dims[2:]:
+            names = group.values(dim).tolist()
+            if not names or len(set(names)) != len(names) or not all(names):
+                raise Unlike(f"variable `{dim}` does not name each")
+        joints = group.shape(variable.dims[2])[0] if of_joints(variable) else 1
+        if variable.units_by_joint and len(variable.units_by_joint) != joints:
+            raise Unlike(f"variable `{variable.name}` has not a unit of each joint")
+        if "time" not in group.variables or "recorded_case" not in group.variables:
+            raise Unlike(f"variable `{variable.name}` is not over cases and time")
+
+
+def _rises(values: np.ndarray) -> bool:
+    return bool((values[1:] > values[:-1]).all())
+
+
+def _within(group: Group, name: str, low: int, high: int) -> None:
+    values = group.values(name)
+    if values.size and not (values.min() >= low and values.max() <= high):
+        raise Unlike(f"variable `{name}` has a value that it cannot have")

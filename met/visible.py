@@ -1,0 +1,41 @@
+"""Texts from decks, archives and file names, in which what cannot be seen is made visible; and how they are said.
+
+A name may hold what a terminal obeys: sequences that move the cursor, change colours or the window's title, or turn the
+direction of what follows. So nothing that somebody else wrote is printed but through here, on a terminal or not.
+"""
+
+from __future__ import annotations
+
+import sys
+import unicodedata
+
+# Marks that turn the direction of what follows: a name with one reads as another name.
+TURNING = frozenset("\u200e\u200f\u061c\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+
+
+def visible(text: str) -> str:
+    """The text with what cannot be seen, or cannot be written as UTF-8, as an escape: `\\x00`, `\\u202e`."""
+    if text.isascii() and text.isprintable():
+        return text
+    return "".join(_shown(character) for character in text)
+
+
+def line(text: str) -> str:
+    """The same of what is to be one line: its line ends and tabs are escapes, too."""
+    return visible(text).replace("\n", "\\n").replace("\t", "\\t")
+
+
+def say(text: str = "", *, end: str = "\n", err: bool = False, exact: bool = False) -> None:
+    """Print a text, visible. err: on stderr. exact: as it is where no terminal is, for programs and files."""
+    stream = sys.stderr if err else sys.stdout
+    print(text if exact and not stream.isatty() else visible(text), end=end, file=stream, flush=True)
+
+
+def _shown(character: str) -> str:
+    if character in "\n\t":
+        return character
+    hidden = unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp") or character in TURNING
+    if not hidden:
+        return character
+    code = ord(character)
+    return f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}"
