@@ -182,7 +182,7 @@ def heading(group: Group, width: int) -> list[str]:
     )
     indent = len(group.name) + 2
     if width - indent < NARROWEST:  # a name that leaves no room stands on a line of its own
-        lines = ["", *textwrap.wrap(text, width - (indent := 4))]
+        lines = ["", *textwrap.wrap(text, max(NARROWEST, width - (indent := 4)))]
     else:
         lines = textwrap.wrap(text, width - indent)
     out = [f"{group.name}  {lines[0]}".rstrip(), *(" " * indent + rest for rest in lines[1:])]

@@ -12,6 +12,9 @@ from hw.protocol.frames import Decoder, unframed
 from hw.transcript import LOST, OPENED, RECEIVED, SENT, Record, Transcript, read
 from met.diagnostic import Problem, error
 
+LONGEST = 1000.0
+"""Seconds between two exchanges that no bed waits."""
+
 
 class ReplayBed(WireBed):
     """path: of the transcript. Raises Problem E409; its methods E407 where what is asked is not what was asked,
@@ -25,6 +28,8 @@ class ReplayBed(WireBed):
         header = self.transcript.header
         try:
             period, first = float(header["period"]), int(header["first"])
+            if not 0.0 < period < LONGEST or not 0 <= first <= 0xFFFF:
+                raise ValueError
         except (KeyError, TypeError, ValueError, OverflowError):
             helps = "give the transcript of a bed on a serial line"
             raise Problem(error("E409", f"{path} does not say how its bed was driven", help=helps)) from None

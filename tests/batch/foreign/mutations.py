@@ -178,6 +178,14 @@ def _group(chance: random.Random, file: Any, name: str) -> str:
 def _plan(chance: random.Random, provenance: Any) -> str:
     """Something else at one place of the plan's JSON."""
     document = json.loads(provenance["plan"].asstr()[()])
+    path = mutate_json(chance, document)
+    del provenance["plan"]
+    provenance.create_dataset("plan", data=json.dumps(document), dtype=h5py.string_dtype("utf-8"))
+    return f"plan{path}"
+
+
+def mutate_json(chance: random.Random, document: Any) -> str:
+    """Something else at one place of a document; which, in words."""
     node, path = document, ""
     while True:
         keys: list[Any] = list(node) if isinstance(node, dict) else list(range(len(node)))
@@ -193,13 +201,11 @@ def _plan(chance: random.Random, provenance: Any) -> str:
             path += " gone"
         else:
             node[key] = chance.choice((None, True, 0, -1, 1, 1e308, 10**30, "", "nan", "x\x1b[31m", "../a", [], {},
-                                       [[]], [1, 2, 3], {"word": "x"}, {"formula": 0}, 0.5))  # fmt: skip
+                                       [[]], [1, 2, 3], {"word": "x"}, {"formula": 0}, 0.5,
+                                       float("nan"), "a/b"))  # fmt: skip
             path += f" = {node[key]!r}"
         break
-    text = json.dumps(document)
-    del provenance["plan"]
-    provenance.create_dataset("plan", data=text, dtype=h5py.string_dtype("utf-8"))
-    return f"plan{path}"
+    return path
 
 
 def wrong(said: Said, words: tuple[str, ...]) -> str:
