@@ -5,13 +5,15 @@
     case,gearbox.kp,time,shoulder.q,elbow.q,shoulder.qd
 
 `#` begins a comment (`pandas.read_csv(path, comment="#")`). Numbers are written so that reading gives the same bits.
-Of histories the column `run` is there where there are several, `case` and what is varied where there are cases.
+Of histories the column `run` is there where there are several, `case` and what is varied where there are cases. No
+name begins as a formula of a spreadsheet does.
 """
 
 from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -22,11 +24,35 @@ from batch.export.cases import Table, of_varied, value_of, varied
 from batch.export.output import whole
 from batch.export.picking import Case, Column
 from met.version import VERSION
+from met.visible import line
+
+BEGINS = "=+-@\t\r\uff1d\uff0b\uff0d\uff20"
+"""With what a spreadsheet takes a cell for a formula; no name that a deck gives begins so."""
 
 
 def own(path: Path) -> bool:
     """Whether a file may be written over unasked: a table may have been worked on, so never."""
     return False
+
+
+def word(text: str) -> str:
+    """A word that no spreadsheet takes for a formula: what begins as one gets an apostrophe before it. What begins with
+    an apostrophe gets one, too, so that who takes the first away has the word again."""
+    return f"'{text}" if text[:1] in (*BEGINS, "'") else text
+
+
+def _remark(text: str) -> str:
+    """What stands behind `#`: a spreadsheet cuts that into cells, too."""
+    return re.sub(rf"([,;]\s*)(?=[{re.escape(BEGINS)}])", r"\1'", line(text))
+
+
+def _cell(text: str) -> str:
+    """A word as a cell, in quotes where it needs them."""
+    if text.isalnum():
+        return text
+    out = io.StringIO()
+    csv.writer(out, lineterminator="").writerow([word(text)])
+    return out.getvalue()
 
 
 def united(cases: Sequence[Case]) -> list[Column]:
@@ -72,21 +98,16 @@ def _head(file: ArchiveFile, runs: Iterable[str], heads: Sequence[tuple[str, str
     """What it is of, the columns' units, their names."""
     head = io.StringIO()
     lines = csv.writer(head, lineterminator="\n")
-    head.write(f"# MET {VERSION}: {', '.join(runs)} of {' '.join(file.deck.split())}\n# units: ")
-    lines.writerow([unit for _, unit in heads])
-    lines.writerow([name for name, _ in heads])
+    about = _remark(f"{', '.join(runs)} of {' '.join(file.deck.split())}")
+    head.write(f"# MET {VERSION}: {about}\n# units: ")
+    lines.writerow([word(line(unit)) for _, unit in heads])
+    lines.writerow([word(name) for name, _ in heads])
     return head.getvalue().encode("utf-8", "replace")
 
 
 def _line(cells: Sequence[object]) -> list[str]:
     """Cells as CSV has them: numbers as `repr` writes them, words in quotes where they need some."""
-    return [_quoted(cell) if isinstance(cell, str) else "" if cell is None else repr(cell) for cell in cells]
-
-
-def _quoted(text: str) -> str:
-    if not set(text) & set(',"\r\n'):
-        return text
-    return '"' + text.replace('"', '""') + '"'
+    return [_cell(cell) if isinstance(cell, str) else "" if cell is None else repr(cell) for cell in cells]
 
 
 def _cells(case: Case, columns: Sequence[Column]) -> list[list[str]]:
