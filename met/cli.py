@@ -155,6 +155,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     # numpy's linear algebra would start a thread a core while it is imported (a sixth of `met check`); MET has its own.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # HDF5 loads a library because a file names its filter, from wherever the environment says; archives have none.
+    os.environ.setdefault("HDF5_PLUGIN_PRELOAD", "::")
     # A start makes many objects and drops few: by default they are looked through some 30 times, 15 ms of a start.
     gc.set_threshold(50_000)
     for name in ("stdout", "stderr"):

@@ -9,6 +9,7 @@ from typing import Any
 from batch.output import quoted
 from met.diagnostic import Problem, error
 from met.files import open_regular
+from met.visible import visible
 
 SOFTWARE = "MET"
 MOST_DOTS = 200_000_000
@@ -68,6 +69,10 @@ def save(figure: Any, output: Path) -> None:
     import importlib
     import warnings
 
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):  # names and units of an archive are anybody's
+        text.set_text(visible(text.get_text()))
     kind = output.suffix.lower()
     _check_dots(figure, kind)
     backend, canvas = {

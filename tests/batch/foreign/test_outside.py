@@ -190,3 +190,9 @@ def test_a_group_of_ones_own_in_an_archive_is_in_nobodys_way(single: Path, tmp_p
         notes["again"] = notes
         notes.create_dataset("packed", data=np.zeros(100_000), compression="gzip", shuffle=True)
     assert met("show", str(copy)).status == 0
+
+
+def test_no_library_is_loaded_because_a_file_names_its_filter(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("HDF5_PLUGIN_PRELOAD", raising=False)
+    met("--version")
+    assert os.environ["HDF5_PLUGIN_PRELOAD"] == "::"  # HDF5's word for: none at all

@@ -7,6 +7,7 @@ import json
 import sys
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
@@ -160,3 +161,16 @@ def test_a_report_escapes_what_would_end_its_script(archive: Path, tmp_path: Pat
     assert "<script>alert" not in text and "<img src=x" not in text and "</script><" not in text.replace(
         "</script></body>", ""
     ).replace("</script>\n<", "")
+
+
+def test_pictures_and_pages_hold_what_was_made_visible(archive: Path, tmp_path: Path) -> None:
+    with changed(archive, tmp_path) as (copy, file):
+        poisoned(file)
+    commands = readers(copy, tmp_path, archive)
+    for name in ("plot", "report", "report --against", "export csv"):
+        assert met(*commands[name]).status == 0, name
+    ElementTree.parse(tmp_path / "plot.svg")
+    for name in ("plot.svg", "report.html", "out.csv"):
+        text = (tmp_path / name).read_text(encoding="utf-8").replace("\t", "")
+        found = CONTROL.search(text)
+        assert found is None, (name, text[max(0, found.start() - 80) : found.end() + 20])
