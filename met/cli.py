@@ -8,6 +8,7 @@ wrong it raises as a `Problem`, which is printed here, once, and ends with 2.
 from __future__ import annotations
 
 import gc
+import io
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +21,7 @@ from met.diagnostic import Diagnostic, Problem, error, nearest
 from met.entry_points import EntryPoint, offered
 from met.sources import names_archive, names_plan
 from met.version import VERSION
-from met.visible import say, visible
+from met.visible import say
 
 YES, NO, BAD_INPUT = 0, 1, 2
 INTERRUPTED, PIPE_CLOSED = 130, 141  # 128 + the signal, as a shell counts
@@ -191,8 +192,9 @@ def _run(arguments: list[str]) -> int:
         if json:
             complain([error("U001", mistake.format_message())], {}, json=True)
         else:
-            mistake.message = visible(mistake.message)
-            mistake.show()
+            shown = io.StringIO()
+            mistake.show(shown)
+            say(shown.getvalue(), end="", err=True)
         return BAD_INPUT
     except (KeyboardInterrupt, click.Abort):
         print("\nmet: interrupted", file=sys.stderr)

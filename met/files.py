@@ -12,7 +12,8 @@ import json
 import math
 import os
 import stat
-from typing import Any, BinaryIO
+from io import BufferedReader
+from typing import Any
 
 MOST_JSON_BYTES = 64 << 20
 """A sidecar or a description of a campaign has some kilobytes."""
@@ -25,7 +26,7 @@ KINDS = {
 }  # fmt: skip
 
 
-def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
+def open_regular(path: str | os.PathLike[str]) -> BufferedReader:
     """A regular file, open for reading. Raises OSError, at once, where it is none."""
     name = os.fspath(path)
     if "\0" in name:

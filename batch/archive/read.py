@@ -256,7 +256,7 @@ class ArchiveFile:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._arithmetic.__exit__()
+        self._arithmetic.__exit__(None, None, None)
         self._file.close()
 
     def _groups(self) -> tuple[Group, ...]:

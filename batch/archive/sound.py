@@ -102,7 +102,7 @@ def _attributes(attributes: dict[str, Any]) -> None:
         value = attributes.get(name)
         if not isinstance(value, types) or isinstance(value, bool):
             raise Unlike(f"attribute `{name}` is missing or of another type")
-        if not isinstance(value, str) and not 1 / MOST < value < MOST:
+        if isinstance(value, int | float) and not 1 / MOST < value < MOST:
             raise Unlike(f"attribute `{name}` is {value}")
     for name in WORDED:
         if not isinstance(attributes.get(name, ""), str):
