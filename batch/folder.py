@@ -36,7 +36,7 @@ from batch.tasks import Done, Section, Task
 from met import plan_file
 from met import run as engine
 from met.diagnostic import Problem, error
-from met.files import is_count, read_json, read_regular
+from met.files import is_count, new_file, read_json, read_regular
 from met.plan import Plan
 from met.program.step import ASTRAY
 from met.version import VERSION
@@ -157,7 +157,7 @@ class Folder:
             rows = None
             if len(section.rows) < section.prepared.experiment.cases.count:
                 rows = f"rows.{section.number}.npy"
-                with (self.path / rows).open("wb") as file:
+                with new_file(self.path / rows) as file:
                     np.save(file, section.rows)
             told.append({
                 "number": section.number, "name": section.name, "again": section.number != section.experiment,
@@ -376,8 +376,8 @@ def put(path: Path, data: Any) -> None:
     """Write JSON whole, or not at all."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        with temporary.open("w", encoding="utf-8") as file:
-            json.dump(data, file)
+        with new_file(temporary) as file:
+            file.write(json.dumps(data).encode())
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)

@@ -19,6 +19,7 @@ from batch.export import FORMATS
 from batch.folder import Folder, beside
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem, error
+from met.files import new_file
 from met.plan import Experiment, Plan
 
 
@@ -45,7 +46,8 @@ def publish(output: Path, temporary: Path, sidecar: dict[str, Any]) -> None:
     beside = sidecar_path(output)
     beside_temporary = temporary_of(beside)
     try:
-        beside_temporary.write_text(json.dumps(sidecar, indent=1) + "\n", encoding="utf-8")
+        with new_file(beside_temporary) as file:
+            file.write(f"{json.dumps(sidecar, indent=1)}\n".encode())
         temporary.replace(output)
         beside_temporary.replace(beside)
     finally:

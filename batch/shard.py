@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from met.files import is_count, open_regular, parse_json
+from met.files import is_count, new_file, open_regular, parse_json
 from met.frozen import frozen
 from met.run import FAILED, LOST, TIMED_OUT
 
@@ -82,7 +82,7 @@ def write(path: Path, shard: Shard) -> None:
     temporary = path.with_name(f".{path.name}.{socket.gethostname()}.{os.getpid()}.tmp")
     summed = SUM()
     try:
-        with temporary.open("wb", buffering=0) as file:
+        with new_file(temporary) as file:
             for part in parts:
                 summed.update(part)
                 _put(file.fileno(), part)

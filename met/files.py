@@ -7,12 +7,13 @@ archives, plans, shards, sidecars, transcripts, decks. Whatever is refused is an
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import json
 import math
 import os
 import stat
-from io import BufferedReader
+from io import BufferedReader, BufferedWriter
 from typing import Any
 
 MOST_JSON_BYTES = 64 << 20
@@ -49,6 +50,14 @@ def read_regular(path: str | os.PathLike[str], most: int | None = None) -> bytes
     if most is not None and len(data) > most:
         raise OSError(errno.EFBIG, f"it has more than {most >> 20} MiB", os.fspath(path))
     return data
+
+
+def new_file(path: str | os.PathLike[str]) -> BufferedWriter:
+    """A new file of this name, open for writing; what had the name is gone. A link or a pipe that lies in wait there is
+    neither followed nor written into. Raises OSError."""
+    with contextlib.suppress(FileNotFoundError):
+        os.unlink(path)
+    return open(path, "xb")
 
 
 def read_json(path: str | os.PathLike[str], most: int = MOST_JSON_BYTES) -> Any:

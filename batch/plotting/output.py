@@ -8,7 +8,7 @@ from typing import Any
 
 from batch.output import quoted
 from met.diagnostic import Problem, error
-from met.files import open_regular
+from met.files import new_file, open_regular
 from met.visible import visible
 
 SOFTWARE = "MET"
@@ -82,7 +82,7 @@ def save(figure: Any, output: Path) -> None:
     temporary = output.with_name(f".{output.name}.{os.getpid()}.tmp")
     try:
         try:
-            with temporary.open("wb") as file, warnings.catch_warnings():
+            with new_file(temporary) as file, warnings.catch_warnings():
                 warnings.filterwarnings("error", message="constrained_layout not applied")
                 warnings.filterwarnings("ignore", message="Glyph .* missing from font")
                 getattr(drawn, f"print_{kind[1:]}")(file, metadata=METADATA[kind])

@@ -8,7 +8,7 @@ from pathlib import Path
 from batch.output import quoted
 from batch.report.page import GENERATOR
 from met.diagnostic import Problem, error
-from met.files import open_regular
+from met.files import new_file, open_regular
 
 ENDINGS = (".html", ".htm")
 HEAD_BYTES = 400
@@ -59,7 +59,7 @@ def write(output: Path, text: str) -> None:
     temporary = output.with_name(f".{output.name}.{os.getpid()}.tmp")
     try:
         try:
-            with temporary.open("wb") as file:
+            with new_file(temporary) as file:
                 file.write(text.encode("utf-8"))
                 file.flush()
                 os.fsync(file.fileno())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -68,3 +69,15 @@ def test_json_is_read_as_it_was_written() -> None:
     assert files.parse_json('{"a": [1, -2.5, null, true, 18446744073709551615]}') == {
         "a": [1, -2.5, None, True, (1 << 64) - 1]
     }
+
+
+@pytest.mark.parametrize("make", [lambda at: at.symlink_to("other"), os.mkfifo, lambda at: at.write_bytes(b"old")])
+def test_a_new_file_is_written_into_nothing_that_lies_in_wait_there(
+    make: Callable[[Path], object], tmp_path: Path
+) -> None:
+    (tmp_path / "other").write_bytes(b"mine")
+    make(tmp_path / "a")
+    with files.new_file(tmp_path / "a") as file:
+        file.write(b"new")
+    assert (tmp_path / "other").read_bytes() == b"mine"
+    assert not (tmp_path / "a").is_symlink() and (tmp_path / "a").read_bytes() == b"new"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
@@ -11,13 +12,14 @@ from pathlib import Path
 
 import pytest
 
+import batch
 from batch.folder import beside
 from hw.transcript import read
 from met import plan_file
 from met.diagnostic import Problem
 from met.render import render
 from tests.batch import plans
-from tests.batch.begun import begin, go_on, refused, short_tasks
+from tests.batch.begun import begin, go_on, plan, refused, short_tasks
 from tests.batch.foreign.archives import DECK, met
 
 
@@ -168,3 +170,22 @@ def test_a_pipe_in_the_place_of_a_sidecar_is_as_if_there_were_none(archive: Path
     os.mkfifo("a.h5.run.json")
     said = met("status", "a.h5")
     assert (said.status, said.text) == (0, "a.h5 is whole: 7 cases\n")
+
+
+def test_a_link_in_the_place_of_a_campaigns_rows_is_not_written_through(
+    here: Path, engine: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short_tasks(monkeypatch)
+    begin(Path("a.h5"), cases=list(range(30)))
+    Path("mine").write_bytes(b"mine")
+    rows = Path("a.h5.campaign/rows.0.npy")
+    rows.unlink()
+    rows.symlink_to("../mine")
+    batch.run(plan(), output="a.h5", cases=list(range(30)))
+    assert Path("mine").read_bytes() == b"mine"
+
+
+def test_a_pipe_in_the_place_of_a_temporary_sidecar_is_not_waited_for(here: Path, engine: None) -> None:
+    os.mkfifo(".a.h5.run.json.tmp")
+    batch.run(plans.plan(), output="a.h5")
+    assert json.loads(Path("a.h5.run.json").read_text(encoding="utf-8"))["experiments"]
