@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Container, Sequence
 
-from ic.text.lexer import BAD, NAME, NOTHING, NUMBERS, PASTE, SPACE, Token
+from ic.text.lexer import BAD, NAME, NUMBERS, PASTE, SPACE, Token
 from ic.text.limits import LONGEST_NAME, MOST_MACRO_BODY, Findings
 from ic.text.strays import complain_of_stray
+from ic.text.substitute import OPTIONAL, REST, Macro, closing
 from met import units
+from met.diagnostic import Label
 
-PASTED_COMMA = "##"  # text of white space; see forms_at_comma
 CLOCK = ("__DATE__", "__TIME__", "__TIMESTAMP__")
-REST = "__VA_ARGS__"
-PREDEFINED = ("__FILE__", "__LINE__", "defined", REST, *CLOCK)
+LONGEST_UNIT = 200  # tokens
+COUNTER = "__COUNTER__"  # 0, 1, 2, ...: another number at each use
+PREDEFINED = ("__FILE__", "__LINE__", COUNTER, "defined", REST, OPTIONAL, *CLOCK)
 
 
-def checked(tokens: list[Token], findings: Findings) -> list[Token] | None:
-    """The body of a sound definition; None, and a message, for another."""
+def checked(tokens: list[Token], is_macro: Callable[[str], bool], findings: Findings) -> list[Token] | None:
+    """The body of a sound definition; None, and a message, for another. is_macro: whether there is one of a name."""
     name, tell = tokens[0], findings.error
     if name.kind != NAME:
         tell("D007", f"a macro's name cannot be `{name.text[:LONGEST_NAME]}`", name.place,
@@ -55,7 +57,12 @@ def checked(tokens: list[Token], findings: Findings) -> list[Token] | None:
     for token in written:
         if token.kind == BAD:
             complain_of_stray(token, findings)
-    if parameters is not None and not _checked_strings(written, {token.text for token in parameters}, findings):
+    if not _checked_rest(written, parameters or (), findings):
+        return None
+    if parameters is not None and not (
+        _checked_strings(written, {token.text for token in parameters}, findings)
+        and _checked_units(parameters, written, is_macro, findings)
+    ):
         return None
     for token in (*written[:1], *written[-1:]):
         if token.kind == PASTE:
@@ -76,12 +83,6 @@ def _checked_parameters(name: Token, written: list[Token], findings: Findings) -
                 findings.error("D007", f"expected `,` and a parameter, or `)`, not `{token.text}`", token.place,
                                help=help)  # fmt: skip
                 return False
-        elif units.is_unit(token.text):
-            word = units.UNITS[token.text].word
-            message = f"a macro's parameter cannot be called `{token.text}`: that is the unit {word}"
-            help = f"in the body of `{name.text}` it would replace the unit: `0.5 {token.text}` would lose it"
-            findings.error("D011", message, token.place, help=help)
-            return False
         elif token.text == "..." and last:
             pass
         elif token.kind != NAME or token.text in PREDEFINED or token.text in seen:
@@ -96,13 +97,98 @@ def _checked_parameters(name: Token, written: list[Token], findings: Findings) -
 
 def _checked_strings(written: list[Token], parameters: set[str], findings: Findings) -> bool:
     """Whether a parameter follows each `#` of a macro that takes arguments."""
-    known = parameters - {"...", ","} | ({REST} if "..." in parameters else set())
+    known = parameters - {"...", ","} | ({REST, OPTIONAL} if "..." in parameters else set())
     for i, token in enumerate(written):
         if token.text == "#" and (i + 1 == len(written) or written[i + 1].text not in known):
             findings.error("D019", "`#` makes a string of a parameter, and none follows", token.place,
                            help="a macro cannot make directives")  # fmt: skip
             return False
     return True
+
+
+def _checked_rest(written: list[Token], parameters: Sequence[Token], findings: Findings) -> bool:
+    """Whether `__VA_ARGS__` and `__VA_OPT__(...)` stand where a macro takes more arguments, and the latter is whole."""
+    tell = findings.error
+    variadic = any(token.text == "..." for token in parameters)
+    end = 0
+    for i, token in enumerate(written):
+        if token.kind != NAME or token.text not in (REST, OPTIONAL):
+            continue
+        if not variadic:
+            tell("D007", f"`{token.text}` stands in the body of a macro that takes `...` only", token.place,
+                 help="`...` as the last parameter takes all further arguments")  # fmt: skip
+            return False
+        if token.text == REST:
+            continue
+        if i < end:
+            tell("D007", f"`{OPTIONAL}` stands within another", token.place, help="write one behind the other")
+            return False
+        opens = i + 1 < len(written) and written[i + 1].text == "("
+        end = closing(written, i + 1) if opens else len(written)
+        if end == len(written):
+            tell("D007", f"`{OPTIONAL}` needs parentheses around what it is about", token.place,
+                 help=f"write `{OPTIONAL}(, {REST})`: what stands there is left out where no more arguments are given",
+                 )  # fmt: skip
+            return False
+        for piece in (written[i + 2], written[end - 1]):
+            if piece.kind == PASTE:
+                tell("D019", "`##` joins two tokens, so it cannot stand at an end", piece.place,
+                     help="write what it joins on both sides of it")  # fmt: skip
+                return False
+    return True
+
+
+def _checked_units(parameters: Sequence[Token], written: list[Token], is_macro: Callable[[str], bool],
+                   findings: Findings) -> bool:  # fmt: skip
+    """Whether no parameter with a unit's name stands where the body may have that unit."""
+    names = {token.text: token for token in parameters}
+    for i, token in enumerate(written):
+        if token.text not in names or not units.is_unit(token.text):
+            continue
+        before = written[max(0, i - LONGEST_UNIT) : i]
+        if _may_be_unit(before, names, is_macro):
+            word = units.UNITS[token.text].word
+            message = f"a macro's parameter cannot be called `{token.text}`: in its body that is the unit {word}"
+            label = Label(token.place, f"this `{token.text}` would be the argument, not the unit")
+            findings.error("D011", message, names[token.text].place, also=(label,), help="choose another name for it")
+            return False
+    return True
+
+
+def _may_be_unit(body: Sequence[Token], parameters: Container[str], is_macro: Callable[[str], bool]) -> bool:
+    """Whether a unit could follow: the body ends in a number or closing bracket, or what may become one, or in `*`, `/`
+    or `(` behind another unit."""
+    at = len(body)
+    while at > 0:
+        before = body[at - 1]
+        if before.text == "(":
+            at -= 1
+            continue
+        if before.text not in ("*", "/"):
+            if before.kind == NAME:
+                return before.text in parameters or is_macro(before.text)
+            return before.kind in NUMBERS or before.text in ("]", ")", "%")
+        at -= 2
+        if at < 1:
+            return False
+        if body[at].text == "1" and (body[at - 1].kind in NUMBERS or body[at - 1].text in ("]", ")")):
+            return True  # `15 1/s`
+        if body[at].kind in NUMBERS:  # behind an exponent, or no unit at all
+            at -= 1
+            at -= body[at].text in ("-", "+")
+            if body[at].text != "^":
+                return False
+            at -= 1
+        if body[at].text == ")":
+            depth = 0
+            while at > 0:
+                depth += {")": 1, "(": -1}.get(body[at].text, 0)
+                if depth == 0:
+                    break
+                at -= 1
+        elif not units.is_unit(body[at].text):
+            return False
+    return False
 
 
 def warn_of_quantity(name: Token, body: list[Token], findings: Findings) -> None:
@@ -120,50 +206,33 @@ def warn_of_quantity(name: Token, body: list[Token], findings: Findings) -> None
     findings.warn("D017", f"macro `{name.text}` is a quantity", name.place, help=help)
 
 
-def spelling(macro: Any) -> tuple[object, ...]:
+def parameters(head: list[Token]) -> tuple[str, ...] | None:
+    """The names between the parentheses of a sound definition; None where it has none."""
+    if not any(token.text == "(" for token in head):
+        return None
+    names = [token.text for token in head[2:-1] if token.kind != SPACE and token.text != ","]
+    return tuple(REST if name == "..." else name for name in names)
+
+
+def spelling(macro: Macro) -> tuple[object, ...]:
     """What makes two definitions the same: parameters and body, any white space being as good as another."""
     body: list[str] = []
-    for token in macro.written:
-        blank = token.kind == SPACE and token.text != PASTED_COMMA
+    for token in macro.body:
+        blank = token.kind == SPACE
         if not blank or (body and body[-1] != " "):
             body.append(" " if blank else token.text)
-    while body and body[-1] == " ":
-        body.pop()
-    return (tuple(macro.arglist) if macro.arglist is not None else None, macro.variadic, tuple(body))
+    return (macro.parameters, tuple(body))
 
 
-def without_space_at_paste(body: list[Token]) -> list[Token]:
+def trimmed(body: list[Token]) -> list[Token]:
+    """The body without white space at its ends and beside `##`."""
     kept: list[Token] = []
     for token in body:
-        if token.kind == SPACE and kept and kept[-1].kind == PASTE:
+        if token.kind == SPACE and (not kept or kept[-1].kind == PASTE):
             continue
-        while token.kind == PASTE and kept and kept[-1].kind == SPACE and len(kept) > 1:
+        while token.kind == PASTE and kept and kept[-1].kind == SPACE:
             kept.pop()
         kept.append(token)
+    while kept and kept[-1].kind == SPACE:
+        kept.pop()
     return kept
-
-
-def forms_at_comma(body: list[Token]) -> tuple[list[Token], list[Token]] | None:
-    """The body for a call that gives the rest of the arguments, and for one that does not; None where it is the same.
-
-    As in gcc, `, ## __VA_ARGS__` is a comma and the rest of the arguments, or neither. The `##` that pastes nothing
-    becomes white space; by its text pcpp still sees that the arguments behind it are to be put in as written.
-    """
-    given, omitted = list(body), list(body)
-    for i in range(len(body) - 3, -1, -1):
-        behind = body[i + 3].kind if i + 3 < len(body) else ""
-        if body[i].text == "," and body[i + 1].kind == PASTE and body[i + 2].text == REST and behind != PASTE:
-            given[i + 1] = body[i + 1].__copy__()
-            given[i + 1].kind = SPACE
-            spaced = i > 0 and body[i - 1].kind == SPACE
-            del omitted[i - spaced : i + 2]
-    return (given, omitted) if len(omitted) < len(body) else None
-
-
-def without_nothing(made: list[Token], spaced: bool) -> list[Token]:
-    """What a macro made, without what stood for nothing. spaced: white space was written before the rest of the
-    arguments, and stands behind the comma of forms_at_comma too."""
-    for piece in made:
-        if piece.kind == NOTHING and spaced and piece.text == PASTED_COMMA:
-            piece.kind, piece.text = SPACE, " "
-    return [piece for piece in made if piece.kind != NOTHING]

@@ -30,6 +30,7 @@ BAD = "BAD"  # no token; with an empty text where that has been said
 END = "END"
 PASTE = "CPP_DPOUND"
 NOTHING = "NOTHING"  # stands for an empty argument while `##` joins, and where a directive was
+LEFT = "LEFT"  # stands behind what a macro made, whose name is its text
 HASHES = "HASHES"  # a `##` that joins nothing: in an argument, or one that was joined itself
 COMMAND_LINE = "<command line>"  # the name of the text that holds the macros given with -D
 
@@ -132,10 +133,10 @@ class Token:
     """A piece of a deck: its kind, its text, and where it was written.
 
     expansions  the macros it came through, innermost first, as in `Place`
-    hidden      names of macros that this token may not expand again (C's rule against endless expansion)
+    painted     whether this name was met within what its macro made, so that it is never again a use of that macro
     """
 
-    __slots__ = ("expansions", "hidden", "kind", "length", "lexer", "offset", "source", "text")
+    __slots__ = ("expansions", "kind", "length", "lexer", "offset", "painted", "source", "text")
 
     # pcpp's names for `kind`, `text` and `offset`: the same slots
     type: str
@@ -149,7 +150,7 @@ class Token:
         self.offset = offset
         self.length = length
         self.expansions: tuple[Expansion, ...] = ()
-        self.hidden: frozenset[str] = frozenset()
+        self.painted = False
 
     @property
     def line(self) -> int:
@@ -171,7 +172,7 @@ class Token:
     def __copy__(self) -> Token:
         other = Token(self.kind, self.text, self.source, self.offset, self.length)
         other.expansions = self.expansions
-        other.hidden = self.hidden
+        other.painted = self.painted
         return other
 
     def __repr__(self) -> str:
@@ -238,29 +239,3 @@ def _lines_of(source: Text, text: str) -> Iterator[list[Token]]:
 
 def _number_kind(piece: str) -> str:
     return WHOLE if piece.isdigit() or piece[1:2] in ("x", "X") else DECIMAL
-
-
-class Lexer:
-    """What pcpp calls a lexer, for the little texts that it cuts itself: two tokens pasted by `##`.
-
-    made: how many tokens the last text gave.
-    """
-
-    def __init__(self) -> None:
-        self._left: list[Token] = []
-        self.made: list[tuple[str, int]] = []
-
-    def clone(self) -> Lexer:
-        return self
-
-    def input(self, text: str) -> None:
-        lines = list(logical_lines(Text("", text)))
-        self._left = [token for line in lines for token in line if token.text != "\n"][::-1]
-        for token in self._left:
-            token.kind = HASHES if token.kind == PASTE else token.kind
-        if not self._left:  # two empty arguments pasted
-            self._left = [Token(NOTHING, "", Text("", text), 0, 0)]
-        self.made.append((text, len(self._left)))
-
-    def token(self) -> Token | None:
-        return self._left.pop() if self._left else None

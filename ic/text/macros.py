@@ -1,8 +1,7 @@
 """Macros: what may be defined, and what a use of one becomes.
 
-pcpp parses a definition and puts arguments into a body, with `#` and `##`. The scan that finds what to expand is ours:
-it is linear, keeps C's hide sets, and lets every token know each macro that it came through. So are the checks: a
-deck's macros can be neither endless nor large, and may not take a unit's name.
+The scan that finds what to expand is linear, does what gcc's does (C leaves some of it open), and lets every token know
+each macro that it came through. A deck's macros can be neither endless nor large, and may not take a unit's name.
 """
 
 from __future__ import annotations
@@ -13,8 +12,8 @@ from typing import Any
 from pcpp import Preprocessor as Pcpp
 
 from ic.text import definitions
-from ic.text.definitions import CLOCK, PASTED_COMMA, PREDEFINED
-from ic.text.lexer import BAD, CHARACTER, HASHES, NAME, NOTHING, PASTE, SPACE, STRING, WHOLE, Lexer, Token
+from ic.text.definitions import CLOCK, COUNTER, PREDEFINED
+from ic.text.lexer import BAD, CHARACTER, HASHES, LEFT, NAME, NOTHING, PASTE, SPACE, STRING, WHOLE, Token
 from ic.text.limits import (
     LONGEST_NAME,
     LONGEST_STRING,
@@ -25,20 +24,9 @@ from ic.text.limits import (
     Findings,
     GiveUp,
 )
+from ic.text.substitute import Argument, Macro, NotOneToken, substituted
 from met import units
 from met.diagnostic import Expansion, Label, Place
-
-
-class _Argument(list[Token]):
-    """A macro's argument as written, with what it expands to; pcpp asks for one or the other."""
-
-    expanded: list[Token]
-    omitted = spaced = False
-
-    def __copy__(self) -> _Argument:
-        other = _Argument(self)
-        other.expanded = self.expanded
-        return other
 
 
 class Macros(Pcpp):
@@ -48,10 +36,12 @@ class Macros(Pcpp):
         self.findings = findings
         self._expanded = 0
         self._expanded_here = 0
+        self._counted = 0
         self._depth = 0
+        self._inside: set[str] = set()  # macros that are not used now: what they made is being read
         self.in_condition = False
-        super().__init__(Lexer())
-        self.macros: dict[str, Any] = {}
+        super().__init__(object())  # a lexer, which it never asks: it is handed tokens
+        self.macros: dict[str, Macro] = {}
         self.refused: dict[str, bool] = {}  # macros that were refused, which was told; whether with parameters
         self.auto_pragma_once_enabled = False
         self.expand_filemacro = False
@@ -69,7 +59,7 @@ class Macros(Pcpp):
     def define(self, tokens: Any) -> None:
         if isinstance(tokens, str):  # pcpp's own macros, and the clock: a deck must mean the same tomorrow
             return
-        body = definitions.checked(tokens, self.findings)
+        body = definitions.checked(tokens, self.is_macro, self.findings)
         name = tokens[0]
         if body is None:
             takes = len(tokens) > 1 and tokens[1].text == "("
@@ -78,36 +68,16 @@ class Macros(Pcpp):
             return
         self.refused.pop(name.text, None)
         old = self.macros.get(name.text)
-        head, body = tokens[: len(tokens) - len(body)], definitions.without_space_at_paste(body)
-        forms = definitions.forms_at_comma(body) if any(token.text == "..." for token in head) else None
-        macro = self._defined(head, body if forms is None else forms[0])
-        if forms is not None:
-            macro.without_rest = self._defined(head, forms[1])
-            self.macros[name.text] = macro
+        macro = Macro(name, definitions.parameters(tokens[: len(tokens) - len(body)]), definitions.trimmed(body))
+        self.macros[name.text] = macro
         if old is not None and definitions.spelling(old) != definitions.spelling(macro):
             self.findings.error(
                 "D010", f"macro `{name.text}` is defined again, differently", name.place,
                 also=(Label(old.name_token.place, "first defined here"),),
                 help=(f"`#undef {name.text}` first, or put the default between `#ifndef {name.text}` and `#endif`",),
             )  # fmt: skip
-        elif old is None and macro.arglist is None:
-            definitions.warn_of_quantity(name, macro.value, self.findings)
-
-    def _defined(self, head: list[Token], body: list[Token]) -> Any:
-        """The macro as pcpp makes it, with what we want to know besides."""
-        super().define([*head, *body])
-        macro = self.macros[head[0].text]
-        macro.name_token = head[0]
-        macro.written = body
-        macro.without_rest = None
-        for token in macro.value:
-            if token.kind == SPACE and token.text == PASTED_COMMA:
-                token.kind = NOTHING
-        macro.pastes = any(token.kind in (PASTE, NOTHING) for token in macro.value)
-        if macro.arglist is None and macro.pastes:
-            macro.patch, macro.str_patch = [], []
-        macro.var_comma_patch = []
-        return macro
+        elif old is None and macro.parameters is None:
+            definitions.warn_of_quantity(name, macro.body, self.findings)
 
     def undef(self, tokens: list[Token]) -> None:
         if tokens[0].kind != NAME:
@@ -118,48 +88,95 @@ class Macros(Pcpp):
         self.refused.pop(tokens[0].text, None)
 
     def expand_macros(self, tokens: list[Token], expanding_from: object = ()) -> list[Token]:
-        """The tokens with every macro expanded; at the outermost level without white space."""
-        if type(tokens) is _Argument:
-            return list(tokens.expanded)
-        macros = self.macros
+        """The tokens with every macro expanded; at the outermost level without white space.
+
+        As gcc does it: a macro is not used while what it made is being read, up to the token of kind LEFT behind that;
+        where its name is met meanwhile, that token is never again a use of it.
+        """
+        macros, inside = self.macros, self._inside
         keep_space = self._depth > 0
         pending = tokens[::-1]
         out: list[Token] = []
+        before = ""  # the last token that is no white space
         while pending:
             token = pending.pop()
             kind = token.kind
             if kind == NAME:
                 text = token.text
                 macro = macros.get(text)
-                if macro is not None and text not in token.hidden and not _is_varied(out, pending):
-                    self._use(token, macro, pending, out)
-                    continue
-                if macro is None and text in self.refused:
-                    self._use_refused(token, pending, out)
-                    continue
-                if text[:2] == "__":
+                if macro is not None and not token.painted:
+                    if text in inside:
+                        token.painted = True
+                    elif not (before == "macro" and self._is_varied(pending)) and self._use(token, macro, pending):
+                        continue
+                elif macro is None and text in self.refused:
+                    token = self._use_refused(token, pending)
+                elif text[:2] == "__":
                     token = self._predefined(token)
                 elif text == "defined" and self.in_condition:
                     self._keep_defined(pending, out, token)
                     continue
+            elif kind == LEFT:
+                inside.discard(token.text)
+                continue
             elif kind == NOTHING or (kind == SPACE and not keep_space):
                 continue
             out.append(token)
+            if kind != SPACE:
+                before = token.text
         return out
+
+    def _next_solid(self, pending: list[Token]) -> Token | None:
+        """What is next but for white space, which stays; macros whose end is passed on the way are left."""
+        blanks = []
+        while pending and pending[-1].kind in (SPACE, LEFT):
+            piece = pending.pop()
+            if piece.kind == LEFT:
+                self._inside.discard(piece.text)
+            else:
+                blanks.append(piece)
+        found = pending[-1] if pending else None
+        pending.extend(reversed(blanks))
+        return found
+
+    def _opens(self, pending: list[Token]) -> bool:
+        """Whether a "(" is next, which is then taken."""
+        following = self._next_solid(pending)
+        if following is None or following.text != "(":
+            return False
+        while pending.pop() is not following:
+            pass
+        return True
+
+    def _is_varied(self, pending: list[Token]) -> bool:
+        """Whether a macro's name behind `macro` stands in `vary macro NAME = [...]`, where it is the macro that is
+        meant, not its body."""
+        following = self._next_solid(pending)
+        return following is not None and following.text == "="
 
     def _keep_defined(self, pending: list[Token], out: list[Token], token: Token) -> None:
         """`defined NAME` that a macro made: the name is asked for, not expanded."""
         out.append(token)
-        while pending and (pending[-1].kind == SPACE or pending[-1].text == "("):
-            out.append(pending.pop())
-        if pending and pending[-1].kind == NAME:
-            out.append(pending.pop())
+        if self._opens(pending):
+            out.append(Token("CPP_LPAREN", "(", token.source, token.offset, token.length))
+        following = self._next_solid(pending)
+        if following is not None and following.kind == NAME:
+            while pending.pop() is not following:
+                pass
+            out.append(following)
 
     def _predefined(self, token: Token) -> Token:
         outermost = token.expansions[-1].use if token.expansions else token.place
         made = token.__copy__()
         if token.text == "__LINE__":
             made.kind, made.text = WHOLE, str(outermost.line)
+        elif token.text == COUNTER and self.in_condition:
+            self.findings.error("D009", f"`{COUNTER}` has no value in a condition", token.place,
+                                help="it counts its uses in the text; `#define` a macro to choose by")  # fmt: skip
+            made.kind, made.text = BAD, ""
+        elif token.text == COUNTER:
+            made.kind, made.text = WHOLE, str(self._counted)
+            self._counted += 1
         elif token.text == "__FILE__":
             made.kind, made.text = STRING, f'"{outermost.file}"'
         elif token.text in CLOCK:
@@ -170,59 +187,49 @@ class Macros(Pcpp):
             made.kind, made.text = BAD, ""
         return made
 
-    def _use_refused(self, token: Token, pending: list[Token], out: list[Token]) -> None:
+    def _use_refused(self, token: Token, pending: list[Token]) -> Token:
         """Of a macro that was refused nothing is known but that it was meant: no more is said of what it makes."""
         if self.refused[token.text]:
-            at = len(pending) - 1
-            while at >= 0 and pending[at].kind == SPACE:
-                at -= 1
-            if at < 0 or pending[at].text != "(":
-                out.append(token)
-                return
-            depth = 0
-            while at >= 0:
-                depth += {"(": 1, ")": -1}.get(pending[at].text, 0)
-                if depth == 0:
-                    break
-                at -= 1
-            del pending[max(at, 0):]
+            if not self._opens(pending):
+                return token
+            depth = 1
+            while pending and depth:
+                piece = pending.pop()
+                depth += {"(": 1, ")": -1}.get(piece.text, 0)
+                if piece.kind == LEFT:
+                    self._inside.discard(piece.text)
         bad = token.__copy__()
         bad.kind, bad.text = BAD, ""
-        out.append(bad)
+        return bad
 
-    def _use(self, token: Token, macro: Any, pending: list[Token], out: list[Token]) -> None:
-        """Puts a macro's replacement in front of what is pending, or the name itself out where it is no use."""
+    def _use(self, token: Token, macro: Macro, pending: list[Token]) -> bool:
+        """Puts a macro's replacement in front of what is pending; False where the name is no use of it."""
         if not token.expansions and self._depth == 0:
             self._expanded_here = 0
         if len(token.expansions) >= MACRO_DEPTH:
             self._endless(token, f"macros go deeper than {MACRO_DEPTH}")
-        hidden = token.hidden
-        if macro.arglist is None:
-            made = self.macro_expand_args(macro, []) if macro.pastes else macro.value
-        else:
-            at = len(pending) - 1
-            while at >= 0 and pending[at].kind == SPACE:
-                at -= 1
-            if at < 0 or pending[at].text != "(":
-                out.append(token)
-                return
-            del pending[at:]
-            arguments, close = self._collect(token, macro, pending)
-            hidden = hidden & close.hidden
+        arguments: list[Argument] | None = []
+        if macro.parameters is not None:
+            if not self._opens(pending):
+                return False
+            arguments = self._collect(token, macro, pending)
             if arguments is None:
                 bad = token.__copy__()
                 bad.kind, bad.text = BAD, ""
-                out.append(bad)
-                return
-            made = self._substitute(token, macro, arguments)
+                pending.append(bad)
+                return True
+        made = self._substitute(token, macro, arguments)
         self._check_made(token, made)
-        pending.extend(_come_through(token, made, hidden | {token.text})[::-1])
+        pending.append(Token(LEFT, token.text, token.source, token.offset, 0))
+        pending.extend(_come_through(token, made)[::-1])
+        self._inside.add(token.text)
+        return True
 
-    def _collect(self, token: Token, macro: Any, pending: list[Token]) -> tuple[list[_Argument] | None, Token]:
+    def _collect(self, token: Token, macro: Macro, pending: list[Token]) -> list[Argument] | None:
         """Takes a call's arguments and its ")" off the pending tokens; None, and a message, for a wrong number."""
-        arguments = [_Argument()]
+        arguments = [Argument()]
         depth = taken = 0
-        names = macro.arglist
+        names = macro.parameters or ()
         while pending:
             piece = pending.pop()
             taken += 1
@@ -231,8 +238,13 @@ class Macros(Pcpp):
                     "D018", f"a call of macro `{token.text}` has more than {MOST_ARGUMENTS} tokens", token.place
                 )
             text = piece.text
+            if piece.kind == LEFT:
+                self._inside.discard(text)
+                continue
             if piece.kind == NOTHING:
                 continue
+            if piece.kind == NAME and text in self._inside:
+                piece.painted = True
             if text == "(":
                 depth += 1
             elif text == ")":
@@ -240,7 +252,7 @@ class Macros(Pcpp):
                     break
                 depth -= 1
             elif text == "," and depth == 0 and not (macro.variadic and len(arguments) == len(names)):
-                arguments.append(_Argument())
+                arguments.append(Argument())
                 continue
             if piece.kind == PASTE:  # as an argument it joins nothing
                 piece = piece.__copy__()
@@ -256,19 +268,19 @@ class Macros(Pcpp):
             self.tokenstrip(argument)
             argument.spaced = argument != [] and argument[0] is not first
         if macro.variadic and len(arguments) == len(names) - 1:
-            arguments.append(_Argument())
+            arguments.append(Argument())
             arguments[-1].omitted = True
         elif macro.variadic and arguments == [[]]:
             arguments[-1].omitted = True
-        if names == [] and arguments == [[]]:
+        if not names and arguments == [[]]:
             arguments = []
         if len(arguments) != len(names):
             self._wrong_number(token, macro, arguments, piece)
-            return None, piece
-        return arguments, piece
+            return None
+        return arguments
 
-    def _wrong_number(self, token: Token, macro: Any, arguments: list[_Argument], close: Token) -> None:
-        wanted, got = len(macro.arglist) - macro.variadic, len(arguments) if arguments != [[]] else 0
+    def _wrong_number(self, token: Token, macro: Macro, arguments: list[Argument], close: Token) -> None:
+        wanted, got = len(macro.parameters or ()) - macro.variadic, len(arguments) if arguments != [[]] else 0
         least = "at least " if macro.variadic else ""
         count = f"{least}{wanted} argument{'s' * (wanted != 1)}, but {got} {'is' if got == 1 else 'are'} given"
         split = any(piece.text in ("[", "{") for argument in arguments for piece in argument)
@@ -285,42 +297,34 @@ class Macros(Pcpp):
         together = first.source is last.source and first.expansions == last.expansions and first.line == last.line
         return first.source.place(first.offset, (last.end if together else first.end) - first.offset, first.expansions)
 
-    def _defined_at(self, macro: Any) -> Label:
+    def _defined_at(self, macro: Macro) -> Label:
         return Label(macro.name_token.place, f"`{macro.name}` is defined here")
 
-    def _substitute(self, token: Token, macro: Any, arguments: list[_Argument]) -> list[Token]:
-        """The macro's body with the arguments in it, by pcpp; sizes are checked before."""
-        if macro.without_rest is not None and arguments[-1].omitted:
-            macro = macro.without_rest
-        expanded = {number for kind, number, _ in macro.patch if kind == "e"}
+    def _substitute(self, token: Token, macro: Macro, arguments: list[Argument]) -> list[Token]:
+        """The macro's body with the arguments in it; sizes are checked before."""
         self._depth += 1
         if self._depth > MACRO_DEPTH:
             self._endless(token, f"macro calls within arguments go deeper than {MACRO_DEPTH}")
-        for number in expanded:
+        for number in macro.expanded:
             arguments[number].expanded = self.expand_macros([piece.__copy__() for piece in arguments[number]])
         self._depth -= 1
-        size = len(macro.value)
-        for kind, number, _ in macro.patch:
-            size += len(arguments[number].expanded if kind == "e" else arguments[number])
+        size = len(macro.body)
+        for piece in macro.body:
+            number = macro.numbers.get(piece.text)
+            if number is not None:
+                size += len(arguments[number].expanded if number in macro.expanded else arguments[number])
         if size > MOST_FROM_ONE_USE:
             self._endless(token, f"one use of macro `{token.text}` makes more than {MOST_FROM_ONE_USE} tokens")
-        for number, argument in enumerate(arguments):
-            if number not in expanded:
-                argument.expanded = argument
-            if not argument and macro.pastes:  # pcpp would paste what stands on either side of an empty argument
-                argument.append(Token(NOTHING, "", token.source, token.offset, token.length))
-        self.lexer.made.clear()
-        made: list[Token] = self.macro_expand_args(macro, arguments)
-        for text, count in self.lexer.made:
-            if count != 1:
-                message = f"`##` makes `{text[:LONGEST_NAME]}`, which is not one token"
-                self.findings.error("D019", message, token.place, also=(self._defined_at(macro),),
-                                    help="what it joins must be one name, one number or one sign")  # fmt: skip
-                return [Token(BAD, "", token.source, token.offset, token.length)]
-        return definitions.without_nothing(made, macro.variadic and arguments[-1].spaced) if macro.pastes else made
+        try:
+            return substituted(macro, arguments)
+        except NotOneToken as reason:
+            message = f"`##` makes `{reason.text[:LONGEST_NAME]}`, which is not one token"
+            self.findings.error("D019", message, token.place, also=(self._defined_at(macro),),
+                                help="what it joins must be one name, one number or one sign")  # fmt: skip
+            return [Token(BAD, "", token.source, token.offset, token.length)]
 
     def is_macro(self, name: str) -> bool:
-        return name in self.macros or name in ("__FILE__", "__LINE__")
+        return name in self.macros or name in ("__FILE__", "__LINE__", COUNTER)
 
     def on_unknown_macro_in_defined_expr(self, token: Token) -> bool:
         return self.is_macro(token.text)
@@ -355,19 +359,7 @@ class Macros(Pcpp):
         raise GiveUp
 
 
-def _is_varied(before: Sequence[Token], pending: Sequence[Token]) -> bool:
-    """Whether a macro's name stands in `vary macro NAME = [...]`, where it is the macro that is meant, not its body.
-
-    pending: what follows, the next token last
-    """
-    last = next((token for token in reversed(before) if token.kind != SPACE), None)
-    if last is None or last.text != "macro":
-        return False
-    following = next((token for token in reversed(pending) if token.kind != SPACE), None)
-    return following is not None and following.text == "="
-
-
-def _come_through(token: Token, made: list[Token], hidden: frozenset[str]) -> list[Token]:
+def _come_through(token: Token, made: list[Token]) -> list[Token]:
     """Copies of the tokens that a macro made, each knowing that it came through this use of it.
 
     Where the use stands in a macro's body itself, an argument's tokens have come through what surrounds the use
@@ -378,7 +370,6 @@ def _come_through(token: Token, made: list[Token], hidden: frozenset[str]) -> li
     through = step + around
     # by identity: to hash or compare chains of places would cost more than all the rest
     steps: dict[int, tuple[Expansion, ...]] = {id(()): through, id(around): through}
-    hides: dict[frozenset[str], frozenset[str]] = {frozenset(): hidden}
     copies = []
     for piece in made:
         copy = Token(piece.kind, piece.text, piece.source, piece.offset, piece.length)
@@ -388,8 +379,6 @@ def _come_through(token: Token, made: list[Token], hidden: frozenset[str]) -> li
             within = inner >= 0 and all(a is b for a, b in zip(came[inner:], around, strict=True))
             steps[id(came)] = (came[:inner] if within else came) + through
         copy.expansions = steps[id(came)]
-        if piece.hidden not in hides:
-            hides[piece.hidden] = piece.hidden | hidden
-        copy.hidden = hides[piece.hidden]
+        copy.painted = piece.painted
         copies.append(copy)
     return copies

@@ -1,8 +1,7 @@
 """The preprocessor: pcpp reads the directives; tokens go in and come out, never text.
 
-pcpp keeps the conditionals, parses and stores the macros, and puts arguments into bodies (with `#` and `##`). Ours are
-the tokens, the scan that finds what to expand (linear, with C's hide sets, each token keeping the places it came
-through), the values of conditions, the search for included files, every check, and every message.
+pcpp keeps the conditionals. Ours are the tokens, the macros (each token keeping the places it came through), the values
+of conditions, the search for included files, every check, and every message.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from ic.text.strays import complain_of_stray
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean
 from met.frozen import frozen
 
-CONDITIONALS = ("if", "ifdef", "ifndef", "elif", "else", "endif")
+CONDITIONALS = ("if", "ifdef", "ifndef", "elif", "elifdef", "elifndef", "else", "endif")
 DIRECTIVES = (*CONDITIONALS, "define", "undef", "include", "pragma", "error", "warning")
 _LONG_LINE = re.compile(rf"[^\n]{{{LONGEST_LINE + 1}}}")
 _INCLUDES = 'write `#include "beside.ic"` or `#include <servos/rigid_gearbox.ic>`'
@@ -178,6 +177,8 @@ class _Preprocessor(Macros):
             elif not ifs or ifs[-1].active:
                 # a macro's name and the parenthesis of its call stand on one side of a directive
                 yield [Token(NOTHING, "", source, first.offset, 0)]
+            if first.text == "#":
+                _as_elif(line, line.index(first) + 1)
             yield line
 
     def _warn_of_joined_comments(self, line: list[Token]) -> None:
@@ -322,7 +323,7 @@ class _Preprocessor(Macros):
                 self._give_up("D018", f"`#if` goes deeper than {CONDITION_DEPTH}", directive.place)
             return
         if not ifs:
-            self.findings.error("D007", f"`#{name}` without an `#if`", directive.place,
+            self.findings.error("D007", f"`#{_shown(directive)}` without an `#if`", directive.place,
                                 help="leave it out, or write the `#if` that it belongs to")  # fmt: skip
             raise OutputDirective(Action.IgnoreAndRemove)
         opened = ifs[-1]
@@ -331,7 +332,7 @@ class _Preprocessor(Macros):
             self._nothing_after(args, "#endif")
         elif opened.otherwise is not None:
             label = Label(opened.otherwise.place, "the `#else` is here")
-            self.findings.error("D007", f"`#{name}` after `#else`", directive.place, also=(label,),
+            self.findings.error("D007", f"`#{_shown(directive)}` after `#else`", directive.place, also=(label,),
                                 help="`#elif` comes before the one `#else`")  # fmt: skip
             raise OutputDirective(Action.IgnoreAndRemove)
         elif name == "else":
@@ -341,7 +342,11 @@ class _Preprocessor(Macros):
         elif opened.outer and opened.active:
             opened.active = False
         elif opened.outer and not opened.done:
-            opened.active = opened.done = self._condition(directive, args)
+            asked = _shown(directive)
+            if asked == "elif":
+                opened.active = opened.done = self._condition(directive, args)
+            else:
+                opened.active = opened.done = self._known(asked, directive, args) == (asked == "elifdef")
             args[:] = [_constant(opened.active, directive)]
 
     def _known(self, name: str, directive: Token, args: list[Token]) -> bool:
@@ -383,6 +388,18 @@ class _Preprocessor(Macros):
         """pcpp's own complaints: those that ours have not forestalled."""
         if not message.startswith("Unterminated") and self._directive is not None:
             self.findings.error("D007", f"the preprocessor cannot read this: {message}", self._directive.place)
+
+
+def _as_elif(line: list[Token], at: int) -> None:
+    """Makes an `#elif`, which pcpp knows, of `#elifdef` and `#elifndef`; the token's kind says which it is."""
+    directive = next((token for token in line[at:] if token.kind != SPACE), None)
+    if directive is not None and directive.text in ("elifdef", "elifndef"):
+        directive.kind, directive.text = directive.text, "elif"
+
+
+def _shown(directive: Token) -> str:
+    """The directive's name as written: see `_as_elif`."""
+    return directive.text if directive.kind == NAME else directive.kind
 
 
 def _reached_by(complaint: Diagnostic, at: Place, included: tuple[tuple[str, int], ...]) -> Diagnostic:

@@ -198,16 +198,35 @@ error[D011]: a macro cannot be called `N`: that is the unit newton
   |         ^
   = help: it would replace the unit in every quantity after it: `2 N` would lose its unit
 
-error[D011]: a macro's parameter cannot be called `m`: that is the unit metre
+error[D011]: a macro's parameter cannot be called `m`: in its body that is the unit metre
  --> a.ic:2:19
   |
 2 | #define ROD(name, m) link name { mass = 0.5 m; }
   |                   ^
-  = help: in the body of `ROD` it would replace the unit: `0.5 m` would lose it
+ ::: a.ic:2:45  this `m` would be the argument, not the unit
+  = help: choose another name for it
 
 2 errors
 """
     )
+
+
+@pytest.mark.parametrize("body", [
+    "2 m", "2 N*m", "2 N^2/(s*m)", "2 N^-1*m", "15 1/m", "(1 + X) m", "[X] m", "X m", "TWO m", "9 (m/s)", "2 m ## X",
+])  # fmt: skip
+def test_a_parameter_may_not_bear_the_name_of_a_unit_that_its_body_may_have(desk: Desk, body: str):
+    made = desk.tokens(f"#define TWO 2\n#define ROD(X, m) {body}\n")
+    assert [d.code for d in made.diagnostics] == ["D011"]
+
+
+@pytest.mark.parametrize(("body", "made"), [
+    ("link N { mass = m; }", "link 3 { mass = 4 ; }"), ("m", "4"), ("N*m", "3 * 4"), ("2*(N + 1)*m", "2 * ( 3 + 1 ) * 4"),
+    ("2 - m", "2 - 4"), ("2 * m", "2 * 4"), ("f(m, N)", "f ( 4 , 3 )"), ("link m revolute", "link 4 revolute"),
+    ("#m", '"4"'), ("x ## m", "x4"), ("N.q", "3 . q"), ("2^m", "2 ^ 4"), ("rod(1)*m", "rod ( 1 ) * 4"),
+])  # fmt: skip
+def test_elsewhere_a_parameter_may_be_called_like_a_unit(desk: Desk, body: str, made: str):
+    seen = desk.tokens(f"#define ROD(N, m) {body}\nROD(3, 4)\n")
+    assert (" ".join(token.text for token in seen.tokens[:-1]), seen.diagnostics) == (made, ())
 
 
 def test_a_macro_that_is_a_quantity_gets_a_warning_that_proposes_let(desk: Desk):
@@ -225,6 +244,47 @@ warning[D017]: macro `LENGTH` is a quantity
 """
     )
     assert desk.told("#define COUNT 2\n#define AREA (2.0 m)\n#define ROD 2 m; x = 3 kg\nx = COUNT;\n") == ""
+
+
+def test_two_tokens_that_a_macro_without_arguments_does_not_join_are_an_error(desk: Desk):
+    assert (
+        desk.told("#define PART 5 ## mm\nx = PART;\n")
+        == """\
+error[D019]: `##` makes `5mm`, which is not one token
+ --> a.ic:2:5
+  |
+2 | x = PART;
+  |     ^^^^
+ ::: a.ic:1:9  `PART` is defined here
+  = help: what it joins must be one name, one number or one sign
+
+1 error
+"""
+    )
+    assert [token.text for token in desk.tokens("#define PART a ## b ## 1\nPART").tokens[:-1]] == ["ab1"]
+
+
+def test_what_may_be_left_out_stands_where_a_macro_takes_more_arguments(desk: Desk):
+    assert (
+        desk.told("#define LOG(x) f(x __VA_OPT__(,))\n#define SET(x, ...) f(x __VA_OPT__, __VA_ARGS__)\n")
+        == """\
+error[D007]: `__VA_OPT__` stands in the body of a macro that takes `...` only
+ --> a.ic:1:20
+  |
+1 | #define LOG(x) f(x __VA_OPT__(,))
+  |                    ^^^^^^^^^^
+  = help: `...` as the last parameter takes all further arguments
+
+error[D007]: `__VA_OPT__` needs parentheses around what it is about
+ --> a.ic:2:25
+  |
+2 | #define SET(x, ...) f(x __VA_OPT__, __VA_ARGS__)
+  |                         ^^^^^^^^^^
+  = help: write `__VA_OPT__(, __VA_ARGS__)`: what stands there is left out where no more arguments are given
+
+2 errors
+"""
+    )
 
 
 def test_a_wrong_number_of_arguments_says_how_many_and_shows_the_definition(desk: Desk):
