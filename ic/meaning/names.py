@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 from ic.grammar.syntax import Expression, Name
-from ic.meaning.complaints import known_words
+from ic.meaning.complaints import MOST, known_words
 from ic.meaning.resolve import Definitions
 from ic.meaning.values import CONSTANTS, FUNCTIONS, Value, Values, evaluate
 from ic.text.lexer import COMMAND_LINE
@@ -137,8 +137,10 @@ class Names:
 
     def check_lets(self) -> list[Problem]:
         """What is wrong with the deck's lets, used or not."""
-        problems = []
+        problems: list[Problem] = []
         for text, let in self.definitions.lets.items():
+            if len(problems) >= MOST:  # no more would be told, and each looks at all names for one that is near
+                break
             try:
                 if units.is_unit(text):
                     raise Problem(

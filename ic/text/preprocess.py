@@ -38,7 +38,7 @@ from met.frozen import frozen
 
 CONDITIONALS = ("if", "ifdef", "ifndef", "elif", "elifdef", "elifndef", "else", "endif")
 DIRECTIVES = (*CONDITIONALS, "define", "undef", "include", "pragma", "error", "warning")
-_LONG_LINE = re.compile(rf"[^\n]{{{LONGEST_LINE + 1}}}")
+_LONG_LINE = re.compile(rf"^[^\n]{{{LONGEST_LINE + 1}}}", re.MULTILINE)
 _INCLUDES = 'write `#include "beside.ic"` or `#include <servos/rigid_gearbox.ic>`'
 TRUTH = "TRUTH"  # the kind of a condition's value
 

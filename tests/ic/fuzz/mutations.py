@@ -170,6 +170,19 @@ def nested(rng: random.Random, text: str) -> str:
     return text[:at] + made + text[at:]
 
 
+def long_line(rng: random.Random, text: str) -> str:
+    """A comment, a string, a name or a row of them on one very long line."""
+    spots = [match.end() for match in re.finditer(r"[;{}\n]", text)] or [0]
+    at, count = rng.choice(spots), rng.choice([200, 5_000, 50_000])
+    opening, piece, closing = rng.choice([
+        ("// ", "x", "\n"), ("// ", "x ", "\n"), ("/* ", "*", " */"), ("/*", " /*", "*/"), ('"', "x", '"'),
+        ('x = "', "x\\", ";\n"), ("let ", "x", " = 1;"), ("x = ", "1", ";"), ("x = [", "1, ", "1];"), ("", "x ", ";"),
+        ("", " ", ""), ("#define LONG ", "x ", "\nLONG\n"), ("#if ", "1 + ", "1\n#endif\n"),
+        ("", "/**/", ""), ("", "\\\n", ""),
+    ])  # fmt: skip
+    return text[:at] + opening + piece * (count // len(piece)) + closing + text[at:]
+
+
 def spliced(rng: random.Random, text: str) -> str:
     """The head of one deck and the tail of another."""
     other = rng.choice(corpus.decks())
@@ -185,5 +198,5 @@ GENTLE: Sequence[Callable[[random.Random, str], str]] = (
     word_of_its_kind, word_of_its_kind, changed_number, changed_entry, other_block, other_block,
 )  # fmt: skip
 _WILD: Sequence[Callable[[random.Random, str], str]] = (
-    *GENTLE, changed_word, changed_word, changed_word, through_macro, through_macro, nested, spliced,
+    *GENTLE, changed_word, changed_word, changed_word, through_macro, through_macro, nested, long_line, spliced,
 )  # fmt: skip

@@ -48,6 +48,19 @@ def test_a_hostile_deck_ends_in_a_diagnostic_soon(desk: Desk, text: str, code: s
     assert time.process_time() - start < 5
 
 
+@pytest.mark.parametrize("line", [
+    "// " + "x" * 199_000, "/*" + "* " * 99_000 + "*/", "// " + "x \\\n" * 30_000, '"' + "x" * 199_000 + '"',
+    " " * 199_000, "/**/" * 20_000, "\\" + " " * 190_000, "#if 0 // " + "x" * 190_000 + "\n#endif",
+    "let " + "x" * 190_000 + " = 1;",
+], ids=lambda line: line[:12])  # fmt: skip
+def test_very_long_lines_cost_time_in_proportion(desk: Desk, line: str):
+    desk.write(f"{line}\n" * 10)
+    start = time.process_time()
+    desk.tokens(f"{line}\n" * 10)
+    # 0.3 s; a search that began anew at each character would take 50
+    assert time.process_time() - start < 3
+
+
 def test_macros_in_ten_thousand_lines_cost_time_in_proportion(desk: Desk):
     head = "#define REACH 2.0 m\n#define ROD(NAME, MASS) link NAME { mass = MASS; at = REACH; }\n"
 

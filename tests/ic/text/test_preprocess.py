@@ -220,8 +220,9 @@ def test_a_parameter_may_not_bear_the_name_of_a_unit_that_its_body_may_have(desk
 
 
 @pytest.mark.parametrize(("body", "made"), [
-    ("link N { mass = m; }", "link 3 { mass = 4 ; }"), ("m", "4"), ("N*m", "3 * 4"), ("2*(N + 1)*m", "2 * ( 3 + 1 ) * 4"),
-    ("2 - m", "2 - 4"), ("2 * m", "2 * 4"), ("f(m, N)", "f ( 4 , 3 )"), ("link m revolute", "link 4 revolute"),
+    ("link N { mass = m; }", "link 3 { mass = 4 ; }"), ("m", "4"), ("N*m", "3 * 4"), ("2 - m", "2 - 4"),
+    ("2*(N + 1)*m", "2 * ( 3 + 1 ) * 4"), ("2 * m", "2 * 4"), ("f(m, N)", "f ( 4 , 3 )"),
+    ("link m revolute", "link 4 revolute"),
     ("#m", '"4"'), ("x ## m", "x4"), ("N.q", "3 . q"), ("2^m", "2 ^ 4"), ("rod(1)*m", "rod ( 1 ) * 4"),
 ])  # fmt: skip
 def test_elsewhere_a_parameter_may_be_called_like_a_unit(desk: Desk, body: str, made: str):
