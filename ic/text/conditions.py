@@ -95,16 +95,20 @@ def _each_defined(written: Sequence[Token], findings: Findings) -> list[tuple[in
     return stretches
 
 
-def evaluate(tokens: Sequence[Token], findings: Findings) -> bool:
-    """Whether an expanded condition holds; raises Refused, with a message noted, where it has no meaning."""
-    return _Condition([token for token in tokens if token.kind != SPACE], findings).truth()
+def evaluate(tokens: Sequence[Token], findings: Findings, unknown: Callable[[Token], None]) -> bool:
+    """Whether an expanded condition holds; raises Refused, with a message noted, where it has no meaning.
+
+    unknown: is told of each name that is no macro and counts as 0
+    """
+    return _Condition([token for token in tokens if token.kind != SPACE], findings, unknown).truth()
 
 
 class _Condition:
     """Where reading stands in the tokens of a condition. `live`: whether what is read counts."""
 
-    def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
+    def __init__(self, tokens: Sequence[Token], findings: Findings, unknown: Callable[[Token], None]) -> None:
         self.tokens = tokens
+        self.unknown = unknown
         self.findings = findings
         self.at = 0
         self.depth = 0
@@ -240,7 +244,7 @@ class _Condition:
         token = self.tokens[self.at]
         text = token.text
         if text not in ("-", "+", "~", "!", "("):
-            return self.operand(token)
+            return self.operand(token, live)
         self.deeper(token)
         self.at += 1
         if text == "(":
@@ -257,12 +261,14 @@ class _Condition:
         self.depth -= 1
         return value
 
-    def operand(self, token: Token) -> _Value:
+    def operand(self, token: Token, live: bool) -> _Value:
         self.no_stray(token)
         if token.kind == WHOLE:
             return self.number(token)
         if token.kind == NAME:  # what is no macro is 0, as in C
             self.at += 1
+            if live:
+                self.unknown(token)
             return _Value(0)
         if token.kind == CHARACTER:
             return self.character(token)

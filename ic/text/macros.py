@@ -37,6 +37,7 @@ class Macros(Pcpp):
         self._expanded = 0
         self._expanded_here = 0
         self._counted = 0
+        self.asked: dict[str, None] = {}  # names that were used as macros, or asked for
         self._depth = 0
         self._inside: set[str] = set()  # macros that are not used now: what they made is being read
         self.in_condition = False
@@ -59,7 +60,7 @@ class Macros(Pcpp):
     def define(self, tokens: Any) -> None:
         if isinstance(tokens, str):  # pcpp's own macros, and the clock: a deck must mean the same tomorrow
             return
-        body = definitions.checked(tokens, self.is_macro, self.findings)
+        body = definitions.checked(tokens, self.macros.__contains__, self.findings)
         name = tokens[0]
         if body is None:
             takes = len(tokens) > 1 and tokens[1].text == "("
@@ -105,6 +106,7 @@ class Macros(Pcpp):
                 text = token.text
                 macro = macros.get(text)
                 if macro is not None and not token.painted:
+                    self.asked[text] = None
                     if text in inside:
                         token.painted = True
                     elif not (before == "macro" and self._is_varied(pending)) and self._use(token, macro, pending):
@@ -324,6 +326,7 @@ class Macros(Pcpp):
             return [Token(BAD, "", token.source, token.offset, token.length)]
 
     def is_macro(self, name: str) -> bool:
+        self.asked[name] = None
         return name in self.macros or name in ("__FILE__", "__LINE__", COUNTER)
 
     def on_unknown_macro_in_defined_expr(self, token: Token) -> bool:

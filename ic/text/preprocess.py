@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ from ic.text.limits import (
     without_collection,
 )
 from ic.text.macros import Macros
-from ic.text.strays import complain_of_stray
+from ic.text.strays import complain_of_stray, complain_of_unseen
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean
 from met.frozen import frozen
 
@@ -75,6 +76,7 @@ def preprocess(
         with without_collection():
             run.define_from_command_line(defines)
             run.read_deck(files.deck(path))
+            run.warn_of_names()
     except GiveUp:
         whole = False
     except Problem as problem:
@@ -102,6 +104,7 @@ class _Preprocessor(Macros):
         self.files = files
         self.output: list[Token] = []
         self.command_line: tuple[SourceText, ...] = ()
+        self.given: dict[str, Token] = {}
         self._including: list[tuple[FoundFile, Text]] = []
         self._entered: list[Place] = []
         self._ifs: list[list[_If]] = []
@@ -110,6 +113,7 @@ class _Preprocessor(Macros):
         self._tokens = 0
         self._directive: Token | None = None
         self._conditions = 0
+        self._zeros: dict[str, Place] = {}  # names in conditions that are no macros
         super().__init__(findings)
 
     # reading
@@ -123,16 +127,35 @@ class _Preprocessor(Macros):
         self.command_line = (SourceText(COMMAND_LINE, written, ""),)
         for line in logical_lines(Text(COMMAND_LINE, written)):
             self.define(self.tokenstrip(line))
+        self.given = {name: macro.name_token for name, macro in self.macros.items()}
 
     def read_deck(self, file: FoundFile) -> None:
         source = Text(file.name, self.files.text(file))
         self._read(file, source, source.place(0, 1))
         self.output.append(Token(END, "", source, len(source.text.rstrip()), 1))
 
+    def warn_of_names(self) -> None:
+        """Warns of names in conditions that are no macros, and of macros on the command line that nothing asks for."""
+        lets = {name.text: name for word, name in pairwise(self.output) if word.text == "let" and name.kind == NAME}
+        for name, place in self._zeros.items():
+            told = f"`{name}` is no macro, so it counts as 0 in this condition"
+            help = f"ask `defined({name})`, or define it before: `#define {name} 1`, `-D {name}=1`"
+            if name in lets:
+                label = Label(lets[name].place, "this `let` is a value; a condition sees macros alone")
+                self.findings.warn("D036", told, place, also=(label,), help="write a macro for what is to be asked")
+            else:
+                self.findings.warn("D036", told, place, help=[*did_you_mean(name, self.macros), help])
+        for name, token in self.given.items():
+            if name not in self.asked:
+                near = did_you_mean(name, [*self.asked, *self._zeros])
+                self.findings.warn("D037", f"`-D {name}` has no effect: nothing in the deck asks for a macro `{name}`",
+                                   token.place, help=[*near, f"`--set '{name}=VALUE'` sets a `let`"])  # fmt: skip
+
     def _read(self, file: FoundFile, source: Text, at: Place) -> None:
         self._including.append((file, source))
         self._entered.append(at)
         self._ifs.append([])
+        complain_of_unseen(source, self.findings)
         for token in self.parsegen("", source):
             kind = token.kind
             if kind == SPACE:
@@ -370,7 +393,11 @@ class _Preprocessor(Macros):
             self.in_condition = True
             expanded = with_defined(self.expand_macros(before), self.is_macro, self.findings)
             if expanded:
-                return evaluate(expanded, self.findings)
+                zeros: list[Token] = []
+                truth = evaluate(expanded, self.findings, zeros.append)
+                for token in zeros:
+                    self._zeros.setdefault(token.text[:LONGEST_NAME], token.place)
+                return truth
         except Refused:
             return False
         finally:

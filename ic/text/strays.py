@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from ic.text.lexer import CHARACTER, Token
+from ic.text.lexer import CHARACTER, Text, Token
 from ic.text.limits import Findings
 
 # characters that come out of word processors and other notations, and what a deck writes for them
@@ -14,9 +15,35 @@ _PLAIN: Mapping[str, str] = MappingProxyType({
     "\u00d7": "*", "\u00b7": "*", "\u22c5": "*", "\u00f7": "/",  # times and dots, division sign
     "\u2212": "-", "\u2013": "-", "\u2014": "-", "\u00b2": "^2", "\u00b3": "^3",  # minus and dashes, powers
     "\u201c": '"', "\u201d": '"', "\u201e": '"', "\u2264": "<=", "\u2265": ">=", "\u2260": "!=",  # quotes
-    "\u00a0": "a space", "\u202f": "a space", "\ufeff": "nothing", "\u200b": "nothing",
+    "\u00a0": "a space", "\u202f": "a space",
     "\uff1a": ":", "\uff1b": ";", "\uff0c": ",",  # full width
 })  # fmt: skip
+
+# marks that no one sees: those that turn the direction of writing, joiners and blanks without width, tags
+_UNSEEN = re.compile(
+    "[\u00ad\u034f\u061c\u115f\u1160\u17b4\u17b5\u180b-\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\u3164\ufeff\uffa0"
+    "\ufff9-\ufffb\U000e0000-\U000e007f]"
+)
+_JOINERS = "\u00ad\u200c\u200d"  # some languages write with them
+
+
+def complain_of_unseen(source: Text, findings: Findings) -> None:
+    """Says where a text, comments and strings too, has characters that are not seen; of those in a line, once."""
+    if source.text.isascii():
+        return
+    seen: set[tuple[int, bool]] = set()
+    for match in _UNSEEN.finditer(source.text):
+        place = source.place(match.start(), 1)
+        soft = match[0] in _JOINERS
+        if (place.line, soft) in seen:
+            continue
+        seen.add((place.line, soft))
+        import unicodedata
+
+        known = unicodedata.name(match[0], "no name").lower()
+        tell = findings.warn if soft else findings.error
+        tell("D038", f"U+{ord(match[0]):04X} ({known}) is not seen, so this may not say what it seems to say", place,
+             help="leave it out")  # fmt: skip
 
 
 def complain_of_stray(token: Token, findings: Findings) -> None:
@@ -40,11 +67,13 @@ def complain_of_stray(token: Token, findings: Findings) -> None:
         import unicodedata
 
         first = text[0]
+        if _UNSEEN.match(first) and first not in _JOINERS:  # which is told of the whole text
+            return
         plain = _PLAIN.get(first)
         known = unicodedata.name(first, "no name").lower()
         said = f"`{text[:8]}`" if text.isprintable() else f"U+{ord(first):04X}"
         if not text.isascii():
             said += f" ({known})"
-        remedy = f"write {plain}" if plain in ("a space", "nothing") else f"write `{plain}`"
+        remedy = f"write {plain}" if plain == "a space" else f"write `{plain}`"
         usual = "leave it out" if text.isascii() else "names and units are written in plain ASCII"
         tell("D004", f"{said} does not belong in a deck", token.place, help=remedy if plain else usual)

@@ -288,6 +288,63 @@ error[D007]: `__VA_OPT__` needs parentheses around what it is about
     )
 
 
+def test_a_name_in_a_condition_that_is_no_macro_gets_a_warning(desk: Desk):
+    assert (
+        desk.told("#define LINKS 2\nlet span = 2 m;\n#if LINK > 1 || span > 1\n#endif\n")
+        == """\
+warning[D036]: `LINK` is no macro, so it counts as 0 in this condition
+ --> a.ic:3:5
+  |
+3 | #if LINK > 1 || span > 1
+  |     ^^^^
+  = help: did you mean `LINKS`?
+  = help: ask `defined(LINK)`, or define it before: `#define LINK 1`, `-D LINK=1`
+
+warning[D036]: `span` is no macro, so it counts as 0 in this condition
+ --> a.ic:3:17
+  |
+3 | #if LINK > 1 || span > 1
+  |                 ^^^^
+ ::: a.ic:2:5  this `let` is a value; a condition sees macros alone
+  = help: write a macro for what is to be asked
+
+2 warnings
+"""
+    )
+
+
+@pytest.mark.parametrize("text", [
+    "#ifdef LINK\n#elifndef ROD\n#endif", "#if defined(LINK) && LINK > 1\n#endif", "#if 1 || LINK\n#endif",
+    "#if 0 && LINK\n#endif", "#if 0\n#if LINK\n#endif\n#endif", "#define LINK 0\n#if LINK\n#endif",
+])  # fmt: skip
+def test_to_ask_whether_a_macro_is_defined_gets_no_warning(desk: Desk, text: str):
+    assert desk.told(text + "\n") == ""
+
+
+def test_a_macro_on_the_command_line_that_nothing_asks_for_gets_a_warning(desk: Desk):
+    asked = "#ifdef LINKS\n#endif\n#if RODS > 1 && defined(BARS)\n#endif\nlet mass = MASS * 1 kg;\n"
+    made = desk.tokens(asked, defines=["LINKS", "RODS=2", "BARS", "MASS=3", "LINK=2", "mas=1"])
+    assert [(d.severity, d.code, d.message, d.help) for d in made.diagnostics] == [
+        ("warning", "D037", "`-D LINK` has no effect: nothing in the deck asks for a macro `LINK`",
+         ("did you mean `LINKS`?", "`--set 'LINK=VALUE'` sets a `let`")),
+        ("warning", "D037", "`-D mas` has no effect: nothing in the deck asks for a macro `mas`",
+         ("`--set 'mas=VALUE'` sets a `let`",)),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("mark", ["\u202e", "\u2066", "\u200b", "\u2028", "\U000e0041", "\ufeff"])
+@pytest.mark.parametrize("text", ["x // {}", "x /* {} */", 'x = "{}";', "x {} y", "#if 0\n{}\n#endif", "#define X {}"])
+def test_a_character_that_is_not_seen_is_an_error_wherever_it_stands(desk: Desk, text: str, mark: str):
+    made = desk.tokens(text.format(mark))
+    assert [(d.code, d.severity) for d in made.diagnostics] == [("D038", "error")]
+
+
+def test_a_character_that_some_languages_write_with_is_a_warning_in_a_comment(desk: Desk):
+    assert [(d.code, d.severity) for d in desk.tokens("// a\u200db\n").diagnostics] == [("D038", "warning")]
+    both = desk.tokens("// a\u200db\u202e\n").diagnostics
+    assert sorted((d.code, d.severity) for d in both) == [("D038", "error"), ("D038", "warning")]
+
+
 def test_a_wrong_number_of_arguments_says_how_many_and_shows_the_definition(desk: Desk):
     assert (
         desk.told("#define ROD(NAME, MASS) link NAME { mass = MASS; }\narm a {\n  ROD(upper)\n  ROD(lower, 1 kg)\n}\n")
@@ -458,7 +515,7 @@ warning[D015]: careful
         ("#define FN(x) x\ny = FN(1\n#define G\n);", ["D012:2"]),
         ("x = 3 \u00b5m;", ["D004:1"]),
         ("x = 3\u00a0kg;", ["D004:1"]),
-        ("\u202e\u202dx = 3;", ["D004:1"]),
+        ("\u202e\u202dx = 3;", ["D038:1"]),
     ],
 )
 def test_a_broken_directive_is_one_error_on_its_line_and_nothing_else(desk: Desk, text: str, codes: list[str]):
