@@ -328,7 +328,7 @@ def test_a_macro_on_the_command_line_that_nothing_asks_for_gets_a_warning(desk: 
         ("warning", "D037", "`-D LINK` has no effect: nothing in the deck asks for a macro `LINK`",
          ("did you mean `LINKS`?", "`--set 'LINK=VALUE'` sets a `let`")),
         ("warning", "D037", "`-D mas` has no effect: nothing in the deck asks for a macro `mas`",
-         ("`--set 'mas=VALUE'` sets a `let`",)),
+         ("did you mean `MASS`?", "`--set 'mas=VALUE'` sets a `let`")),
     ]  # fmt: skip
 
 
