@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from met.cli import BAD_INPUT, YES, check_options, complain, deck_options, format_option, loudness_options
-from met.diagnostic import Problem, did_you_mean
+from met.diagnostic import Problem, did_you_mean, error
 from met.visible import say
 
 if TYPE_CHECKING:
@@ -100,6 +100,8 @@ def plan(
 
     check_options(deck, names, everything, defines, include_dirs, settings)
     made = _plan(deck, include_dirs, defines, settings, names, everything, quiet)
+    if not made.experiments:
+        raise Problem(error("D161", "this deck has no run", help="write `run NAME { ... }`"))
     if output is not None:
         plan_file.write(made, output)
         if not quiet and form == "text":

@@ -51,16 +51,17 @@ class Quantities(Cursor):
             self.fail("D027", f"`{first.text}{token.text}` is not a number", span(first, token))
 
     def unit(self) -> Unit | None:
-        """The unit that follows, if one does. In `15 1/s` the 1 belongs to it, since no number follows a number."""
+        """The unit that follows, if one does. In `15 1/s` the 1 belongs to it, since no number follows a number, and so
+        does the bracket in `9 (m/s)^2`."""
         token = self.token
         over = None
         if token.kind == WHOLE and token.text == "1" and self.following.text == "/":
             over = self.unit_factor(self.at + 2, -1, 0)
-        if token.kind != NAME and token.text != "%" and over is None:
+        if token.kind != NAME and token.text not in ("%", "(") and over is None:
             return None
         if self.begins_entry(self.at):
             return None
-        if over is None and not units.is_unit(token.text):
+        if over is None and token.text != "(" and not units.is_unit(token.text):
             self.unknown_unit()
             return None
         start = self.at

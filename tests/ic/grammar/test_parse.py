@@ -577,3 +577,15 @@ def test_a_macro_of_the_deck_that_takes_the_name_of_a_let_is_told_as_that(desk: 
 def test_a_list_may_be_broken_before_a_path(desk: Desk) -> None:
     deck = desk.read("record = [q,\n    arm.servo.voltage,\n    arm.qd, b];\nlast = 3;")
     assert len(deck.entries) == 2 and spell(deck.entries[0].value) == "[q, arm.servo.voltage, arm.qd, b]"
+
+
+@pytest.mark.parametrize(("written", "unit"), [
+    ("9 (m/s)^2", "(m/s)^2"), ("(1 + 2) (m/s)", "(m/s)"), ("[1, 2] (m)^2/s", "(m)^2/s"),
+])  # fmt: skip
+def test_a_unit_may_begin_with_a_bracket(desk: Desk, written: str, unit: str):
+    (entry,) = desk.read(f"let x = {written};").entries
+    assert entry.value.unit.text == unit
+
+
+def test_a_bracket_that_holds_no_unit_begins_none(desk: Desk):
+    assert "expected `;` or an operator, found `(`" in desk.told("let x = 9 (y);")

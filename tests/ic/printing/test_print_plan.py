@@ -586,3 +586,12 @@ def test_a_sweep_of_one_case_shows_the_vectors_that_follow_from_what_varies(
     assert cli.main(["plan", "swing.ic", "one", "-v"]) == 0
     shown = capsys.readouterr().out
     assert "  slider  6 kg    [0, 0, 0.05] m  [0.01, 0.01, 0.01, 0, 0, 0] kg*m^2\n" in shown
+
+
+def test_the_plan_of_a_deck_without_a_run_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from met.cli import main
+
+    (tmp_path / "empty.ic").write_text("// nothing\n")
+    assert main(["plan", str(tmp_path / "empty.ic"), "--all", "-o", str(tmp_path / "p.json")]) == 2
+    assert "error[D161]: this deck has no run\n" in capsys.readouterr().err
+    assert not (tmp_path / "p.json").exists()
