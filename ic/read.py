@@ -7,13 +7,16 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from ic.grammar.parse import parse
-from ic.grammar.syntax import Deck, Entry, SourceText
+from ic.grammar.parse import parse_on
+from ic.grammar.syntax import Deck, Entry, SourceText, Wreck
 from ic.text.files import LIBRARY
 from ic.text.limits import Findings, GiveUp
 from ic.text.preprocess import preprocess
 from met.diagnostic import Diagnostic, Problem
 from met.render import shown_place
+
+UNKNOWN_TEXT = ("D001", "D002", "D005", "D006", "D007", "D008", "D009", "D010", "D014", "D016", "D018")
+"""Errors after which it is not known what the deck says: a file or a branch of it may be lacking."""
 
 
 def read(
@@ -22,27 +25,32 @@ def read(
     defines: Sequence[str] = (),
     *,
     library: Path = LIBRARY,
+    despite_errors: bool = False,
 ) -> Deck:
     """The deck at `path`, or the standard library's of that name where there is no such file.
 
     include_dirs  further directories for `#include`, and for other files that the deck names
     defines       macros, `NAME` or `NAME=VALUE`
+    despite_errors  also where errors are found, as long as what is not wrong could be read: `Deck.wrecks`
 
     Raises Problem with every error and warning found, in the order of the text, and the text of every file read.
     """
     seen = preprocess(path, include_dirs, defines, library=library)
     findings = Findings()
     entries: tuple[Entry, ...] = ()
+    wrecks: tuple[Wreck, ...] = ()
+    sound = False
     with suppress(GiveUp):
         findings.add(*seen.diagnostics)
         if seen.whole:
-            entries, _ = parse(seen.tokens, findings)
+            entries, wrecks, sound = parse_on(seen.tokens, findings)
     found = in_order(findings.all, seen.sources)
-    if findings.errors or not seen.whole:
+    sound = sound and despite_errors and not any(each.code in UNKNOWN_TEXT for each in findings.errors)
+    if not seen.whole or (findings.errors and not sound):
         raise Problem(found, {source.name: source.text for source in seen.sources})
     return Deck(
         seen.sources[0].name, entries, seen.sources, found, tuple(os.fspath(each) for each in include_dirs),
-        os.fspath(path), tuple(defines),
+        os.fspath(path), tuple(defines), wrecks,
     )  # fmt: skip
 
 

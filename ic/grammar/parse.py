@@ -11,16 +11,18 @@ where they stand: what a run of names means is decided by what comes behind it, 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from contextlib import suppress
+from itertools import takewhile
 
 from ic.grammar.cursor import OPENING, SHOWN, Ended, Unreadable, found, span
 from ic.grammar.expressions import Expressions
-from ic.grammar.syntax import Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
+from ic.grammar.syntax import Broken, Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word, Wreck
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import Findings, GiveUp, without_collection
 from met import units
-from met.diagnostic import Diagnostic, Label
+from met.diagnostic import Diagnostic, Label, Place
 
 COMPARE = ("require", "exclude")
 _SEMICOLON = "an entry ends with `;`"
@@ -32,14 +34,27 @@ def parse(
 ) -> tuple[tuple[Entry, ...], tuple[Diagnostic, ...]]:
     """The entries of a deck, and what is wrong with it; where something is, the entries are not all there."""
     findings = findings if findings is not None else Findings()
+    return parse_on(tokens, findings)[0], findings.all
+
+
+def parse_on(tokens: Sequence[Token], findings: Findings) -> tuple[tuple[Entry, ...], tuple[Wreck, ...], bool]:
+    """The entries of a deck, the stretches of it that could not be read, and whether the rest is where it belongs: not
+    where a brace is missing or too many."""
     parser = _Parser(tokens, findings)
     entries: list[Entry] = []
+    sound = False
     with without_collection(), suppress(GiveUp, Ended):
         parser.entries(entries)
-    return tuple(entries), findings.all
+        sound = not any(each.code == "D022" for each in findings.all)
+    return tuple(entries), tuple(parser.wrecks), sound
 
 
 class _Parser(Expressions):
+    def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
+        super().__init__(tokens, findings)
+        self.wrecks: list[Wreck] = []
+        self.within: Place | None = None
+
     def entries(self, into: list[Entry]) -> None:
         """Entries up to the closing brace of the block they stand in, or to the end."""
         depth = len(self.open)
@@ -65,6 +80,32 @@ class _Parser(Expressions):
             except Unreadable:
                 self.operators = operators
                 self.recover(start, depth)
+                into += self.wreck(start)
+
+    def wreck(self, start: int) -> list[Entry]:
+        """Notes that an entry could not be read; what of it is known: what it sets, to a value that nobody knows."""
+        tokens = self.tokens[start : max(self.at, start + 1)]
+        names = list(takewhile(lambda token: token.kind == NAME, tokens))
+        behind = len(names)
+        while behind + 1 < len(tokens) and tokens[behind].text == "." and tokens[behind + 1].kind == NAME and names:
+            behind += 2
+        path = [names[-1], *tokens[len(names) + 1 : behind : 2]] if names else []
+        first, last = tokens[0], tokens[-1]
+        sets = bool(names) and behind < len(tokens) and tokens[behind].text in ("=", "+=")
+        end = last.expansions[-1].use if last.expansions else last.place
+        at = first.expansions[-1].use if first.expansions else first.place
+        known = [each.text for each in names[1:] or names]
+        if any(token.kind == BAD for token in tokens):  # a macro's use, perhaps: its arguments may be names
+            known += re.findall(r"[A-Za-z_]\w*", last.source.rest_of_line(first.offset if first.source is last.source
+                                                                         else last.offset))  # fmt: skip
+        self.wrecks.append(Wreck(at, (end.line, end.column + end.length), tuple(known), None if sets else self.within))
+        if not sets:
+            return []
+        value = Broken(first.place)
+        if names[0].text == "let":
+            return [Let(_word(names[1]), value, span(names[0], names[1]))] if len(names) == 2 and len(path) == 1 else []
+        operator = tokens[behind].text
+        return [Setting(_words(names[:-1]), _words(path), operator, value, span(names[0], path[-1]))]
 
     def block(self) -> tuple[Entry, ...]:
         opening = self.enter()
@@ -233,7 +274,9 @@ class _Parser(Expressions):
         if self.token.text == ";":
             self.advance()
         else:
+            outer, self.within = self.within, span(words[0], words[-1])
             body = self.block()
+            self.within = outer
         return Group(_words(words), like, of, body, span(words[0], words[-1]))
 
     def group_from(self, names: list[Token]) -> Group:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ic.grammar.syntax import (
     Binary,
+    Broken,
     Call,
     Entry,
     Expression,
@@ -45,6 +46,8 @@ def spell(expression: Expression, within: int = 0) -> str:
             inside = ", ".join([*(spell(value) for value in expression.positional), *named])
             head = expression.name.text + (f"({inside})" if inside or expression.body is None else "")
             return head if expression.body is None else f"{head} {_body(expression.body)}"
+        case Broken():
+            return "..."
         case Range():
             return f"{spell(expression.first)} .. {spell(expression.last)} by {spell(expression.step)}"
         case Unary():

@@ -124,7 +124,14 @@ class Binary:
     place: Place  # of the operator
 
 
-Expression = Number | String | Name | List | Call | WithUnit | Range | Unary | Binary
+@frozen
+class Broken:
+    """What stands where an expression should, and could not be read; that has been told."""
+
+    place: Place
+
+
+Expression = Number | String | Name | List | Call | WithUnit | Range | Unary | Binary | Broken
 
 
 def children(expression: Expression) -> tuple[Expression, ...]:
@@ -184,6 +191,21 @@ Entry = Let | Setting | Statement | Group
 
 
 @frozen
+class Wreck:
+    """A stretch of text that could not be read, which has been told: what else is wrong there follows from it.
+
+    place   its first token; the line and column of its end
+    names   what it may have named or defined
+    within  the place of the block that it stands in, where it is not known which of its entries this is
+    """
+
+    place: Place
+    end: tuple[int, int]
+    names: tuple[str, ...]
+    within: Place | None
+
+
+@frozen
 class SourceText:
     """A file that was read: the name messages print, its text, SHA-256 of its bytes."""
 
@@ -198,6 +220,7 @@ class Deck:
 
     include_dirs: further directories in which files that the deck names are looked for.
     path, defines: what it was read from and with, to read it again.
+    wrecks: what could not be read; where there are some, `warnings` holds errors too.
     """
 
     file: str
@@ -207,3 +230,4 @@ class Deck:
     include_dirs: tuple[str, ...] = ()
     path: str = ""
     defines: tuple[str, ...] = ()
+    wrecks: tuple[Wreck, ...] = ()

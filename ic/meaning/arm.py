@@ -73,9 +73,10 @@ def resolve_arm(scope: Scope, definition: Definition) -> Arm | None:
     made = [_joint(scope, item, homes, ends) for item in block.of_kind("joint")]
     joints = [joint for joint in made if joint is not None]
     if not any(True for _ in block.of_kind("link")):
-        scope.complaints.error("D081", f"arm `{definition.name}` has no links", definition.place,
-                               help="write `link NAME { ... }` and a joint to hold it")
-    check_tree(scope, definition.name, links, joints, complete=len(joints) == len(made))
+        scope.complaints.missing(definition.place, ("link",), "D081", f"arm `{definition.name}` has no links",
+                                 help="write `link NAME { ... }` and a joint to hold it")
+    complete = len(joints) == len(made) and not scope.complaints.lacks(definition.place, "joint")
+    check_tree(scope, definition.name, links, joints, complete=complete)
     whole = not scope.complaints.errors
     written = {item.name for kind in ("link", "joint") for item in block.of_kind(kind)}
     lost = frozenset(written - {link.name for link in links} - {joint.name for joint in joints})

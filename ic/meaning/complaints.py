@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
+from ic.grammar.syntax import Wreck
 from met.diagnostic import Diagnostic, Label, Place, Problem, error, meant
 
 MOST = 200  # a deck with more mistakes than this is told the first ones: the rest seldom say more
@@ -14,6 +15,10 @@ ONCE = ("D060", "D061", "D076", "D077", "D087", "D104", "D125", "D141", "D305", 
 inertia, a rate too slow, no channel, no such key, a unit that may mean cycles, a share above 1."""
 
 
+UNKNOWN_WORDS = ("D044", "D045", "D082", "D108", "D136", "D157")
+"""What is told of words of the language, which no deck defines."""
+
+
 class Complaints:
     """Diagnostics in the order found, each once."""
 
@@ -21,6 +26,10 @@ class Complaints:
         self._found: dict[Diagnostic, None] = dict.fromkeys(found)
         self._remarks: dict[Diagnostic, None] = {}
         self.faults = 0  # errors so far, with those that are not told again: to see whether something brought one
+        self._wrecks: list[Wreck] = []
+        self._torn: set[Place] = set()  # definitions and blocks of which an entry could not be read
+        self._lost: set[str] = set()  # names that what could not be read may have defined
+        self._spots: set[tuple[str, int, int]] = set()  # where errors of syntax are told
         self.lacking: set[tuple[Place, str]] = set()  # definitions, and entries that they lack, as was told
 
     @property
@@ -38,8 +47,38 @@ class Complaints:
     def add(self, *diagnostics: Diagnostic) -> None:
         for diagnostic in diagnostics:
             self.faults += diagnostic.severity == "error"
-            if len(self._found) < MOST and not self._told_of_another_user(diagnostic):
+            if len(self._found) < MOST and not self._told_of_another_user(diagnostic) and not self._follows(diagnostic):
                 self._found.setdefault(diagnostic)
+
+    def after(self, wrecks: Sequence[Wreck]) -> None:
+        """Notes what could not be read, so that nothing is told that follows from it, nor from the errors so far."""
+        self._spots.update(_spot(each.at.place) for each in self.errors if each.at is not None)
+        self._wrecks += wrecks
+        self._torn.update(each.within for each in wrecks if each.within is not None)
+        self.lost(*(name for each in wrecks for name in each.names))
+
+    def lost(self, *names: str) -> None:
+        """Notes names that something may have defined which could not be taken in, as was told."""
+        self._lost.update(names)
+
+    def inherits(self, of: Place, base: Place) -> None:
+        """Notes that what is defined at `of` has what its base has, and may lack what that lacks."""
+        if base in self._torn:
+            self._torn.add(of)
+
+    def _follows(self, diagnostic: Diagnostic) -> bool:
+        """Whether this is about something that could not be read, or about a name that this may have defined."""
+        if diagnostic.code not in UNKNOWN_WORDS and diagnostic.message.startswith("no "):
+            path = diagnostic.message.split("`")[1:2]
+            if any(word in self._lost for text in path for word in text.split(".")):
+                return True
+        if diagnostic.at is None or not (self._wrecks or self._spots):
+            return False
+        file, line, column = _spot(diagnostic.at.place)
+        return (file, line, column) in self._spots or any(
+            each.place.file == file and (each.place.line, each.place.column) <= (line, column) < each.end
+            for each in self._wrecks
+        )
 
     def _told_of_another_user(self, diagnostic: Diagnostic) -> bool:
         """Whether this value's mistake is known: what a base or a `let` writes is found wrong at each of its users."""
@@ -60,7 +99,10 @@ class Complaints:
             self.lacking.add((of, near.rpartition(".")[2]))
 
     def lacks(self, of: Place, *names: str) -> bool:
-        """Whether it was told that what is defined at `of` lacks one of these entries, or has another word for it."""
+        """Whether it was told that what is defined at `of` lacks one of these entries, or has another word for it; or
+        whether one of its entries could not be read."""
+        if of in self._torn:
+            return True
         return any((of, name) in self.lacking for name in names)
 
     def missing(self, of: Place, names: tuple[str, ...], code: str, message: str, at: Place | None = None, *,
@@ -101,6 +143,12 @@ class Complaints:
             yield
         except Problem as problem:
             self.add(*problem.diagnostics)
+
+
+def _spot(place: Place) -> tuple[str, int, int]:
+    """Where the reader of the deck sees it: of what a macro made, at the macro's use."""
+    at = place.expansions[-1].use if place.expansions else place
+    return at.file, at.line, at.column
 
 
 def belongs(word: str) -> list[str]:

@@ -44,7 +44,7 @@ def check(path: str | PathLike[str], *, include_dirs: Sequence[str | PathLike[st
           select: Select, settings: Sequence[str] = ()) -> Compiled:
     """The deck at `path`, compiled."""
     try:
-        deck = read(Path(path), [Path(each) for each in include_dirs], defines)
+        deck = read(Path(path), [Path(each) for each in include_dirs], defines, despite_errors=True)
     except Problem as problem:
         return Compiled(None, problem.diagnostics, problem.sources)
     return compile_deck(deck, select=select, defines=defines, settings=settings)
@@ -57,6 +57,7 @@ def compile_deck(deck: Deck, *, select: Select = None, defines: Iterable[str] = 
     settings  `PATH=VALUE`, each as if the deck said so
     """
     complaints = complaints if complaints is not None else Complaints(deck.warnings)
+    complaints.after(deck.wrecks)
     deck, entries = _with_settings(deck, settings, complaints)
     definitions = Definitions(deck, complaints)
     given = Settings(entries)

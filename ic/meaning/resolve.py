@@ -61,8 +61,11 @@ class Definitions:
         self._complaints = complaints
         self._file = deck.file
         for entry in deck.entries:
-            with complaints.gather():
+            try:
                 self._enter(entry)
+            except Problem as problem:
+                complaints.add(*problem.diagnostics)
+                complaints.lost(*(word.text for word in getattr(entry, "words", ())[1:]))
         self._check_defaults()
 
     def instead(self, *changed: Definition, lets: Sequence[Let] = ()) -> Definitions:
@@ -132,6 +135,8 @@ class Definitions:
                 if block is None:
                     self._failed.update((d.kind, d.name) for d in chain)
                     return None
+            if above is not None:
+                self._complaints.inherits(each.place, above.place)
             block = merge(block, each.group.body, home=each.home, base_name=base_name, complaints=self._complaints)
             for entry in each.upon:
                 block = merge(block, (entry,), home=each.home, base_name=base_name, complaints=self._complaints)

@@ -13,6 +13,7 @@ from typing import cast
 from ic.grammar.spell import spell
 from ic.grammar.syntax import (
     Binary,
+    Broken,
     Call,
     Expression,
     List,
@@ -111,6 +112,8 @@ def _leaf(expression: Expression, lookup: Lookup) -> Value | Values:
             return _call(expression, lookup)
         case String():
             raise Problem(error("D064", "a number is needed here, not text", expression.place))
+        case Broken():
+            raise Problem(())
     raise AssertionError(expression)
 
 

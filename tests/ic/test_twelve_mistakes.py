@@ -1,0 +1,81 @@
+"""Mistakes of different stages are told in one run, and none of them is told of another: not even one of syntax."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import ic
+
+DECK = """\
+#include <servos/rigid_gearbox.ic>
+#define HEAVY(MASS) mass = MASS
+
+let reach = {0};
+let slow  = 0.03 rad/s{1}
+
+arm two_link {{
+    link upper {{ mass = {2};  shape = rod(length = reach, along = x); }}
+    link lower {{ mass = 20 kg;  {3} = rod(length = reach, along = x); }}
+    link hook  {{ {12};  shape = sphere(radius = 1 cm); }}
+    joint shoulder revolute {{ parent = base;  child = upper;  axis = z; }}
+    joint elbow    revolute {{ parent = upper;  child = lower;  axis = {4};  at = [reach, 0 m, 0 m]; }}
+    joint tip      fixed    {{ parent = lower;  child = hook;  at = {13} m; }}
+}}
+
+servo gearbox like rigid_gearbox {{ command = rate(slow);  kp = 3 {5}; }}
+servo other like {6} {{ command = rate(slow); }}
+
+default run nominal {{
+    arm         = two_link;
+    servos      {{ shoulder = gearbox;  elbow = {7}; }}
+    environment {{ velocity_products = {8}; }}
+    rates       {{ dynamics = 25 Hz;  servos = {9};  record = 25 Hz; }}
+    duration    = 20 s;
+    record      = [q, qd, tau];
+    metric settle = settling_time {{ of = shoulder.qd;  target = slow;  band = {10}; }}
+    require {11} < 10 s;
+}}
+"""
+# right, wrong, and the code of what is said of it
+MISTAKES = [
+    ("2.0 m", "2.0 metre", "D028"), (";", "", "D021"), ("40 kg", "40 kgs", "D028"), ("shape", "shap", "D141"),
+    ("z", "w", "D065"), ("V*s/rad", "m", "D061"), ("rigid_gearbox", "rigid_gearbx", "D041"),
+    ("gearbox", "gearbx", "D041"), ("off", "offf", "D076"), ("100 Hz", "100", "D060"), ("2 %", "", "D020"),
+    ("settle", "setle", "D132"), ("HEAVY(1 kg)", "HEAVY(1 kg, 2)", "D012"), ("[1, 0, 0]", "[1, 0 0]", "D024"),
+]  # fmt: skip
+
+
+def told(folder: Path, wrong: set[int]) -> list[tuple[str, int]]:
+    """The errors of the deck with these mistakes in it: codes and lines."""
+    pieces = [mistake[i in wrong] for i, mistake in enumerate(MISTAKES)]
+    (folder / "deck.ic").write_text(DECK.format(*pieces))
+    errors = [d for d in ic.check(folder / "deck.ic").diagnostics if d.severity == "error"]
+    return sorted((d.code, d.at.place.line) for d in errors if d.at is not None)
+
+
+def expected(wrong: set[int]) -> list[tuple[str, int]]:
+    lines = {i: n for n, line in enumerate(DECK.splitlines(), 1) for i in range(len(MISTAKES)) if f"{{{i}}}" in line}
+    return sorted((MISTAKES[i][2], lines[i]) for i in wrong)
+
+
+def test_the_deck_without_mistakes_is_sound(tmp_path: Path) -> None:
+    assert told(tmp_path, set()) == []
+
+
+def test_all_mistakes_are_told_in_one_run_and_nothing_else(tmp_path: Path) -> None:
+    everything = set(range(len(MISTAKES)))
+    assert len(everything) >= 12
+    assert told(tmp_path, everything) == expected(everything)
+
+
+@pytest.mark.parametrize("mended", range(len(MISTAKES)), ids=[wrong or "nothing" for _, wrong, _ in MISTAKES])
+def test_to_mend_a_mistake_takes_just_its_message_away(tmp_path: Path, mended: int) -> None:
+    others = set(range(len(MISTAKES))) - {mended}
+    assert told(tmp_path, others) == expected(others)
+
+
+@pytest.mark.parametrize("alone", range(len(MISTAKES)), ids=[wrong or "nothing" for _, wrong, _ in MISTAKES])
+def test_a_mistake_alone_is_told_once(tmp_path: Path, alone: int) -> None:
+    assert told(tmp_path, {alone}) == expected({alone})
