@@ -210,16 +210,17 @@ class Macros(Pcpp):
             self._expanded_here = 0
         if len(token.expansions) >= MACRO_DEPTH:
             self._endless(token, f"macros go deeper than {MACRO_DEPTH}")
-        arguments: list[Argument] | None = []
+        arguments: list[Argument] = []
         if macro.parameters is not None:
             if not self._opens(pending):
                 return False
-            arguments = self._collect(token, macro, pending)
-            if arguments is None:
+            collected = self._collect(token, macro, pending)
+            if collected is None:
                 bad = token.__copy__()
                 bad.kind, bad.text = BAD, ""
                 pending.append(bad)
                 return True
+            arguments = collected
         made = self._substitute(token, macro, arguments)
         self._check_made(token, made)
         pending.append(Token(LEFT, token.text, token.source, token.offset, 0))
@@ -312,8 +313,8 @@ class Macros(Pcpp):
         self._depth -= 1
         size = len(macro.body)
         for piece in macro.body:
-            number = macro.numbers.get(piece.text)
-            if number is not None:
+            if piece.text in macro.numbers:
+                number = macro.numbers[piece.text]
                 size += len(arguments[number].expanded if number in macro.expanded else arguments[number])
         if size > MOST_FROM_ONE_USE:
             self._endless(token, f"one use of macro `{token.text}` makes more than {MOST_FROM_ONE_USE} tokens")
