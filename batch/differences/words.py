@@ -10,8 +10,8 @@ from batch.differences.samples import LEVEL, Sample
 from batch.failures import STATUS, ranges
 from batch.output import quoted
 from batch.signals import number_text
-from met.visible import visible
 from met.frozen import frozen
+from met.visible import visible
 
 SAME = "made from the same: deck, parameters, models and versions"
 
