@@ -329,7 +329,8 @@ def _checked(data: Any) -> dict[str, Any]:
     for each in sections if good else ():
         good = good and (
             is_count(each["experiment"]) and is_count(each["cases"])
-            and isinstance(each["name"], str) and each["rows"] in (None, f"rows.{each['number']}.npy")
+            and isinstance(each["name"], str) and isinstance(each["code"], str)
+            and each["rows"] in (None, f"rows.{each['number']}.npy")
             and all(isinstance(each[name], bool) for name in ("again", "recorded", "single"))
         )  # fmt: skip
     if not good:

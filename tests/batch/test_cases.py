@@ -292,7 +292,8 @@ def test_few_values_are_read_by_themselves_and_many_at_once(here: Path) -> None:
 def test_an_archive_that_does_not_say_its_limits_has_a_table_all_the_same(here: Path) -> None:
     import h5py
 
-    made(plans.gains(4)).__exit__()
+    with made(plans.gains(4)):
+        pass
     with h5py.File("a.h5", "r+") as file:
         del file["requirement"].attrs["limit"]
     with ArchiveFile("a.h5") as file:

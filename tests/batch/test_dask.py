@@ -51,7 +51,7 @@ def many(tmp_path: Path) -> tuple[Folder, dict[int, Section]]:
     sections = {section.number: section for section in values_sections(campaign)}
     folder = Folder(beside(campaign.output))
     folder.path.mkdir()
-    folder.describe(campaign.plan, sections.values(), key="")
+    folder.describe(campaign.plan, sections.values(), key="", archive="a.h5", histories=["all"], float32=False)
     return folder, sections
 
 

@@ -218,7 +218,7 @@ class TestHowItEnds:
 
 @pytest.mark.usefixtures("engine")
 @pytest.mark.parametrize(("name", "why"), [
-    ("lock/x", "lock: is a directory"), ("shards", "shards: file exists"), ("plan.json/x", "plan.json: is a directory"),
+    ("shards", "shards: file exists"), ("plan.json/x", "plan.json: is a directory"),
 ])  # fmt: skip
 def test_what_is_in_the_way_in_the_campaigns_folder_is_named(here: Path, name: str, why: str) -> None:
     there = here / "a.h5.campaign" / name

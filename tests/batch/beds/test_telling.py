@@ -61,7 +61,7 @@ def test_cases_of_an_earlier_run_count_as_well(here: Path) -> None:
     executor, folder = OnBeds(Ports({"elbow": "a", "shoulder": "b"}, 921600)), Folder(here / "a.h5.campaign")
     folder.path.mkdir()
     executor.open(folder, {}, lambda: None)
-    head = {"joints": ["shoulder", "elbow"], "tick_hz": 1000.0,
+    head = {"key": "", "row": 3, "repeats": 1, "joints": ["shoulder", "elbow"], "tick_hz": 1000.0,
             "beds": [{"name": each, "firmware": "00"} for each in ("one", "two")]}  # fmt: skip
     sample = Sample(State.ARMED, True, Fault(0), False, 7, 0.0)
     with (folder.beds / "0-3.records").open("wb") as file:

@@ -35,7 +35,8 @@ def test_a_name_that_is_a_formula_gets_an_apostrophe_before_it(name: str, archiv
     assert {row[0] for row in numbers} == {f"'{name}", "masses"}
     read_back = [cell.removeprefix("'") for cell in rows[2]]
     assert f"{name}.q" in read_back
-    times = [float(row[2]) for row in numbers if row[0] == f"'{name}"]
+    time = rows[2].index("time")
+    times = [float(row[time]) for row in numbers if row[0] == f"'{name}"]
     with ArchiveFile(copy) as opened:
         np.testing.assert_array_equal(times, opened.groups[0].values("time"))
 

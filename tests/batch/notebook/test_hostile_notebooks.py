@@ -207,7 +207,7 @@ class TestStraightFromARun:
     def test_what_is_said_after_an_interrupt_makes_what_was_asked_for(
         self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        def stopped(*_: object) -> None:
+        def stopped(*_: object, **__: object) -> None:
             raise KeyboardInterrupt
 
         monkeypatch.setattr(running, "written", stopped)
@@ -215,5 +215,5 @@ class TestStraightFromARun:
         assert "x.h5 is whole; x.csv is missing: `met export x.h5 -o x.csv`" in capsys.readouterr().out
 
 
-def full(*_: object) -> None:
+def full(*_: object, **__: object) -> None:
     raise Problem(error("E305", "cannot write x.mcap: no space left on device"))

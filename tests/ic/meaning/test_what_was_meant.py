@@ -95,12 +95,13 @@ def test_uses_of_a_macro_that_was_refused_are_silent(tmp_path: Path) -> None:
     arm = changed(ARM, ("link bar { mass = 2 kg; shape = rod(length = 1 m, along = x); }", "BAR(bar,\n        2 kg)"),
                   ("axis = z;", "axis = z; at = [0 m, s(m), 0 m];"))
     assert shown(tmp_path, macros, arm, IDEAL, RUN) == """\
-error[D011]: a macro's parameter cannot be called `m`: that is the unit metre
+error[D011]: a macro's parameter cannot be called `m`: in its body that is the unit metre
  --> deck.ic:1:19
   |
 1 | #define BAR(NAME, m) link NAME { mass = m; shape = rod(length = 1 m, along = x); }
   |                   ^
-  = help: in the body of `BAR` it would replace the unit: `0.5 m` would lose it
+ ::: deck.ic:1:67  this `m` would be the argument, not the unit
+  = help: choose another name for it
 
 error[D011]: a macro cannot be called `s`: that is the unit second
  --> deck.ic:2:9
@@ -112,7 +113,7 @@ error[D011]: a macro cannot be called `s`: that is the unit second
 
 
 def test_a_name_that_was_refused_may_be_defined_soundly_after(tmp_path: Path) -> None:
-    macros = "#define BAR(NAME, m) link\n#define BAR(NAME, MASS) link NAME { mass = MASS }\n"
+    macros = "#define BAR(NAME, m) link NAME { at = 2 m }\n#define BAR(NAME, MASS) link NAME { mass = MASS }\n"
     arm = changed(ARM, ("link bar", "BAR(end, 2 kg)\n    link bar"))
     codes = [each.code for each in check(tmp_path, macros, arm, IDEAL, RUN).diagnostics]
     assert codes == ["D011", "D021"]  # its own body has no `;`

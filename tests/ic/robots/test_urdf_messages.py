@@ -541,13 +541,6 @@ error[D214]: a servo is not made from a file
 1 | servo two from urdf("two.urdf") { }
   |                ^^^^
   = help: `from urdf(...)` makes an arm
-
-error[D041]: no arm `two`
- --> deck.ic:2:18
-  |
-2 | run fall { arm = two;  rates { dynamics = 1 kHz; }  duration = 10 ms;  record = [q]; }
-  |                  ^^^
-  = help: arms of this deck: none
 """)
 naming("a link that is there", 'arm two from urdf("two.urdf") { link bar { mass = 1 kg; } }', says="""\
 error[D053]: link `bar` is in `two` already
