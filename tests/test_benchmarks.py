@@ -17,6 +17,8 @@ from benchmarks.benchmark import Benchmark, Derived, Target, Untaken, ratio, tak
 import ic
 from met import kernel
 
+pytestmark = pytest.mark.slow
+
 HERE = {
     "processor": "A", "code_for": "a", "avx512": True, "cores": 2, "load": 0.1, "system": "L", "python": "3.11.7",
     "compiler": "llvm 22", "commit": "abc1234", "changed": False,

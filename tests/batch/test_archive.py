@@ -125,6 +125,7 @@ def test_several_experiments_are_groups_of_a_tree(here: Path, engine_name: str) 
         assert tree["nominal"].attrs["structure_key"] != ""
 
 
+@pytest.mark.slow
 def test_open_gives_a_dataset_or_a_tree(here: Path) -> None:
     import xarray
 
@@ -136,6 +137,7 @@ def test_open_gives_a_dataset_or_a_tree(here: Path) -> None:
     two.close()
 
 
+@pytest.mark.slow
 def test_the_bytes_do_not_depend_on_batches_or_the_clock(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plan = plans.plan(plans.nominal(), plans.gains(23))
     found = set()
@@ -336,6 +338,7 @@ OWN_NAMES = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OWN_NAMES)
 def test_a_swept_coordinate_may_be_called_as_anything_of_our_own(here: Path, name: str) -> None:
     experiment = renamed(plans.gains(3), "gearbox.kp", name)
@@ -395,6 +398,7 @@ def damaged(change: Any, *experiments: Any) -> str:
     return "; ".join(f"{d.code}: {d.message}" for d in caught.value.diagnostics)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -441,6 +445,7 @@ def test_a_flipped_bit_in_a_history_is_noticed(here: Path) -> None:
     assert caught.value.diagnostics[0].code == "E302"
 
 
+@pytest.mark.slow
 def test_flipped_bits_anywhere_are_a_problem_or_an_archive(here: Path) -> None:
     """In a process of its own, which has two minutes: HDF5 may not come back from some damage, nor may it be ours."""
     import os
@@ -488,6 +493,7 @@ print("done")
     assert said.returncode < 0 or said.stdout == "done\n", said.stderr  # a signal is HDF5's own end
 
 
+@pytest.mark.slow
 def test_what_may_be_written_over_is_seen_without_hdf5(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import h5py
 

@@ -45,6 +45,7 @@ def noise_of(plan: Plan) -> np.ndarray:
 STRUCTURES = "sweep it of hold { vary links.bar.mass = [1, 2, 3] kg; vary hinge.servo = [drive, brisk]; }\n"
 
 
+@pytest.mark.slow
 def test_an_archive_has_a_group_for_each_structure(tmp_path: Path) -> None:
     path = ran(tmp_path, compiled(tmp_path, TIMED, STRUCTURES))
     tree = xarray.open_datatree(path, engine="h5netcdf")
@@ -69,6 +70,7 @@ def test_a_group_is_the_run_that_one_would_write(tmp_path: Path) -> None:
     assert np.array_equal(engine.run(brisk).signals["q"], engine.run(other.experiments[0]).signals["q"])
 
 
+@pytest.mark.slow
 def test_a_position_names_one_case_of_all_groups(tmp_path: Path) -> None:
     plan = compiled(tmp_path, TIMED, STRUCTURES)
     whole = xarray.open_datatree(ran(tmp_path, plan), engine="h5netcdf")["it.brisk"].to_dataset().load()
@@ -79,6 +81,7 @@ def test_a_position_names_one_case_of_all_groups(tmp_path: Path) -> None:
     assert np.array_equal(one["q"].values[0], whole["q"].values[1])
 
 
+@pytest.mark.slow
 def test_show_finds_a_case_by_its_position_and_a_sweep_by_its_name(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -112,6 +115,7 @@ it: 6 of 6 cases reached their end, of 2 structures
 """ in told
 
 
+@pytest.mark.slow
 def test_of_many_structures_the_table_alone_is_told_and_shown(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -160,6 +164,7 @@ def test_cases_feel_the_same_noise_unless_seeds_are_independent(tmp_path: Path) 
     assert abs(apart[1] - apart[0]) > 1e-9
 
 
+@pytest.mark.slow
 def test_more_values_products_and_repeats_change_no_old_case(tmp_path: Path) -> None:
     def by_name(body: str) -> dict[str, bytes]:
         plan = compiled(tmp_path, NOISY, f"sweep it of hold {{ {body} }}")
@@ -217,6 +222,7 @@ def test_a_value_that_the_engine_did_not_use_fails_its_case(tmp_path: Path, monk
     assert "the engine used" in found.cause[1]
 
 
+@pytest.mark.slow
 def test_by_a_metric_the_cases_of_all_structures_are_in_one_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -129,6 +129,7 @@ def test_jobs_of_a_queue_run_nothing_of_the_folder(
     assert (folder / "a.h5").exists(), (folder / "log").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [("run", "-o", "a.h5", "--no-picture"), ("probe",)], ids=" ".join)
 def test_beds_run_nothing_of_the_folder(
     met: Callable[..., subprocess.CompletedProcess[str]], words: tuple[str, ...]

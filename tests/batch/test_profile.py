@@ -71,6 +71,7 @@ def test_a_profile_is_shown_in_columns() -> None:
     assert "\n".join(told(MADE_UP, plans.gains(36))) == SHOWN
 
 
+@pytest.mark.slow
 def test_what_a_deck_gives_is_shown_whole(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Numbers are masked, and how the code was come by; without friction there are no events."""
     Path("a.ic").write_text(PLAIN)
@@ -107,6 +108,7 @@ brief: # joints, # case, modified_euler, steps of #
 """
 
 
+@pytest.mark.slow
 def test_programs_get_json_of_every_run_asked_for(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["profile", "two_link.ic", "nominal", "gains", "--format", "json"]) == 0
     found = json.loads(capsys.readouterr().out)

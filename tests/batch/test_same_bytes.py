@@ -66,6 +66,7 @@ def small_tasks(patch: pytest.MonkeyPatch, cases: int) -> None:
 # However it is run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 2])
 def test_threads(here: Path, plan: Plan, undisturbed: bytes, threads: int) -> None:
     assert batch.run(plan, output="a.h5", threads=threads).path.read_bytes() == undisturbed
@@ -80,6 +81,7 @@ def test_processes(
     assert batch.run(plan, output="a.h5", processes=processes).path.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cases", [1, 7, 33])
 def test_tasks_of_any_size(
     here: Path, plan: Plan, undisturbed: bytes, cases: int, monkeypatch: pytest.MonkeyPatch
@@ -90,6 +92,7 @@ def test_tasks_of_any_size(
     assert max(task.cases for task in executor.tasks) == min(cases, 40)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cases", [5, 32])
 def test_tasks_of_so_many_bytes(
     here: Path, plan: Plan, undisturbed: bytes, cases: int, monkeypatch: pytest.MonkeyPatch
@@ -100,6 +103,7 @@ def test_tasks_of_so_many_bytes(
     assert max(task.cases for task in executor.tasks if task.section == 0) == cases
 
 
+@pytest.mark.slow
 def test_blocks_that_are_merged_decide_nothing_but_where_text_lies(
     here: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -115,6 +119,7 @@ def test_blocks_that_are_merged_decide_nothing_but_where_text_lies(
     assert found[0] == found[1] == found[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sizes", [(7, 4), (1, 40)])
 def test_interrupted_and_gone_on_with_tasks_of_another_size(
     here: Path, plan: Plan, undisturbed: bytes, sizes: tuple[int, int], monkeypatch: pytest.MonkeyPatch
@@ -136,6 +141,7 @@ def test_interrupted_and_gone_on_with_tasks_of_another_size(
     assert batch.run(plan, output="a.h5", threads=1).path.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_a_deck_and_its_plan_file(
     place: Path, tmp_path: Path, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -156,6 +162,7 @@ def test_whole_processes(place: Path, tmp_path: Path, undisturbed: bytes) -> Non
         assert output.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("histories", "single"),
     [(("every:3",), True), (("worst:3:volts", "#3"), False), (("failed", "every:11"), False), (("none",), False)],
@@ -243,6 +250,7 @@ def extended(run: str, entries: str) -> Path:
     return batch.run(ic.compile("d.ic", select=["it"]), output=f"{len(list(Path('.').iterdir()))}.h5").path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", EXTENSIONS)
 def test_more_cases_change_no_old_one(here: Path, what: str) -> None:
     run, before, after = EXTENSIONS[what]
@@ -307,34 +315,41 @@ def check_kept(path: Path, kept: list[int], full: Path, single: bool = False) ->
 
 @pytest.mark.parametrize("single", [False, True], ids=["float64", "float32"])
 class TestWhatIsKept:
+    @pytest.mark.slow
     @pytest.mark.parametrize("every", [7, 60])
     def test_every_so_many(self, here: Path, kept_whole: Path, every: int, single: bool) -> None:
         path = batch.run(plans.plan(sweep()), output="a.h5", histories=f"every:{every}", float32=single).path
         check_kept(path, list(range(0, 60, every)), kept_whole, single)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("metric", "count"), [("settle", 5), ("volts", 5), ("volts", 100)])
     def test_the_worst(self, here: Path, kept_whole: Path, metric: str, count: int, single: bool) -> None:
         path = batch.run(plans.plan(sweep()), output="a.h5", histories=f"worst:{count}:{metric}", float32=single).path
         check_kept(path, worst(kept_whole, metric, count), kept_whole, single)
 
+    @pytest.mark.slow
     def test_the_worst_of_a_lower_limit_are_the_smallest(self, here: Path, kept_whole: Path, single: bool) -> None:
         path = batch.run(plans.plan(sweep(">")), output="a.h5", histories="worst:4:volts", float32=single).path
         check_kept(path, worst(kept_whole, "volts", 4, lower=True), kept_whole, single)
 
+    @pytest.mark.slow
     def test_the_worst_without_a_metric_are_by_the_first(self, here: Path, kept_whole: Path, single: bool) -> None:
         path = batch.run(plans.plan(sweep()), output="a.h5", histories="worst:3", float32=single).path
         check_kept(path, worst(kept_whole, "settle", 3), kept_whole, single)
 
+    @pytest.mark.slow
     def test_named_ones(self, here: Path, kept_whole: Path, single: bool) -> None:
         name = opened(kept_whole).values("case_id")[17]
         path = batch.run(plans.plan(sweep()), output="a.h5", histories=["#3", name[:9]], float32=single).path
         check_kept(path, [3, 17], kept_whole, single)
 
+    @pytest.mark.slow
     def test_several_rules_together(self, here: Path, kept_whole: Path, single: bool) -> None:
         rules = ["every:20", "worst:2:volts", "#3", "failed"]
         path = batch.run(plans.plan(sweep()), output="a.h5", histories=rules, float32=single).path
         check_kept(path, sorted({0, 20, 40, 3, *worst(kept_whole, "volts", 2)}), kept_whole, single)
 
+    @pytest.mark.slow
     def test_all_and_none(self, here: Path, kept_whole: Path, single: bool) -> None:
         for histories, kept in (("all", list(range(60))), ("none", [])):
             path = batch.run(plans.plan(sweep()), output=f"{histories}.h5", histories=histories, float32=single).path
@@ -344,6 +359,7 @@ class TestWhatIsKept:
         path = batch.run(plans.plan(sweep()), output="a.h5", histories="failed", float32=single).path
         check_kept(path, [], kept_whole, single)
 
+    @pytest.mark.slow
     def test_those_that_failed(self, here: Path, single: bool) -> None:
         """A rate whose square is too large is no number after some steps; what came before is kept."""
         Path("d.ic").write_text(

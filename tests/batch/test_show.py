@@ -111,6 +111,7 @@ def test_a_case_that_is_not_there(sweep: ArchiveFile) -> None:
     assert caught.value.diagnostics[0].help == ("cases here: #0 to #19; or the beginning of a case_id",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["#²", "#" + "9" * 5000, "#99999999999999999999"])
 def test_a_position_that_no_table_has(sweep: ArchiveFile, case: str) -> None:
     with pytest.raises(Problem) as caught:

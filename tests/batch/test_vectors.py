@@ -66,6 +66,7 @@ def sweep(files: dict[str, Path]) -> Iterator[ArchiveFile]:
         yield file
 
 
+@pytest.mark.slow
 def test_plain_xarray_finds_joints_and_components_by_name(files: dict[str, Path]) -> None:
     before = ("recorded_case", "time")
     with xarray.open_dataset(files["masses"]) as data:

@@ -70,6 +70,7 @@ class TestWhatIsSaid:
         assert "picture  two_link.png\n" in capsys.readouterr().out
         assert (here / "two_link.png").read_bytes().startswith(b"\x89PNG")
 
+    @pytest.mark.slow
     def test_a_picture_of_one_of_several_runs_says_of_which(
         self, here: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:

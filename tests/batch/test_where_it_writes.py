@@ -248,6 +248,7 @@ def test_where_no_more_files_can_be_opened_it_is_said(here: Path, monkeypatch: p
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", [2_000, 60_000, 200_000, 700_000])  # full at the head, the layout, the histories
 def test_a_disk_that_fills_up_leaves_nothing(tmp_path: Path, room: int) -> None:
     """A limit on the file's size stands for a full disk; in a process of its own, where HDF5 may fail as it likes."""
@@ -276,6 +277,7 @@ with mock.patch.multiple(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("signal_name", "status", "last"), [("INT", 130, "interrupted"), ("TERM", 143, "terminated")])
 def test_a_signal_ends_a_real_run_and_leaves_nothing(tmp_path: Path, signal_name: str, status: int, last: str) -> None:
     """Through the command line: kernels run outside Python, and must let it go."""

@@ -84,6 +84,7 @@ def test_the_move_takes_the_torque_that_pinocchio_has_for_its_motion(tmp_path: P
     np.testing.assert_allclose(tau, wanted, rtol=0.0, atol=1e-12 * np.abs(wanted).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", [*MOVES, *DRIVEN])
 def test_the_run_meets_its_requirements_in_steps_that_are_short_enough(what: str) -> None:
     made = compiled(what)
@@ -93,6 +94,7 @@ def test_the_run_meets_its_requirements_in_steps_that_are_short_enough(what: str
     assert len(figures) == len(made.structure.moving) and max(figures) <= 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["shuttle_arm.ic shuttle_arm_reach", "station_arm.ic station_arm_reach", *DRIVEN])
 def test_the_arms_of_space_stay_within_what_is_published_of_their_joints(what: str) -> None:
     effort, rate, stops = SPACE[what.split()[0]]
@@ -104,6 +106,7 @@ def test_the_arms_of_space_stay_within_what_is_published_of_their_joints(what: s
         assert least - 0.5 < angles.min() and angles.max() < most + 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", ["shuttle", "station"])
 def test_motors_and_gearboxes_take_the_arm_to_where_ideal_joints_do(arm: str) -> None:
     ideal, driven = (engine.run(compiled(f"{arm}_arm.ic {arm}_arm_{how}")).signals["q"][0, -1]
@@ -111,6 +114,7 @@ def test_motors_and_gearboxes_take_the_arm_to_where_ideal_joints_do(arm: str) ->
     np.testing.assert_allclose(driven, ideal, atol=0.05 * DEG)  # what friction leaves
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("arm", "largest"), [("shuttle", 28.0), ("station", 120.0)])
 def test_a_heavier_payload_takes_more_until_the_motors_are_at_their_limit(arm: str, largest: float) -> None:
     (sweep,) = ic.compile(f"{arm}_arm.ic", select=[f"{arm}_arm_payloads"]).experiments
@@ -231,6 +235,7 @@ def test_the_joints_of_the_r3_keep_step_below_the_librarys_limits() -> None:
     assert np.abs(qd[:, 4]).max() > 3.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("deck", [
     "ets_vii.ic ets_vii_afloat", "shuttle_arm.ic shuttle_arm_afloat", "station_arm.ic station_arm_afloat",
 ])  # fmt: skip

@@ -79,6 +79,7 @@ def test_the_tutorials_deck_has_neither_errors_nor_warnings_and_as_many_cases_as
     assert "1 run, 1 sweep, 15 cases: no errors" in PAGE and "the sweep's 14 cases" in PAGE
 
 
+@pytest.mark.slow
 def test_the_tutorials_run_meets_its_requirements_and_its_sweep_fails_in_two_cases_as_the_page_says(
     tmp_path: Path,
 ) -> None:
@@ -98,6 +99,7 @@ def test_the_tutorials_run_meets_its_requirements_and_its_sweep_fails_in_two_cas
     assert "2 of the cases settle too late" in PAGE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("where", "code", "text"), FRAGMENTS, ids=[f"{w} {t.split()[0]}" for w, _, t in FRAGMENTS])
 def test_a_fragment_compiles_where_it_belongs_or_gives_the_error_it_shows(
     where: str, code: str, text: str, tmp_path: Path
@@ -123,6 +125,7 @@ def test_the_sweep_of_the_page_counts_with_its_last_axis_fastest(tmp_path: Path)
     assert columns["links.boom.com.x"] == [0.35] * 12
 
 
+@pytest.mark.slow
 def test_the_sweeps_of_the_page_have_the_cases_and_structures_that_it_says(tmp_path: Path) -> None:
     with_tables(tmp_path)
     more = "".join(text for where, code, text in FRAGMENTS if where == "more" and not code)
@@ -220,6 +223,7 @@ def test_every_function_shape_key_and_model_is_on_the_page() -> None:
 PATHS = [path for row in table("path") for path in re.findall(r"`([^`]+)`", row[0])]
 
 
+@pytest.mark.slow
 def test_every_path_of_the_page_can_vary(tmp_path: Path) -> None:
     deck, values = tmp_path / "picker.ic", {}
     deck.write_text(PICKER, encoding="utf-8")
@@ -238,6 +242,7 @@ def test_every_path_of_the_page_can_vary(tmp_path: Path) -> None:
         assert compiled.plan is not None or (idle and path in ("swing.at.x", "swing.rpy.z")), said
 
 
+@pytest.mark.slow
 def test_the_readmes_deck_runs_and_its_lines_of_python_open_what_they_wrote(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

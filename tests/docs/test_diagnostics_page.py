@@ -229,6 +229,7 @@ def printed(one: Shown) -> tuple[str, int]:
 ALL = list(all_shown(PAGE))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("one", ALL, ids=lambda one: one.code)
 def test_what_the_page_shows_is_what_is_said(one: Shown) -> None:
     said, status = printed(one)

@@ -17,6 +17,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return mended_servo.told(tmp_path_factory.mktemp("story"))
 
 
+@pytest.mark.slow
 def test_the_page_shows_what_is_said(folder: Path) -> None:
     found = re.search(r"\$ met diff before\.h5 after\.h5\n(.*?)```", PAGE, re.DOTALL)
     assert found is not None
@@ -41,6 +42,7 @@ def test_the_mended_servo_stops_at_once(folder: Path) -> None:
     assert at_rest[0] - at_rest[1] > 2.0  # s
 
 
+@pytest.mark.slow
 def test_an_archive_that_is_run_again_by_the_same_version_is_identical(folder: Path) -> None:
     met(folder, "run", "after.h5", "--all", "-o", "again.h5", "-q", "--no-picture", status=1)
     met(folder, "diff", "after.h5", "again.h5", "--require", "identical", status=0)

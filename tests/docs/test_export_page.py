@@ -27,6 +27,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return where
 
 
+@pytest.mark.slow
 def test_the_commands_write_what_they_name(folder: Path) -> None:
     written = {path.name for path in folder.iterdir() if path.name.startswith("lengths")}
     assert written == {"lengths.mcap", "lengths.layout.json", "lengths.csv", "lengths.qd.csv", "lengths.parquet"}

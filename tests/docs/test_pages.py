@@ -65,6 +65,7 @@ def archives(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return one, both
 
 
+@pytest.mark.slow
 def test_an_archive_holds_what_the_page_lists_and_nothing_else(archives: tuple[Path, Path]) -> None:
     text = page("architecture.md")
     tables = text[text.index("| dimension | is |") : text.index("Histories of all cases are kept")]

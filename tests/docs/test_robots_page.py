@@ -32,6 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_imported_deck_holds_the_arm_and_lets_it_fall(folder: Path) -> None:
     assert set(FILES) == {"swing.urdf", "deck.ic"} and len(COMMANDS) == 6
     with xarray.open_dataset(folder / "swing.h5") as data:
@@ -65,6 +66,7 @@ def test_every_type_of_joint_that_is_read_is_on_the_page() -> None:
     assert all(f"`{kind}`" in PAGE for kind in TYPES)
 
 
+@pytest.mark.slow
 def test_the_arms_that_come_with_met_are_those_and_have_these_joints_and_this_mass() -> None:
     section = PAGE.partition("## Arms that come with MET")[2].partition("\n## ")[0]
     rows = re.findall(r"^\| `(\w+\.ic)` \| (\d+) \| ([\d.]+) \|", section, re.MULTILINE)

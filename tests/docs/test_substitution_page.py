@@ -46,6 +46,7 @@ def test_as_many_motors_pass_as_the_page_says(tmp_path: Path) -> None:
     assert f"--case '#{worst}'" in PAGE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", ["100 Hz", "200 Hz", "1 kHz", "2 kHz"])
 def test_the_limits_of_the_page_are_those_that_are_predicted(rate: str) -> None:
     (row,) = re.findall(rf"^\| {rate} \| (\S+) \| (\S+) \| (\S+) \|$", PAGE, re.MULTILINE)
@@ -53,6 +54,7 @@ def test_the_limits_of_the_page_are_those_that_are_predicted(rate: str) -> None:
     assert row == tuple(f"{limit:#.3g}" for limit in found if limit is not None)
 
 
+@pytest.mark.slow
 def test_an_arm_that_is_too_light_rings_where_the_page_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -94,6 +96,7 @@ def columns(law: str) -> list[str]:
     return [each.removesuffix(" %") for each in row.split(" | ")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_the_errors_of_the_page_are_those_of_its_deck(law: str, tmp_path: Path) -> None:
     """At 1 kHz, without faults and delay; the third digit is the page's rounding."""

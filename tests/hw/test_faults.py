@@ -221,6 +221,7 @@ def test_without_a_look_at_the_numbers_wrong_answers_would_be_taken(
         endings("delay", lock_step=True, exchanges=2000, folder=tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["drop", "flip", "duplicate", "delay", "reorder", "split", "garbage"])
 def test_faults_among_real_bytes(kind: str, on_pty: Callable[..., str]) -> None:
     device = Device()

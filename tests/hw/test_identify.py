@@ -26,6 +26,8 @@ from met.plan import Experiment
 from met.program.plant import Plant, bed_values
 from tests.hw.conftest import said
 
+pytestmark = pytest.mark.slow
+
 UNITS = {"kt": "N*m/A", "resistance": "ohm", "tau_max": "N*m", "f_c": "N*m", "f_v": "N*m*s/rad", "inertia": "kg*m^2",
          "kt_load": "N*m/A", "f_cut": "Hz"}  # fmt: skip
 SHEET = {"kt": 0.061, "resistance": 2.05, "tau_max": 0.144, "f_c": 0.0205, "f_v": 2.58e-5, "inertia": 6.38e-5,

@@ -61,6 +61,7 @@ def check(folder: Path, seed: int) -> None:
     assert time.process_time() - begun < 5.0, seed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", range(0, 200, 20))
 def test_a_mutilated_deck_ends_in_placed_diagnostics(tmp_path: Path, first: int) -> None:
     for seed in range(first, first + 20):

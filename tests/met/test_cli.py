@@ -190,6 +190,7 @@ def test_a_file_that_cannot_be_read_is_the_users_to_mend_not_a_defect(
     assert capsys.readouterr().err == "error[E338]: `/no/such/file`: No such file or directory\n\n1 error\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", ["stdout", "stderr"])
 def test_a_stream_that_the_shell_has_closed_is_no_defect(closed: str) -> None:
     program = f"import sys; sys.{closed} = None; from met.cli import main; sys.exit(main(['check', 'two_link.ic']))"
@@ -211,6 +212,7 @@ def test_a_closed_pipe_ends_quietly() -> None:
 SLOW_TO_IMPORT = {"llvmlite", "h5py", "h5netcdf", "xarray", "pandas", "dask", "matplotlib", "scipy", "pint"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", ["check two_link.ic", "plan two_link.ic", "--version", "--help", "doc"])
 def test_what_costs_a_tenth_of_a_second_is_not_imported(words: str) -> None:
     """Each of these packages takes 0.1 to 2 s to import, and none of these commands needs it."""
@@ -225,6 +227,7 @@ def test_what_costs_a_tenth_of_a_second_is_not_imported(words: str) -> None:
     assert not imported & SLOW_TO_IMPORT
 
 
+@pytest.mark.slow
 def test_check_does_not_import_the_engine() -> None:
     program = "import sys; from met.cli import main; main(['check', 'two_link.ic', '-q']); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)

@@ -187,6 +187,7 @@ def test_bits_do_not_depend_on_recording():
     assert outputs.tobytes() == k.run(inputs, 60)[1].tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("columns", [1, 3, 8, 9, 64, 100])
 def test_rows_of_any_width_reach_their_case(columns):
     row = Phase("row", lambda t: [t.record(i, t.input("x") * 1000.0 + t.tick + i / 128.0) for i in range(columns)])
@@ -261,6 +262,7 @@ def as_program(steps):
     return Program(1.0, (), (), (Run(Phase("all", body)),), ("x", "y", "z"), 0, outputs)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(expressions())
 def test_machine_code_has_the_bits_of_a_numpy_replay_of_its_graph(steps):
@@ -280,6 +282,7 @@ def test_machine_code_has_the_bits_of_a_numpy_replay_of_its_graph(steps):
 STEADY = [*BINARY[:3], lambda a, b: where(a < b, a, b), lambda a, b: a * 0.5 + b]
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.tuples(st.sampled_from(STEADY), st.integers(0, 40), st.integers(0, 40)), min_size=3, max_size=25),
        st.integers(0, 2**32 - 1))
@@ -325,6 +328,7 @@ def test_the_compiler_fuses_nothing_by_itself():
         assert kernel.compile(program, level=level).run(x, 0)[1].tolist() == [[0.1 * 0.1, 0.0]]
 
 
+@pytest.mark.slow
 def test_a_long_section_cut_into_pieces_has_the_same_bits():
     from met.trace import llvm
     from met.trace.ir import emit
@@ -564,6 +568,7 @@ def _write_many(_):
     return [outcome(answer(float(i)))[0] for i in range(5)]
 
 
+@pytest.mark.slow
 def test_many_processes_may_share_a_cache(empty_cache):
     with multiprocessing.get_context("spawn").Pool(4) as pool:
         assert pool.map(_write_many, range(8)) == [[1.0 + i for i in range(5)]] * 8

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from met import keys
 from met.diagnostic import Place
@@ -112,6 +113,7 @@ def test_what_makes_another_program_changes_the_structure_key() -> None:
     assert keys.structure_key(structure, ["gearbox.kp"]) not in found
 
 
+@pytest.mark.slow
 def test_a_million_cases_are_named_in_seconds() -> None:
     experiment = plans.gains(1_000_000)
     began = time.process_time()

@@ -45,6 +45,7 @@ def _in_pint(written: str, registry: pint.UnitRegistry) -> pint.Quantity:
     return base
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", sorted({*WORDS} - {*UNITS, *OTHERWISE}))
 def test_what_is_proposed_has_the_size_and_the_kind_that_pint_gives_the_word(
     word: str, registry: pint.UnitRegistry

@@ -33,6 +33,7 @@ def plan(folder: Path, text: str = TWO, **options: object) -> Plan:
     return ic.compile(folder / "deck.ic", **options)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_plan_file_keeps_payloads_and_runs_without_the_deck(tmp_path: Path) -> None:
     made = plan(tmp_path, TWO + SWEEP, select=["some"])
     plan_file.write(made, tmp_path / "p.json")
@@ -73,6 +74,7 @@ def value(path: str, to: object) -> Change:
     return lambda e: e["parameters"][f"payloads.{path}"].update(value=to)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("change", "said"), [
     (box(name="upper"), "structure.payloads[0].name: `upper` is there twice"),
     (box(name="world"), "structure.payloads[0].name: `world` is there twice"),

@@ -69,6 +69,7 @@ def test_a_plan_with_guides_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert plan_file.dumps(plan_file.loads(written, "p.json")) == written
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"),
     [

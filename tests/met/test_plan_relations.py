@@ -53,6 +53,7 @@ def test_a_plan_with_all_of_them_is_read_as_it_was_written(tmp_path: Path) -> No
     assert json.loads(written)["experiments"][0]["parameters"]["environment.push.force_y"]["value"] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -126,6 +126,7 @@ EXACT = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_number_in_a_unit_is_the_double_nearest_to_the_product_of_what_is_written():
     """46,000 products against fractions, pi to 86 places; as they are written, and by what the number prints as."""
     assert set(EXACT) == set(UNITS)

@@ -65,6 +65,7 @@ def test_without_servo_and_friction_energy_is_conserved():
     assert abs(without[1] / without[0] - 1.0) > 1e-3  # and so the law is not empty
 
 
+@pytest.mark.slow
 def test_two_tolerances_agree_so_the_digits_have_converged():
     times = np.linspace(0.0, 4.0, 41)
     drive = {"command": sine_rate(0.03, 0.5), "servo_hz": 100.0, "friction": True}

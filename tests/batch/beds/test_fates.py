@@ -16,6 +16,8 @@ from met import cli
 from tests.batch.beds.listening import DECK
 from tests.hw.device import DEAD, DISARMED, STOPPED, Device
 
+pytestmark = pytest.mark.slow
+
 __all__ = ["DECK"]  # deck.ic
 
 Met = Callable[..., tuple[int, str, str]]

@@ -32,7 +32,7 @@ from met import cli
 from met.diagnostic import Problem
 from tests.hw.device import DISARMED, RATE, STOPPED, Device, payload
 
-pytestmark = pytest.mark.alone
+pytestmark = [pytest.mark.alone, pytest.mark.slow]
 
 DECK = """\
 #include <two_link.ic>

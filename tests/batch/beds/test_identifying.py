@@ -25,6 +25,8 @@ from met.plan import Experiment, Plan
 from met.program.plant import Plant, bed_values
 from tests.hw.conftest import said
 
+pytestmark = pytest.mark.slow
+
 DECK = """\
 #include <two_link.ic>
 run wired like nominal {

@@ -17,6 +17,8 @@ from hw.build import CROSS_COMPILER, EMULATOR
 from met import cli
 from tests.batch.beds import paper
 
+pytestmark = pytest.mark.slow
+
 slow = pytest.mark.slow
 on_arm = pytest.mark.firmware
 

@@ -33,7 +33,7 @@ from met import cli
 from met.plan import Experiment
 from met.program.plant import bed_values, plant_c
 
-pytestmark = pytest.mark.alone
+pytestmark = [pytest.mark.alone, pytest.mark.slow]
 
 slow = pytest.mark.slow
 PERIOD = 0.002

@@ -135,6 +135,7 @@ def test_no_histories_in_the_second(ran: Callable[..., Path]) -> None:
 # Tolerances
 
 
+@pytest.mark.slow
 def test_a_tolerance_is_of_what_has_its_unit(ran: Callable[..., Path]) -> None:
     names = ("turning", "sliding")
     a, b = ran("a.h5", *names), ran("b.h5", *names, change=("one.qd = 1 rad/s", "one.qd = 1.001 rad/s"))
@@ -331,6 +332,7 @@ def expected(a: Sequence[float], b: Sequence[float], allowed: Sequence[float], r
     return verdict, used
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_verdicts_are_those_of_an_oracle_with_xarray(two: Callable[..., tuple[Path, Path]], seed: int) -> None:
     rng = np.random.default_rng(seed)

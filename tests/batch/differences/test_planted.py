@@ -111,6 +111,7 @@ def test_a_case_that_fails_now_is_the_headline(monkeypatch: pytest.MonkeyPatch, 
     assert lines[at + 2].endswith("t = 0.8 s: joint elbow: it broke")
 
 
+@pytest.mark.slow
 def test_missing_and_new_cases(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     mixed = [each for each in order(6) if each not in (17, 18, 200)]
     found = diff(*two(monkeypatch, tmp_path, mixed))
@@ -150,6 +151,7 @@ def test_parameters_that_changed_and_one_that_is_new(monkeypatch: pytest.MonkeyP
     assert found.defaults == ("elbow.servo.k_aw is new, at its default, 0.5 1/s",)
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_planted_changes_are_found_and_none_is_invented(

@@ -37,6 +37,7 @@ def reaches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[ArchiveF
         yield file, Mcap(export(archive, cases=["#2", 0, "#1", 2]).path)
 
 
+@pytest.mark.slow
 def test_the_frames_are_where_the_archive_has_the_links(pick: tuple[ArchiveFile, Mcap]) -> None:
     file, read = pick
     group = file.groups[0]
@@ -52,6 +53,7 @@ def test_the_frames_are_where_the_archive_has_the_links(pick: tuple[ArchiveFile,
             np.testing.assert_allclose(world[:3, :3], kept_turn[:3, :3], rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_frames_are_where_the_kinematics_have_them(reaches: tuple[ArchiveFile, Mcap]) -> None:
     file, read = reaches
     [experiment] = file.plan().experiments
@@ -208,6 +210,7 @@ def test_a_length_that_follows_from_what_is_varied_is_the_cases_own(reaches: tup
     np.testing.assert_allclose(lengths, [0.8, 1.1, 0.5], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_size_that_is_varied_by_its_path_is_the_cases_own(tmp_path: Path) -> None:
     read = Mcap(export(made(tmp_path, "sizes")).path)
     assert len(read.metadata) == 5
@@ -406,6 +409,7 @@ def test_the_same_archive_gives_the_same_bytes(pick: tuple[ArchiveFile, Mcap], t
     assert first.read_bytes() == second.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_case_of_two_thousand_rows_takes_less_than_a_second(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import time
 

@@ -39,6 +39,7 @@ def made(folder: Path, text: str, axis: str = "") -> Path:
     return archive
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", SWEEPS)
 def test_frames_in_a_notebook_are_where_the_archive_has_the_links(tmp_path: Path, kind: str) -> None:
     with batch.open(made(tmp_path, *SWEEPS[kind])) as data:
@@ -53,6 +54,7 @@ def test_frames_in_a_notebook_are_where_the_archive_has_the_links(tmp_path: Path
         np.testing.assert_allclose(one["position"].sel(link="lower"), kept, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", SWEEPS)
 def test_the_frames_of_an_export_move_with_the_base(tmp_path: Path, kind: str) -> None:
     archive = made(tmp_path, SWEEPS[kind][0])

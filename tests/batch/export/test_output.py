@@ -53,6 +53,7 @@ def killed(output: str, after: int, when: str = "") -> None:
     assert subprocess.run(words, env=surroundings, timeout=120).returncode == -9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", [0, 10, 2000, 20_000])
 def test_a_writer_that_is_killed_leaves_no_file_under_the_name(archive: Path, after: int) -> None:
     killed("a.mcap", after)
@@ -61,6 +62,7 @@ def test_a_writer_that_is_killed_leaves_no_file_under_the_name(archive: Path, af
     assert not temporary_of(Path("a.mcap")).exists()  # taken over
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMATS)
 def test_nor_does_one_that_is_killed_before_it_is_named_and_what_was_there_stays(archive: Path, form: str) -> None:
     killed(f"a.{form}", 1 << 30, "settled")
@@ -71,6 +73,7 @@ def test_nor_does_one_that_is_killed_before_it_is_named_and_what_was_there_stays
         assert Path("a.mcap").read_bytes() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMATS)
 @pytest.mark.parametrize("reason", [KeyboardInterrupt, MemoryError])
 def test_what_stops_a_writer_leaves_nothing(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import batch
 import ic
@@ -18,6 +19,7 @@ HELD = "    payload crate { mass = 3 kg;  shape = sphere(radius = 0.1 m);  on = 
 RECORD = "record   = [links.lower.position, payloads.crate.position, "
 
 
+@pytest.mark.slow
 def test_frames_are_where_the_archive_has_the_links(tmp_path: Path) -> None:
     deck = tmp_path / "deck.ic"
     deck.write_text(ARM + changed(RUN, (BOX, BOX + HELD), ("record   = [", RECORD)), encoding="utf-8")

@@ -39,6 +39,7 @@ def there(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()} - {"deck.ic"}
 
 
+@pytest.mark.slow
 def test_the_archive_and_the_export(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert met("few", "-o", "x.mcap") == cli.YES
     assert there(here) == {"x.h5", "x.h5.run.json", "x.png", "x.mcap"}
@@ -50,6 +51,7 @@ def test_the_archive_and_the_export(here: Path, capsys: pytest.CaptureFixture[st
     assert one.topics() == other.topics() and len((here / "x.mcap").read_bytes()) == len((here / "y.mcap").read_bytes())
 
 
+@pytest.mark.slow
 def test_of_python_and_for_programs(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     archive = batch.run(ic.compile("deck.ic", select=["brief", "few"]), output="x.csv")
     assert archive.path == Path("x.h5") and archive.ok
@@ -60,6 +62,7 @@ def test_of_python_and_for_programs(here: Path, capsys: pytest.CaptureFixture[st
     assert (said["archive"], said["export"]) == ("y.h5", "y.parquet") and Path("y.parquet").exists()
 
 
+@pytest.mark.slow
 def test_it_may_be_run_again(here: Path) -> None:
     assert met("brief", "-o", "x.mcap", "-q") == cli.YES
     before = (here / "x.mcap").read_bytes()
@@ -120,6 +123,7 @@ def test_an_archive_of_another_format_is_refused(here: Path) -> None:
     assert diagnostic.message == "cannot write x.mcap: it is to be an archive, which ends in .h5"
 
 
+@pytest.mark.slow
 def test_an_export_that_fails_leaves_the_archive_and_says_so(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -67,6 +67,7 @@ def test_a_pipe_in_the_place_of_a_plan_and_of_its_table(here: Path) -> None:
     assert said.status == 2 and "cannot be read: it is a named pipe, not a regular file" in said.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["a.h5", "a.mcap", "a.parquet", "a.html", "a.svg", "a.json"])
 def test_a_pipe_where_something_is_to_be_written(output: str, archive: Path, here: Path) -> None:
     os.mkfifo(output)

@@ -96,6 +96,7 @@ def test_rows_that_are_none_of_the_table_are_told(here: Path, engine: None, monk
         assert render(caught.value.diagnostics).startswith("error[E350]: a.h5.campaign/rows.0.npy is damaged")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["campaign.json", "status.json", "plan.json"])
 def test_whatever_it_says_the_campaign_goes_on_or_says_why_not(
     name: str, campaign: Path, monkeypatch: pytest.MonkeyPatch
@@ -122,6 +123,7 @@ def test_whatever_it_says_the_campaign_goes_on_or_says_why_not(
 # .run.json
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [
     DEEP, "[]", '{"experiments": [{"seconds": 1e400, "cases": 1}]}', '{"experiments": [{"seconds": NaN}]}',
     '{"experiments": 3}', '{"experiments": [{"seconds": 1e308, "cases": 9}, {"seconds": 1e308, "cases": 1}]}',
@@ -178,6 +180,7 @@ HEADS: dict[str, Callable[[dict[str, Any]], object]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HEADS)
 def test_a_shard_with_a_right_checksum_and_a_wrong_head_counts_as_none(name: str, campaign: Path) -> None:
     first = sorted((campaign / "shards").iterdir())[0]

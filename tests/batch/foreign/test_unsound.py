@@ -72,6 +72,7 @@ UNSOUND: dict[str, tuple[Change, str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", UNSOUND)
 def test_what_no_run_gives_is_told(name: str, archive: Path, tmp_path: Path) -> None:
     change, why = UNSOUND[name]
@@ -84,6 +85,7 @@ def test_what_no_run_gives_is_told(name: str, archive: Path, tmp_path: Path) -> 
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["run --case", "show --case", "report", "export mcap"])
 def test_a_group_under_another_name_than_in_the_plan_is_told(command: str, archive: Path, tmp_path: Path) -> None:
     with changed(archive, tmp_path) as (copy, file):
@@ -104,6 +106,7 @@ def test_a_name_longer_than_the_terminal_is_wide_is_shown(archive: Path, tmp_pat
     assert f"\n{long}\n    {about}\n" in answer.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", [1.7e308, -1.7e308, 5e-324, float("inf"), float("nan")])
 def test_any_number_may_be_in_a_signal(value: float, archive: Path, tmp_path: Path) -> None:
     with changed(archive, tmp_path) as (copy, file):
@@ -114,6 +117,7 @@ def test_any_number_may_be_in_a_signal(value: float, archive: Path, tmp_path: Pa
         assert met(*readers(copy, tmp_path, archive)[name]).status in (0, 1), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_an_archive_with_something_else_in_it_is_read_or_told(
     seed: int, archive: Path, single: Path, tmp_path: Path

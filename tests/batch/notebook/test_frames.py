@@ -38,6 +38,7 @@ def chain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[xarray.DataTree]
         yield tree
 
 
+@pytest.mark.slow
 def test_all_links_of_all_cases_are_where_the_archive_recorded_them(reaches: xarray.Dataset) -> None:
     frames = reaches.met.frames()
     assert frames["position"].dims == ("recorded_case", "time", "link", "axis")
@@ -102,6 +103,7 @@ def test_after_a_failure_there_are_no_frames(tmp_path: Path, monkeypatch: pytest
             assert unknown.sum("time").values.tolist() == [0, 0, data.sizes["time"] - 5, 0]
 
 
+@pytest.mark.slow
 def test_frames_are_where_q_is_taken(reaches: xarray.Dataset) -> None:
     whole = reaches.met.frames("tool")["position"]
     rows = reaches.isel(time=slice(None, None, 10)).met.frames("tool")["position"]
@@ -130,6 +132,7 @@ def test_of_one_case_of_several_and_of_those_that_are_selected(reaches: xarray.D
     np.testing.assert_allclose(far["position"], again["position"], rtol=0, atol=CLOSE)
 
 
+@pytest.mark.slow
 def test_structures_have_their_own_links(chain: xarray.DataTree) -> None:
     frames = chain.met.frames()
     assert {name: node["link"].values.tolist() for name, node in frames.children.items()} == {
@@ -142,6 +145,7 @@ def test_structures_have_their_own_links(chain: xarray.DataTree) -> None:
     assert list(chain.met.frames(case="#3").children) == ["links.2"]
 
 
+@pytest.mark.slow
 def test_joints_that_are_recorded_one_by_one_and_in_other_units(tmp_path: Path, reaches: xarray.Dataset) -> None:
     with batch.open(decks.made(tmp_path, "apart")) as data:
         assert "q" not in data
@@ -152,6 +156,7 @@ def test_joints_that_are_recorded_one_by_one_and_in_other_units(tmp_path: Path, 
         np.testing.assert_allclose(frames["position"].isel(recorded_case=0), nominal["position"], rtol=0, atol=CLOSE)
 
 
+@pytest.mark.slow
 def test_numbers_of_four_bytes(tmp_path: Path, reaches: xarray.Dataset) -> None:
     with batch.open(decks.made(tmp_path, "reaches", float32=True)) as data:
         frames = data.met.frames()
@@ -195,6 +200,7 @@ def test_what_cannot_be_placed(reaches: xarray.Dataset, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_case_without_a_history(tmp_path: Path) -> None:
     archive = decks.made(tmp_path, "reaches", histories=["#1"])
     with batch.open(archive) as data:

@@ -116,6 +116,7 @@ def test_a_structure_of_which_one_repeat_is_left_is_at_that_repeat(
         assert dict(grid.sizes) == {"integrator": 2, "repeat": 2} and grid["repeat"].values.tolist() == [0, 1]
 
 
+@pytest.mark.slow
 def test_the_plan_of_an_archive_of_which_the_second_run_was_changed_is_refused(tmp_path: Path) -> None:
     with made(tmp_path, ONE, "swing", "other") as tree:
         made(tmp_path, ONE, "swing", "other", TURNED="0.7").close()
@@ -146,6 +147,7 @@ def test_a_signal_that_one_run_lacks_is_put_in_another_unit_in_the_others(tmp_pa
         assert turned["swing"]["q"].attrs["units"] == "deg" and "qd" in turned["blind"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["time", "joint"])
 def test_a_parameter_called_as_a_dimension_is_unfolded(tmp_path: Path, name: str) -> None:
     with made(tmp_path, BRIEF.replace("reach_back", name), "backs") as data:
@@ -189,6 +191,7 @@ class TestStraightFromARun:
         )
         assert not Path("x.h5").exists()
 
+    @pytest.mark.slow
     def test_an_export_that_fails_is_told_to_programs_in_one_document(
         self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:
@@ -197,6 +200,7 @@ class TestStraightFromARun:
         told = json.loads(capsys.readouterr().out)
         assert told["export"] is None and "cannot write x.mcap: no space left on device" in told["notes"]
 
+    @pytest.mark.slow
     def test_what_is_said_to_make_a_missing_export_makes_all_of_it(
         self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:
@@ -204,6 +208,7 @@ class TestStraightFromARun:
         assert cli.main(["run", "deck.ic", "brief", "backs", "-o", "x.csv"]) == cli.NO
         assert "`met export x.h5 --run brief --run backs -o x.csv`" in capsys.readouterr().out
 
+    @pytest.mark.slow
     def test_what_is_said_after_an_interrupt_makes_what_was_asked_for(
         self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:

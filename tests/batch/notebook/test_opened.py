@@ -32,11 +32,13 @@ def data(archive: Path) -> Iterator[xarray.Dataset]:
         yield data
 
 
+@pytest.mark.slow
 def test_xarray_is_loaded_by_who_opens_and_not_by_who_imports() -> None:
     script = "import sys, batch; assert 'xarray' not in sys.modules; import batch.notebook as n; n.xarray.Dataset().met"
     subprocess.run([sys.executable, "-W", "error", "-c", script], check=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["h5netcdf", pytest.param("netcdf4", marks=pytest.mark.oracle), None])
 def test_what_xarray_opens_alone_has_it_too(archive: Path, data: xarray.Dataset, engine: Any) -> None:
     with xarray.open_dataset(archive, engine=engine) as same:
@@ -48,6 +50,7 @@ def test_what_xarray_opens_alone_has_it_too(archive: Path, data: xarray.Dataset,
         np.testing.assert_array_equal(tree.met.frames("lower")["position"], data.met.frames("lower")["position"])
 
 
+@pytest.mark.slow
 def test_in_chunks_of_dask(archive: Path, data: xarray.Dataset) -> None:
     with batch.open(archive, chunks={}) as lazy:
         chosen = lazy.met.sel({"gearbox.kp": "0.03 V*s/rad"})
@@ -58,6 +61,7 @@ def test_in_chunks_of_dask(archive: Path, data: xarray.Dataset) -> None:
         assert lazy.met.in_units(qd="deg/s")["qd"].chunks is not None
 
 
+@pytest.mark.slow
 def test_copies_and_what_was_sent_elsewhere(data: xarray.Dataset) -> None:
     assert data.met.plan.deck.endswith("tuning.ic")
     expected = data.met.frames("lower", case=4)
@@ -65,6 +69,7 @@ def test_copies_and_what_was_sent_elsewhere(data: xarray.Dataset) -> None:
         xarray.testing.assert_identical(same.met.frames("lower", case=4).load(), expected.load())
 
 
+@pytest.mark.slow
 def test_an_archive_that_is_run_anew_meanwhile(tmp_path: Path) -> None:
     archive = made(tmp_path, ["tuning"])
     with batch.open(archive) as data:
@@ -145,6 +150,7 @@ class TestWhatWasRun:
             '  name one: `data.met.parameters("#0")`; of several runs, `data.met.sel(run=NAME)` before'
         )  # fmt: skip
 
+    @pytest.mark.slow
     def test_of_one_run_among_several(self, tmp_path: Path) -> None:
         with batch.open(made(tmp_path, ["brief", "ways"])) as tree:
             assert tree["brief"].met.parameters().loc["shoulder.servo.kp", "value"] == 0.02
@@ -157,6 +163,7 @@ class TestWhatWasRun:
         assert next(iter(files.values())) == TUNING and "<servos/rigid_gearbox.ic>" in files
         assert [experiment.name for experiment in data.met.plan.experiments] == ["tuning"]
 
+    @pytest.mark.slow
     def test_a_few_lines_say_what_it_is(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         archive = answered(monkeypatch, tmp_path / "a.h5", plans.gains(7), plans.nominal(), fails=frozenset({3}))
         with batch.open(archive) as tree:
@@ -203,6 +210,7 @@ class TestUnits:
             '  nearest are: "60 mV/rad", "125 mV/rad"'
         )  # fmt: skip
 
+    @pytest.mark.slow
     def test_of_several(self, tmp_path: Path) -> None:
         with batch.open(made(tmp_path, ["ways"])) as tree:
             turned = tree.met.in_units({"gearbox.kp": "mV*s/rad"})

@@ -111,6 +111,7 @@ def test_a_selection_of_a_selection(tuning: xarray.Dataset) -> None:
 
 
 class TestOfSeveral:
+    @pytest.mark.slow
     def test_structures_are_chosen_by_a_word(self, ways: xarray.DataTree) -> None:
         found = ways.met.sel(integrator="midpoint")
         assert list(found.children) == ["ways.midpoint"]
@@ -131,6 +132,7 @@ class TestOfSeveral:
         assert rows(node.met.sel({"gearbox.kp": 0.03})) == [3]
         assert rows(node.to_dataset().met.sel({"gearbox.kp": 0.03})) == [3]
 
+    @pytest.mark.slow
     def test_a_run_or_a_sweep(self, tmp_path: Path) -> None:
         with batch.open(made(tmp_path, ["brief", "ways"])) as tree:
             assert list(tree.met.sel(run="ways").children) == ["ways.rk4", "ways.midpoint"]

@@ -61,6 +61,7 @@ def refused(*names: str, **options: Any) -> str:
 
 
 class TestSignals:
+    @pytest.mark.slow
     def test_of_the_same_cases_lie_under_the_own_ones(
         self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -87,6 +88,7 @@ class TestSignals:
         assert [line.get_xdata()[-1] for line in ax.lines] == pytest.approx([4.0, 2.0])
         assert [text.get_text() for text in ax.get_legend().get_texts()] == ["a.h5", "b.h5"]
 
+    @pytest.mark.slow
     def test_of_a_fan_are_a_median_and_edges(self, here: Path, figures: list[Any]) -> None:
         archives.made(here / "a.h5", plans.gains(40))
         archives.made(here / "b.h5", turned(plans.gains(40), range(12)))
@@ -98,6 +100,7 @@ class TestSignals:
         assert len([line for line in ax.lines if line.get_linestyle() == ":"]) == 2
         assert said(figures[0]) == "40 cases: median, nine in ten, and all; 12 of them also in b.h5"
 
+    @pytest.mark.slow
     def test_that_the_other_lacks_are_drawn_alone_and_told_where_they_are_named(
         self, here: Path, figures: list[Any]
     ) -> None:

@@ -34,6 +34,7 @@ def sweep(here: Path) -> Path:
     return archives.made(here / "a.h5", one)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("options", "labels"), [
     ({"names": ["qd"]}, {"qd  (rad/s)"}),
     ({"names": ["volts"]}, {"volts  (V)"}),
@@ -49,6 +50,7 @@ def test_names_are_those_of_signals_or_of_metrics(
     assert {ax.get_ylabel() for ax in shown(figures[0])} - {""} == labels
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("options", "said"), [
     ({"names": ["qdd"]},
      "error[E324]: no signal or metric `qdd` in `gains`\n = help: did you mean `qd`?\n"

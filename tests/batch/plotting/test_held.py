@@ -60,6 +60,7 @@ def units(file: ArchiveFile) -> tuple[DeckUnits, dict[str, Any]]:
     return found, {panel.name: found.panel(panel) for panel in panels(file.groups[0])}
 
 
+@pytest.mark.slow
 def test_a_signal_is_in_the_unit_in_which_the_deck_wrote_what_it_does(ran: dict[str, ArchiveFile]) -> None:
     _, found = units(ran["slew"])
     assert {name: panel.unit for name, panel in found.items()} == {

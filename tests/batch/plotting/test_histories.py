@@ -105,6 +105,7 @@ def dashed(ax: Any) -> list[Any]:
     return [line for line in ax.lines if line.is_dashed() and len(line.get_xdata())]
 
 
+@pytest.mark.slow
 def test_a_command_is_drawn_over_what_follows_it_and_nowhere_else(
     here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -138,6 +139,7 @@ def test_a_command_is_shared_by_a_case_that_broke_off(
     assert np.isfinite(line.get_ydata()).all()
 
 
+@pytest.mark.slow
 def test_a_fan_of_unlike_commands_leaves_them_a_panel(
     here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -177,6 +179,7 @@ def test_a_case_that_breaks_off_is_marked(here: Path, figures: list[Any], monkey
     assert ax.lines[1].get_xdata()[0] == pytest.approx(0.16)  # the fifth row, the last that is valid
 
 
+@pytest.mark.slow
 def test_the_legend_is_outside_of_the_data(here: Path, figures: list[Any]) -> None:
     for cases in (1, 3):
         with archive(cases) as file:
@@ -207,6 +210,7 @@ def test_a_row_that_is_zero_throughout_is_low_and_the_others_are_not(
     assert rows.get_height_ratios() == [1.0, FLAT]
 
 
+@pytest.mark.slow
 def test_under_many_panels_the_legend_is_there_again(here: Path, figures: list[Any]) -> None:
     with archive(1) as file:
         draw(file, "a.png", ["q", "qd", "tau", "q", "qd", "tau"])

@@ -64,6 +64,7 @@ def legend(figure: Any) -> list[str]:
 
 
 class TestPoints:
+    @pytest.mark.slow
     @pytest.mark.parametrize("values", [[np.inf, 2.0, 3.0, 4.0, np.nan], [np.inf]])
     def test_on_the_edge_are_within_the_axis(
         self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch, values: list[float]
@@ -74,6 +75,7 @@ class TestPoints:
         low, high = shown(figures[0])[0].get_xlim()
         assert 0.0 < low < 0.01 and 0.04 < high < 0.05
 
+    @pytest.mark.slow
     def test_of_the_other_archive_that_are_no_numbers_are_on_the_edge(
         self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -98,6 +100,7 @@ class TestPoints:
 
 
 class TestMapsOfADifference:
+    @pytest.mark.slow
     def test_judge_each_archive_by_what_it_requires_itself(
         self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -138,6 +141,7 @@ class TestNames:
         ax = shown(figures[0])[0]
         assert [text.get_text().strip() for text in ax.get_legend().get_texts()] == ["_shoulder", "_elbow"]
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("name", "shown_as"),
         [
@@ -184,6 +188,7 @@ class TestOutput:
         with pytest.raises(Problem, match="was not drawn by MET"):
             plot("a.h5", "theirs.png")
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("over", [[], ["gearbox.kp"]], ids=["map", "points"])
     def test_is_drawn_of_values_that_overflow(
         self, here: Path, monkeypatch: pytest.MonkeyPatch, over: list[str]

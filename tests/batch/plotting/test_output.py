@@ -20,6 +20,7 @@ pytestmark = pytest.mark.usefixtures("engine")
 BEGINS = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", BEGINS)
 def test_the_ending_says_the_format_and_the_same_archive_gives_the_same_bytes(here: Path, ending: str) -> None:
     with archive(3) as file:
@@ -30,6 +31,7 @@ def test_the_ending_says_the_format_and_the_same_archive_gives_the_same_bytes(he
     assert not re.search(rb"CreationDate|<dc:date>", first)
 
 
+@pytest.mark.slow
 def test_letters_of_an_svg_are_drawn_and_those_of_a_pdf_are_letters(here: Path) -> None:
     with archive(3) as file:
         drawn = draw(file, "a.svg").read_text(encoding="utf-8")
@@ -37,6 +39,7 @@ def test_letters_of_an_svg_are_drawn_and_those_of_a_pdf_are_letters(here: Path) 
         assert b"/FontFile2" in draw(file, "a.pdf").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("output", "said"),
     [
@@ -60,6 +63,7 @@ def test_a_picture_that_cannot_be_written(here: Path, output: str, said: str) ->
     assert not list(here.glob(".*.tmp"))
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_the_picture_that_was_there(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -92,6 +96,7 @@ def test_a_size_is_a_width_or_both_sides(text: str, inches: tuple[float, float |
     assert caught.value.diagnostics[0].message == f"size `{text}` cannot be read"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "dpi", "said"),
     [
@@ -112,6 +117,7 @@ def test_a_size_that_cannot_be(here: Path, size: str, dpi: int | None, said: str
     assert render(caught.value.diagnostics).rpartition("\n1 error")[0] == said
 
 
+@pytest.mark.slow
 def test_paper_has_its_size_its_letters_and_no_title(here: Path, figures: list[Any]) -> None:
     from PIL import Image
 
@@ -127,6 +133,7 @@ def test_paper_has_its_size_its_letters_and_no_title(here: Path, figures: list[A
     assert figures[1].get_suptitle() == "3 cases"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", ["8.5cm", "17.5cm"])
 @pytest.mark.parametrize(("cases", "histories", "over"), [
     (1, "all", ()), (3, "all", ()), (40, "all", ()), (40, "none", ()), (40, "none", ("gearbox.kp", "links.lower.mass")),

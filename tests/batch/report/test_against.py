@@ -75,6 +75,7 @@ def squeezed(text: str) -> str:
 
 
 class TestTheVerdict:
+    @pytest.mark.slow
     def test_counts_the_cases_by_how_they_differ(self, planted: tuple[Path, Path]) -> None:
         verdict = gathered(*planted, "q=1e-6rad").verdicts[-1]
         assert (verdict.kind, verdict.about) == ("comparison", "Against a.h5")
@@ -83,6 +84,7 @@ class TestTheVerdict:
             ("identical", CASES - 2 - 4), ("equivalent", 1), ("different", 3), ("only before", 2),
         ]  # fmt: skip
 
+    @pytest.mark.slow
     def test_says_which_cases_meet_a_requirement_now_and_which_no_longer(self, planted: tuple[Path, Path]) -> None:
         verdict = gathered(*planted).verdicts[-1]
         settle, volts = verdict.flows
@@ -91,6 +93,7 @@ class TestTheVerdict:
         assert (volts.met, volts.gained, volts.lost) == ("met by 0, now by 1 of 58", f"#{number(14)}", "")
         assert verdict.figure == (0, 1, 58)
 
+    @pytest.mark.slow
     def test_of_an_archive_and_itself_is_identical(self, planted: tuple[Path, Path]) -> None:
         found = gathered(planted[0], planted[0])
         verdict = found.verdicts[-1]
@@ -99,6 +102,7 @@ class TestTheVerdict:
         [section] = found.sections
         assert section.compared[0].worst == () and section.compared[0].word == "identical"
 
+    @pytest.mark.slow
     def test_of_what_has_nothing_in_common_says_so(self, here: Path, engine: None) -> None:
         one = archives.made(here / "a.h5", plans.nominal(), plans.gains(3))
         other = archives.made(here / "b.h5", plans.nominal("swing"), plans.gains(4, name="loads"))
@@ -126,12 +130,14 @@ class TestThePage:
         word, _, rest = last.partition(";" if ";" in last else ":" if ":" in last else ",")
         assert squeezed(word) in source and squeezed(rest) in source
 
+    @pytest.mark.slow
     def test_says_all_that_met_diff_says(self, planted: tuple[Path, Path]) -> None:
         self.all_told(*planted)
         self.all_told(*planted, "q=1e-6rad,qd=1rad/s,rel=1e-3,time=1ms")
         self.all_told(*reversed(planted))
         self.all_told(planted[0], planted[0])
 
+    @pytest.mark.slow
     def test_says_it_of_several_structures_and_runs(self, here: Path) -> None:
         batch.run(archives.compiled(here, "ways", "brief"), output="a.h5")
         deck = archives.DECK.replace("0.03]", "0.04]").replace("duration = 4 s", "duration = 5 s")
@@ -146,6 +152,7 @@ class TestThePage:
         deck_says, command_says = only.allowed
         assert deck_says.startswith("the deck of a.h5 allows rel ") and command_says.startswith("--tol allows qd ")
 
+    @pytest.mark.slow
     def test_of_other_seeds_has_distributions(self, here: Path, engine: None) -> None:
         one = plans.gains(40)
         archives.made(here / "a.h5", one)
@@ -165,12 +172,14 @@ class TestThePage:
         assert len(made.lines) > 20
         assert f"and {len(made.lines) - 12} more" in words(page(found))
 
+    @pytest.mark.slow
     def test_says_where_there_is_no_text_of_a_deck_as_markup(self, planted: tuple[Path, Path]) -> None:
         found = gathered(*planted, "q=1e-6rad")
         usual, wild = Parsed(page(found)), Parsed(page(hostile(found)))
         assert {tag for tag, _ in wild.elements} <= {tag for tag, _ in usual.elements}
         assert page(hostile(found)).count("</script>") == 2
 
+    @pytest.mark.slow
     def test_has_the_same_bytes_for_the_same_archives(self, planted: tuple[Path, Path]) -> None:
         one, other = (report(planted[1], name, against=planted[0]).read_bytes() for name in ("1.html", "2.html"))
         assert one == other
@@ -179,6 +188,7 @@ class TestThePage:
         source = report(planted[1], "1.html").read_text(encoding="utf-8")
         assert "What changed" not in source and '"against":null' in source
 
+    @pytest.mark.slow
     def test_of_one_run_of_several_is_of_it_alone(self, here: Path, engine: None) -> None:
         archives.made(here / "a.h5", plans.nominal(), plans.gains(3))
         archives.made(here / "b.h5", plans.nominal(), plans.gains(4))
@@ -187,6 +197,7 @@ class TestThePage:
         [only] = found.sections[0].compared
         assert only.heading == "nominal: 1 case in both, identical"
 
+    @pytest.mark.slow
     def test_has_commands_that_run_both_again(self, here: Path) -> None:
         batch.run(archives.compiled(here, "ways", "brief"), output="a.h5")
         deck = archives.DECK.replace("duration = 4 s", "duration = 5 s")
@@ -203,6 +214,7 @@ class TestThePoints:
         assert overview is not None
         return {column.key: column for column in overview.columns}
 
+    @pytest.mark.slow
     def test_know_what_each_case_was_before(self, planted: tuple[Path, Path]) -> None:
         columns = self.columns(gathered(*planted))
         with ArchiveFile(planted[0]) as file:
@@ -215,11 +227,13 @@ class TestThePoints:
         expected[MIXED.index(12)] = np.nan
         assert change == pytest.approx(expected, nan_ok=True)
 
+    @pytest.mark.slow
     def test_have_no_change_where_both_are_infinite(self, planted: tuple[Path, Path]) -> None:
         columns = self.columns(gathered(*planted))
         assert columns["metric:settle"].values[MIXED.index(0)] == math.inf
         assert columns["change:metric:settle"].values[MIXED.index(0)] == 0.0
 
+    @pytest.mark.slow
     def test_say_how_each_case_compares(self, planted: tuple[Path, Path]) -> None:
         columns = self.columns(gathered(*planted, "q=1e-6rad"))
         compared, outcome = columns["choice:compared"], columns["choice:outcome"]
@@ -227,6 +241,7 @@ class TestThePoints:
         assert said == {3: "identical", 5: "equivalent", 7: "different", 12: "different"}
         assert outcome.words[int(outcome.values[MIXED.index(14)])] == "meets all, and did not"
 
+    @pytest.mark.slow
     def test_of_a_case_that_is_new_have_nothing_before(self, planted: tuple[Path, Path]) -> None:
         columns = self.columns(gathered(planted[1], planted[0]))
         assert np.flatnonzero(np.isnan(columns["metric:volts"].before)).tolist() == [12, *GONE]  # type: ignore[arg-type]
@@ -260,6 +275,7 @@ class TestThePoints:
         assert overview is not None
         assert overview.maps[0].values["change:metric:volts"] == pytest.approx(np.full((2, 3), 0.5))
 
+    @pytest.mark.slow
     def test_of_many_keep_those_that_changed_most(
         self, planted: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -273,12 +289,14 @@ class TestThePoints:
 
 
 class TestTheSignals:
+    @pytest.mark.slow
     def test_that_changed_most_come_first_and_then_the_worst(self, planted: tuple[Path, Path]) -> None:
         found = gathered(*planted).sections[0].signals
         assert found is not None and found.most[:1] == (MIXED.index(12),) == found.shown
         assert found.worst == MIXED.index(12) and found.middle is None
         assert len(found.histories) == len(MIXED)
 
+    @pytest.mark.slow
     def test_are_there_twice_and_their_difference_too(self, planted: tuple[Path, Path]) -> None:
         found = gathered(*planted).sections[0].signals
         assert found is not None
@@ -300,6 +318,7 @@ class TestTheSignals:
         assert np.isin(np.round(both, 9), np.round(now, 9)).all() and np.isin(np.round(both, 9), np.round(was, 9)).all()
         assert len(both) == len(mine.change.values[0]) < len(was)
 
+    @pytest.mark.slow
     def test_of_a_case_that_is_new_are_alone(self, planted: tuple[Path, Path]) -> None:
         found = gathered(planted[1], planted[0]).sections[0].signals
         assert found is not None
@@ -345,6 +364,7 @@ class TestNames:
 
 
 class TestTheCommand:
+    @pytest.mark.slow
     @pytest.mark.parametrize("swap", [False, True])
     def test_ends_well_when_the_page_is_written(
         self, planted: tuple[Path, Path], swap: bool, capsys: pytest.CaptureFixture[str]
@@ -379,6 +399,7 @@ class TestTheCommand:
         assert not Path("b.html").exists()
 
 
+@pytest.mark.slow
 def test_a_structure_says_how_many_met_all_before(here: Path) -> None:
     batch.run(archives.compiled(here, "ways"), output="a.h5")
     deck = archives.DECK.replace("run brief like nominal { ", "run brief like nominal { require settle < 2.2 s; ")

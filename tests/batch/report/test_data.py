@@ -90,6 +90,7 @@ class TestWorstCases:
         worst = found.sections[1].worst
         assert worst is not None and worst.commands[0].startswith("met run 'it is.h5' gains --case '#")
 
+    @pytest.mark.slow
     def test_are_run_again_by_that_command(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         import shlex
 
@@ -282,6 +283,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class TestStability:
+    @pytest.mark.slow
     def test_is_what_met_margin_says(self, bench: Path) -> None:
         found = gathered(bench).sections[0].stability
         assert found is not None
@@ -297,6 +299,7 @@ class TestStability:
         assert bed.unstable.tolist() == [place in bad for place in range(6)]
         assert found.unstable == (f"shoulder: not stable in {len(bad)} of 6 cases: #3, #5",) and bad == [3, 5]
 
+    @pytest.mark.slow
     def test_tells_from_where_where_an_arm_may_be_too_light(self, tmp_path: Path) -> None:
         deck = archives.DECK + """
             run stiff like there { shoulder { bed = emulated;  law = measured_acceleration; } duration = 0.1 s; }
@@ -310,6 +313,7 @@ class TestStability:
         assert np.isnan(bed.lower[:2]).all() and bed.lower[2:] == pytest.approx([0.181, 0.181], rel=0.01)
         assert bed.stable_at == "0.181 to 4.01" and bed.margin == "none: unstable, too light"
 
+    @pytest.mark.slow
     def test_of_many_cases_is_of_some_and_that_is_said(self, bench: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(stability, "MOST_CASES", 3)
         monkeypatch.setattr(stability, "MOST_LOOPS", 1)
@@ -333,6 +337,7 @@ def test_a_plan_that_cannot_be_read_here_leaves_the_rest(sweep: Path, monkeypatc
     assert section.overview is not None and section.signals is not None
 
 
+@pytest.mark.slow
 def test_a_pool_of_groups_is_in_the_order_of_the_case_table(tmp_path: Path) -> None:
     batch.run(archives.compiled(tmp_path, "ways"), output=tmp_path / "a.h5")
     with ArchiveFile(tmp_path / "a.h5") as file:

@@ -39,6 +39,7 @@ def test_nothing_is_missing(archive: Path, tmp_path: Path, capsys: pytest.Captur
     assert whole.beside_it(archive) == ["a.h5", "a.h5.run.json"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9, 1.0])
 def test_a_flipped_bit_in_the_archive_is_noticed(archive: Path, undisturbed: bytes, share: float) -> None:
     go_on(archive)
@@ -48,6 +49,7 @@ def test_a_flipped_bit_in_the_archive_is_noticed(archive: Path, undisturbed: byt
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["", "[]", "null", "{}", '{"campaign": 7}', "\0\xff"])
 def test_a_damaged_sidecar_costs_time_alone(archive: Path, undisturbed: bytes, text: str) -> None:
     go_on(archive)
@@ -99,6 +101,7 @@ def killed(where: str, archive: Path) -> None:
     assert whole.met(words, archive.parent, program=f"{DIES}{where}\n{whole.MET}").returncode == -9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", DEATHS)
 def test_what_is_killed_while_it_merges_merges_again(archive: Path, undisturbed: bytes, where: str) -> None:
     killed(DEATHS[where], archive)
@@ -110,6 +113,7 @@ def test_what_is_killed_while_it_merges_merges_again(archive: Path, undisturbed:
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_what_is_killed_before_its_folder_is_removed_is_tidied_up(archive: Path, undisturbed: bytes) -> None:
     killed("folder.Folder.remove = die", archive)
     assert archive.read_bytes() == undisturbed
@@ -117,6 +121,7 @@ def test_what_is_killed_before_its_folder_is_removed_is_tidied_up(archive: Path,
     assert rest.tasks == []
 
 
+@pytest.mark.slow
 def test_what_is_killed_while_its_folder_is_removed_is_tidied_up(archive: Path, undisturbed: bytes) -> None:
     killed("folder.shutil.rmtree = lambda path, **_: (path / 'campaign.json').unlink() or die()", archive)
     assert archive.read_bytes() == undisturbed

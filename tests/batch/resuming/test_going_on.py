@@ -112,6 +112,7 @@ DAMAGES = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("damage", "why"), DAMAGES, ids=[damage.__name__ for damage, _ in DAMAGES])
 def test_a_shard_that_does_not_count(
     archive: Path, undisturbed: bytes, damage: Callable[[Path], None], why: str
@@ -188,6 +189,7 @@ def test_what_workers_had_begun_to_write_is_swept_away(archive: Path, undisturbe
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"updated": 1}', '{"updated": "now"}', "\0\xff"])
 def test_a_damaged_status_file_is_harmless(archive: Path, undisturbed: bytes, text: str) -> None:
     begin(archive)
@@ -218,6 +220,7 @@ def damaged(data: bytes) -> Iterator[tuple[str, bytes]]:
     yield "odd sections", json.dumps({**json.loads(data), "sections": {"number": 0}}).encode()
 
 
+@pytest.mark.slow
 def test_a_damaged_description_is_refused(archive: Path, undisturbed: bytes) -> None:
     kept = begin(archive)
     path = whole.folder_of(archive).path / "campaign.json"
@@ -245,6 +248,7 @@ def test_a_description_that_is_gone_is_written_anew(archive: Path, undisturbed: 
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["", "{}", "[1]"])
 def test_a_damaged_plan_file_is_written_anew(archive: Path, undisturbed: bytes, text: str) -> None:
     begin(archive)

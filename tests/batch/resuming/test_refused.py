@@ -117,6 +117,7 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", CHANGES)
 def test_another_campaign_is_left_alone(archive: Path, here: Path, what: str) -> None:
     change, told = CHANGES[what]
@@ -181,6 +182,7 @@ def test_starting_over_where_nothing_was_begun(archive: Path, undisturbed: bytes
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change", [("run brief", "// gently\n\nrun brief"), with_entry("require settle < 1.5 s;")], ids=["comment", "limit"]
 )

@@ -202,6 +202,7 @@ def of_another_name(path: Path) -> None:
     (path.parent / "sum").write_bytes(cache.digest_of("another", path.read_bytes()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil", [emptied, cut, Path.unlink, others_may_write_it, others_may_write_its_folder,
                                    of_another_name])  # fmt: skip
 def test_what_is_not_as_it_was_built_is_built_anew(fresh: Path, spoil: Callable[[Path], None]) -> None:

@@ -78,6 +78,7 @@ wrote my_arm.ic
     assert capsys.readouterr() == ("my_arm.ic: 1 run, 1 sweep, 7 cases: no errors\n", "")
 
 
+@pytest.mark.slow
 def test_the_deck_runs_and_meets_its_requirement_in_every_case() -> None:
     cli.main(["new", "deck", "my_arm", "-q"])
     archive = batch.run(ic.compile("my_arm.ic", select="all"), histories="none")
@@ -127,6 +128,7 @@ def begin(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[s
     models.available.cache_clear()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", MODELS)
 def test_a_model_does_what_every_model_must(
     kind: models.Kind, begin: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -143,6 +145,7 @@ def test_a_model_does_what_every_model_must(
             test(kind, "begun", joint, tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", MODELS)
 def test_its_deck_checks_without_a_word_and_runs_and_is_laid_out(kind: str, begin: Callable[[str], Path]) -> None:
     deck = begin(kind) / "begun.ic"
@@ -160,6 +163,7 @@ def test_its_file_passes_the_projects_own_linter(kind: str, folder: Path) -> Non
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.slow
 def test_pip_installs_what_is_written_and_met_finds_it(folder: Path) -> None:
     for kind in MODELS:
         cli.main(["new", kind, f"my_{kind}", "-q"])

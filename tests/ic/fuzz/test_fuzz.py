@@ -48,6 +48,7 @@ def test_what_was_found_stays_mended(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert [d.code for d in ic.check(deck).diagnostics] == ["D103"]
 
 
+@pytest.mark.slow
 def test_a_deck_of_the_series_is_the_same_each_time() -> None:
     assert mutations.changed_bytes(_rng(), ARM.encode()) == mutations.changed_bytes(_rng(), ARM.encode())
     for change in mutations.GENTLE:
@@ -91,6 +92,7 @@ def test_a_deck_that_takes_too_long_is_a_fault(tmp_path: Path, monkeypatch: pyte
     assert fault[0].startswith("Hung in")
 
 
+@pytest.mark.slow
 def test_a_deck_that_takes_too_much_memory_is_a_fault() -> None:
     """In a process of its own, which is then limited for good."""
     script = "from tests.ic.fuzz import one; one.limit_memory(); kept = bytearray(2**29); bytearray(2**30)"
@@ -116,6 +118,7 @@ Traceback ...
 x = 1;"""
 
 
+@pytest.mark.slow
 def test_some_random_sweeps_show_no_fault(tmp_path: Path) -> None:
     """All kinds of axes, with one case and with several, over one deck; the test below tries many more of all."""
     decks = ("two_link.ic",)

@@ -526,18 +526,21 @@ FUZZ = settings(
 )
 
 
+@pytest.mark.slow
 @FUZZ
 @given(st.lists(st.sampled_from(PIECES), max_size=60).map("".join))
 def test_no_heap_of_pieces_raises_anything_but_a_problem(desk: Desk, text: str):
     _survives(desk, text)
 
 
+@pytest.mark.slow
 @FUZZ
 @given(st.binary(max_size=200))
 def test_no_bytes_raise_anything_but_a_problem(desk: Desk, data: bytes):
     _survives(desk, data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(300))
 def test_no_mutilated_deck_raises_anything_but_a_problem(desk: Desk, seed: int):
     rng = random.Random(seed)

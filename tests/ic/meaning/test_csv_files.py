@@ -398,6 +398,7 @@ error[D141]: `trajectory` has no `times`
 """, 'trajectory(file = "moves.csv", times = [1, 2] s)')
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "course", "message"), [m[1:] for m in MISTAKES], ids=[m[0] for m in MISTAKES])
 def test_a_mistake_is_told_where_it_is(tmp_path: Path, text: str | bytes, course: str, message: str) -> None:
     assert shown(tmp_path, text, course) == message
@@ -435,6 +436,7 @@ def test_one_mistake_of_a_file_is_told_once_however_many_joints_read_it(tmp_path
     assert [d.code for d in said.diagnostics] == ["D195"]
 
 
+@pytest.mark.slow
 def test_a_broken_file_is_told_with_a_place_whatever_is_wrong_with_it(tmp_path: Path) -> None:
     pick = random.Random(190)
     odd = b'0123456789.,;[]"#\n\r\t -+eE\xff\x00am/^*'

@@ -84,6 +84,7 @@ PATHS = {"bandwidth": "hinge.servo.bandwidth", "frequency": "hinge.servo.command
          "ratio": "lift.servo.ratio"}  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DOUBTS)
 def test_each_remedy_followed_as_it_is_written_is_what_it_says_and_is_plain(tmp_path: Path, name: str) -> None:
     (before, after), written, _, meant = DOUBTS[name]

@@ -114,6 +114,7 @@ TABLES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("convention", "rows", "kinds"), TABLES)
 def test_every_link_is_where_the_product_of_the_published_rows_has_it(
     tmp_path: Path, convention: str, rows: tuple[dh.Row, ...], kinds: str

@@ -46,6 +46,7 @@ FOLLOWED = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FOLLOWED)
 def test_what_the_help_says_to_write(tmp_path: Path, name: str) -> None:
     text, wrong = FOLLOWED[name]

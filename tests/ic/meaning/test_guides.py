@@ -424,6 +424,7 @@ error[D274]: `x` of guide `tip` is a component of its path, and a joint that fol
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vary", [
     "high.at.x = [1, 1.2] m", "initial.low.q = [10, 30] deg", "guides.tip.point.x = [0.5, 1] m",
     "guides.tip.gain = [1, 100] 1/s",

@@ -36,6 +36,7 @@ GUIDE = changed(RUN, ("duration", "guide home = together { hinge.to = 1 rad; max
                                   "max_acceleration = 1 rad/s^2; }\n    duration"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("deck", "written", "misspelt", "code", "message", "remedies"), [
     ((ARM, SERVO, RUN), "mass =", "mas =", "D141", "link `bar` has no `mas`", (OF_LINK,)),
     ((ARM, SERVO, RUN), "shape =", "shap =", "D141", "link `bar` has no `shap`", (OF_LINK,)),

@@ -59,6 +59,7 @@ warning[D168]: environment `fault` never acts: the law of servo `drive` (ideal) 
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", [RUN, changed(RUN, ("servos = 1 kHz", "servos = continuous"))])
 @pytest.mark.parametrize(("servo", "of", "read"), [
     (SERVO, "qd", True), (SERVO, "q", False), (POSITION, "q", True), (POSITION, "qd", True), (TORQUE, "qd", True),

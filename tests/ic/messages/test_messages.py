@@ -39,6 +39,7 @@ def test_a_mistake_is_this_message(desk: Desk, title: str) -> None:
     assert desk.told(deck, (), others) == said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("title", [title for title in ALL if "include" not in title])
 def test_in_an_included_file_it_is_the_same_message_with_the_includes_that_led_there(desk: Desk, title: str) -> None:
     deck, others, said = ALL[title]
@@ -81,6 +82,7 @@ LONG = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("title", LONG)
 def test_what_is_too_large_is_told_where_it_becomes_so(desk: Desk, title: str) -> None:
     text, said, place = LONG[title]

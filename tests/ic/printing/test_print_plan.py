@@ -237,6 +237,7 @@ def test_plan_as_json_is_the_plan_file(capsys: pytest.CaptureFixture[str]) -> No
     assert plan_file.loads(out).experiments[0].name == "free"
 
 
+@pytest.mark.slow
 def test_an_arm_of_a_thousand_joints_is_drawn(deck: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Deeper than Python's stack."""
     links = "".join(f"link l{i} {{ mass = 1 kg; shape = sphere(radius = 1 m); }}\n" for i in range(1200))
@@ -309,6 +310,7 @@ def test_explain_of_an_unknown_path_says_what_was_meant(capsys: pytest.CaptureFi
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["knee.qdd", "tau", "knee.reaction", "links.first.position.z", "energy.kinetic"])
 def test_explain_of_a_channel_says_that_only_a_run_has_it(path: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert complained(capsys, "explain", "swing.ic", path) == (

@@ -52,6 +52,7 @@ def outcome(text: str) -> str | None:
     return None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", HOSTILE)
 def test_a_hostile_file_ends_in_a_diagnostic_within_seconds_and_bounded_memory(what: str) -> None:
     tracemalloc.start()
@@ -65,6 +66,7 @@ def test_a_hostile_file_ends_in_a_diagnostic_within_seconds_and_bounded_memory(w
     assert peak < 400e6
 
 
+@pytest.mark.slow
 def test_the_longest_robot_that_is_read_is_told_of_within_seconds(tmp_path: Path) -> None:
     begun = time.monotonic()
     assert [each.code for each in check(tmp_path, LONGEST).diagnostics] == ["D217"]
@@ -76,6 +78,7 @@ def test_a_file_cut_anywhere_is_told() -> None:
         assert outcome(TWO[:end]) is not None, end
 
 
+@pytest.mark.slow
 def test_a_mutilated_file_is_a_robot_or_told_and_never_a_traceback() -> None:
     pick = random.Random(SEED)
     texts = [TWO, RICH, random_urdf(1), random_urdf(4)]

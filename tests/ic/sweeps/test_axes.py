@@ -145,6 +145,7 @@ def test_a_definition_and_one_of_its_joints_on_one_parameter_is_an_error(tmp_pat
     assert swept_codes(tmp_path, other, TWO, BOTH) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("body", "code"), [
     ("", "D126"),
     ("vary drive.kp = 1 V*s/rad;", "D126"),
@@ -275,6 +276,7 @@ def test_a_sweep_has_a_seed_of_its_own(tmp_path: Path) -> None:
     assert swept_codes(tmp_path, "seed = 7.5; vary drive.kp = [1, 2] V*s/rad;") == ["D113"]
 
 
+@pytest.mark.slow
 def test_the_cases_of_a_sweep_that_is_too_large_are_all_counted(tmp_path: Path) -> None:
     axes = "".join(f"vary {path} = linspace(1, 2, 10000) {unit}; " for path, unit in (
         ("drive.kp", "V*s/rad"), ("drive.ki", "V/rad"), ("drive.ratio", "")))

@@ -293,6 +293,7 @@ def test_what_a_macros_value_makes_is_what_the_command_line_makes(tmp_path: Path
     assert keys.structure_key(found.structure) == keys.structure_key(by_hand.structure)
 
 
+@pytest.mark.slow
 def test_a_table_of_a_million_cases_of_two_structures_is_parted_at_once(tmp_path: Path) -> None:
     gains = "vary drive.kp = linspace(1, 2, 1000) V*s/rad;", "vary drive.ki = linspace(1, 2, 1000) V/rad;"
     body = f"{gains[0]} vary integrator = [rk4, midpoint]; {gains[1]}"

@@ -157,6 +157,7 @@ def test_a_sum_may_be_of_sums_and_the_default(tmp_path: Path) -> None:
     assert len(compiled.plan.experiments) == 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("more", "message"), [
     ("sweep x = gains + nothing;", "error[D041]: no run or sweep `nothing`"),
     ("sweep x = gains + x;", "error[D043]: sweep `x` is made of itself"),

@@ -35,6 +35,7 @@ def values(run: Experiment, path: str) -> np.ndarray:
     return np.asarray(run.formulas.replay(inputs)[found.output] if isinstance(found, Formula) else found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("axis", "component", "swept_over"), [
     ("[1, 0, 1]", "x", [0, 0.5, 2]),
     ("[3, 0, 4]", "x", [3, 0.6]),  # the components are those that the deck writes, not those of the unit vector

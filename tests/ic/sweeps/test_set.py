@@ -52,6 +52,7 @@ def refused(folder: Path, *settings: str, text: str = ARM + SERVO + OTHERS + RUN
     return told(compiled)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("setting", "old", "new"), [
     ("drive.kp=0.2 V*s/rad", "kp = 0.1", "kp = 0.2"),
     ("hinge.servo.kp=0.2 V*s/rad", "hinge = drive;", "hinge = drive { kp = 0.2 V*s/rad; };"),
@@ -116,6 +117,7 @@ def test_it_holds_for_all_runs_that_are_asked_for(
     assert same(made(tmp_path, text, "all", settings), made(tmp_path, edited, "all"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("setting", "body", "old", "new"), [
     ("drive.kp=0.2 V*s/rad", "vary drive.ki = [1, 2] V/rad;", "kp = 0.1", "kp = 0.2"),
     ("integrator=rk4", "vary drive.ki = [1, 2] V/rad;", "duration", "integrator = rk4; duration"),
@@ -267,6 +269,7 @@ def test_what_is_set_stands_behind_the_macros_of_the_command_line(
     assert plan.sources[-1].text == "ONE 1\nTWO 1\nduration=2 s\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [
     ["check", "hold.ic"], ["plan", "a.ic", "hold"], ["cases", "a.ic"], ["explain", "a.ic", "duration", "--run", "hold"],
     ["dump", "plan", "a.ic", "hold"], ["run", "a.ic", "hold", "-q", "--no-picture"], ["profile", "a.ic", "hold"],

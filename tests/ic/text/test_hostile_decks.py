@@ -15,6 +15,7 @@ def _nested(name: str, count: int) -> str:
     return f"{name}(" * count + "1" + ")" * count
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "code"),
     [
@@ -61,6 +62,7 @@ def test_very_long_lines_cost_time_in_proportion(desk: Desk, line: str):
     assert time.process_time() - start < 3
 
 
+@pytest.mark.slow
 def test_macros_in_ten_thousand_lines_cost_time_in_proportion(desk: Desk):
     head = "#define REACH 2.0 m\n#define ROD(NAME, MASS) link NAME { mass = MASS; at = REACH; }\n"
 

@@ -16,6 +16,8 @@ from tests.ic.small_decks import check, experiment, told
 from tests.met.declarations.values import errors, inner, paths, varied
 from tests.met.small_models import EVERY, Use, finite, first_uses, uses
 
+pytestmark = pytest.mark.slow
+
 WITH_PARAMETERS = [(kind, name) for kind, name in EVERY if models.written(models.find(kind, name))]
 
 

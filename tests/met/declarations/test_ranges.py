@@ -25,6 +25,8 @@ from tests.ic.small_decks import check, experiment, told
 from tests.met.declarations.values import NUMBERS, bounds, constant, errors, inner, paths, several, shaped, varied
 from tests.met.small_models import EVERY, SMALLEST, Small, Use, smallest, uses
 
+pytestmark = pytest.mark.slow
+
 UNSTABLE = {"D104"}
 """What else a number may be refused for: one at its bound may make a servo too fast for the step."""
 

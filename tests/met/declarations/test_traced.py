@@ -14,6 +14,8 @@ from tests.ic.small_decks import experiment
 from tests.met.declarations import both_ways
 from tests.met.small_models import EVERY, smallest, uses
 
+pytestmark = pytest.mark.slow
+
 DRAWS = 25
 """Sets of random numbers for each function, under each kind of command and each choice of words."""
 

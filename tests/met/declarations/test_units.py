@@ -22,6 +22,8 @@ from tests.ic.small_decks import check, experiment, told
 from tests.met.declarations.values import NUMBERS, holds, inner, paths, several, shaped
 from tests.met.small_models import EVERY, JOINTS, Use, Value, first_uses, smallest
 
+pytestmark = pytest.mark.slow
+
 ODD = "K"
 """A unit of a dimension that no parameter has."""
 

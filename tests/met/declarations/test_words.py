@@ -23,6 +23,7 @@ def words_of(use: Use) -> Iterator[Parameter]:
     return (parameter for parameter in use.parameters() if parameter.shape == "word")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "name"), WITH_WORDS)
 def test_every_word_that_is_declared_is_taken(kind: models.Kind, name: str, tmp_path: Path) -> None:
     found = set()
@@ -40,6 +41,7 @@ def test_every_word_that_is_declared_is_taken(kind: models.Kind, name: str, tmp_
     assert {(each, word) for known in (words, names) for each in known for word in known[each]} <= found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "name"), WITH_WORDS)
 def test_any_other_word_is_refused_with_those_there_are(kind: models.Kind, name: str, tmp_path: Path) -> None:
     use = smallest(kind, name)
@@ -57,6 +59,7 @@ def test_any_other_word_is_refused_with_those_there_are(kind: models.Kind, name:
             assert f"one of: {', '.join(parameter.words)}" in refused.help
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["1", "1 N*m", '"world"', "[1, 2]"])
 @pytest.mark.parametrize(("kind", "name"), WITH_WORDS)
 def test_what_is_no_word_is_refused(kind: models.Kind, name: str, text: str, tmp_path: Path) -> None:
@@ -79,6 +82,7 @@ def test_a_word_does_not_vary_as_a_number_does(kind: models.Kind, name: str, tmp
         assert f"`{path}`" in refused.message and "word" in refused.message + " ".join(refused.help), told(compiled)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "name"), WITH_WORDS)
 def test_what_is_not_there_under_a_word_is_refused_with_the_words_under_which_it_is(
     kind: models.Kind, name: str, tmp_path: Path

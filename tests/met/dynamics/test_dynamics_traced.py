@@ -82,6 +82,7 @@ def close(ours: Sequence[float], plain: Sequence[float], seed: int, share: float
     assert not wrong.size, f"seed {seed}: entries {wrong}: {a[wrong]} against {b[wrong]}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_recorded_state_gives_the_plain_results(seed: int) -> None:
     arm = random_tree(seed)
@@ -91,6 +92,7 @@ def test_a_recorded_state_gives_the_plain_results(seed: int) -> None:
     close(record.replayed(recorded), everything(tree, arm, arm.mode), seed, CLOSE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_mode_decided_when_the_program_runs_gives_the_same_as_one_decided_before(seed: int) -> None:
     arm = random_tree(seed)
@@ -103,6 +105,7 @@ def test_a_mode_decided_when_the_program_runs_gives_the_same_as_one_decided_befo
         close(record.replayed(recorded), everything(tree, arm, mode), seed, CLOSE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_an_arm_whose_every_number_is_a_cases_gives_the_same_motion(seed: int) -> None:
     arm = random_tree(seed)
@@ -113,6 +116,7 @@ def test_an_arm_whose_every_number_is_a_cases_gives_the_same_motion(seed: int) -
     close(record.replayed(recorded), everything(Tree.build(arm.bodies), arm, arm.mode), seed, 1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_numpys_numbers_take_the_traced_path(seed: int) -> None:
     arm = random_tree(seed)

@@ -18,6 +18,7 @@ from tests.oracles.worst import Worst
 CLOSE = 1e-9
 
 
+@pytest.mark.slow
 def test_inertia_and_torque_felt_agree_with_linear_algebra_in_every_mode() -> None:
     # J as a share of itself, b as a share of the torques that it is the difference of.
     held, yielding = Worst("J_eff against M, acceleration mode"), Worst("J_eff against M, torque mode")
@@ -37,6 +38,7 @@ def test_inertia_and_torque_felt_agree_with_linear_algebra_in_every_mode() -> No
     bias.below(CLOSE)
 
 
+@pytest.mark.slow
 def test_a_joints_own_rotor_and_own_mode_are_not_felt() -> None:
     worst = Worst("J_eff with another rotor or mode of its own")
     for arm, tree in forest():
@@ -49,6 +51,7 @@ def test_a_joints_own_rotor_and_own_mode_are_not_felt() -> None:
     worst.below(CLOSE)
 
 
+@pytest.mark.slow
 def test_torque_felt_is_affine_in_the_joints_acceleration() -> None:
     worst = Worst("tau_load against J_eff qdd + b")
     for arm, tree in forest():

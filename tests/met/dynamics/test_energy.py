@@ -116,6 +116,7 @@ def order(coarse: float, fine: float) -> float:
     return math.log2(coarse / fine)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda integrator: integrator.name)
 def test_a_run_without_losses_keeps_energy_to_the_integrators_order(integrator: Integrator) -> None:
     found = []
@@ -133,6 +134,7 @@ def test_a_run_without_losses_keeps_energy_to_the_integrators_order(integrator: 
     assert min(found) > integrator.order - 0.2, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda integrator: integrator.name)
 def test_an_arm_that_floats_keeps_momentum_to_the_integrators_order(integrator: Integrator) -> None:
     found = []

@@ -117,6 +117,7 @@ def test_energy_and_momentum_agree_with_pinocchios_free_flyer() -> None:
         each.below(CLOSE)
 
 
+@pytest.mark.slow
 def test_momentum_changes_by_the_external_wrench_alone() -> None:
     # From the accelerations, by an independent sum over the links; as a share of the largest part of the wrench's rate.
     worst = Worst("free base: d(momentum)/dt against the external wrench")
@@ -149,6 +150,7 @@ def test_qdd_given_back_in_acceleration_mode_returns_the_same_motion_and_torques
     torques.below(CLOSE)
 
 
+@pytest.mark.slow
 def test_inertia_and_torque_felt_agree_with_linear_algebra_in_every_mode() -> None:
     # The base's six coordinates are those of a stand without matter that yields: three slides and three hinges.
     held, yielding, bias = (Worst(f"free base: {what}") for what in ("J_eff, held", "J_eff, yielding", "b"))
@@ -179,6 +181,7 @@ def test_inertia_and_torque_felt_agree_with_linear_algebra_in_every_mode() -> No
     bias.below(1e-9)
 
 
+@pytest.mark.slow
 def test_a_free_base_moves_as_a_prescribed_one_that_is_told_its_acceleration() -> None:
     motion, borne = Worst("acceleration given back: joints"), Worst("acceleration given back: reactions")
     for arm, tree, base in fleet():
@@ -231,6 +234,7 @@ def test_a_free_base_is_given_no_acceleration_and_moves_with_all_velocity_produc
             solve(tree, (0.0,), (0.0,), **given)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_a_recorded_state_gives_the_plain_results_in_every_mode(seed: int) -> None:
     arm, base = floated(random_tree(seed)), flight(seed)

@@ -35,6 +35,7 @@ def test_qdd_given_back_in_acceleration_mode_returns_the_same_motion_and_torques
     torques.below(CLOSE)
 
 
+@pytest.mark.slow
 def test_renumbering_branches_changes_nothing_beyond_rounding() -> None:
     motion, torques = Worst("renumbered: qdd"), Worst("renumbered: tau")
     for arm, tree in forest():
@@ -50,6 +51,7 @@ def test_renumbering_branches_changes_nothing_beyond_rounding() -> None:
     torques.below(CLOSE)
 
 
+@pytest.mark.slow
 def test_joints_are_given_back_in_the_order_asked_for() -> None:
     for arm, tree in forest():
         turned = [body.joint for body in arm.bodies if body.kind != "fixed"][::-1]
@@ -60,6 +62,7 @@ def test_joints_are_given_back_in_the_order_asked_for() -> None:
         assert ours.qdd[::-1] == passed(arm, arm.mode, tree).qdd, f"seed {arm.seed}"
 
 
+@pytest.mark.slow
 def test_cutting_a_link_in_two_at_a_fixed_joint_changes_nothing_beyond_rounding() -> None:
     motion, torques, borne = Worst("cut: qdd"), Worst("cut: tau"), Worst("cut: reactions")
     for arm, tree in forest():
@@ -75,6 +78,7 @@ def test_cutting_a_link_in_two_at_a_fixed_joint_changes_nothing_beyond_rounding(
     borne.below(CLOSE)
 
 
+@pytest.mark.slow
 def test_momentum_changes_by_gravity_wrenches_and_what_the_base_gives() -> None:
     worst = Worst("d(momentum)/dt against the external wrench")
     for plain, _ in forest():
@@ -95,6 +99,7 @@ def test_momentum_changes_by_gravity_wrenches_and_what_the_base_gives() -> None:
     worst.below(CLOSE)
 
 
+@pytest.mark.slow
 def test_a_base_that_accelerates_is_a_gravity_that_points_back() -> None:
     for arm, tree in forest():
         up = tuple(-x for x in arm.gravity)
@@ -102,6 +107,7 @@ def test_a_base_that_accelerates_is_a_gravity_that_points_back() -> None:
         assert ours.qdd == passed(arm, arm.mode, tree).qdd, f"seed {arm.seed}"
 
 
+@pytest.mark.slow
 def test_a_base_that_moves_is_six_more_joints_in_acceleration_mode() -> None:
     motion, torques, borne = Worst("moving base: qdd"), Worst("moving base: tau"), Worst("moving base: reactions")
     for arm, tree in forest():

@@ -121,6 +121,7 @@ def total(arm: RandomArm, tree: Tree, qd: tuple[float, ...], base: Pose, twist: 
     return sum(np.array([each.kinetic, *each.linear, *each.angular]) for each in (own, *others))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("free", [False, True])
 def test_the_jump_of_the_rates_agrees_with_linear_algebra_in_every_mode(free: bool) -> None:
     joints, bases = Worst("impact: joints"), Worst("impact: base")
@@ -142,6 +143,7 @@ def test_the_jump_of_the_rates_agrees_with_linear_algebra_in_every_mode(free: bo
         bases.below(1e-11)
 
 
+@pytest.mark.slow
 def test_momentum_goes_over_to_rounding_and_energy_is_lost_as_the_formula_says() -> None:
     kept, lost = Worst("impact on a free base: momentum"), Worst("impact: energy lost")
     for seed in range(60):
@@ -163,6 +165,7 @@ def test_momentum_goes_over_to_rounding_and_energy_is_lost_as_the_formula_says()
     lost.below(1e-11)
 
 
+@pytest.mark.slow
 def test_a_payload_on_a_link_is_a_body_of_the_tree() -> None:
     motion, felt, borne = (Worst(f"payload held: {what}") for what in ("motion", "J_eff and b", "reactions"))
     for seed in range(60):

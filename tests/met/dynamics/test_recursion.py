@@ -66,6 +66,7 @@ def test_mixed_modes_agree_with_pinocchio_both_ways() -> None:
     forward.below(CLOSE)
 
 
+@pytest.mark.slow
 def test_mixed_modes_agree_with_linear_algebra() -> None:
     accelerations, torques = Worst("mixed modes: qdd against M"), Worst("mixed modes: tau against M")
     for arm, tree in forest():

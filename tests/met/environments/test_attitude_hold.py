@@ -38,6 +38,7 @@ def oscillator(J: float, k: float, d: float, x: float, v: float, t: np.ndarray) 
     return np.real(first * np.exp((root - a) * t) + (x - first) * np.exp((-root - a) * t))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", ["link", "world"])
 def test_small_angles_about_each_axis_are_a_damped_oscillator(tmp_path: Path, axes: str) -> None:
     run = engine.run(experiment(tmp_path, changed(DECK, ("axes = link", f"axes = {axes}"))))
@@ -49,6 +50,7 @@ def test_small_angles_about_each_axis_are_a_damped_oscillator(tmp_path: Path, ax
         np.testing.assert_allclose(angles[:, i], expected, rtol=0, atol=3e-7)
 
 
+@pytest.mark.slow
 def test_it_turns_a_body_from_anywhere_to_where_it_is_wanted(tmp_path: Path) -> None:
     limited = "rpy = [20, 30, -50] deg; limit = [0.5, 0.6, 0.7] N*m; damping = [3, 4, 5] N*m*s/rad"
     far = ("[0.0001, -0.0002, 0.0003] rad", "[100, -40, 150] deg")

@@ -63,6 +63,7 @@ def test_an_end_that_is_not_written_is_none() -> None:
             assert math.isfinite(found) and (found != 0.0) == (("lower" in one) == (q < 0.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("deck", [SLIDER, HINGE], ids=["prismatic", "revolute"])
 @pytest.mark.parametrize("dissipation", [0.2, 0.5, 1.5])
 def test_a_contact_gives_back_what_the_closed_form_says(tmp_path: Path, deck: str, dissipation: float) -> None:
@@ -105,6 +106,7 @@ def places() -> np.ndarray:
     return np.asarray(0.1 + end.y[1, -1] * left)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["modified_euler", "midpoint", "rk4"])
 def test_integrators_keep_order_two_through_contacts(tmp_path: Path, integrator: str) -> None:
     worst = []

@@ -130,6 +130,7 @@ def test_a_plate_right_before_the_nozzle_takes_its_momentum_with_few_cells(expon
             assert force[2] == pytest.approx(2.0 * THRUST, rel=off + lost), (far, cells)
 
 
+@pytest.mark.slow
 def test_on_a_plate_beside_the_plume_few_cells_come_near_many() -> None:
     """In general position, and where the plume goes along the plate."""
     for nozzle, axis in (((0.2, -0.1), (0.3, -0.4, -1.0)), ((-1.0, 0.0), (1.0, 0.0, -0.2)),
@@ -233,6 +234,7 @@ def test_the_thruster_pushes_its_own_link_where_it_is_told_to() -> None:
     np.testing.assert_allclose(back.force, -THRUST * R[:, 2], rtol=0, atol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("schedule", "fires"), [
     ({"from": 0.2, "until": 0.5}, lambda t: 0.2 <= t < 0.5),
     ({"switches": (0.1, 0.25, 0.3, 0.31, 0.6)}, lambda t: 0.1 <= t < 0.25 or 0.3 <= t < 0.31 or t >= 0.6),
@@ -291,6 +293,7 @@ run it {
 """
 
 
+@pytest.mark.slow
 def test_in_a_run_it_turns_the_panel_until_it_ends(tmp_path: Path) -> None:
     found = engine.run(experiment(tmp_path, DECK))
     assert found.cause == [""]
@@ -344,6 +347,7 @@ run it {
 """
 
 
+@pytest.mark.slow
 def test_the_times_of_a_file_are_the_switches_of_a_deck(tmp_path: Path) -> None:
     (tmp_path / "fire.csv").write_text("time [ms]\n200\n400\n", encoding="utf-8")
     written = experiment(tmp_path, FILED)

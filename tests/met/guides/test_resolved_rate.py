@@ -79,6 +79,7 @@ def test_without_damping_the_path_is_kept(tmp_path: Path) -> None:
         assert run.signals["guides.tip.damping"][0, i] == 0.0
 
 
+@pytest.mark.slow
 def test_limits_shorten_the_rates_and_keep_their_direction(tmp_path: Path) -> None:
     bound = "max_rate = 0.08 rad/s; j3.max_rate = 0.03 rad/s;"
     free, held = (engine.run(experiment(tmp_path, chain(5, 7, f"{LAW} {more}"))) for more in ("", bound))
@@ -144,6 +145,7 @@ def test_between_its_ticks_a_position_goes_on_with_the_rate(tmp_path: Path) -> N
     np.testing.assert_allclose(steps, np.broadcast_to(steps[:, :1], steps.shape), rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_a_continuous_servo_follows_between_the_ticks(tmp_path: Path) -> None:
     ends = []
     for servos in ("2 kHz", "continuous"):
@@ -155,6 +157,7 @@ def test_a_continuous_servo_follows_between_the_ticks(tmp_path: Path) -> None:
     assert np.ptp(ends[0], axis=0).max() > 0.1
 
 
+@pytest.mark.slow
 def test_a_base_that_is_moved_is_made_up_for(tmp_path: Path) -> None:
     # It begins at rest, as the joints do: else these lag behind it from the first step on.
     base = "base = prescribed { x = sine(amplitude = 5 cm, frequency = 0.7 Hz, phase = 90 deg);"
@@ -175,6 +178,7 @@ FLYING = "base = free;"
 TUMBLING = "base.velocity = [0.02, -0.01, 0.03] m/s; base.rate = [3, -2, 4] deg/s;"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("initial", ["", TUMBLING])
 def test_the_generalized_jacobian_knows_what_a_free_base_does(initial: str, tmp_path: Path) -> None:
     text = f"{path()} max_damping = 0 m; threshold = 0 m; gain = 3 1/s; jacobian = "
@@ -190,6 +194,7 @@ def test_the_generalized_jacobian_knows_what_a_free_base_does(initial: str, tmp_
     assert errors["arm"] > 5 * errors["generalized"]
 
 
+@pytest.mark.slow
 def test_the_generalized_jacobian_knows_the_payloads_that_are_held_for_a_time(tmp_path: Path) -> None:
     """Held for good, released as the run ends, grappled as it begins: one motion, and so one course of the error."""
     text = f"{path()} max_damping = 0 m; threshold = 0 m; gain = 3 1/s; jacobian = generalized;"
@@ -211,6 +216,7 @@ def test_the_generalized_jacobian_knows_the_payloads_that_are_held_for_a_time(tm
                                        err_msg=name)
 
 
+@pytest.mark.slow
 def test_the_generalized_jacobian_of_a_base_that_is_held_is_the_arms(tmp_path: Path) -> None:
     one, other = (engine.run(experiment(tmp_path, chain(3, 7, f"{LAW} jacobian = {word};"))).signals["q"].tobytes()
                   for word in ("arm", "generalized"))

@@ -62,6 +62,7 @@ def test_a_decay_is_stable_up_to_the_limit_and_no_further(model: Integrator) -> 
     assert all(after(x) < 1.0 for x in np.linspace(0.01, model.real_limit - 0.01, 50))
 
 
+@pytest.mark.slow
 @EACH
 def test_a_damped_spring_with_both_roots_alike_is_stable_as_physics_says(model: Integrator) -> None:
     """As under `ideal` with a position command: docs/physics.md, section 3."""

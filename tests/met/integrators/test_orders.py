@@ -38,6 +38,7 @@ def test_all_integrators_are_held_to_their_order() -> None:
     assert {name: model.order for name, model in models.find_own("integrator").items()} == ORDERS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ORDERS)
 def test_the_error_falls_with_the_order_through_the_whole_program(integrator: str) -> None:
     """Measured at 800 Hz, share of the rates' range: 6e-4, 6e-6 (both of order 2), 3e-10."""
@@ -49,6 +50,7 @@ def test_the_error_falls_with_the_order_through_the_whole_program(integrator: st
         assert np.abs(found - ORDERS[integrator]).max() < 0.1, (signal, found)
 
 
+@pytest.mark.slow
 def test_rk4_at_1_khz_is_exact_to_a_part_in_1e9() -> None:
     """Measured 6.8e-11 of q's range and 6.0e-11 of qd's."""
     exact = reference(np.arange(501) / 100.0, velocity_products=True, **SWING)
@@ -81,6 +83,7 @@ def energy(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return kinetic, 9.81 * (rods.mass_1 * elbow / 2.0 + rods.mass_2 * middle)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ORDERS)
 def test_energy_of_a_free_fall_is_kept_to_the_order(tmp_path: Path, integrator: str) -> None:
     """Measured at 1600 Hz, largest share of the kinetic energy's range: 6e-3, 2e-6, 1e-6, 3e-11."""
@@ -97,6 +100,7 @@ def test_energy_of_a_free_fall_is_kept_to_the_order(tmp_path: Path, integrator: 
     assert np.abs(orders(errors) - ORDERS[integrator]).max() < 0.1, errors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ORDERS)
 def test_friction_keeps_order_two_where_the_integrator_has_it(integrator: str) -> None:
     """A sine that reverses both joints: ten stops and twelve releases.
@@ -121,6 +125,7 @@ def test_friction_keeps_order_two_where_the_integrator_has_it(integrator: str) -
     np.testing.assert_array_equal(runs[-1].signals["qd"][0] == 0.0, exact.qd == 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ORDERS)
 def test_a_joint_held_below_its_friction_stops_and_does_not_creep(integrator: str) -> None:
     pushed = {"dynamics_hz": 25, "servo_hz": 25, "record_hz": 1, "duration": 120}

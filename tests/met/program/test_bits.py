@@ -83,11 +83,13 @@ def test_cases_of_one_block_have_events_of_their_own(swung: Swung) -> None:
     assert ((per_step.max(axis=1) == 2.0) & (per_step.min(axis=1) == 0.0)).any(), "split twice in some, not in others"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [2, 4, 16, 32])
 def test_bits_do_not_depend_on_lanes(swung: Swung, lanes: int) -> None:
     assert swung.differences(*swung.run(kernel.from_recording(swung.recording, lanes))) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cpu", ["haswell", "x86-64-v3", "skylake-avx512"])
 def test_bits_do_not_depend_on_the_instruction_set(swung: Swung, cpu: str) -> None:
     if cpu == "skylake-avx512" and llvm.machine().width < 8:
@@ -97,6 +99,7 @@ def test_bits_do_not_depend_on_the_instruction_set(swung: Swung, cpu: str) -> No
     assert swung.differences(*swung.run(made)) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", [0, 1, 3])
 def test_bits_do_not_depend_on_optimisation(swung: Swung, level: int) -> None:
     assert swung.differences(*swung.run(kernel.from_recording(swung.recording, 8, level=level))) == 0

@@ -32,6 +32,7 @@ def last(run: Run) -> np.ndarray:
     return np.concatenate([run.signals[name][0, -1].ravel() for name in STATE])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", models.find_own("integrator"))
 def test_a_tumbling_free_flyer_is_integrated_to_the_integrators_order(tmp_path: Path, integrator: str) -> None:
     order = models.find("integrator", integrator).order
@@ -44,6 +45,7 @@ def test_a_tumbling_free_flyer_is_integrated_to_the_integrators_order(tmp_path: 
     assert abs(found - order) < 0.15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", models.find_own("integrator"))
 def test_momentum_and_energy_are_kept_to_the_integrators_order(tmp_path: Path, integrator: str) -> None:
     order = models.find("integrator", integrator).order
@@ -71,6 +73,7 @@ run it {{
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", models.find_own("integrator"))
 def test_a_steady_spin_is_exact_at_any_step(tmp_path: Path, integrator: str) -> None:
     # a sphere spins about any axis; nothing but rounding is left, at a quarter of a turn a step, and no sign jumps
@@ -132,6 +135,7 @@ def test_a_wrench_on_the_base_moves_all_of_it(tmp_path: Path) -> None:
 RUB = "servo rub { model = passive; friction = 4 N*m; }\n"
 
 
+@pytest.mark.slow
 def test_joints_that_stick_and_slide_leave_momentum_alone(tmp_path: Path) -> None:
     rates = (200, 400, 800)
     runs = []
@@ -152,6 +156,7 @@ def test_joints_that_stick_and_slide_leave_momentum_alone(tmp_path: Path) -> Non
     assert (found > 1.7).all(), "order 2 through events"
 
 
+@pytest.mark.slow
 def test_bits_depend_on_the_case_alone_and_plain_numbers_give_the_same(tmp_path: Path) -> None:
     sweep = """\
 sweep some of tumbling {
@@ -194,6 +199,7 @@ def test_a_base_that_runs_away_fails_and_says_so(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("integrator", "limit"), [
     ("modified_euler", 0.199), ("midpoint", 0.199), ("semi_implicit_euler", 0.00254), ("rk4", 0.999),
 ])
@@ -266,6 +272,7 @@ def test_a_joint_that_is_driven_is_not_blamed_for_its_base(tmp_path: Path) -> No
     )
 
 
+@pytest.mark.slow
 def test_a_motor_on_a_bed_feels_an_arm_on_a_free_base(tmp_path: Path) -> None:
     # what the bed is told of the arm is what the record says of it, which linear algebra has shown (test_free_base.py
     # of the dynamics)

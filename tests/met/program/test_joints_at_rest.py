@@ -13,6 +13,8 @@ from met.frozen import frozen
 from met.program import friction
 from tests.ic.small_decks import experiment
 
+pytestmark = pytest.mark.slow
+
 g = 9.81
 
 

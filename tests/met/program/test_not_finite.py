@@ -97,6 +97,7 @@ def changed(experiment: Experiment, case: int, path: str, value: float) -> Exper
     return replace(experiment, cases=Cases(experiment.cases.count, tuple(coordinates), experiment.cases.seed))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("path", "value", "joint", "why", "line"), [
     # an input that is no number, wherever it is read first
     ("swinging.f_c", np.nan, "shoulder", NO_NUMBER, 12),

@@ -213,6 +213,7 @@ def test_random_decks(tmp_path: Path, seed: int) -> None:
     compare(experiment(tmp_path, recording(text, *names)), names)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8, 12))
 def test_kernel_and_plain_floats_agree(tmp_path: Path, seed: int) -> None:
     text = random_deck(seed)
@@ -270,6 +271,7 @@ METRICS = """
 """
 
 
+@pytest.mark.slow
 def test_a_metric_of_a_derived_channel_sees_every_instant(tmp_path: Path) -> None:
     watched = DECK.replace("    metric furthest", METRICS + "    metric furthest")
     every = watched.replace("record = 50 Hz", "record = 1 kHz")
@@ -281,6 +283,7 @@ def test_a_metric_of_a_derived_channel_sees_every_instant(tmp_path: Path) -> Non
     assert {name: fast.metrics[name][0] for name in wanted} == wanted
 
 
+@pytest.mark.slow
 def test_a_slow_record_has_the_rows_of_a_fast_one(tmp_path: Path) -> None:
     names = (*JOINTS, "energy", "links.tip.orientation")
     slow, fast = (
@@ -301,6 +304,7 @@ def test_a_row_between_instants_shows_the_last_one(tmp_path: Path) -> None:
         assert len(np.unique(values[::4], axis=0)) > 100, name
 
 
+@pytest.mark.slow
 def test_what_is_asked_for_changes_no_bit_of_the_rest(tmp_path: Path) -> None:
     names = [*JOINTS, "energy", "momentum", *of_links(DECK)]
     plain = engine.run(experiment(tmp_path, DECK, "masses"))

@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from met import run as engine
 from met.program.build import build
@@ -65,6 +66,7 @@ def test_the_bits_of_an_orientation_are_the_case_s_own(tmp_path: Path) -> None:
             assert some.signals[name].tobytes() == together.signals[name][cases].tobytes()
 
 
+@pytest.mark.slow
 def test_kernel_and_plain_floats_turn_the_same_way(tmp_path: Path) -> None:
     made = experiment(tmp_path, DECK)
     rows, _ = execute(build(made), {}, made.structure.schedule.ticks)

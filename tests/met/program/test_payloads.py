@@ -43,6 +43,7 @@ def assert_kept(now: np.ndarray, was: np.ndarray) -> None:
     np.testing.assert_allclose(now, was, rtol=0, atol=2e-15 * np.max(np.abs(was)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", models.find_own("integrator"))
 def test_a_run_with_a_grapple_and_a_release_keeps_the_integrators_order(tmp_path: Path, integrator: str) -> None:
     def last(run: Run) -> np.ndarray:
@@ -58,6 +59,7 @@ def test_a_run_with_a_grapple_and_a_release_keeps_the_integrators_order(tmp_path
     assert abs(found - order) < 0.15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", models.find_own("integrator"))
 def test_momentum_is_kept_from_end_to_end_to_the_integrators_order(tmp_path: Path, integrator: str) -> None:
     order = models.find("integrator", integrator).order
@@ -71,6 +73,7 @@ def test_momentum_is_kept_from_end_to_end_to_the_integrators_order(tmp_path: Pat
     assert found > order - 0.3
 
 
+@pytest.mark.slow
 def test_the_impact_keeps_momentum_to_rounding_and_loses_energy_and_the_release_nothing(tmp_path: Path) -> None:
     # The same run with what happens left for later shows the instant as it was before.
     run, before = flown(tmp_path, EVERY), flown(tmp_path, EVERY, ("grapple  = 0.8 s", "grapple  = 0.9 s"))
@@ -107,6 +110,7 @@ run it {
 """
 
 
+@pytest.mark.slow
 def test_two_spheres_that_meet_lose_what_the_formula_says(tmp_path: Path) -> None:
     run = engine.run(experiment(tmp_path, SPHERES))
     signals, mu, d, v, I = run.signals, 0.75, 0.5, 4.0, 0.9  # noqa: E741
@@ -124,6 +128,7 @@ def test_two_spheres_that_meet_lose_what_the_formula_says(tmp_path: Path) -> Non
     np.testing.assert_allclose(spin, np.broadcast_to(spin[0], spin.shape), rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_while_it_is_held_it_moves_with_its_link(tmp_path: Path) -> None:
     run = flown(tmp_path, EVERY, ("record   = [", "record   = [links.lower.position, links.lower.orientation, "
                                   "links.lower.velocity, links.lower.rate, "))
@@ -152,6 +157,7 @@ BARE = changed(RUN, (BOX, ""), (", payloads.box.position, payloads.box.orientati
 SAME = ("q", "qd", "qdd", "tau", "J_eff", "b", "reaction.moment", "reaction.force", "energy.kinetic", *KEPT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("base", ["free", "fixed"])
 @pytest.mark.parametrize("released", [True, False])
 def test_a_payload_that_is_held_is_a_link_behind_a_fixed_joint(tmp_path: Path, base: str, released: bool) -> None:
@@ -175,6 +181,7 @@ def test_a_payload_that_is_held_is_a_link_behind_a_fixed_joint(tmp_path: Path, b
         np.testing.assert_allclose(kept, kept[0], rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_payload_falls_freely_until_it_is_grappled(tmp_path: Path) -> None:
     falls = [("environment {}", "environment { gravity = [1, -2, -9] m/s^2; }"),
              ("        com      = [0.1, -0.05, 0.02] m;\n", ""), ("grapple  = 0.8 s", "grapple  = 1.8 s"),
@@ -190,6 +197,7 @@ def test_a_payload_falls_freely_until_it_is_grappled(tmp_path: Path) -> None:
     assert whole[18] < whole[17]
 
 
+@pytest.mark.slow
 def test_a_wrench_on_a_payload_is_felt_wherever_it_is(tmp_path: Path) -> None:
     push = "push = wrench { link = box; force = [6, 4, 2] N; moment = [1, 2, 3] N*m; point = [0.2, 0.1, 0] m; };"
     run = flown(tmp_path, ("environment {}", f"environment {{ {push} }}"), EVERY, *at_rate(200, "rk4"))
@@ -242,6 +250,7 @@ run it {
 """
 
 
+@pytest.mark.slow
 def test_the_gas_of_a_thruster_pushes_a_payload_in_flight(tmp_path: Path) -> None:
     # straight on: 2 q A with q = (n + 2) thrust/(4 pi r^2), the plate a hundredth of the distance wide
     run = engine.run(experiment(tmp_path, PLUME))
@@ -277,6 +286,7 @@ def both(folder: Path, servos: str, *changes: tuple[str, str]) -> tuple[Run, Run
     return runs[0], runs[1]
 
 
+@pytest.mark.slow
 def test_dry_friction_holds_no_joint_against_a_blow(tmp_path: Path) -> None:
     run, before = both(tmp_path, "shoulder = rub;", ("shoulder.qd   = 0.5", "shoulder.qd   = 0"))
     assert before.signals["qd"][0, 8, 0] == 0.0
@@ -284,6 +294,7 @@ def test_dry_friction_holds_no_joint_against_a_blow(tmp_path: Path) -> None:
     assert_kept(momentum(run)[8, :6], momentum(before)[8, :6])
 
 
+@pytest.mark.slow
 def test_a_locked_joint_does_not_jump_and_momentum_is_kept_all_the_same(tmp_path: Path) -> None:
     run, before = both(tmp_path, "elbow = hold;", ("elbow.qd      = -1", "elbow.qd      = 0"))
     assert run.signals["qd"][0, 8:15, 1].tolist() == [0.0] * 7
@@ -291,6 +302,7 @@ def test_a_locked_joint_does_not_jump_and_momentum_is_kept_all_the_same(tmp_path
     assert_kept(momentum(run)[8, :6], momentum(before)[8, :6])
 
 
+@pytest.mark.slow
 def test_a_motor_behind_a_compliant_gear_does_not_jump_with_its_joint(tmp_path: Path) -> None:
     recorded = ("record   = [", "record   = [shoulder.servo.motor_rate, ")
     run, before = both(tmp_path, "shoulder = soft;", recorded, ("shoulder.qd   = 0.5", "shoulder.qd   = 0"))
@@ -299,6 +311,7 @@ def test_a_motor_behind_a_compliant_gear_does_not_jump_with_its_joint(tmp_path: 
     assert abs(run.signals["qd"][0, 8, 0] - before.signals["qd"][0, 8, 0]) > 0.1
 
 
+@pytest.mark.slow
 def test_a_rigid_gears_rotor_takes_its_share_of_the_blow(tmp_path: Path) -> None:
     # With the base fixed, and rotors as heavy as can be: what is nearly held does not jump.
     free, _ = both(tmp_path, "", *FIXED[1:], ("base = free;", ""))
@@ -313,6 +326,7 @@ def test_a_rigid_gears_rotor_takes_its_share_of_the_blow(tmp_path: Path) -> None
     assert free.cause == [""]
 
 
+@pytest.mark.slow
 def test_a_motor_on_a_bed_turns_on_as_its_shaft_does(tmp_path: Path) -> None:
     run, before = both(tmp_path, "shoulder = drive; } substitute shoulder { bed = emulated;",
                        ("shoulder.qd   = 0.5", "shoulder.qd   = 0"))

@@ -261,6 +261,7 @@ def test_noise_is_its_size_white_and_the_same_wherever_else_cases_differ(tmp_pat
 # What else is in the run
 
 
+@pytest.mark.slow
 def test_a_sensor_changes_nothing_else(tmp_path: Path) -> None:
     sensors = "sensor tip = accelerometer { link = lower; along = [1, 2, 3]; cutoff = 2 Hz; rate = 10 Hz; }\n"
     bare = engine.run(experiment(tmp_path, FLYER, TUMBLING))
@@ -270,6 +271,7 @@ def test_a_sensor_changes_nothing_else(tmp_path: Path) -> None:
         assert found.signals[name].tobytes() == values.tobytes(), name
 
 
+@pytest.mark.slow
 def test_a_grapple_is_no_acceleration_and_a_payload_has_sensors_wherever_it_is(tmp_path: Path) -> None:
     """Carried, it goes with its link; flying, freely. Rates jump as it is grappled: a gyroscope shows it at once."""
     sensors = "".join(
@@ -338,6 +340,7 @@ def test_in_orbit_it_feels_the_tide_away_from_the_centre_and_nothing_at_it(frame
     np.testing.assert_allclose(of(run, "turn"), N, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_both_frames_of_the_gradient_feel_the_same(tmp_path: Path) -> None:
     """One motion in a world that keeps its directions, and in one that turns: specific force knows no frame."""
     w, v, p = np.array([0.0, 0.0, N]), np.array([0.01, -0.02, 0.03]), np.array([3.0, 4.0, 5.0])
@@ -350,6 +353,7 @@ def test_both_frames_of_the_gradient_feel_the_same(tmp_path: Path) -> None:
         np.testing.assert_allclose(of(a, name), of(b, name), rtol=1e-6, atol=size, err_msg=name)
 
 
+@pytest.mark.slow
 def test_plain_numbers_lanes_and_threads_give_the_same(tmp_path: Path) -> None:
     sensors = ("sensor tip = accelerometer { link = lower; at = [1, 0, 0] m; along = [1, 2, 3]; cutoff = 5 Hz; "
                "noise = 0.1 m/s^2; resolution = 1e-3 m/s^2; delay = 1; }\n"

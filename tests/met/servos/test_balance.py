@@ -23,6 +23,7 @@ def values(use: Use, made: Experiment) -> SimpleNamespace:
     return SimpleNamespace(**{p.name: made.parameters[f"{use.head}.{p.name}"].value for p in use.in_plan()})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("qd", [0.0, 0.07, -0.07])
 @pytest.mark.parametrize("torque", [0.0, 31.0, -31.0])
 @pytest.mark.parametrize("name", BALANCED)
@@ -106,6 +107,7 @@ BEGINS = "servos = balanced;"
 SPRING = "used = spring { link = link5;  to = world;  stiffness = 90 N/m;  length = 0.1 m; }"
 
 
+@pytest.mark.slow
 def test_an_arm_on_elastic_gears_hangs_still_with_any_load(tmp_path: Path) -> None:
     """The torques are those of each case: its payload, and what the environment does."""
     deck = ARM + run_of("panda", BEGINS).replace("{more}", SPRING)
@@ -118,6 +120,7 @@ def test_an_arm_on_elastic_gears_hangs_still_with_any_load(tmp_path: Path) -> No
     assert np.abs(run.signals["qd"]).max() < 3e-3, "the motors' loops pull by what the gears are wound up, no more"
 
 
+@pytest.mark.slow
 def test_an_arm_that_hangs_still_feels_gravity_alone(tmp_path: Path) -> None:
     sensor = "sensor hand = accelerometer { link = link7;  along = [0, 0, 1];  cutoff = 50 Hz;  rate = 1 kHz; } record"
     deck = (ARM + run_of("panda", BEGINS)).replace("{more}", "").replace("record = [", f"{sensor} = [sensors, ")
@@ -125,11 +128,13 @@ def test_an_arm_that_hangs_still_feels_gravity_alone(tmp_path: Path) -> None:
     assert abs(found[0]) > 5.0 and np.abs(found - found[0]).max() < 0.05
 
 
+@pytest.mark.slow
 def test_unloaded_it_falls_into_its_gears(tmp_path: Path) -> None:
     run = engine.run(experiment(tmp_path, ARM + run_of("panda", "").replace("{more}", "")))
     assert np.abs(run.signals["qdd"][0, 0]).max() > 1.0 and np.abs(run.signals["qd"]).max() > 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["modified_euler", "rk4"])
 def test_on_a_base_that_moves_the_joints_do_not(tmp_path: Path, integrator: str) -> None:
     """The base floats or swings; what its motion asks of the joints is in the balance."""
@@ -144,6 +149,7 @@ def test_on_a_base_that_moves_the_joints_do_not(tmp_path: Path, integrator: str)
         assert np.abs(run.signals["qdd"][0, 0]).max() < 1e-9, base
 
 
+@pytest.mark.slow
 def test_joints_that_cannot_be_balanced_move_and_are_reckoned_with(tmp_path: Path) -> None:
     deck = ARM + run_of("panda", BEGINS).replace("{more}", "").replace("joint4 = soft;", "joint4 = limp;")
     deck += "servo limp { model = passive; damping = 0.1 N*m*s/rad; }\n"
@@ -151,6 +157,7 @@ def test_joints_that_cannot_be_balanced_move_and_are_reckoned_with(tmp_path: Pat
     assert abs(qdd[3]) > 1.0 and np.abs(np.delete(qdd, 3)).max() < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", [50.0, 2.0])
 @pytest.mark.parametrize("by", ["friction", "brake"])
 def test_what_holds_a_joint_that_is_not_balanced_is_reckoned_with(by: str, level: float, tmp_path: Path) -> None:

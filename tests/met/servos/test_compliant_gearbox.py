@@ -91,6 +91,7 @@ def test_teeth_push_and_never_pull(tmp_path: Path) -> None:
 STUCK = (("j_m = 1e-4", "f_c = 0.02 N*m;  j_m = 1e-4"), ("stiffness = 500", "damping = 4 N*m*s/rad;  stiffness = 500"))
 
 
+@pytest.mark.slow
 def test_a_motor_that_sticks_does_not_creep_in_an_hour(tmp_path: Path) -> None:
     """Held by 0.98 of what breaks it away, N F_c, through the wound gear, once the jolt at the start is over."""
     run = ran(tmp_path, *STUCK, ("[0, 0, 6] N*m", "[0, 0, 1.96] N*m"), ("dynamics = 5 kHz", "dynamics = 200 Hz"),
@@ -101,6 +102,7 @@ def test_a_motor_that_sticks_does_not_creep_in_an_hour(tmp_path: Path) -> None:
     np.testing.assert_allclose(of(run, "servo.deflection")[-1], -1.96 / STIFFNESS, rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("moment", "moves"), [("2.05", True), ("1.99", False)])
 def test_it_breaks_away_where_the_gear_pulls_harder_than_friction(tmp_path: Path, moment: str, moves: bool) -> None:
     """The push grows slowly enough for the gear not to overshoot: it is ten times damped."""
@@ -123,6 +125,7 @@ def test_friction_at_the_joint_sticks_behind_a_motor_that_turns(tmp_path: Path) 
     assert not waits[-1] and qd[-1] > 0.1
 
 
+@pytest.mark.slow
 def test_a_gear_with_a_loss_takes_more_to_drive_and_less_to_hold_back(tmp_path: Path) -> None:
     """At a steady rate against a moment, (1 + loss) of its share; driven back by it, (1 - loss)."""
     steady = (
@@ -136,6 +139,7 @@ def test_a_gear_with_a_loss_takes_more_to_drive_and_less_to_hold_back(tmp_path: 
         assert of(run, "servo.motor_torque")[-1] == pytest.approx(share * -float(moment) / 100.0, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_modified_euler_keeps_its_order_through_events_of_both_sides(tmp_path: Path) -> None:
     """Motor and joint stick and slip under an alternating torque of the motor."""
     moving = (

@@ -55,6 +55,7 @@ def test_an_acceleration_is_the_joints(tmp_path: Path) -> None:
     np.testing.assert_allclose(found["q"], 1.5 * t**2, rtol=0, atol=1e-13)  # 500 steps' rounding
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hz", [4, 500, 2000])
 @pytest.mark.parametrize(
     ("command", "q"),

@@ -87,6 +87,7 @@ def assert_same_run(found: Experiment, case: int = 0, ticks: int | None = None) 
     assert different(inside[0], np.array(rows)) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("faults", ["none", "typical"])
 @pytest.mark.parametrize(("dynamics", "servos"), [(25, 100), (1000, 1000)])
 def test_at_the_wire_it_makes_the_run_of_the_bed_inside_to_the_bit(
@@ -96,11 +97,13 @@ def test_at_the_wire_it_makes_the_run_of_the_bed_inside_to_the_bit(
     assert_same_run(experiment(tmp_path, dynamics=dynamics, servos=servos, faults=faults))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("law", "delay"), [("torque_balance_observer", 0), ("torque_balance", 2)])
 def test_so_it_does_under_other_laws_and_with_a_delay(tmp_path: Path, law: str, delay: int) -> None:
     assert_same_run(experiment(tmp_path, dynamics=250, servos=500, law=law, delay=delay), ticks=2000)
 
 
+@pytest.mark.slow
 def test_so_do_two_at_two_wires(tmp_path: Path) -> None:
     more = "substitute elbow { bed = emulated(faults = typical, once = 0.004 N*m); }  record += [elbow.bed.shaft_rate];"
     found = experiment(tmp_path, dynamics=250, servos=500, more=more)
@@ -108,6 +111,7 @@ def test_so_do_two_at_two_wires(tmp_path: Path) -> None:
     assert_same_run(found, ticks=2000)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [0, 5, 14])
 def test_a_case_of_a_sweep_over_the_bed_has_its_own_plant(tmp_path: Path, case: int) -> None:
     found = experiment(tmp_path, "several", dynamics=250, servos=500)

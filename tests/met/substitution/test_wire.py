@@ -15,6 +15,8 @@ from met.run import prepare, run
 from met.substitution import emulated
 from met.substitution.bed import Wire
 
+pytestmark = pytest.mark.slow
+
 DECK = """
 #include <two_link.ic>
 run wired like nominal {{

@@ -104,6 +104,7 @@ def test_machine_code_draws_what_plain_numbers_draw():
     np.testing.assert_allclose(rows[:, :, 2:], plain[:, :, 2:], rtol=0.0, atol=8e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lanes", "cpu", "level"), [
     (2, None, 2), (4, "haswell", 2), (16, None, 3), (32, "haswell", 0), (8, "skylake-avx512", 1)])
 def test_draws_have_the_same_bits_whatever_they_are_compiled_for(lanes, cpu, level):
@@ -169,6 +170,7 @@ def likely(score):
     return abs(score) < stats.norm.isf(UNLIKELY / 2)
 
 
+@pytest.mark.slow
 def test_moments_are_those_of_the_normal_distribution(deviates):
     x = deviates.ravel()
     # variances of the means of x, x^2, x^3 and x^4 are 1, 2, 15 and 96 over their number
@@ -176,6 +178,7 @@ def test_moments_are_those_of_the_normal_distribution(deviates):
         assert likely((np.mean(x**power) - mean) / math.sqrt(variance / x.size)), power
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", [0, 1])
 def test_deviates_are_normal_by_kolmogorov_smirnov_and_by_anderson_darling(deviates, which):
     x = np.sort(deviates[:, :, which].ravel())
@@ -186,6 +189,7 @@ def test_deviates_are_normal_by_kolmogorov_smirnov_and_by_anderson_darling(devia
     assert a < 6.0 - math.log(UNLIKELY / 1e-3)
 
 
+@pytest.mark.slow
 def test_tails_hold_as_many_as_they_should_up_to_five_sigma(deviates):
     counts = np.zeros(4)
     total = 0
@@ -200,6 +204,7 @@ def test_tails_hold_as_many_as_they_should_up_to_five_sigma(deviates):
     assert counts[3] > 5  # of 33 million, 19 are expected
 
 
+@pytest.mark.slow
 def test_uniform_deviates_are_uniform():
     u = drawn(lambda t: uniform_pair(stream_of(t), t.tick), [(3.0, float(i), 0.0) for i in range(256)], TICKS, 2)
     for which in (0, 1):
@@ -224,6 +229,7 @@ def independent(x, y):
     return likely(np.sum(x * y) / math.sqrt(n)) and likely(np.sum((x * x - 1.0) * (y * y - 1.0)) / (2.0 * math.sqrt(n)))
 
 
+@pytest.mark.slow
 def test_the_two_of_a_pair_and_neighbours_in_time_and_repeat_are_independent(deviates):
     a, b = deviates[:, :, 0], deviates[:, :, 1]
     assert independent(a, b)
