@@ -8,19 +8,16 @@ archive. Nothing is opened by looking: HDF5 follows only when values or sizes ar
 
 from __future__ import annotations
 
-import math
+import os
 from collections.abc import Iterator
+from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
+from batch.archive import room
 from batch.archive.hdf5 import h5py
 from met.diagnostic import Problem, error
-
-PACKED = 1100
-"""Bytes that a byte of a file may hold, at most: what deflate makes of zeros, 1032, and a little."""
-
-SMALL = 1 << 20
-"""Bytes that a dataset may have in any file."""
+from met.files import open_regular
 
 SCALES = ("DIMENSION_LIST", "REFERENCE_LIST")
 """Attributes by which HDF5 itself says what a dataset's dimensions are: references to datasets of the same file."""
@@ -28,19 +25,20 @@ SCALES = ("DIMENSION_LIST", "REFERENCE_LIST")
 
 def check(file: Any, path: Path) -> None:
     """Refuse an open file (h5py.File) that is not all in itself, or holds what no archive does. Raises Problem E308."""
-    most = max(SMALL, PACKED * path.stat().st_size)
-    for where, why in _wrong(file.id, most):
-        message = f"the archive {path} holds what MET writes into none: `{where}` {why}"
-        helps = (
-            "nothing of it was read: an archive is one file, leads to no other, and runs nothing",
-            "ask whoever made it for the archive as `met run` wrote it",
-        )
-        raise Problem(error("E308", message, help=helps))
+    with open_regular(path) as raw:
+        for where, why in _wrong(file.id, raw):
+            message = f"the archive {path} holds what MET writes into none: `{where}` {why}"
+            helps = (
+                "nothing of it was read: an archive is one file, leads to no other, and runs nothing",
+                "ask whoever made it for the archive as `met run` wrote it",
+            )
+            raise Problem(error("E308", message, help=helps))
 
 
-def _wrong(root: Any, most: int) -> Iterator[tuple[str, str]]:
-    """What is wrong with the things in a file: the name of each, and why."""
+def _wrong(root: Any, raw: BufferedReader) -> Iterator[tuple[str, str]]:
+    """What is wrong with the things in a file: the name of each, and why. raw: the file itself."""
     module = h5py()
+    size = os.fstat(raw.fileno()).st_size
     seen = set()
     waiting = [("", root)]
     while waiting:
@@ -51,7 +49,7 @@ def _wrong(root: Any, most: int) -> Iterator[tuple[str, str]]:
         seen.add((about.fileno, about.addr))
         yield from _attributes(where or "/", node)
         if isinstance(node, module.h5d.DatasetID):
-            why = _dataset(node, most)
+            why = _dataset(node) or room.check(node, size, raw.fileno())
             if why:
                 yield where, why
         elif isinstance(node, module.h5g.GroupID):
@@ -76,7 +74,7 @@ def _links(group: Any) -> list[tuple[bytes, int]]:
     return found
 
 
-def _dataset(node: Any, most: int) -> str:
+def _dataset(node: Any) -> str:
     """Why a dataset is none of an archive's; empty where it may be one. Its values and its size are not asked for
     before it is known where they are."""
     module = h5py()
@@ -92,8 +90,6 @@ def _dataset(node: Any, most: int) -> str:
     kind = node.get_type()
     if kind.get_class() not in (module.h5t.INTEGER, module.h5t.FLOAT, module.h5t.STRING):
         return "is neither of numbers nor of strings"
-    if math.prod(node.shape or ()) * kind.get_size() > most:
-        return "has more values than the file has room for"
     return ""
 
 

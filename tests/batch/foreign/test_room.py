@@ -1,0 +1,118 @@
+"""A small archive stays small: what it unpacks to, and its strings, are counted before anything of it is read."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.batch.foreign.archives import changed, met
+
+STRING = h5py.string_dtype("utf-8")
+
+
+def packed(file: Any, filters: int, data: bytes) -> None:
+    """A chunk of five numbers that is these bytes, to be unpacked so many times."""
+    made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    made.set_chunk((5,))
+    for _ in range(filters):
+        made.set_filter(h5py.h5z.FILTER_DEFLATE, 0, (1,))
+    space = h5py.h5s.create_simple((5,))
+    node = h5py.h5d.create(file["open"].id, b"many", h5py.h5t.IEEE_F64LE, space, made)
+    node.write_direct_chunk((0,), data)
+
+
+def stacked(file: Any) -> None:
+    packed(file, 2, zlib.compress(zlib.compress(bytes(40))))
+
+
+def inflated(file: Any) -> None:
+    packed(file, 1, zlib.compress(bytes(100_000)))
+
+
+def no_stream(file: Any) -> None:
+    packed(file, 1, b"these are no packed bytes")
+
+
+def strings(file: Any, **how: Any) -> None:
+    """A thousand strings, all of them the same few bytes of the file."""
+    one = file["open"].create_dataset("one", (1,), STRING, chunks=(1,))
+    one[0] = "x" * 10_000
+    reference = one.id.read_direct_chunk((0,))[1]
+    many = file["open"].create_dataset("many", (1000,), STRING, chunks=(1000,), **how)
+    data = reference * 1000
+    if how.get("shuffle"):
+        data = np.frombuffer(data, np.uint8).reshape(-1, 16).T.tobytes()
+    many.id.write_direct_chunk((0,), zlib.compress(data) if how else data)
+
+
+def packed_strings(file: Any) -> None:
+    strings(file, compression="gzip", shuffle=True)
+
+
+def unwritten(file: Any) -> None:
+    """Numbers of which none is in the file, which is large for other reasons."""
+    file["open"].create_dataset("many", (1 << 19,), "<f8", chunks=(1 << 10,))
+
+
+TRAPS: dict[Callable[[Any], None], str] = {
+    stacked: "is packed twice over",
+    inflated: "has a chunk that is packed to more than it should hold",
+    no_stream: "has a chunk that is packed to more than it should hold",
+    strings: "has more letters than the file has room for",
+    packed_strings: "has more letters than the file has room for",
+    unwritten: "has more values than the file has room for",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("trap", TRAPS, ids=lambda trap: trap.__name__)
+def test_a_small_file_that_would_fill_the_memory_is_refused(
+    trap: Callable[[Any], None], archive: Path, tmp_path: Path
+) -> None:
+    with changed(archive, tmp_path) as (copy, file):
+        trap(file)
+    said = met("show", str(copy))
+    assert said.status == 2
+    assert said.text == (
+        f"error[E308]: the archive {copy} holds what MET writes into none: `open/many` {TRAPS[trap]}\n"
+        " = help: nothing of it was read: an archive is one file, leads to no other, and runs nothing\n"
+        " = help: ask whoever made it for the archive as `met run` wrote it\n"
+        "\n1 error\n"
+    )
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"compression": "gzip"}, {"compression": "gzip", "shuffle": True, "fletcher32": True}, {"fletcher32": True},
+        {"chunks": (2,)}, {},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_an_archive_that_somebody_has_packed_is_shown_as_before(
+    how: dict[str, Any], archive: Path, tmp_path: Path
+) -> None:
+    with changed(archive, tmp_path) as (copy, file):
+        notes = file.create_group("open/notes")
+        words = {name: word for name, word in how.items() if name != "fletcher32"}  # HDF5 has no checksum of strings
+        notes.create_dataset("words", data=np.array(["a", "of two", "x" * 5000], object), dtype=STRING, **words)
+        notes.create_dataset("numbers", data=np.random.default_rng(1).random(3000), **how)
+    assert met("show", str(copy)).status == 0
+
+
+def test_strings_are_counted_in_a_file_with_a_foreword(archive: Path, tmp_path: Path) -> None:
+    """HDF5 lets a file begin with anything of 512 bytes and more: places in it are counted from there."""
+    with changed(archive, tmp_path) as (copy, file):
+        size = len(file["provenance/source_text"])
+    copy.write_bytes(bytes(512) + copy.read_bytes())
+    with h5py.File(copy) as file:
+        node = file["provenance/source_text"].id
+        data = copy.read_bytes()
+        at = node.get_offset()
+        lengths = np.frombuffer(data[at : at + 16 * size], "<u4")[::4]
+        assert lengths.tolist() == [len(text) for text in file["provenance/source_text"][...]]
