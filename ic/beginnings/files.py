@@ -14,6 +14,7 @@ from ic.beginnings.models import MODELS, PROJECT, TRIAL, Beginning
 from ic.meaning.resolve import RESERVED
 from met import models, units
 from met.diagnostic import Problem, error
+from met.files import new_file
 
 PARTS = [each.name for each in dataclasses.fields(Beginning)]
 
@@ -76,11 +77,14 @@ def write(texts: Mapping[str, str], *, force: bool) -> None:
 
 
 def put(path: str, text: str) -> None:
-    """Writes a file. Raises Problem E338 where the system refuses; what was not there before is not there then."""
+    """Writes a new file in the place of what has its name; a link there is not followed. Raises Problem E338 where the
+    system refuses; what was not there before is not there then."""
     there = os.path.lexists(path)
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise Problem(error("E338", f"cannot write `{path}`: it is not a regular file"))
     try:
-        with open(path, "w", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
+        with new_file(path) as stream:
+            stream.write(text.encode())
     except OSError as reason:
         if not there and os.path.lexists(path):
             os.unlink(path)

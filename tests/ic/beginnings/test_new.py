@@ -11,6 +11,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -190,6 +191,19 @@ error[E344]: `my_arm.ic` is there already
     assert Path("my_arm.ic").read_text().startswith("// my_arm.ic")
 
 
+def test_what_is_no_file_is_not_written_into_and_a_link_is_not_followed(capsys: pytest.CaptureFixture[str]) -> None:
+    os.mkfifo("pipe.ic")
+    assert new(capsys, "deck", "my_arm", "-o", "pipe.ic", "--force") == (2, "", """\
+error[E338]: cannot write `pipe.ic`: it is not a regular file
+
+1 error
+""")  # fmt: skip
+    Path("mine").write_text("mine")
+    Path("my_arm.ic").symlink_to("mine")
+    assert new(capsys, "deck", "my_arm", "--force", "-q") == (0, "", "")
+    assert not Path("my_arm.ic").is_symlink() and Path("mine").read_text() == "mine"
+
+
 def test_of_a_model_nothing_is_written_where_one_file_is_there(capsys: pytest.CaptureFixture[str]) -> None:
     Path("spring").mkdir()
     Path("spring/pyproject.toml").write_text("mine")
@@ -225,15 +239,15 @@ def test_a_name_that_nothing_may_have_is_refused(
 def test_what_cannot_be_written_leaves_nothing(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class Full(io.StringIO):
-        def write(self, text: str) -> int:
+    class Full(io.BytesIO):
+        def write(self, data: Any) -> int:
             raise OSError(28, os.strerror(28))
 
-    def open_full(path: str, *words: str, **named: str) -> Full:
+    def new_full(path: str) -> Full:
         Path(path).touch()
         return Full()
 
-    monkeypatch.setattr(files, "open", open_full, raising=False)
+    monkeypatch.setattr(files, "new_file", new_full)
     assert new(capsys, "deck", "bars") == (2, "", """\
 error[E338]: cannot write `bars.ic`: No space left on device
 
