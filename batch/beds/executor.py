@@ -28,7 +28,7 @@ from hw.ports import kind
 from hw.process import talk
 from met import plan_file
 from met.diagnostic import Problem, error
-from met.files import read_json
+from met.files import new_file, read_json
 from met.frozen import frozen
 from met.plan import Plan
 from met.run import FAILED
@@ -197,8 +197,9 @@ class OnBeds:
         finally:
             self.driving = None
             if ended is not None:
-                with contextlib.suppress(OSError):  # what the case's process says of a full disk is what counts
-                    told.write_text(json.dumps(ended), encoding="utf-8")
+                # what the case's process says of a full disk is what counts
+                with contextlib.suppress(OSError), new_file(told) as file:
+                    file.write(json.dumps(ended).encode())
 
     def _greeted(self, joint: str, bed: str) -> None:
         """Say which bed it is, where it is not the one of the case before."""

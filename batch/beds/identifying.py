@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -16,6 +17,7 @@ from hw.process import talk
 from ic.printing.columns import columns, quantity
 from met import models, plan_file, visible
 from met.diagnostic import Problem, error
+from met.files import new_file
 from met.frozen import frozen
 from met.plan import Experiment, Formula, Plan, Substitution
 from met.program.plant import bed_values
@@ -95,7 +97,8 @@ def identify_and_tell(
     check(found, about)
     estimates = widened(found.parameters, kt_load_error / 100.0)
     origin = origin_of(about, ended, estimates)
-    deck.write_text(included(deck, which.experiment, which.joint, estimates, origin), encoding="utf-8")
+    with new_file(deck) as file:
+        file.write(included(deck, which.experiment, which.joint, estimates, origin).encode())
     if form == "json":
         visible.say(json.dumps(as_data(found, estimates, sheet, deck, records), indent=2))
         return
@@ -118,7 +121,7 @@ def _check_output(deck: Path) -> None:
     wrong, helps = "", "give another name with `-o`"
     if deck.suffix != ".ic":
         wrong, helps = f"cannot write {deck}: it is to be a deck, which ends in .ic", f"`-o {deck.with_suffix('.ic')}`"
-    elif deck.exists():
+    elif os.path.lexists(deck):
         wrong, helps = f"{deck} is there already: it is not written over", f"{helps}, or remove it"
     elif not deck.parent.is_dir():
         wrong, helps = f"cannot write {deck}: {deck.parent} does not exist", f"make it first: `mkdir -p {deck.parent}`"
