@@ -149,7 +149,7 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
 
     What it can besides is in `data.met` (batch.notebook): cases by what is varied in them, where links are, and more.
     """
-    from batch.archive.read import ArchiveFile
+    from batch.archive.read import ArchiveFile, reading
 
     with ArchiveFile(Path(path)) as file:
         several = len(file.groups) > 1
@@ -158,4 +158,7 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     import batch.notebook  # noqa: F401 - registers `data.met`
 
     opened = xarray.open_datatree if several else xarray.open_dataset
-    return opened(path, engine="h5netcdf", chunks=chunks)
+    if chunks is not None:
+        return opened(path, engine="h5netcdf", chunks=chunks)
+    with reading(Path(path)):
+        return opened(path, engine="h5netcdf")

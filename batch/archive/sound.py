@@ -52,6 +52,9 @@ OF_ROLES: dict[str, str | tuple[str, ...]] = {
 MOST = 1e15
 """Seconds, hertz and cases that no run has; nor one by it of seconds and hertz."""
 
+LONGEST = 10_000
+"""Letters of a name or a unit: a picture of longer ones takes minutes."""
+
 MOST_CASE = 1 << 53
 """Numbers of cases are exact as doubles, too."""
 
@@ -92,7 +95,12 @@ def _names(group: Group) -> None:
     for variable in group.role("signal"):
         for dim in variable.dims[2:]:
             names += group.values(dim).tolist()
+    for variable in group.variables.values():
+        if max(map(len, (variable.name, variable.unit, variable.long_name, *variable.units_by_joint))) > LONGEST:
+            raise Unlike(f"variable `{variable.name[:99]}` has more words than there can be")
     for name in names:
+        if len(name) > LONGEST:
+            raise Unlike(f"a name in it has {len(name):,} letters")
         if line(name) != name:
             raise Unlike(f"a name in it has characters that no name has: {name}")
 
