@@ -24,8 +24,10 @@ SCALES = ("DIMENSION_LIST", "REFERENCE_LIST")
 
 
 def check(file: Any, path: Path) -> None:
-    """Refuse an open file (h5py.File) that is not all in itself, or holds what no archive does. Raises Problem E308."""
+    """Refuse an open file (h5py.File) that is not all in itself, or holds what no archive does. Raises Problem E308,
+    Unlike."""
     with open_regular(path) as raw:
+        room.check_heaps(raw, os.fstat(raw.fileno()).st_size)
         for where, why in _wrong(file.id, raw):
             message = f"the archive {path} holds what MET writes into none: `{where}` {why}"
             helps = (

@@ -2,20 +2,24 @@
 
 HDF5 unpacks a chunk until its packer's stream ends, however little the chunk should hold, packers may be stacked, and
 any number of strings may be the same bytes of the file. So some kilobytes could fill the memory of a machine. Here a
-chunk is unpacked no further than to what it should hold, and strings are counted by their lengths.
+chunk is unpacked no further than to what it should hold, and strings are counted by their lengths. And where strings
+lie is walked through once, for HDF5 itself does so without an end in a heap that is damaged.
 """
 
 from __future__ import annotations
 
 import math
+import mmap
 import os
 import zlib
 from collections.abc import Iterator
+from io import BufferedReader
 from typing import Any
 
 import numpy as np
 
 from batch.archive.hdf5 import h5py
+from batch.archive.sound import Unlike
 
 PACKED = 1100
 """Bytes that a byte of a file may hold, at most: what deflate makes of zeros, 1032, and a little."""
@@ -26,8 +30,43 @@ SMALL = 1 << 20
 CHECKSUM = 4
 """Bytes that fletcher32 puts behind a chunk."""
 
+HEAP = b"GCOL\x01\0\0\0"
+"""How a heap of strings begins in a file."""
+
+SEARCHED = 64 << 20
+"""Bytes at either end of a file in which heaps are looked for: more would take seconds of a large archive."""
+
 REFERENCE = np.dtype([("length", "<u4"), ("address", "<u8"), ("index", "<u4")])
 """A string of any length, as a dataset has it: its length, and where it is."""
+
+
+def check_heaps(raw: BufferedReader, size: int) -> None:
+    """Refuse heaps of strings in which HDF5 would go round for ever: those with a gap of no bytes, as a damaged disk
+    leaves them. size: of the file. Raises Unlike."""
+    if not size:
+        return
+    with mmap.mmap(raw.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        for first, last in {(0, min(size, SEARCHED)), (max(0, size - SEARCHED), size)}:
+            at = data.find(HEAP, first, last)
+            while at >= 0:
+                if _endless(data, at, size):
+                    raise Unlike("its strings are not where they should be")
+                at = data.find(HEAP, at + 1, last)
+
+
+def _endless(data: mmap.mmap, start: int, size: int) -> bool:
+    """Whether a heap that begins here has a gap of no bytes."""
+    if start + 16 > size:
+        return False
+    end = min(size, start + int.from_bytes(data[start + 8 : start + 16], "little"))
+    at = start + 16
+    while at + 16 <= end:
+        used = data[at : at + 2] != b"\0\0"
+        length = int.from_bytes(data[at + 8 : at + 16], "little")
+        if not used and not length:
+            return True
+        at += 16 + -(-length // 8) * 8 if used else length
+    return False
 
 
 def check(node: Any, size: int, file: int) -> str:

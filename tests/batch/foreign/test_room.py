@@ -11,6 +11,8 @@ import h5py
 import numpy as np
 import pytest
 
+import batch
+from met.diagnostic import Problem
 from tests.batch.foreign.archives import changed, met
 
 STRING = h5py.string_dtype("utf-8")
@@ -116,3 +118,41 @@ def test_strings_are_counted_in_a_file_with_a_foreword(archive: Path, tmp_path: 
         at = node.get_offset()
         lengths = np.frombuffer(data[at : at + 16 * size], "<u4")[::4]
         assert lengths.tolist() == [len(text) for text in file["provenance/source_text"][...]]
+
+
+def test_a_heap_of_strings_with_a_gap_of_no_bytes_is_told_and_not_walked_for_ever(
+    archive: Path, tmp_path: Path
+) -> None:
+    copy = tmp_path / "given.h5"
+    data = bytearray(archive.read_bytes())
+    at = data.index(b"GCOL") + 16
+    data[at : at + 64] = bytes(64)
+    copy.write_bytes(data)
+    said = met("show", str(copy))
+    assert said.status == 2
+    assert said.text == (
+        f"error[E302]: the archive {copy} is damaged: its strings are not where they should be\n"
+        " = help: an archive that MET writes has its name only when it is whole: was this one copied in part?\n"
+        "\n1 error\n"
+    )
+
+
+def test_an_attribute_that_xarray_cannot_read_is_told_by_its_archive(single: Path, tmp_path: Path) -> None:
+    with changed(single, tmp_path) as (copy, file):
+        file["status"].attrs["coordinates"] = np.zeros(3)
+    with pytest.raises(Problem) as caught:
+        batch.open(copy)
+    assert [each.code for each in caught.value.diagnostics] == ["E302"]
+
+
+@pytest.mark.parametrize("units", [np.bytes_("x" * 60_000), np.zeros(8000)], ids=["a word", "numbers"])
+def test_a_unit_that_would_fill_a_picture_is_refused(units: Any, single: Path, tmp_path: Path) -> None:
+    with changed(single, tmp_path) as (copy, file):
+        file["end"].attrs["units"] = units
+    said = met("plot", str(copy), "-o", str(tmp_path / "a.svg"))
+    assert said.status == 2
+    assert said.text == (
+        f"error[E302]: the archive {copy} is damaged: variable `end` has more words than there can be\n"
+        " = help: an archive that MET writes has its name only when it is whole: was this one copied in part?\n"
+        "\n1 error\n"
+    )
