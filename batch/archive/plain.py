@@ -19,6 +19,9 @@ from batch.archive.hdf5 import h5py
 from met.diagnostic import Problem, error
 from met.files import open_regular
 
+DEEPEST = 64
+"""Groups that one may be in: whoever opens a file of thousands takes minutes."""
+
 SCALES = ("DIMENSION_LIST", "REFERENCE_LIST")
 """Attributes by which HDF5 itself says what a dataset's dimensions are: references to datasets of the same file."""
 
@@ -55,6 +58,8 @@ def _wrong(root: Any, raw: BufferedReader) -> Iterator[tuple[str, str]]:
             if why:
                 yield where, why
         elif isinstance(node, module.h5g.GroupID):
+            if where.count("/") >= DEEPEST:
+                yield where, f"is in more than {DEEPEST} groups, one in another"
             for name, kind in _links(node):
                 inside = f"{where}/{name.decode('utf-8', 'replace')}".removeprefix("/")
                 if kind != module.h5l.TYPE_HARD:

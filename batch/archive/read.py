@@ -360,9 +360,12 @@ def _stored(name: str, node: Any) -> Stored:
     else:
         dims = tuple(axis[0].name.rpartition("/")[2] if len(axis) else "" for axis in node.dims)
     by_joint = attributes.pop("units_by_joint", ())
+    role = attributes.pop("role", "")
+    if not isinstance(role, str):
+        raise Unlike(f"variable `{name}` has a role that is no word")
     by_joint = by_joint if isinstance(by_joint, list) else [by_joint] if by_joint else []
     return Stored(
-        name, dims, str(attributes.pop("role", "")), str(attributes.pop("units", "")), tuple(map(str, by_joint)),
+        name, dims, role, str(attributes.pop("units", "")), tuple(map(str, by_joint)),
         str(attributes.pop("long_name", "")), attributes,
     )  # fmt: skip
 

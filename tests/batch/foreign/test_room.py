@@ -62,6 +62,11 @@ def unwritten(file: Any) -> None:
     file["open"].create_dataset("many", (1 << 19,), "<f8", chunks=(1 << 10,))
 
 
+def nested(file: Any) -> None:
+    """Groups in groups."""
+    file["open"].create_group("many" + "/many" * 70)
+
+
 TRAPS: dict[Callable[[Any], None], str] = {
     stacked: "is packed twice over",
     inflated: "has a chunk that is packed to more than it should hold",
@@ -156,3 +161,19 @@ def test_a_unit_that_would_fill_a_picture_is_refused(units: Any, single: Path, t
         " = help: an archive that MET writes has its name only when it is whole: was this one copied in part?\n"
         "\n1 error\n"
     )
+
+
+def test_groups_within_groups_are_followed_so_far_and_no_further(archive: Path, tmp_path: Path) -> None:
+    with changed(archive, tmp_path) as (copy, file):
+        nested(file)
+    said = met("show", str(copy))
+    assert said.status == 2 and "many/many` is in more than 64 groups, one in another\n" in said.text
+
+
+def test_a_role_that_is_no_word_is_told(single: Path, tmp_path: Path) -> None:
+    with changed(single, tmp_path) as (copy, file):
+        file["end"].attrs["role"] = np.zeros(3)
+    said = met("show", str(copy))
+    assert said.status == 2
+    message = "variable `end` has a role that is no word"
+    assert said.text.startswith(f"error[E302]: the archive {copy} is damaged: {message}\n")
