@@ -27,18 +27,21 @@ _SAME: Mapping[str, str] = MappingProxyType({
     "kOhm": "kohm", "mOhm": "mohm", "volt": "V", "volts": "V", "amp": "A", "amps": "A", "ampere": "A", "amperes": "A",
     "newton": "N", "newtons": "N", "watt": "W", "watts": "W", "joule": "J", "joules": "J", "kgs": "kg", "KG": "kg",
     "Kg": "kg", "gram": "g", "grams": "g", "tonnes": "t", "percent": "%", "pct": "%", "v": "V", "mv": "mV", "n": "N",
-    "M": "m", "MM": "mm", "VA": "W", "C": "A*s", "coulomb": "A*s", "coulombs": "A*s", "Wb": "V*s", "weber": "V*s",
+    "M": "m", "MM": "mm", "VA": "W", "coulomb": "A*s", "coulombs": "A*s", "Wb": "V*s", "weber": "V*s", "degK": "K",
+    "asec": "arcsec", "amin": "arcmin",
 })  # fmt: skip
 
 _SIZES: Mapping[str, int] = MappingProxyType({
-    "G": 9, "M": 6, "k": 3, "h": 2, "d": -1, "c": -2, "m": -3, "u": -6, "n": -9, "p": -12,
+    "T": 12, "G": 9, "M": 6, "k": 3, "h": 2, "da": 1, "d": -1, "c": -2, "m": -3, "u": -6, "n": -9, "p": -12,
 })  # fmt: skip
 _PREFIXED: Mapping[str, tuple[str, int]] = MappingProxyType(
     {name: (name, 0) for name in ("m", "s", "rad", "Hz", "N", "J", "W", "Pa", "A", "V", "ohm", "H", "F", "K")}
     | {name: (name, 0) for name in ("deg", "arcmin", "arcsec", "cycle", "rpm")}
-    | {"g": ("kg", -3), "Ohm": ("ohm", 0), "bar": ("Pa", 5)}
+    | {"g": ("kg", -3), "Ohm": ("ohm", 0), "bar": ("Pa", 5), "C": ("A*s", 0), "Wb": ("V*s", 0), "T": ("V*s/m^2", 0)}
+    | {"S": ("ohm^-1", 0), "VA": ("W", 0), "Wh": ("W*h", 0), "Ah": ("A*h", 0), "Nm": ("N*m", 0), "l": ("m^3", -3)}
+    | {"L": ("m^3", -3)}
 )
-"""Units that take prefixes, as a unit of the table and a power of ten."""
+"""Units that take prefixes, as units of the table and a power of ten."""
 
 _OTHERS: Mapping[str, tuple[str, str, str]] = MappingProxyType({
     "in": ("an inch", "0.0254", "m"), "inch": ("an inch", "0.0254", "m"), "inches": ("an inch", "0.0254", "m"),
@@ -51,19 +54,27 @@ _OTHERS: Mapping[str, tuple[str, str, str]] = MappingProxyType({
     "knots": ("a knot", "1852", "m/h"), "kn": ("a knot", "1852", "m/h"),
     "lb": ("a pound", "0.45359237", "kg"), "lbs": ("a pound", "0.45359237", "kg"),
     "lbm": ("a pound", "0.45359237", "kg"), "oz": ("an ounce", "0.028349523125", "kg"),
+    "ozin": ("an inch-ounce of force", "7.06155181422604375e-3", "N*m"), "dyne": ("a dyne", "1e-5", "N"),
+    **dict.fromkeys(("lbft", "ftlb", "lbfft", "ftlbf"), ("a foot-pound of force", "1.3558179483314004", "N*m")),
+    **dict.fromkeys(("lbin", "inlb", "lbfin", "inlbf"), ("an inch-pound of force", "0.1129848290276167", "N*m")),
+    "kgfcm": ("a kilogram of force times a centimetre", "9.80665e-2", "N*m"),
+    "mils": ("a thousandth of an inch", "2.54e-5", "m"),
+    "kip": ("a thousand pounds of force", "4448.2216152605", "N"), "ksi": ("a thousand psi", "6894757.293168", "Pa"),
+    **dict.fromkeys(("g0", "gee", "gn"), ("standard gravity", "9.80665", "m/s^2")),
     "slug": ("a slug", "14.59390294", "kg"), "ton": ("a ton of 2000 pounds", "907.18474", "kg"),
     "tons": ("a ton of 2000 pounds", "907.18474", "kg"), "lbf": ("a pound of force", "4.4482216152605", "N"),
     "ozf": ("an ounce of force", "0.27801385095378125", "N"), "kgf": ("a kilogram of force", "9.80665", "N"),
     "kp": ("a kilogram of force", "9.80665", "N"), "gf": ("a gram of force", "9.80665e-3", "N"),
     "dyn": ("a dyne", "1e-5", "N"), "psi": ("a pound of force on a square inch", "6894.757293168", "Pa"),
     "bar": ("a bar", "1e5", "Pa"), "atm": ("an atmosphere", "101325", "Pa"), "torr": ("a torr", "133.32236842", "Pa"),
-    "Torr": ("a torr", "133.32236842", "Pa"), "mmHg": ("a millimetre of mercury", "133.322387415", "Pa"),
+    "Torr": ("a torr", "133.32236842", "Pa"), "mHg": ("a metre of mercury", "133322.387415", "Pa"), "mmHg": ("a millimetre of mercury", "133.322387415", "Pa"),
     "hp": ("a horsepower", "745.69987158227", "W"), "PS": ("a metric horsepower", "735.49875", "W"),
     "cal": ("a calorie", "4.184", "J"), "kcal": ("a kilocalorie", "4184", "J"), "Wh": ("a watt hour", "1", "W*h"),
     "kWh": ("a kilowatt hour", "1", "kW*h"), "eV": ("an electronvolt", "1.602176634e-19", "J"),
     "erg": ("an erg", "1e-7", "J"), "Ah": ("an ampere hour", "1", "A*h"), "mAh": ("a milliampere hour", "1", "mA*h"),
     "T": ("a tesla", "1", "V*s/m^2"), "tesla": ("a tesla", "1", "V*s/m^2"), "mT": ("a millitesla", "1", "mV*s/m^2"),
     "G": ("a gauss", "1e-4", "V*s/m^2"), "gauss": ("a gauss", "1e-4", "V*s/m^2"),
+    "C": ("a coulomb", "1", "A*s"), "mho": ("a siemens", "1", "ohm^-1"),
     "S": ("a siemens", "1", "ohm^-1"), "siemens": ("a siemens", "1", "ohm^-1"),
     "mS": ("a millisiemens", "1", "kohm^-1"),
     "d": ("a day", "24", "h"), "day": ("a day", "24", "h"), "days": ("a day", "24", "h"),
@@ -87,8 +98,17 @@ _NOT_HERE: Mapping[str, tuple[str, ...]] = MappingProxyType({
     **dict.fromkeys(("dB", "db", "dBm"), ("decibels are no unit here: write the ratio as a number, 20 dB as `10`",)),
     **dict.fromkeys(("k", "mega", "kilo", "milli", "micro"), (
         "a prefix stands in the unit's name, as in `kg`; for a pure number write `1e3`, `1e-3`",)),
+    **dict.fromkeys(("degR", "Rankine", "rankine"), ("temperatures are in K: 1 degree Rankine is 5/9 K",)),
+    **dict.fromkeys(("KV", "Kv"), ("a kilovolt is a `kV`; what is called the KV of a motor is in `rpm/V`",)),
     **dict.fromkeys(("mol", "cd", "lm", "lx"), ("no unit of light or of an amount of substance is known here",)),
 })  # fmt: skip
+
+_AS_FORCE: Mapping[str, str] = MappingProxyType({
+    **dict.fromkeys(("lb", "lbs"), "4.4482216152605"), "oz": "0.27801385095378125",
+})  # fmt: skip
+"""Words for a mass that are said of its weight too, in N."""
+
+_NEVER_RUN_TOGETHER = ("t", "h", "K", "H", "F")  # `th`, `mHg`: such words are no products
 
 
 def suggest(name: str) -> str | None:
@@ -101,6 +121,8 @@ def suggest(name: str) -> str | None:
     if prefixed is not None:
         unit, power = prefixed
         return unit if power == 0 else None
+    if name[0] == "K" and is_unit(f"k{name[1:]}"):
+        return f"k{name[1:]}"
     splits = _splits(name)
     if splits:
         return "*".join(splits[0]) if len(splits) == 1 else None
@@ -114,8 +136,16 @@ def suggest(name: str) -> str | None:
         return None
     if len(name) >= _FUZZY:
         near = nearest(name, UNITS, cutoff=0.75)
-        return near if near is not None and near[0] == name[0] else None
+        return near if near is not None and near[0] == name[0] and _one_slip(name, near) else None
     return next((unit for unit in UNITS if len(unit) > 2 and sorted(unit) == sorted(name)), None)
+
+
+def _one_slip(word: str, unit: str) -> bool:
+    """Whether one letter too many, too few or wrong parts the two, or two letters that changed places."""
+    same = next((i for i, pair in enumerate(zip(word, unit, strict=False)) if pair[0] != pair[1]),
+                min(len(word), len(unit)))  # fmt: skip
+    a, b = word[same:], unit[same:]
+    return a[1:] in (b, b[1:]) or a == b[1:] or (a[1::-1] == b[:2] and a[2:] == b[2:])
 
 
 def remedy(name: str, number: str = "", *, alone: bool = True) -> tuple[str, ...]:
@@ -133,8 +163,11 @@ def remedy(name: str, number: str = "", *, alone: bool = True) -> tuple[str, ...
     if name in _OTHERS:
         what, size, unit = _OTHERS[name]
         written = f"`{_times(number or '1', size)} {unit}`"
+        weight = f"`{_times(number or '1', _AS_FORCE[name])} N`" if name in _AS_FORCE else ""
         return (f"{what} is not in the table: write {written}" if number else
-                f"{what} is {written}: put that into the number",)  # fmt: skip
+                f"{what} is {written}: put that into the number",
+                *([f"as a force it is {weight}"] if weight else []),
+                *([_NOT_HERE["degC"][0]] if name == "C" else []))  # fmt: skip
     prefixed = _with_prefix(name) if len(name) <= LONGEST else None
     if prefixed is not None:
         unit, power = prefixed
@@ -147,9 +180,12 @@ def remedy(name: str, number: str = "", *, alone: bool = True) -> tuple[str, ...
 
 def _with_prefix(name: str) -> tuple[str, int] | None:
     """A prefix before a unit, as a unit of the table and a power of ten: `MHz` is Hz and 6."""
-    prefix, unit = name[:1], name[1:]
+    prefix = "da" if name[:2] == "da" else name[:1].replace("K", "k")
+    unit = name[len(prefix):]
     if prefix not in _SIZES or unit not in _PREFIXED:
         return None
+    if unit == "Nm" and is_unit(f"{prefix}N"):
+        return f"{prefix}N*m", 0
     base, power = _PREFIXED[unit]
     if is_unit(f"{prefix}{base}"):
         return f"{prefix}{base}", 0
@@ -163,9 +199,9 @@ def _splits(name: str) -> list[tuple[str, ...]]:
     """
     found: list[tuple[str, ...]] = [(name[:-1],)] if name.endswith("s") and len(name) > 2 and is_unit(name[:-1]) else []
     for cut in range(1, len(name)):
-        if is_unit(name[:cut]) and name[:cut] not in ("m", "h"):
+        if is_unit(name[:cut]) and name[:cut] not in ("m", *_NEVER_RUN_TOGETHER):
             rest = name[cut:]
-            found += [(name[:cut], rest)] if is_unit(rest) else []
+            found += [(name[:cut], rest)] if is_unit(rest) and rest not in _NEVER_RUN_TOGETHER else []
             found += [(name[:cut], *more) for more in _splits(rest) if 1 < len(more) < 3]
     return sorted((each for each in found if len(set(each)) == len(each)), key=len)
 

@@ -57,6 +57,10 @@ class Quantities(Cursor):
         over = None
         if token.kind == WHOLE and token.text == "1" and self.following.text == "/":
             over = self.unit_factor(self.at + 2, -1, 0)
+            named = self.tokens[self.at + 2]
+            if over is None and named.kind == NAME and not units.is_unit(named.text) and not self.on_new_line(self.at):
+                self.fail("D028", f"`{named.text}` is not a unit", named,
+                          help=other_units.remedy(named.text) or _units_known())  # fmt: skip
         if token.kind != NAME and token.text not in ("%", "(") and over is None:
             return None
         if self.begins_entry(self.at):
@@ -66,6 +70,7 @@ class Quantities(Cursor):
             return None
         start = self.at
         product = self.unit_product(start, 1, 0, over)
+        self.not_joined_otherwise(start if product is None else product[1] - 1, start)
         if product is None:  # a path or a block begins with this name
             return None
         factors, self.at = product
@@ -144,6 +149,25 @@ class Quantities(Cursor):
             # `rad/sec`: said here, since after a unit this is what was meant more often than a name of one's own
             self.fail("D028", f"`{named.text}` is not a unit", named, help=f"did you mean `{near}`?")
 
+    def not_joined_otherwise(self, at: int, start: int) -> None:
+        """Refuses `N.m` and `N-m`, and `s-1`, whose last unit before the sign is token `at`, of a unit from `start` on.
+
+        Without a space these are a unit for those who write them, and no number can go on so: names of units are of
+        units alone, and nothing but a pure number is added to one.
+        """
+        unit, sign, more = self.tokens[at : at + 3] if at + 3 <= len(self.tokens) else (self.token,) * 3
+        if sign.text not in (".", "-") or sign.offset != unit.end or more.offset != sign.end or unit.text == "%":
+            return
+        if unit.kind != NAME or not units.is_unit(unit.text):
+            return
+        before = "".join(token.text for token in self.tokens[start : at + 1])
+        near = more.text if units.is_unit(more.text) else other_units.suggest(more.text)
+        if more.kind == NAME and near is not None:
+            self.fail("D030", "units are multiplied with `*`", more, help=f"write `{before}*{near}`")
+        if more.kind == WHOLE and sign.text == "-" and len(more.text) == 1 and at + 3 < len(self.tokens):
+            self.fail("D030", "a unit's exponent stands behind `^`", span(sign, more),
+                      help=f"write `{before}^-{more.text}`")  # fmt: skip
+
     def unknown_unit(self) -> None:
         """A name behind a number that is no unit: says so, and takes it for one."""
         token = self.token
@@ -159,6 +183,8 @@ class Quantities(Cursor):
         helps = other_units.remedy(token.text, number, alone=self.following.text not in ("^", "*", "/"))
         if powered and units.is_unit(powered.group(1)):
             helps = (f"did you mean `{powered.group(1)}^{powered.group(2)}`?",)
+        elif powered and (near := other_units.suggest(powered.group(1))) and "/" not in near:
+            helps = (f"did you mean `{near}^{powered.group(2)}`?",)
         self.fail("D028", f"`{token.text}` is not a unit", token, help=helps or _units_known())
 
 

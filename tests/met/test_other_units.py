@@ -13,8 +13,9 @@ FOREIGN = """
     in inch inches ft foot yd mil thou mile nmi mph kph knot lb lbs oz slug lbf ozf kgf dyn psi bar atm torr mmHg hp PS
     cal kcal Wh kWh eV erg Ah mAh T mT S mS d day week l L ml cc P cP gon grad rps ppm degC degF C Wb sec secs hours
     degrees turns volts newton joule Nms mNm kNm rads
+    MNm uNm daN THz uS mho KN KW KV Km degK degR uC mT uT mWb MWh kip ksi ozin lbft lbin kgfcm dyne mils
 """
-OTHERWISE = {"M", "MM", "G", "PA", "a", "ma", "k", "kn", "mrads", "mh", "uh"}
+OTHERWISE = {"M", "MM", "G", "PA", "KV", "a", "ma", "k", "kn", "mrads", "mh", "uh"}
 # what pint takes for a constant, a year, a molar, thousandths of an hour
 WORDS = [
     *(prefix + unit for prefix in PREFIXES for unit in (*UNITS, "Ohm", "Nm") if unit != "%"),
@@ -28,6 +29,9 @@ PINT = {
     "Wh": "W*hour", "kWh": "kW*hour", "Nm": "N*m", "Nms": "N*m*s", "mNm": "mN*m", "kNm": "kN*m", "ozf": "force_ounce",
     "deg": "degree", "cycle": "turn", "lb": "pound", "hp": "horsepower", "min": "minute", "h": "hour", "rads": "rad",
     "mph": "mile/hour", "knot": "knot", "%": "percent", "Torr": "torr", "mil_": "thou", "T": "tesla", "m%": "percent",
+    "KN": "kN", "KW": "kW", "Km": "km", "degK": "K", "uC": "microcoulomb", "MWh": "MW*hour", "MNm": "MN*m",
+    "uNm": "uN*m", "mWb": "mV*s", "kip": "kip", "ksi": "ksi", "ozin": "force_ounce*inch", **{f"{p}Nm": f"{p}N*m" for p in PREFIXES}, "lbft": "force_pound*foot",
+    "lbin": "force_pound*inch", "kgfcm": "kgf*cm", "mils": "thou", "uT": "microtesla", "uS": "microsiemens",
     "cc": "cm^3", "dyn": "dyne", "S": "siemens", "mS": "millisiemens", "mT": "millitesla",
 }  # fmt: skip
 
@@ -57,7 +61,7 @@ def test_what_is_proposed_has_the_size_and_the_kind_that_pint_gives_the_word(
         return
     for help in remedy(word, "2"):
         quoted = help.partition("`")[2].partition("`")[0]
-        if word in ("degC", "degF") or help.startswith(("no unit", "a prefix")):
+        if word in ("degC", "degF", "degR") or "temperatures" in help or "as a force" in help or help.startswith(("no unit", "a prefix")):
             assert "did you mean" not in help
             continue
         number, _, unit = quoted.partition(" ") if quoted[:1].isdigit() else ("2", "", quoted)
@@ -98,7 +102,9 @@ def test_the_digits_stay_as_they_are_written(number: str, told: str) -> None:
 @pytest.mark.parametrize(
     ("wrong", "right"),
     [("sec", "s"), ("Nm", "N*m"), ("Ohm", "ohm"), ("degrees", "deg"), ("RPM", "rpm"), ("kgs", "kg"), ("Metre", "m"),
-     ("hz", "Hz"), ("radd", "rad"), ("elephant", None), ("x" * 500, None), ("foo", None), ("am", None)],
+     ("hz", "Hz"), ("radd", "rad"), ("elephant", None), ("x" * 500, None), ("foo", None), ("am", None), ("th", None),
+     ("At", None), ("mfarad", None), ("minHg", None), ("minch", None), ("mho", None), ("uS", None), ("degR", None),
+     ("KV", None), ("KN", "kN"), ("mNm", "mN*m"), ("MNm", None), ("asec", "arcsec")],
 )  # fmt: skip
 def test_a_word_that_is_no_unit_gets_the_unit_that_was_meant(wrong: str, right: str | None) -> None:
     assert suggest(wrong) == right
