@@ -10,9 +10,9 @@ from met.diagnostic import Diagnostic, Label, Place, Problem, error, meant
 
 MOST = 200  # a deck with more mistakes than this is told the first ones: the rest seldom say more
 
-ONCE = ("D060", "D061", "D076", "D077", "D087", "D104", "D125", "D141", "D305", "D307")
+ONCE = ("D060", "D061", "D076", "D077", "D087", "D104", "D109", "D125", "D141", "D305", "D307")
 """What is told once of a place, whoever finds it: a bare number, a wrong unit, no such word, out of range, no body's
-inertia, a rate too slow, no channel, no such key, a unit that may mean cycles, a share above 1."""
+inertia, a rate too slow, no entry of a run, no channel, no such key, a unit that may mean cycles, a share above 1."""
 
 
 UNKNOWN_WORDS = ("D044", "D045", "D082", "D108", "D136", "D157")

@@ -126,8 +126,10 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         check_rest(scope, use)
         check_start(scope, use)
     schedule, ticks, others = _schedule(scope, run, block, rates, uses, [*guides, *sensors], duration)
-    if schedule is None or integrator is None:
+    if schedule is None:
         return None
+    known = integrator is not None  # else its mistake was told: what depends on it is not looked at, and all else is
+    integrator = integrator or models.find_own("integrator")["modified_euler"]
     check_ticks(scope, substitutions, ticks, schedule)
     check_brakes(scope, substitutions, environment)
     check_failures(scope, uses, ticks, substitutions, environment, schedule)
@@ -136,7 +138,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     fastest = {}
     on_beds = [each.joint for each in substitutions]
     for use in uses:
-        if use.parameters is not None and use.joint not in on_beds:  # there the motor is no part of the step
+        if known and use.parameters is not None and use.joint not in on_beds:  # there the motor is no part of the step
             x = fastest_rate(scope, use.servo, use.parameters, f"{use.joint}.servo",
                              continuous=ticks[use.joint].continuous)
             if x is not None:
@@ -148,10 +150,10 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         if h_lambda is not None:
             stability[use.joint] = h_lambda
     for sensor in sensors:
-        if sensor.values:
+        if known and sensor.values:
             check_sensor(scope, sensor.label, models.find("sensor", sensor.model), sensor.values, schedule, integrator,
                          rates["dynamics"], sensor.path)
-    for use in uses:
+    for use in uses if known else ():
         check_circuits(scope, use, schedule, integrator, rates["dynamics"], on_bed=use.joint in on_beds)
     servos = tuple(ServoUse(use.joint, use.definition, use.servo.name, use.command, ticks[use.joint].divisor, use.place,
                             use.words, ticks[use.joint].continuous, use.sensors) for use in uses)  # fmt: skip
@@ -162,7 +164,8 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     )  # fmt: skip
     check_base(scope, base, structure, _body(scope, block.get("environment")), block.get("base"))
     check_payloads(scope, block, structure)
-    check_spins(scope, block, structure)
+    if known:
+        check_spins(scope, block, structure)
     check_guides(scope, guides, structure)
     metrics = resolve_metrics(scope, block, structure)
     record = resolve_record(scope, run, block.get("record"), structure)

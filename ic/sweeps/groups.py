@@ -273,14 +273,17 @@ def _slugs(groups: Sequence[Experiment]) -> list[str]:
 
 def _sum(source: Source, definition: Definition, within: tuple[str, ...]) -> list[Group]:
     """The groups of all parts, one part's cases after the other's."""
+    known = {**source.definitions.of_kind("run"), **source.definitions.of_kind("sweep")}
+    unknown = [named for named in definition.parts if named.text not in known]
+    for named in unknown:  # first of all: a mistake in another part hides no name
+        source.complaints.error("D041", f"no run or sweep `{named.text}`", named.place,
+                                help=[*did_you_mean(named.text, known),
+                                      known_words("runs and sweeps of this deck", known)])
+    if unknown:
+        return []
     parts = []
     for named in definition.parts:
-        known = {**source.definitions.of_kind("run"), **source.definitions.of_kind("sweep")}
-        part = known.get(named.text)
-        if part is None:
-            raise Problem(error("D041", f"no run or sweep `{named.text}`", named.place,
-                                help=[*did_you_mean(named.text, known),
-                                      known_words("runs and sweeps of this deck", known)]))
+        part = known[named.text]
         if named.text in (*within, definition.name):
             raise Problem(error("D043", f"sweep `{definition.name}` is made of itself", named.place,
                                 help="leave it out"))

@@ -79,3 +79,30 @@ def test_to_mend_a_mistake_takes_just_its_message_away(tmp_path: Path, mended: i
 @pytest.mark.parametrize("alone", range(len(MISTAKES)), ids=[wrong or "nothing" for _, wrong, _ in MISTAKES])
 def test_a_mistake_alone_is_told_once(tmp_path: Path, alone: int) -> None:
     assert told(tmp_path, {alone}) == expected({alone})
+
+
+HIDING = """\
+#include <two_link.ic>
+run first like nominal {{ integrator = {integrator};  {extra}  metric peak = {metric} {{ of = {channel}; }}
+    require peak < {limit}; }}
+run second like first {{ duration = 10 s; }}
+sweep masses of first {{ vary links.upper.mass = [40, 60] kg;  exclude when links.upper.mass > {most}; }}
+sweep all = masses + {part};
+"""
+SOUND = {"integrator": "rk4", "extra": "", "metric": "max", "channel": "elbow.qd", "limit": "1 rad/s", "most": "50 kg",
+         "part": "second"}  # fmt: skip
+
+
+@pytest.mark.parametrize(("wrong", "codes"), [
+    ({"integrator": "rk5", "metric": "mux"}, ["D140", "D140"]),
+    ({"integrator": "rk5", "channel": "elbw.qd"}, ["D125", "D140"]),
+    ({"integrator": "rk5", "limit": "1 kg"}, ["D061", "D140"]),
+    ({"integrator": "rk5", "most": "50 m"}, ["D063", "D140"]),
+    ({"integrator": "rk5", "part": "secnd"}, ["D041", "D140"]),
+    ({"channel": "elbw.qd", "part": "secnd"}, ["D041", "D125"]),
+    ({"extra": "tolerancs { }"}, ["D109"]),
+])  # fmt: skip
+def test_a_wrong_word_of_a_run_hides_no_other_mistake(tmp_path: Path, wrong: dict[str, str], codes: list[str]) -> None:
+    deck = tmp_path / "deck.ic"
+    deck.write_text(HIDING.format(**{**SOUND, **wrong}))
+    assert sorted(d.code for d in ic.check(deck).diagnostics if d.severity == "error") == codes

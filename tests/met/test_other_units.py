@@ -30,7 +30,8 @@ PINT = {
     "deg": "degree", "cycle": "turn", "lb": "pound", "hp": "horsepower", "min": "minute", "h": "hour", "rads": "rad",
     "mph": "mile/hour", "knot": "knot", "%": "percent", "Torr": "torr", "mil_": "thou", "T": "tesla", "m%": "percent",
     "KN": "kN", "KW": "kW", "Km": "km", "degK": "K", "uC": "microcoulomb", "MWh": "MW*hour", "MNm": "MN*m",
-    "uNm": "uN*m", "mWb": "mV*s", "kip": "kip", "ksi": "ksi", "ozin": "force_ounce*inch", **{f"{p}Nm": f"{p}N*m" for p in PREFIXES}, "lbft": "force_pound*foot",
+    "uNm": "uN*m", "mWb": "mV*s", "kip": "kip", "ksi": "ksi", "ozin": "force_ounce*inch",
+    **{f"{p}Nm": f"{p}N*m" for p in PREFIXES}, "lbft": "force_pound*foot",
     "lbin": "force_pound*inch", "kgfcm": "kgf*cm", "mils": "thou", "uT": "microtesla", "uS": "microsiemens",
     "cc": "cm^3", "dyn": "dyne", "S": "siemens", "mS": "millisiemens", "mT": "millitesla",
 }  # fmt: skip
@@ -61,7 +62,10 @@ def test_what_is_proposed_has_the_size_and_the_kind_that_pint_gives_the_word(
         return
     for help in remedy(word, "2"):
         quoted = help.partition("`")[2].partition("`")[0]
-        if word in ("degC", "degF", "degR") or "temperatures" in help or "as a force" in help or help.startswith(("no unit", "a prefix")):
+        if (
+            word in ("degC", "degF", "degR") or "temperatures" in help or "as a force" in help
+            or help.startswith(("no unit", "a prefix"))
+        ):
             assert "did you mean" not in help
             continue
         number, _, unit = quoted.partition(" ") if quoted[:1].isdigit() else ("2", "", quoted)
