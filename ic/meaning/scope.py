@@ -493,9 +493,12 @@ class Scope:
             return []
         fits = [kind for kind in ("position", "rate", "acceleration") if kind != owner.command and units.same(
             value.dimension, unit_here(wanted.unit, owner.joint, kind, owner.of)[1])]
+        found = units.text(value.dimension)
+        if not owner.label.startswith("`"):  # no course: the command is this number
+            return [f"`{owner.command}(...)` takes {in_deck(text)}; `{kind}(...)` takes {found}" for kind in fits]
         course = owner.label.strip("`")
         return [f"of a `{owner.command}` command it is in {in_deck(text)}; with `{kind}({course}(...))` it would be in "
-                f"{units.text(value.dimension)}, like all of that course" for kind in fits]
+                f"{found}, like all of that course" for kind in fits]
 
     def _remark_cycles(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> None:
         """Tells of a unit that may mean cycles where radians count, or the reverse."""

@@ -28,11 +28,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.oracle
 def test_the_commands_write_what_they_name(folder: Path) -> None:
     written = {path.name for path in folder.iterdir() if path.name.startswith("lengths")}
     assert written == {"lengths.mcap", "lengths.layout.json", "lengths.csv", "lengths.qd.csv", "lengths.parquet"}
 
 
+@pytest.mark.oracle
 def test_the_topics_of_the_table_are_in_the_file(folder: Path) -> None:
     read = Mcap(folder / "lengths.mcap")
     table = PAGE[PAGE.index("| topic | is |") : PAGE.index("A channel's metadata")]
@@ -42,6 +44,7 @@ def test_the_topics_of_the_table_are_in_the_file(folder: Path) -> None:
     assert {topic.partition("/")[0] for topic in read.entities("/case0/scene")} == {"case0"}
 
 
+@pytest.mark.oracle
 def test_the_tables_begin_as_they_are_shown(folder: Path) -> None:
     shown = re.findall(r"```text\n(.*?)\n```", PAGE, re.DOTALL)
     for name, text in zip(("lengths.csv", "lengths.qd.csv"), shown, strict=True):

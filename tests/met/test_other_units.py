@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import pint
 import pytest
 
 from met.other_units import remedy, suggest
 from met.units import UNITS, parse_unit
+from tests.oracles.package import Package
+
+pint = Package("pint")
 
 PREFIXES = ("G", "M", "k", "h", "d", "c", "m", "u", "n", "p")
 FOREIGN = """
@@ -51,6 +53,7 @@ def _in_pint(written: str, registry: pint.UnitRegistry) -> pint.Quantity:
 
 
 @pytest.mark.slow
+@pytest.mark.oracle
 @pytest.mark.parametrize("word", sorted({*WORDS} - {*UNITS, *OTHERWISE}))
 def test_what_is_proposed_has_the_size_and_the_kind_that_pint_gives_the_word(
     word: str, registry: pint.UnitRegistry

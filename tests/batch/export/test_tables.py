@@ -224,7 +224,7 @@ def test_a_case_that_failed_says_why(here: Path, monkeypatch: pytest.MonkeyPatch
     assert [bool(row[-1]) for row in rows] == [False, True, False] and rows[1][5] == "nan"
 
 
-@pytest.mark.parametrize("form", ["csv", "parquet"])
+@pytest.mark.parametrize("form", ["csv", pytest.param("parquet", marks=pytest.mark.oracle)])
 def test_structures_and_runs_are_under_one_another(tmp_path: Path, form: str) -> None:
     found = export(made(tmp_path, "links", CHAIN), tmp_path / f"a.{form}").path
     if form == "csv":

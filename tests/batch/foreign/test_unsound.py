@@ -96,7 +96,10 @@ def test_a_group_under_another_name_than_in_the_plan_is_told(command: str, archi
         assert f"the archive {copy} is damaged: its plan is of other runs than it holds" in answer.text
 
 
-def test_a_name_longer_than_the_terminal_is_wide_is_shown(archive: Path, tmp_path: Path) -> None:
+def test_a_name_longer_than_the_terminal_is_wide_is_shown(
+    archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "100")
     long = "masses." + "very_" * 30 + "long"
     with changed(archive, tmp_path) as (copy, file):
         file[SWEEP].attrs["experiment"] = long

@@ -219,7 +219,7 @@ class TestUnits:
     def test_units_that_cannot_be(self, data: xarray.Dataset) -> None:
         assert said(lambda: data.met.in_units(qd="rad")) == ("E386", "`qd` cannot be in rad; it is in rad/s")
         assert said(lambda: data.met.in_units(qd="rads")) == (
-            "E386", "`qd`: unit `rads`: `rads` is not a unit; `rad*s`?\n"
+            "E386", "`qd`: unit `rads`: `rads` is not a unit; `rad`?\n"
             "  units are those of decks: `met doc units`"
         )  # fmt: skip
         assert said(lambda: data.met.in_units(status="s")) == ("E386", "`status` cannot be in s; it is in 1")

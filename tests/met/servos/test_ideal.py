@@ -160,7 +160,7 @@ error[D061]: the command of servo `follow` is in rad/s^2, and this is in rad/s
   |
 5 | servo follow { model = ideal; bandwidth = 20 s^-1; command = acceleration(0.5 rad/s); }
   |                                                                           ^^^^^^^^^
-  = help: write it in rad/s^2 or deg/s^2
+  = help: `acceleration(...)` takes rad/s^2; `rate(...)` takes rad/s
 
 1 error
 """
