@@ -39,7 +39,7 @@ def tools(tmp_path: Path) -> Path:
     directory = tmp_path / "bin"
     directory.mkdir()
     for name in TOOLS:
-        found = shutil.which(name)
+        found = shutil.which(name, path=f"{os.environ['PATH']}:/usr/bin:/bin")
         assert found is not None
         (directory / name).symlink_to(found)
     return directory

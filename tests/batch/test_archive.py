@@ -114,6 +114,7 @@ def test_the_unit_a_requirement_is_written_in(text: str, unit: str, written: tup
     assert limits.written_unit(text, unit) == written
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine_name", ENGINES)
 def test_several_experiments_are_groups_of_a_tree(here: Path, engine_name: str) -> None:
     import xarray

@@ -83,6 +83,7 @@ class TestWhatItIsCalled:
             choose(dask=8786)
         assert str(caught.value) == 'dask is the address of a scheduler, "local" or a Client, and not int'
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "http://example.org", "", "tcp://"])
     def test_where_no_scheduler_answers(self, many: Any, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(dask_connection, "CONNECT_SECONDS", 0.3)
@@ -126,6 +127,7 @@ class TestWhatItIsCalled:
         Dask("local").close()
         assert whole.children(os.getpid()) == before
 
+    @pytest.mark.slow
     def test_commands_that_need_no_cluster_do_not_load_it(self) -> None:
         program = "import sys, batch.cli, batch.executors.dask; print('distributed' in sys.modules)"
         words = [sys.executable, "-c", program]
@@ -180,6 +182,7 @@ class TestWorkersThatCannotServe:
         assert found.kind == "broken"
         assert found.why == f"{HOST} has MET {VERSION}, and not 0.0.9: install that where its Dask worker runs"
 
+    @pytest.mark.slow
     def test_one_with_other_code_of_the_same_version(self, many: Any, tmp_path: Path) -> None:
         folder, sections = many
         ours = {0: replace(sections[0], single=True)}  # so that the same cases have another key here
@@ -188,6 +191,7 @@ class TestWorkersThatCannotServe:
         assert found.kind == "broken"
         assert found.why == f"{HOST} has other code of MET {VERSION}, or other models: install the same everywhere"
 
+    @pytest.mark.slow
     def test_one_that_cannot_write(self, many: Any, tmp_path: Path) -> None:
         folder = many[0]
         with cluster(tmp_path) as started:
@@ -300,6 +304,7 @@ class TestInThisProcess:
             whole.until(lambda: set(whole.children(os.getpid())) == before)
             whole.until(lambda: not [n for worker in started.workers.values() for n in worker.plugins if "met" in n])
 
+    @pytest.mark.slow
     @pytest.mark.usefixtures("poisoned")
     def test_a_driver_that_is_gone_leaves_no_child(
         self, many: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -322,6 +327,7 @@ class TestInThisProcess:
             asyncio.run(dask_worker.Kept.on(worker, order))
         assert not [name for name in worker.plugins if "met" in name]
 
+    @pytest.mark.slow
     def test_children_that_get_nothing_to_do_go_home(
         self, many: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -180,6 +180,7 @@ def test_more_values_products_and_repeats_change_no_old_case(tmp_path: Path) -> 
         assert all(more[name] == bits for name, bits in few.items())
 
 
+@pytest.mark.slow
 def test_an_archive_says_which_repeat_a_case_is(tmp_path: Path) -> None:
     path = ran(tmp_path, compiled(tmp_path, NOISY, "sweep it of hold { vary links.bar.mass = [1, 2] kg; repeat 2; }"))
     dataset = xarray.open_dataset(path, engine="h5netcdf")

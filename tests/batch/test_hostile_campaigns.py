@@ -472,6 +472,7 @@ def test_a_long_name_is_refused_before_or_good_to_the_end(here: Path, length: in
         assert whole.beside_it(here / name) == [name, f"{name}.run.json"]
 
 
+@pytest.mark.slow
 def test_processes_where_many_files_are_open(here: Path) -> None:
     limits = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (2048, limits[1]))

@@ -116,6 +116,7 @@ def test_programs_get_json_of_every_run_asked_for(here: Path, capsys: pytest.Cap
     assert isinstance(found[0], Mapping) and {"peak", "parts", "inputs", "flops", "share_of_peak"} <= set(found[0])
 
 
+@pytest.mark.slow
 def test_a_plan_file_is_measured_too(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from met import plan_file
 

@@ -119,6 +119,7 @@ class TestTheRealEngine:
             found.append(batch.run(plan, output="a.h5", fresh=True).path.read_bytes())
         assert found[0] == found[1]
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("name", ["failure", "friction.splits", "metrics.kp", "q"])
     def test_a_coordinate_and_a_metric_of_the_engines_own_names(self, here: Path, name: str) -> None:
 

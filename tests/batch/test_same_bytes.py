@@ -263,6 +263,7 @@ def test_more_cases_change_no_old_one(here: Path, what: str) -> None:
             assert np.array_equal(bits(np.asarray(value)), bits(np.asarray(new[key][name]))), (key, name)
 
 
+@pytest.mark.slow
 def test_noise_is_noise(here: Path) -> None:
     """Else the tests above would compare silence."""
     found = by_key(extended("bench", f"{KT} repeat 3;"))

@@ -92,6 +92,7 @@ def test_plain_xarray_finds_joints_and_components_by_name(files: dict[str, Path]
         assert data["metrics.axis"].values.tolist() >= position.max("time").values.tolist()
 
 
+@pytest.mark.slow
 def test_units_and_frames_are_told(files: dict[str, Path]) -> None:
     with xarray.open_dataset(files["swing"]) as data:
         told = {name: dict(data[name].attrs) for name in data}

@@ -65,6 +65,7 @@ class TestWhatIsSaid:
             "no_value": 0,
         }
 
+    @pytest.mark.slow
     def test_the_picture_lies_beside_the_archive(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         run_and_tell(self.plan(here, plans.nominal()))
         assert "picture  two_link.png\n" in capsys.readouterr().out

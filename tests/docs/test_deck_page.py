@@ -154,6 +154,7 @@ def test_what_the_page_builds_on_the_tutorial_runs(tmp_path: Path) -> None:
         assert data["requirement"].values.tolist() == ["settle < 2 s", "volts < 48 V"]
 
 
+@pytest.mark.slow
 def test_what_the_page_reads_from_a_file_is_followed(tmp_path: Path) -> None:
     (text,) = (text for where, _, text in FRAGMENTS if text.startswith("servo replay"))
     with_tables(tmp_path)

@@ -25,6 +25,7 @@ def test_the_page_shows_what_is_said(folder: Path) -> None:
     assert "".join(line for line in said.splitlines(keepends=True) if "MET's commit" not in line) == found[1]
 
 
+@pytest.mark.slow
 def test_the_mended_servo_stops_at_once(folder: Path) -> None:
     import numpy as np
 

@@ -89,6 +89,7 @@ def test_an_archive_holds_what_the_page_lists_and_nothing_else(archives: tuple[P
         assert DECK in kept["source_text"].values.tolist()
 
 
+@pytest.mark.slow
 def test_an_archive_of_several_opens_as_the_page_says(archives: tuple[Path, Path]) -> None:
     with xarray.open_dataset(archives[1]) as root:
         assert len(root.variables) == 0 and "deck" in root.attrs

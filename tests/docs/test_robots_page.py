@@ -42,6 +42,7 @@ def test_the_imported_deck_holds_the_arm_and_lets_it_fall(folder: Path) -> None:
         assert data["q"].sel(joint="hinge").isel(time=-1) > 0.5
 
 
+@pytest.mark.slow
 def test_the_deck_made_from_the_file_sweeps_what_hangs_on_it(folder: Path) -> None:
     with xarray.open_dataset(folder / "deck.loads.h5") as data:
         assert data["links.load.mass"].values.tolist() == [0.0, 0.5, 1.0]

@@ -67,6 +67,7 @@ class TestLockStepOnAPty(conformance.LockStep, conformance.Simulated, OfDevice):
 
 
 @pytest.mark.usefixtures("precedence")
+@pytest.mark.slow
 class TestFreeRunningOnAPty(conformance.FreeRunning, conformance.Simulated, OfDevice):
     period = 2e-3
 

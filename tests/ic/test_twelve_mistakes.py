@@ -93,6 +93,7 @@ SOUND = {"integrator": "rk4", "extra": "", "metric": "max", "channel": "elbow.qd
          "part": "second"}  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("wrong", "codes"), [
     ({"integrator": "rk5", "metric": "mux"}, ["D140", "D140"]),
     ({"integrator": "rk5", "channel": "elbw.qd"}, ["D125", "D140"]),

@@ -44,6 +44,7 @@ def test_ids_and_keys_are_what_they_were() -> None:
     assert keys.structure_key(experiment.structure, keys.inputs(experiment)) == STRUCTURE_KEY
 
 
+@pytest.mark.slow
 def test_another_process_finds_the_same_ids() -> None:
     """String hashes differ from process to process; ids must not."""
     program = "from met import keys; from tests.met.test_keys import first_plan; print(*keys.case_ids(first_plan()))"

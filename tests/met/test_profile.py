@@ -50,6 +50,7 @@ def test_a_varied_gain_is_read_where_it_is_used_and_a_varied_mass_is_worked_into
     assert mass.sets == 1 and mass.hoisted > 0 and mass.read_by > mass.kept > 0
 
 
+@pytest.mark.slow
 def test_a_step_is_counted_as_the_rates_have_it(gains: Profile) -> None:
     """Servos at 100 Hz, dynamics and record at 25 Hz; the run's last instant has no step after it, 500 have."""
     calls = {(part.work, part.part): part.calls for part in gains.parts if not part.event}

@@ -97,6 +97,7 @@ def test_a_newton_metre_without_its_sign_is_no_unit(registry: pint.UnitRegistry)
         parse_unit("Nm")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [name for name, unit in UNITS.items() if unit.measure.dimension == Dimension(rad=1)])
 @pytest.mark.parametrize("rest", ["1", "s", "1/s", "1/s^2", "min^3", "Hz"])
 @pytest.mark.parametrize(("power", "other"), [(1, 0), (1, 2), (-1, 1), (2, 3)])

@@ -86,6 +86,7 @@ def test_a_motion_started_from_a_later_servo_tick_is_the_same_motion():
     np.testing.assert_allclose(second.qd[-1], whole.qd[-1], rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_a_reversing_command_makes_joints_stick_and_release():
     motion = reference(np.linspace(0.0, 6.0, 601), command=sine_rate(0.03, 0.5), servo_hz=100.0)
     for joint in (0, 1):
@@ -123,6 +124,7 @@ def test_a_stuck_joint_breaks_away_between_ticks_where_its_need_reaches_friction
     np.testing.assert_allclose(abs(just_before.tau[0, 1]), motor.ratio * motor.f_c, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_steady_rate_takes_the_voltage_of_back_emf_and_friction():
     motion = reference(np.array([0.0, 20.0]), command=rate(0.03), servo_hz=25.0)
     w = 1570.0 * 0.03
@@ -131,6 +133,7 @@ def test_steady_rate_takes_the_voltage_of_back_emf_and_friction():
     np.testing.assert_allclose(motion.voltage[-1], volts, rtol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["position", "torque"])
 def test_every_kind_of_command_is_understood(kind):
     value = 0.01 if kind == "position" else 60.0

@@ -36,6 +36,7 @@ def spectra(run: Run, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndar
     return at, power_x, signal.welch(y, **options)[1], signal.csd(x, y, **options)[1]
 
 
+@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("joint", [0, 1])
 def test_both_joints_settle_at_the_commanded_rate(rates, joint):
@@ -70,6 +71,7 @@ def test_joint_one_is_noisy_and_only_by_the_faults_of_the_bed(rates):
     assert np.std(ideal.signals["qd"][0, ideal.time >= 10.0, 0]) / SLOW < 1e-6
 
 
+@pytest.mark.slow
 @BOTH
 def test_joint_two_oscillates_with_joint_one_once_a_turn_of_the_shaft(rates):
     """Measured coherence 0.974 and 0.999, at 7.5 Hz."""

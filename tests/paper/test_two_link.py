@@ -38,6 +38,7 @@ def off(result: Run, exact: Motion, signal: str) -> float:
     return float(np.max(np.abs(result.signals[signal][0] - expected).max(axis=0) / np.ptp(expected, axis=0)))
 
 
+@pytest.mark.slow
 def test_without_friction_modified_euler_falls_to_the_exact_motion_with_the_step_squared():
     """Servo at 100 Hz. Measured 9.2e-6 of the rates' range at 1 kHz, 2.3e-6 at 2 kHz, 5.6e-7 at 4 kHz."""
     exact = reference(np.arange(501) / 100.0, command=HELD, servo_hz=100.0, friction=False)
@@ -73,6 +74,7 @@ def test_the_errors_with_friction_are_those_after_every_step_too():
         np.testing.assert_array_equal(rate == 0.0, wanted == 0.0)
 
 
+@pytest.mark.slow
 def test_velocity_products_are_those_of_lagrange():
     """The elbow bent, faster, frictionless: here Coriolis and centrifugal torques matter."""
     options = {"command": sine(0.2, 0.3), "servo_hz": 100.0, "friction": False, "q": (0.0, 1.0)}
@@ -86,6 +88,7 @@ def test_velocity_products_are_those_of_lagrange():
     assert off(result, without, "qd") > 50 * off(result, exact, "qd")
 
 
+@pytest.mark.slow
 def test_friction_keeps_order_two_through_sixty_stops_and_releases():
     """A sine that reverses both joints every second. Measured 4.5e-6 of range at 1 kHz, falling by 4.0 each time."""
     exact = reference(np.arange(1601) / 100.0, command=sine(SLOW, 0.5), servo_hz=100.0)
@@ -134,6 +137,7 @@ def test_both_joints_settle_at_the_commanded_rate_at_the_papers_rates(joint):
     assert np.sqrt(np.mean(difference[time <= 5.0] ** 2)) < 0.0012
 
 
+@pytest.mark.slow
 def test_the_figures_can_be_drawn(tmp_path):
     written = draw(tmp_path)
     assert [path.name for path in written] == [f"paper_figure_{number}.png" for number in (5, 6, 7, 8)]

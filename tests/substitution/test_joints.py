@@ -13,6 +13,8 @@ import pytest
 from tests.oracles.worst import Worst
 from tests.substitution.hybrid import REVERSING, deck, measured
 
+pytestmark = pytest.mark.slow
+
 slow = pytest.mark.slow
 # From rest to r = 5 and to r = 20, and reversing, %
 LIMITS = {"velocity_tracking": (0.3, 0.5, 0.6), "torque_balance": (1.0, 2.0, 2.5)}

@@ -59,6 +59,7 @@ def _margin(servo: str, law: str = "velocity_tracking", bed: str = "emulated") -
     return found[0][0], "\n".join(told(experiment, found))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gain", [1.0, 10.0, 30.0])
 def test_under_a_position_command_the_limit_is_that_of_the_position_loop(gain: float) -> None:
     """J s^3 + (D + K kp) s^2 + K (ki + kp k) s + K ki k is stable where (D + K kp)(ki + kp k) > J ki k.
@@ -72,6 +73,7 @@ def test_under_a_position_command_the_limit_is_that_of_the_position_loop(gain: f
     assert _margin(f"k_position = {gain} 1/s;  command = rate(slow);")[0].limit is None
 
 
+@pytest.mark.slow
 def test_under_a_torque_command_the_gains_that_it_does_not_use_do_not_matter() -> None:
     limits = {_margin(f"kp = {kp} V*s/rad;  command = torque(1 N*m);", "measured_acceleration")[0].limit
               for kp in (0.02, 1.0)}  # fmt: skip
@@ -79,6 +81,7 @@ def test_under_a_torque_command_the_gains_that_it_does_not_use_do_not_matter() -
     assert _margin("kp = 1 V*s/rad;", "measured_acceleration")[0].lower > 0.0
 
 
+@pytest.mark.slow
 def test_an_arm_lighter_than_all_that_is_searched_is_not_called_stable_for_that() -> None:
     """A pull of three times J_bed/T turns the shaft's error over at each tick, whatever the arm."""
     one, text = _margin("ratio = 20000;", "velocity_tracking(gain = 3)")
@@ -87,6 +90,7 @@ def test_an_arm_lighter_than_all_that_is_searched_is_not_called_stable_for_that(
     assert "NONE: unstable" in text
 
 
+@pytest.mark.slow
 def test_an_arm_heavier_than_all_that_is_searched_is_searched_too() -> None:
     one, text = _margin("ratio = 10;")
     assert one.r > HEAVIEST and one.searched == 2.0 * one.r
@@ -98,6 +102,7 @@ def test_an_arm_whose_r_is_no_number_is_not_called_stable() -> None:
     assert not one.stable and one.room == 0.0 and verdict(one) == "NONE: r is no number"
 
 
+@pytest.mark.slow
 def test_a_servo_too_stiff_for_a_light_arm_is_stable_with_a_heavier_one_as_in_simulation() -> None:
     arms = (0.02, 0.08, 0.4, 1.6, 6.4)
     experiment, text = _stiff(0.08, arms)
@@ -111,6 +116,7 @@ def test_a_servo_too_stiff_for_a_light_arm_is_stable_with_a_heavier_one_as_in_si
         assert one.factor == one.lighter if one.r < 1.0 else one.factor == min(one.r / one.lower, one.limit / one.r)
 
 
+@pytest.mark.slow
 def test_more_gain_of_the_servo_takes_away_from_below_and_not_all_at_once() -> None:
     found = [margins(_stiff(kp, [2.75])[0])[0][0] for kp in (0.076, 0.079, 0.2)]
     assert found[0].lower == 0.0 and 0.05 < found[1].lower < 0.1 and found[2].lower == pytest.approx(3.17, rel=0.01)
@@ -118,6 +124,7 @@ def test_more_gain_of_the_servo_takes_away_from_below_and_not_all_at_once() -> N
     assert found[2].factor == found[2].lighter and found[2].lighter < 1.0 < found[2].heavier  # type: ignore[operator]
 
 
+@pytest.mark.slow
 def test_where_the_arm_is_too_light_the_table_says_from_where_it_would_not_be() -> None:
     experiment, _ = _stiff(0.08, [0.08, 0.4])
     found = margins(experiment)
@@ -161,6 +168,7 @@ def test_a_margin_in_words(one: Margin, said: str, sentence: str, what_helps: st
         assert remedy(one) == what_helps
 
 
+@pytest.mark.slow
 def test_a_limit_of_the_beds_current_is_not_taken_for_stability() -> None:
     """At r = 100 a measured acceleration asks for more than any bed's current: the loop then looks at rest."""
     one, _ = _margin("ratio = 180;", "measured_acceleration")

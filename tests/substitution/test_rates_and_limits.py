@@ -28,6 +28,7 @@ def test_a_loop_that_is_up_to_three_ticks_late_stays_within_the_limits_at_1_khz(
         worst.below(limit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("servos", "dynamics", "base"), [
     (1000.0, 100.0, None),
     (100.0, 1000.0, None),
@@ -53,6 +54,7 @@ TURNING = "table(times = [0, 0.9995, 1, 2] s, values = [0.3 rad/s, 0.3 rad/s, -0
 AMPLIFIERS = "record += [shoulder.bed.drive_voltage, shoulder.bed.load_current];"
 
 
+@pytest.mark.slow
 def test_a_drive_at_its_limits_is_followed() -> None:
     """Ten times the rate, then back: the voltage stays at 20 V and the motor's torque at 0.144 N m most of the time.
 

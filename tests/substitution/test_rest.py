@@ -58,6 +58,7 @@ HANGING = ("one_rod", ("shoulder",), """
 """)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "limit"), [("slow", 0.5), (REVERSING, 0.6), ("0 rad/s", 0.5)])
 def test_a_rod_that_is_pulled_down_holds_or_gives_way_as_on_its_own_motor(command: str, limit: float) -> None:
     """Friction holds 32 N m. With 20 N m a rod at rest stays there exactly, with 40 N m it turns its motor back."""

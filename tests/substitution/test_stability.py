@@ -52,6 +52,7 @@ def swept(law: str, rate: int, swept: str, heaviness: Sequence[float], duration:
     return text, grows(own, bench, round(duration * rate / 8.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate", "duration", "delays", "cuts"), [
     (100, 8.0, (0, 1), (50,)),
     (1000, 4.0, (0, 1), (50,)),
@@ -85,6 +86,7 @@ def test_measured_acceleration_grows_from_where_the_margin_and_an_independent_mo
         known.below(0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["velocity_tracking", "torque_balance", "torque_balance_observer"])
 @pytest.mark.parametrize(("rate", "delays", "cuts"), [
     (1000, (1,), (50,)),
@@ -121,6 +123,7 @@ def test_the_gain_of_velocity_tracking_has_the_limit_that_the_margin_says(rate: 
         assert low and not high
 
 
+@pytest.mark.slow
 def test_joints_by_measured_acceleration_together_grow_by_the_largest_r_of_all_their_motions() -> None:
     """The largest eigenvalue of Lambda/(N^2 J_m) counts, not each joint by itself: 5.4 as of one joint alone."""
     heavier = np.linspace(2.4, 4.2, 73)
@@ -142,6 +145,7 @@ def test_joints_by_measured_acceleration_together_grow_by_the_largest_r_of_all_t
     assert all(one.limit is not None and case[1].r < 0.3 * one.limit for case in told for one in case)
 
 
+@pytest.mark.slow
 def test_a_servo_with_much_gain_grows_below_one_r_and_above_another_as_the_margin_says() -> None:
     heaviness = (0.05, 0.1, 0.17, 0.2, 0.5, 1.5, 3.0, 3.8, 4.3, 6.0)
     masses = ", ".join(f"{r * ROTOR * 3.0 / REACH**2:.12g}" for r in heaviness)
@@ -154,6 +158,7 @@ def test_a_servo_with_much_gain_grows_below_one_r_and_above_another_as_the_margi
     assert all(one.limit == pytest.approx(4.01, rel=0.01) for one in told)
 
 
+@pytest.mark.slow
 def test_joints_together_grow_where_the_least_r_of_all_their_motions_is_too_small() -> None:
     """Each joint by itself would not: the lighter of the two is at twice the r that its servo needs.
 
@@ -193,6 +198,7 @@ def test_joints_together_grow_where_the_least_r_of_all_their_motions_is_too_smal
     assert all(one.r > 1.5 * one.lower and one.too_light for one in told[1])
 
 
+@pytest.mark.slow
 def test_the_margin_tells_the_r_of_the_arm_at_the_start() -> None:
     text = deck(sweep=loads([0.5, 5.0]), duration=0.5)
     told = [each[0].r for each in margins(compiled(text, "bench"))]

@@ -60,6 +60,7 @@ def test_one_bit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     assert (worst.case_a, worst.case_b, worst.signal) == (77, mixed.index(77), "qd")
 
 
+@pytest.mark.slow
 def test_a_late_drift_within_and_beyond_a_tolerance(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def plant(run: Run, place: dict[int, int]) -> None:
         for case, size in ((5, 1e-6), (250, 3e-6)):

@@ -56,6 +56,7 @@ def test_nothing_is_allowed_unless_it_is_said(archives: Callable[..., tuple[Path
     assert counts(found) == (CASES - 2, 0, 2) and told(found)[-1] == "different; no tolerance was given"
 
 
+@pytest.mark.slow
 def test_the_deck_of_the_second_says_it(archives: Callable[..., tuple[Path, Path]]) -> None:
     a, b = archives(q=5e-6)
     assert counts(diff(a, b)) == (CASES - 2, 1, 1)
@@ -77,6 +78,7 @@ def test_of_one_joint_alone(archives: Callable[..., tuple[Path, Path]]) -> None:
     assert any(line.endswith("(3e-6 rad, elbow 0.002 SI), 66.7 % used") for line in told(both))
 
 
+@pytest.mark.slow
 def test_the_command_line_has_its_way(archives: Callable[..., tuple[Path, Path]]) -> None:
     a, b = archives(q=1.0, rel=0.5, time=0.01)
     assert diff(a, b).verdict == "equivalent"

@@ -43,6 +43,7 @@ def test_it_opens_on_the_arm_beside_plots_and_the_log(written: tuple[Mcap, dict[
     assert layout["layout"]["first"] == "3D!arm"
 
 
+@pytest.mark.slow
 def test_every_topic_and_field_that_it_names_is_in_the_file(written: tuple[Mcap, dict[str, Any]]) -> None:
     read, layout = written
     view, log = layout["configById"]["3D!arm"], layout["configById"]["RosOut!log"]

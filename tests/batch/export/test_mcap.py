@@ -72,6 +72,7 @@ def test_the_frames_are_where_the_kinematics_have_them(reaches: tuple[ArchiveFil
         np.testing.assert_allclose(far, file.groups[0].signal("links.wrist.position", case)[0], rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_no_frame_jumps_between_the_two_quaternions_of_its_turn(pick: tuple[ArchiveFile, Mcap]) -> None:
     _, read = pick
     turns = np.array([
@@ -175,6 +176,7 @@ def test_a_solid_is_where_its_mass_is(pick: tuple[ArchiveFile, Mcap]) -> None:
     assert (lamp.pose.position.x, lamp.pose.position.y, lamp.pose.position.z) == (0.1, 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_a_solid_whose_inertia_is_written_is_only_a_look(tmp_path: Path) -> None:
     boom = "link boom     { mass = 5 kg;  com = [0.7, 0, 0] m;  inertia = [0.1, 1, 1] kg*m^2;"
     read = Mcap(export(made(tmp_path, "pick", DECK.replace("link boom     { mass = 5 kg;", boom))).path)
@@ -190,6 +192,7 @@ def test_a_joint_that_slides_has_a_rail_as_long_as_it_moves(pick: tuple[ArchiveF
     np.testing.assert_allclose([(p.x, p.y, p.z) for p in rail.points], [(0, 0, 0.4), (0, 0, 0.4 + far)], atol=1e-15)
 
 
+@pytest.mark.slow
 def test_several_cases_are_overlaid_the_first_solid_and_the_others_as_ghosts(
     reaches: tuple[ArchiveFile, Mcap],
 ) -> None:
@@ -349,6 +352,7 @@ def test_a_case_without_a_history_is_run_again_first(here: Path, monkeypatch: py
     assert Mcap(export("a.h5").path).metadata[1][1]["case"] == "1"
 
 
+@pytest.mark.slow
 def test_too_many_cases_for_one_scene_are_refused_unless_named(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plans.answering(monkeypatch)
     batch.run(plans.plan(plans.gains(9)), output="a.h5")
@@ -363,6 +367,7 @@ def test_too_many_cases_for_one_scene_are_refused_unless_named(here: Path, monke
     assert export("a.h5", cases=range(9)).cases == 9
 
 
+@pytest.mark.slow
 def test_runs_are_overlaid_under_their_names(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plans.answering(monkeypatch)
     batch.run(plans.plan(plans.nominal(), plans.gains(3)), output="a.h5")

@@ -138,6 +138,7 @@ def test_an_export_that_fails_leaves_the_archive_and_says_so(
     assert batch.look("x.h5").ok
 
 
+@pytest.mark.slow
 def test_none_failed_so_there_is_nothing_to_export(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert met("few", "-o", "x.mcap", "--histories", "failed") == cli.NO
     told = capsys.readouterr()

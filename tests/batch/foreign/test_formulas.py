@@ -42,6 +42,7 @@ def test_a_name_that_is_a_formula_gets_an_apostrophe_before_it(name: str, archiv
         np.testing.assert_array_equal(times, opened.groups[0].values("time"))
 
 
+@pytest.mark.slow
 def test_numbers_below_0_stay_numbers(archive: Path, here: Path) -> None:
     with changed(archive, here) as (copy, file):
         file["open/q"][...] = -1.5

@@ -53,6 +53,7 @@ def test_all_links_of_all_cases_are_where_the_archive_recorded_them(reaches: xar
                 assert frames[name].attrs[told] == kept.attrs[told]
 
 
+@pytest.mark.slow
 def test_the_frames_are_those_of_the_kinematics_one_row_at_a_time(reaches: xarray.Dataset) -> None:
     frames = reaches.met.frames("tool", "lamp")
     [experiment] = reaches.met.plan.experiments

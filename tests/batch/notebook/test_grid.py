@@ -39,6 +39,7 @@ def block(patch: pytest.MonkeyPatch, folder: Path, **columns: Any) -> Any:
         return data.load()
 
 
+@pytest.mark.slow
 def test_a_product_unfolds_and_what_is_excluded_is_not_a_number(tuning: xarray.Dataset) -> None:
     volts = tuning.met.grid("volts")
     assert volts.sizes == {"gearbox.kp": 4, "gearbox.ki": 3, "links.upper.mass": 2}

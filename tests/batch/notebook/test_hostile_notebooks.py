@@ -80,6 +80,7 @@ def test_an_arm_whose_joint_is_called_joint_1_has_frames_of_one_case(tmp_path: P
         )
 
 
+@pytest.mark.slow
 def test_a_metric_in_metres_is_not_compared_with_degrees(tmp_path: Path) -> None:
     with made(tmp_path, ONE, "kinds") as tree:
         assert [tree[name]["end"].attrs["units"] for name in ("kinds.revolute", "kinds.prismatic")] == ["rad", "m"]
@@ -124,6 +125,7 @@ def test_the_plan_of_an_archive_of_which_the_second_run_was_changed_is_refused(t
             tree.met.plan  # noqa: B018
 
 
+@pytest.mark.slow
 def test_what_xarray_answers_is_asked_for(tmp_path: Path) -> None:
     with made(tmp_path, BRIEF, "backs") as data:
         assert data.met.sel(case=data["volts"].idxmax())["case"].item() == int(np.argmax(data["volts"].values))
@@ -162,6 +164,7 @@ def test_a_parameter_called_position_is_no_position(tmp_path: Path) -> None:
         assert frames["position"].dims == ("time", "link", "axis") and frames["coordinates.position"].item() == 0.2
 
 
+@pytest.mark.slow
 def test_the_archive_may_be_told_by_a_path(tmp_path: Path) -> None:
     with made(tmp_path, BRIEF, "brief") as data:
         lost = data.drop_encoding()

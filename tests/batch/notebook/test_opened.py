@@ -90,6 +90,7 @@ def test_an_archive_that_is_run_anew_meanwhile(tmp_path: Path) -> None:
         assert anew.met.frames().sizes["recorded_case"] == 18
 
 
+@pytest.mark.slow
 def test_who_has_forgotten_the_archive_can_be_told(archive: Path, data: xarray.Dataset) -> None:
     lost = data.drop_encoding()
     assert lost.met.grid("volts").sizes["gearbox.kp"] == 4
@@ -225,6 +226,7 @@ class TestUnits:
         assert said(lambda: data.met.in_units(status="s")) == ("E386", "`status` cannot be in s; it is in 1")
         assert said(lambda: data.met.in_units(qdd="deg/s^2"))[1].startswith("no variable `qdd` in `tuning`\n")
 
+    @pytest.mark.slow
     def test_joints_that_have_units_of_their_own(self, tmp_path: Path) -> None:
         from tests.batch.export import decks
 

@@ -39,6 +39,7 @@ def rows(data: xarray.Dataset) -> list[int]:
     return data["case"].values.tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", [0.02, "0.02 V*s/rad", "20 mV*s/rad", "20 N*mm/A", np.float64(0.02), 0.02000000001])
 def test_a_value_may_have_any_unit_and_the_rounding_of_who_types_it(tuning: xarray.Dataset, value: Any) -> None:
     chosen = tuning.met.sel({"gearbox.kp": value})
@@ -118,6 +119,7 @@ class TestOfSeveral:
         assert rows(ways.met.sel({"gearbox.kp": 0.03}, integrator="rk4")["ways.rk4"]) == [1]
         assert list(ways.met.sel(integrator=["rk4", "midpoint"]).children) == ["ways.rk4", "ways.midpoint"]
 
+    @pytest.mark.slow
     def test_a_value_is_cut_out_of_every_structure(self, ways: xarray.DataTree) -> None:
         found = ways.met.sel({"gearbox.kp": "0.03 V*s/rad"})
         assert {name: rows(node) for name, node in found.children.items()} == {"ways.rk4": [1], "ways.midpoint": [3]}

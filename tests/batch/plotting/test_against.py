@@ -124,6 +124,7 @@ class TestSignals:
             " = help: `met diff a.h5 b.h5` says what differs\n"
         )
 
+    @pytest.mark.slow
     def test_that_were_not_kept_are_told_of(self, here: Path) -> None:
         archives.made(here / "a.h5", plans.gains(3))
         archives.made(here / "b.h5", plans.gains(3), histories="none")
@@ -151,6 +152,7 @@ class TestMetrics:
         np.testing.assert_allclose(hollow[1:, 1], [3.75, 3.0], rtol=1e-14)
         assert [text.get_text() for text in figures[0].legends[0].get_texts()] == ["a.h5", "b.h5"]
 
+    @pytest.mark.slow
     def test_as_maps_are_the_difference_around_zero(
         self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -185,6 +187,7 @@ class TestMetrics:
         assert refused("volts") == "error[E393]: no `volts` in b.h5 to draw against\n = help: in b.h5: settle\n"
 
 
+@pytest.mark.slow
 def test_archives_that_have_nothing_in_common(here: Path) -> None:
     archives.made(here / "a.h5", plans.gains(3))
     archives.made(here / "b.h5", archives.grid([0.5, 0.6], [1.0]))

@@ -71,6 +71,7 @@ def test_a_signal_is_in_the_unit_in_which_the_deck_wrote_what_it_does(ran: dict[
     assert found["q"].axis == "q  (deg)" and found["q"].si == "rad"
 
 
+@pytest.mark.slow
 def test_a_requirement_of_a_joint_speaks_for_its_signal(ran: dict[str, ArchiveFile]) -> None:
     _, found = units(ran["turning"])
     assert (found["q"].unit, found["qd"].unit) == ("rad", "rpm")

@@ -17,6 +17,7 @@ from tests.batch.plotting.pictures import archive, shown
 pytestmark = pytest.mark.usefixtures("engine")
 
 
+@pytest.mark.slow
 def test_a_case_has_a_panel_a_signal_and_a_line_a_joint(here: Path, figures: list[Any]) -> None:
     with archive(1) as file:
         assert draw(file, "a.png") == Path("a.png")
@@ -28,6 +29,7 @@ def test_a_case_has_a_panel_a_signal_and_a_line_a_joint(here: Path, figures: lis
     np.testing.assert_array_equal(axes[1].lines[1].get_ydata(), plans.answer(plans.nominal()).signals["qd"][0, :, 1])
 
 
+@pytest.mark.slow
 def test_a_joint_has_one_colour_in_all_panels(here: Path, figures: list[Any]) -> None:
     with archive(1) as file:
         draw(file, "a.png", ["qd", "elbow.q", "shoulder.servo.voltage"])
@@ -35,6 +37,7 @@ def test_a_joint_has_one_colour_in_all_panels(here: Path, figures: list[Any]) ->
     assert colours == [[COLOURS[0], COLOURS[1]], [COLOURS[1]], [COLOURS[0]]]
 
 
+@pytest.mark.slow
 def test_few_cases_are_overlaid_and_named_by_what_varies(here: Path, figures: list[Any]) -> None:
     with archive(3) as file:
         draw(file, "a.png", ["qd"])
@@ -45,6 +48,7 @@ def test_few_cases_are_overlaid_and_named_by_what_varies(here: Path, figures: li
     assert words == ["0.01 · 20000", "0.025 · 20100", "0.04 · 20200"]
 
 
+@pytest.mark.slow
 def test_cases_that_are_told_apart_by_how_faint_they_are_have_a_key(here: Path, figures: list[Any]) -> None:
     with archive(3) as file:
         draw(file, "a.png", ["qd", "shoulder.servo.voltage"], sheet=Sheet(width=2.9))
@@ -56,6 +60,7 @@ def test_cases_that_are_told_apart_by_how_faint_they_are_have_a_key(here: Path, 
     assert [keys[text].get_alpha() for text in cases] == drawn == [1.0, 0.625, 0.25]
 
 
+@pytest.mark.slow
 def test_joints_of_unlike_unit_stand_beside_one_another(here: Path, figures: list[Any]) -> None:
     with mixed(3) as file:
         draw(file, "a.png")
@@ -120,6 +125,7 @@ def test_a_command_is_drawn_over_what_follows_it_and_nowhere_else(
         assert not any("rate asked" in ax.get_title("left") for ax in axes)
 
 
+@pytest.mark.slow
 def test_commands_that_differ_have_their_cases_colours(
     here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

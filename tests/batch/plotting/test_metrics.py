@@ -60,6 +60,7 @@ class TestPoints:
         assert (infinite.get_offsets()[:, 1] == 1.0).all() and len(infinite.get_offsets()) == 2
         assert len(lost.get_offsets()) == 3
 
+    @pytest.mark.slow
     def test_of_few_values_of_another_parameter_are_curves_with_its_name(self, here: Path, figures: list[Any]) -> None:
         made(masses=MASS[:3])
         plot("a.h5", over=["gearbox.kp"])
@@ -166,6 +167,7 @@ class TestMaps:
         assert np.isnan(mesh(ax)).sum() == 1 and cells(ax, face=INFINITE) == cells(ax, face=FAILED) == 0
         assert [text.get_text() for text in figures[0].legends[0].get_texts()] == ["misses what is required", "no case"]
 
+    @pytest.mark.slow
     def test_show_the_worst_of_several_cases_and_say_so(self, here: Path, figures: list[Any]) -> None:
         steps = np.linspace(0.02, 0.05, 2 * MOST_CELLS).tolist()
         made(kps=steps)
@@ -195,6 +197,7 @@ class TestMaps:
         assert isinstance(points, PathCollection) and len(points.get_offsets()) == 40
         assert said(figures[0]) == "40 cases: a point a case"
 
+    @pytest.mark.slow
     def test_of_cases_that_fill_no_grid_lie_by_their_values_with_room_around(
         self, here: Path, figures: list[Any]
     ) -> None:
@@ -224,6 +227,7 @@ class TestMaps:
         assert ax.get_ylim() == (-0.5, 4.5)
         assert [text.get_text() for text in ax.get_yticklabels()] == ["1000", "2000", "30000", "31000", "90000"]
 
+    @pytest.mark.slow
     def test_have_colours_for_the_many_where_a_few_stray(
         self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
     ) -> None:

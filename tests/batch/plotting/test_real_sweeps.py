@@ -52,6 +52,7 @@ def test_maps_stand_beside_one_another_for_a_third_parameter(archive: Path, figu
     assert bar.get_ylabel() == "volts  (V)" and said(figures[0]) == "12 cases: a cell a case"
 
 
+@pytest.mark.slow
 def test_a_map_says_what_stands_for_its_cases(archive: Path, figures: list[Any], tmp_path: Path) -> None:
     plot(archive, tmp_path / "a.png", ["volts"], over=["gearbox.kp", "gearbox.ki"])
     np.testing.assert_array_equal(mesh(shown(figures[0])[0]), np.sort(volts(archive), axis=2)[:, :, 0].T)

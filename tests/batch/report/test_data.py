@@ -247,6 +247,7 @@ class TestSignals:
 
 
 class TestStructures:
+    @pytest.mark.slow
     def test_are_one_section_with_a_row_each(self, tmp_path: Path) -> None:
         batch.run(archives.compiled(tmp_path, "ways"), output=tmp_path / "a.h5")
         found = gathered(tmp_path / "a.h5")

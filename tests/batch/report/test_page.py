@@ -111,6 +111,7 @@ def test_nothing_is_fetched_and_all_else_is_forbidden(found: Report) -> None:
     assert "url(" not in inlined.style() and "@import" not in inlined.style()
 
 
+@pytest.mark.slow
 def test_no_text_of_a_deck_is_markup(found: Report) -> None:
     usual, wild = Parsed(page(found)), Parsed(page(hostile(found)))
     assert {tag for tag, _ in wild.elements} <= {tag for tag, _ in usual.elements}
@@ -148,6 +149,7 @@ def test_it_reads_without_scripts(found: Report) -> None:
         assert said in re.sub(r"\s+", " ", words)
 
 
+@pytest.mark.slow
 def test_a_verdict_of_another_kind_stands_beside_the_first(found: Report) -> None:
     other = replace(found.verdicts[0], kind="difference", about="against b.h5", headline="3 cases differ")
     source = page(replace(found, verdicts=(*found.verdicts, other)))

@@ -135,6 +135,7 @@ def test_another_campaign_is_left_alone(archive: Path, here: Path, what: str) ->
     assert not kept.keys() & set(rest.names)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("histories", ["all", "none"])
 def test_another_duration_is_another_campaign(archive: Path, here: Path, histories: str) -> None:
     begin(archive, compiled(here), histories=histories)
@@ -150,6 +151,7 @@ KEPT: dict[str, tuple[dict[str, Any], str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", KEPT)
 def test_what_else_was_asked_for_is_another_campaign(archive: Path, what: str) -> None:
     options, told = KEPT[what]
@@ -158,6 +160,7 @@ def test_what_else_was_asked_for_is_another_campaign(archive: Path, what: str) -
     assert whole.shards(archive) == kept
 
 
+@pytest.mark.slow
 def test_whose_histories_are_kept_may_change_on_the_way(archive: Path) -> None:
     kept = begin(archive, histories="worst:3")
     rest, _ = go_on(archive, histories="worst:4")

@@ -88,6 +88,7 @@ def test_the_deck_runs_and_meets_its_requirement_in_every_case() -> None:
         assert (data["gains"]["met"].values == 1).all() and data["gains"]["effort"].values.std() > 1.0
 
 
+@pytest.mark.slow
 def test_every_line_of_the_decks_head_that_begins_with_met_is_a_command_that_works(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -38,6 +38,7 @@ ADDED = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "text"), DECKS, ids=[name for name, _ in DECKS])
 def test_the_decks_of_the_library_and_of_the_pages_are_laid_out(name: str, text: str) -> None:
     after = formatted(name, text)

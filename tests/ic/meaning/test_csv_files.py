@@ -404,6 +404,7 @@ def test_a_mistake_is_told_where_it_is(tmp_path: Path, text: str | bytes, course
     assert shown(tmp_path, text, course) == message
 
 
+@pytest.mark.slow
 def test_a_file_of_too_many_rows(tmp_path: Path) -> None:
     rows = "".join(f"{i},0\n" for i in range(100_001))
     assert shown(tmp_path, "time [s], hinge [rad]\n" + rows) == """\

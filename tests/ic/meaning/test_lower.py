@@ -251,6 +251,7 @@ def test_explain_of_nothing_offers_the_nearest() -> None:
     assert caught.value.diagnostics[0].help == ("did you mean `elbow.servo.kt`?",)
 
 
+@pytest.mark.slow
 def test_compiling_loads_nothing_heavy() -> None:
     """What would take longer to load than the whole of `met check` may take."""
     program = (f"import sys, ic; ic.compile({str(TWO_LINK)!r}, select='all');"

@@ -120,6 +120,7 @@ def test_a_name_of_a_file_changes_no_key(tmp_path: Path) -> None:
     assert case_ids(first) == case_ids(second)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
 def test_a_servo_is_asked_for_the_curve_of_each_case_at_every_tick(tmp_path: Path, interpolation: str) -> None:
     """11 cases: more than a vector has lanes, and a rest."""

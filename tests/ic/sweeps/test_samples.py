@@ -24,6 +24,7 @@ def drawn(folder: Path, body: str) -> list[np.ndarray]:
     return [coordinate.values for coordinate in swept(folder, body).cases.coordinates]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("distribution", "law"), [
     ("uniform(1, 3)", stats.uniform(1, 2)),
     ("normal(20, 1)", stats.norm(20, 1)),

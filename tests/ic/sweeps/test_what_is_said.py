@@ -30,6 +30,7 @@ TWICE = "leave one out: each case stands in the table once"
 EACH = "write a run for each, `like` the first, and `sweep NAME = ONE + OTHER;`"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("body", "message"), [
     ("vary links.bar.mass = [1, 2, 1.0] kg;", f"D133 [1.0] values number 1 and 3 are the same | {TWICE}"),
     ("vary integrator = [rk4, midpoint, rk4];", f"D133 [rk4] values number 1 and 3 are the same | {TWICE}"),

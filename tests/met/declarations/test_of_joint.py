@@ -41,6 +41,7 @@ def test_what_one_joint_has_of_its_own_goes_over_it(name: str, tmp_path: Path) -
             assert found[replace(use, joint=joint).path(parameter)].value == expected, joint
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GUIDES)
 def test_a_sweep_varies_it_for_all_or_for_one(name: str, tmp_path: Path) -> None:
     use = for_all(name)

@@ -58,6 +58,7 @@ def test_a_rotor_stores_energy_and_no_momentum() -> None:
     assert (ours.linear, ours.angular) == (bare.linear, bare.angular)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_energy_grows_by_the_power_of_torques_and_wrenches(seed: int) -> None:
     arm = random_tree(seed)

@@ -265,6 +265,7 @@ def test_a_recorded_state_gives_the_plain_results_in_every_mode(seed: int) -> No
         assert np.all(np.abs(ours - plain) <= 1e-10 * (np.abs(plain) + np.median(np.abs(plain)))), f"seed {seed}"
 
 
+@pytest.mark.slow
 def test_a_base_whose_every_number_is_a_cases_moves_the_same() -> None:
     worst = Worst("free base of numpy's numbers")
     for arm, tree, base in fleet()[:20]:

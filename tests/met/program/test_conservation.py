@@ -17,6 +17,8 @@ from tests.met.tree_deck import GRAVITY, TREE
 from tests.oracles import plan_tree
 from tests.oracles.dense import DenseArm
 
+pytestmark = pytest.mark.slow
+
 # All servos of the deck keep energy: a joint without one, a rotor, and one with a spring as well.
 SPRING = 30.0
 FREE = """

@@ -335,6 +335,7 @@ def test_a_motor_on_a_bed_turns_on_as_its_shaft_does(tmp_path: Path) -> None:
     assert run.signals["J_eff"][0, 8, 0] > 1.2 * before.signals["J_eff"][0, 8, 0], "and feels what is held now"
 
 
+@pytest.mark.slow
 def test_two_payloads_that_are_grappled_at_once_are_one_impact(tmp_path: Path) -> None:
     other = changed(BOX, ("payload box", "payload other"), ("on       = lower", "on       = upper"),
                     ("position = [2.6, 3, 3.4] m", "position = [1, 1, 3] m"), ("mass     = 12 kg", "mass     = 7 kg"),
@@ -351,6 +352,7 @@ def test_two_payloads_that_are_grappled_at_once_are_one_impact(tmp_path: Path) -
         np.testing.assert_allclose(swapped.signals[name], run.signals[name], rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("link", ["base", "lower"])
 def test_on_a_base_that_is_told_its_way_a_payload_goes_along_and_off_with_its_speed(tmp_path: Path, link: str) -> None:
     told = (("base     = free;", "base = prescribed { x = sine(amplitude = 0.1 m, frequency = 0.5 Hz); "
@@ -388,6 +390,7 @@ sweep some of tumbling {
 """
 
 
+@pytest.mark.slow
 def test_cases_that_are_grappled_at_other_times_leave_each_other_alone(tmp_path: Path) -> None:
     found = experiment(tmp_path, ARM, RUN, SWEEP, select=["some"])
     run = engine.run(found)
@@ -407,6 +410,7 @@ def test_cases_that_are_grappled_at_other_times_leave_each_other_alone(tmp_path:
         np.testing.assert_allclose(run.signals[name][1], other.signals[name][0], rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_plain_numbers_give_the_kernels_results(tmp_path: Path) -> None:
     found = experiment(tmp_path, ARM, changed(RUN, ("duration = 2 s", "duration = 1.6 s")))
     plain, _ = execute(build(found), {}, found.structure.schedule.ticks)

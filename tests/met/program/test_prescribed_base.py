@@ -107,6 +107,7 @@ def test_the_arm_upon_it_moves_as_pinocchio_says(tmp_path: Path) -> None:
         assert np.max(np.abs(tau)) < 2e-13 * np.max(np.abs(held)), f"{t} s"
 
 
+@pytest.mark.slow
 def test_plain_numbers_and_every_lane_give_the_same(tmp_path: Path) -> None:
     sweep = """\
 sweep some of shaken {
@@ -141,6 +142,7 @@ def test_a_base_of_constants_is_a_fixed_one_that_stands_elsewhere(tmp_path: Path
     assert (one["links.base.position"] == [2.0, -1.0, 0.0]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["modified_euler", "rk4"])
 def test_a_run_upon_it_keeps_the_integrators_order(tmp_path: Path, integrator: str) -> None:
     smooth = changed(RUN, ("yaw   = trapezoid(to = 100 deg, max_rate = 61 deg/s, max_acceleration = 50 deg/s^2);", ""))

@@ -191,6 +191,7 @@ def test_the_filter_answers_as_its_transfer_function_does(cutoff: float, hz: flo
     np.testing.assert_allclose(of(run, "way")[late], expected[late], rtol=0, atol=close)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", models.find_own("integrator"))
 def test_a_reading_is_of_the_integrators_order(integrator: str, tmp_path: Path) -> None:
     order = models.find("integrator", integrator).order
