@@ -82,7 +82,11 @@ def test_memory_does_not_grow_with_the_number_of_steps(tmp_path: Path) -> None:
         words = [sys.executable, "-c", MEASURE, str(deck), str(tmp_path / "out.h5"), histories]
         # Linux counts to a new process what its parent held when it began: a shell between holds little.
         done = subprocess.run(
-            ["/bin/sh", "-c", '"$0" "$@"; exit $?', *words], env=environment, capture_output=True, text=True, check=False
+            ["/bin/sh", "-c", '"$0" "$@"; exit $?', *words],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
         )
         assert done.returncode == 0, done.stderr
         size, ok = json.loads(done.stdout.splitlines()[-1])
