@@ -177,7 +177,7 @@ def test_a_parameter_called_run_is_a_column_of_parquet(tmp_path: Path) -> None:
     from pyarrow import parquet
 
     made(tmp_path, BRIEF.replace("reach_back", "run"), "backs").close()
-    path = export(tmp_path / "a.h5", tmp_path / "a.parquet").path
+    path = export(tmp_path / "a.h5", tmp_path / "a.parquet", table="histories").path
     assert parquet.read_schema(path).names[:4] == ["run", "case", "coordinates.run", "time"]
 
 
