@@ -462,7 +462,7 @@ class Scope:
             self._remark_cycles(owner, wanted, value, text)
             if wanted.share and value.bare and not isinstance(value.number, Scalar) and abs(value.number) > 1.0:
                 number = f"{value.number:.12g}"
-                self.complaints.remark(
+                self.complaints.warn(
                     "D307", f"{owner.what(wanted)} is a share, and {number} is {100.0 * value.number:.12g} %",
                     value.place, help=[f"if per cent are meant, write `{number} %`",
                                        f"if that is meant, write `{100.0 * value.number:.12g} %`"])
@@ -504,7 +504,7 @@ class Scope:
         """Tells of a unit that may mean cycles where radians count, or the reverse."""
         found = doubt(value, text, measure_here(wanted.unit, owner.joint, owner.command, owner.of))
         if found is not None:
-            self.complaints.remark("D305", f"{owner.what(wanted)} is {found.taken}", value.place,
+            self.complaints.warn("D305", f"{owner.what(wanted)} is {found.taken}", value.place,
                                    also=self.names.label(value), help=found.helps)
 
     def _other(self, owner: Owner, wanted: Parameter, value: Value) -> list[str]:

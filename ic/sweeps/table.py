@@ -142,7 +142,7 @@ class _Truths:
             raise Problem(error("D063", f"`{expression.operator}` of {named(sides[0])} and {named(sides[1])}",
                                 expression.place, also=[Label(side.place, named(side)) for side in sides], help=helps))
         if None not in (hertz := [side.hertz for side in sides]) and hertz[0] != hertz[1]:
-            scope.complaints.remark(
+            scope.complaints.warn(
                 "D305", f"`{expression.operator}` of Hz and 1/s, which are taken for one", expression.place,
                 help=["if that is meant, write both sides in the same of the two",
                       "if cycles a second are meant, write 2 pi times the number of Hz, in `s^-1`"])

@@ -175,3 +175,9 @@ def test_the_band_of_a_settling_time_is_a_share_too(tmp_path: Path) -> None:
     seen, helps = found(tmp_path, (LAST[0], metric))
     assert seen == ["D307"]
     assert helps == [("if per cent are meant, write `2 %`", "if that is meant, write `200 %`")]
+
+
+def test_a_mistake_elsewhere_does_not_hide_them(tmp_path: Path) -> None:
+    text = deck(HZ, ("duration = 1 s;", "durations = 1 s;"), ("arm swing", "let a = sin(90);\narm swing"))
+    compiled = check(tmp_path, text, select="all")
+    assert [each.code for each in compiled.diagnostics] == ["D306", "D305", "D109"]
