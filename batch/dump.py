@@ -10,14 +10,14 @@ from ic.printing.dump import Asked
 if TYPE_CHECKING:
     from met.plan import Experiment
     from met.trace.llvm import Machine
-    from met.trace.program import Step
+    from met.trace.recording import Step
 
 
 def program(asked: Asked) -> Iterator[str]:
     """What is computed when: control, then each straight piece, operation by operation; `%n` is what number n gives."""
     from met.program.build import build
     from met.trace.graph import show
-    from met.trace.program import record
+    from met.trace.recorder import record
 
     for experiment in _experiments(asked):
         recording = record(build(experiment))
@@ -58,7 +58,7 @@ def _emitted(asked: Asked) -> Iterator[tuple[Machine, str]]:
     from met import kernel as engine
     from met.program.build import build
     from met.trace import llvm
-    from met.trace.program import record
+    from met.trace.recorder import record
 
     machine = llvm.machine()
     for experiment in _experiments(asked):
@@ -72,7 +72,8 @@ def _experiments(asked: Asked) -> Sequence[Experiment]:
 
 def _steps(steps: Sequence[Step], names: Sequence[str], indent: str) -> Iterator[str]:
     """Control, one line a step with the section's name, the bodies of blocks indented."""
-    from met.trace.program import Block, Every, Recorded, WhileAny
+    from met.trace.program import Every, WhileAny
+    from met.trace.recording import Block, Recorded
 
     for step in steps:
         if isinstance(step, Block):

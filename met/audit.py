@@ -9,7 +9,9 @@ from __future__ import annotations
 from met.plan import Experiment
 from met.program.build import COORDINATE, build
 from met.trace.graph import live
-from met.trace.program import Section, WhileAny, record, walk
+from met.trace.program import WhileAny, walk
+from met.trace.recorder import record
+from met.trace.recording import Section
 
 
 def idle(experiment: Experiment) -> tuple[str, ...]:

@@ -22,7 +22,9 @@ from met.frozen import frozen
 from met.trace import cache
 from met.trace.ir import emit
 from met.trace.pieces import operations
-from met.trace.program import Program, Recording, record
+from met.trace.program import Program
+from met.trace.recorder import record
+from met.trace.recording import Recording
 
 if TYPE_CHECKING:
     from met.trace.llvm import Machine

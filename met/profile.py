@@ -32,24 +32,9 @@ from met.trace import fma, llvm
 from met.trace.counting import counting
 from met.trace.graph import LEAVES, OPERANDS
 from met.trace.pieces import cut, operations
-from met.trace.program import (
-    Block,
-    Every,
-    Phase,
-    Program,
-    Record,
-    Recorded,
-    Recording,
-    Run,
-    Section,
-    Step,
-    Straight,
-    Tape,
-    Unless0,
-    WhileAny,
-    record,
-    walk,
-)
+from met.trace.program import Every, Phase, Program, Record, Run, Tape, Unless0, WhileAny, walk
+from met.trace.recorder import record
+from met.trace.recording import Block, Recorded, Recording, Section, Step, Straight
 
 FLOPS = {"add": 1, "sub": 1, "mul": 1, "div": 1, "sqrt": 1, "fma": 2}
 """Operations that count as arithmetic, and for how much; comparing, choosing and moving count for none."""

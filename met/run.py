@@ -17,7 +17,9 @@ from met.program.build import COORDINATE, METRIC, OUTPUTS, build
 from met.program.step import ASTRAY, EVENTS, NOT_FINITE, SINGULAR
 from met.program.substituted import LIMITED
 from met.trace.ir import emit
-from met.trace.program import Program, Recording, record
+from met.trace.program import Program
+from met.trace.recorder import record
+from met.trace.recording import Recording
 
 DONE, FAILED, TIMED_OUT, LOST = range(4)
 """How a case ended: at its end; by its own numbers; cut off for taking too long; with whatever ran it, each time."""

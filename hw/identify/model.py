@@ -20,7 +20,8 @@ from met.servos.motor import damping, torque
 from met.substitution import butterworth, shaft
 from met.substitution.emulated import SUBSTEP
 from met.trace import cos, sin
-from met.trace.program import Call, Phase, Program, Tape, Unless0, record
+from met.trace.program import Call, Phase, Program, Tape, Unless0
+from met.trace.recorder import record
 
 MOTOR = ("kt", "resistance", "tau_max", "f_c", "f_v", "inertia", "kt_load", "f_cut")
 RIPPLE = ("sin_1", "cos_1", "sin_2", "cos_2")

@@ -19,7 +19,9 @@ from met.program.substituted import Mounted, Substituted
 from met.trace import Real
 from met.trace.c import emit, literal
 from met.trace.graph import evaluate
-from met.trace.program import Call, Phase, Program, Straight, Tape, Unless0, record
+from met.trace.program import Call, Phase, Program, Tape, Unless0
+from met.trace.recorder import record
+from met.trace.recording import Straight
 
 _INPUTS = ("voltage", "current", "rate", "seed", "repeat")
 _OUTPUTS = ("rate", "shaft_rate", "shaft_angle")

@@ -22,7 +22,8 @@ from met.frozen import frozen
 from met.trace.c_functions import HEAD, functions
 from met.trace.graph import OPERANDS, TRUTHS, Node
 from met.trace.primitives import bits_of
-from met.trace.program import Block, Every, Recorded, Recording, Section, Step, Straight, Unless0, WhileAny
+from met.trace.program import Every, Unless0, WhileAny
+from met.trace.recording import Block, Recorded, Recording, Section, Step, Straight
 
 _INFIX = {"mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "and": "&&"}
 

@@ -13,7 +13,8 @@ import struct
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
-from met.trace.program import Block, Every, Recorded, Recording, Step, Straight, Unless0, WhileAny
+from met.trace.program import Every, Unless0, WhileAny
+from met.trace.recording import Block, Recorded, Recording, Step, Straight
 
 ENTRY = "met_run"
 

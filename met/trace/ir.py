@@ -14,7 +14,7 @@ from met.trace.entry import entry, number, spread
 from met.trace.graph import OPERANDS, TRUTHS
 from met.trace.philox import Written
 from met.trace.pieces import CUT_ABOVE, LONGEST, SHORTEST, Piece, cut
-from met.trace.program import Recording, Section
+from met.trace.recording import Recording, Section
 
 _CALLS = {"sqrt": "llvm.sqrt", "floor": "llvm.floor", "rint": "llvm.roundeven", "abs": "llvm.fabs", "fma": "llvm.fma"}
 _ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}

@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 from met.trace.graph import LEAVES, OPERANDS
-from met.trace.program import Section
+from met.trace.recording import Section
 
 # operations above which a section is cut, and the bounds of a piece
 CUT_ABOVE = 500

@@ -45,7 +45,8 @@ from met.trace import (
 )
 from met.trace.cache import folder
 from met.trace.graph import evaluate, live
-from met.trace.program import Every, Phase, Program, Record, Run, Unless0, WhileAny, record
+from met.trace.program import Every, Phase, Program, Record, Run, Unless0, WhileAny
+from met.trace.recorder import record
 from met.trace.reference import execute
 
 

@@ -11,7 +11,7 @@ from met.plan import Experiment
 from met.profile import FLOPS, Profile, as_data, by_part, hoisted, profile
 from met.program.build import build
 from met.trace.pieces import operations
-from met.trace.program import record
+from met.trace.recorder import record
 
 
 def experiment(deck: str, name: str) -> Experiment:

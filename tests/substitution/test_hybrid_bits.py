@@ -14,7 +14,8 @@ from met import kernel
 from met import run as engine
 from met.plan import Cases, Experiment
 from met.program import build
-from met.trace.program import Recording, record
+from met.trace.recorder import record
+from met.trace.recording import Recording
 from met.trace.reference import execute
 from tests.substitution.hybrid import compiled, deck
 

@@ -18,7 +18,8 @@ from met import run as engine
 from met.plan import Experiment
 from met.program import build
 from met.trace import llvm
-from met.trace.program import Recording, record
+from met.trace.recorder import record
+from met.trace.recording import Recording
 from tests.oracles.friction_deck import friction_deck
 
 # No multiple of a block: the last one is part full.

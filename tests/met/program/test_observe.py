@@ -17,7 +17,7 @@ from met import run as engine
 from met.plan import Experiment, Formula
 from met.program import build
 from met.program.build import METRIC
-from met.trace.program import record
+from met.trace.recorder import record
 from met.trace.reference import execute
 from tests.oracles import dense, plan_tree
 from tests.oracles.random_deck import random_deck

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from met.trace.c import emit
-from met.trace.program import Program, record
+from met.trace.program import Program
+from met.trace.recorder import record
 
 HERE = Path(__file__).parent
 STRICT = ("-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror", "-ffp-contract=off")

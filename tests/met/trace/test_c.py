@@ -46,7 +46,8 @@ from met.trace.c import emit, literal
 from met.trace.functions import philox
 from met.trace.graph import evaluate
 from met.trace.noise import Stream, normal_pair
-from met.trace.program import Every, Phase, Program, Record, Run, Tape, Unless0, WhileAny, record
+from met.trace.program import Every, Phase, Program, Record, Run, Tape, Unless0, WhileAny
+from met.trace.recorder import record
 from tests.met.trace.compiled import STRICT, different, driver, need, run
 
 HERE = [("gcc", "-O0"), ("gcc", "-O3"), ("gcc", "-O2", "-mfma"), ("clang", "-O2"), ("clang", "-O1", "-mfma")]

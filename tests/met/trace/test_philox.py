@@ -13,7 +13,8 @@ from met.trace import Formulas, Graph, llvm
 from met.trace.functions import philox
 from met.trace.ir import emit
 from met.trace.primitives import ARRAYS, PLAIN
-from met.trace.program import Phase, Program, Run, record
+from met.trace.program import Phase, Program, Run
+from met.trace.recorder import record
 
 # philox4x32-10 in the known-answer file of the authors' library, Random123: counter, key, result
 ANSWERS = [

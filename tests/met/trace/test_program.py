@@ -9,7 +9,8 @@ from met.kernel import from_recording
 from met.trace import sin, where
 from met.trace.graph import OPERANDS
 from met.trace.pieces import cut, operations
-from met.trace.program import Call, Every, Phase, Program, Record, Run, Unless0, WhileAny, record
+from met.trace.program import Call, Every, Phase, Program, Record, Run, Unless0, WhileAny
+from met.trace.recorder import record
 from met.trace.reference import execute
 
 

@@ -1,0 +1,206 @@
+"""Recording a program: every phase runs once over numbers that write down what is computed with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from met.trace.fuse import fused
+from met.trace.graph import Graph, Real, Truth
+from met.trace.program import Call, Control, Every, Phase, Program, Record, Run, Unless0, WhileAny, walk
+from met.trace.recording import Block, Recorded, Recording, Section, Step, Straight
+from met.trace.scalar import Mask, Scalar
+
+
+class RecordingTape:
+    """A `Tape` that records into a graph."""
+
+    def __init__(self, program: Program, where: str) -> None:
+        self.graph = Graph()
+        self.program = program
+        self.where = where
+        self.written: dict[str, Scalar] = {}
+        self.records: dict[int, Scalar] = {}
+        self.outputs: dict[int, Scalar] = {}
+        self.parts: list[tuple[int, str]] = []
+
+    def _scalar(self, value: Real) -> Scalar:
+        if isinstance(value, Scalar):
+            if value.graph is not self.graph:
+                raise ValueError("a value of another phase: pass it on through a cell")
+            return value
+        return Scalar(self.graph, self.graph.constant(value))
+
+    @property
+    def tick(self) -> Real:
+        return Scalar(self.graph, self.graph.make("tick"))
+
+    @property
+    def time(self) -> Real:
+        return Scalar(self.graph, self.graph.make("time"))
+
+    def read(self, name: str) -> Real:
+        value = self.written.get(name)
+        return Scalar(self.graph, self.graph.make("cell", name)) if value is None else value
+
+    def write(self, name: str, value: Real) -> None:
+        self.written[name] = self._scalar(value)
+
+    def read_mask(self, name: str) -> Truth:
+        return self.read(name) != 0.0
+
+    def write_mask(self, name: str, value: Truth) -> None:
+        graph = self.graph
+        ref = value.ref if isinstance(value, Mask) else graph.truth(bool(value))
+        self.written[name] = Scalar(graph, graph.where(ref, graph.constant(1.0), graph.constant(0.0)))
+
+    def input(self, name: str) -> Real:
+        if name not in self.program.inputs:
+            raise ValueError(f"the program has no input {name!r}")
+        return self.graph.input(name)
+
+    def record(self, column: int, value: Real) -> None:
+        if self.where != "record" or not 0 <= column < self.program.columns:
+            raise ValueError(f"column {column} of {self.program.columns} recorded in a {self.where} phase")
+        self.records[column] = self._scalar(value)
+
+    def output(self, name: str, value: Real) -> None:
+        if self.where != "end":
+            raise ValueError(f"output {name!r} written before the end")
+        self.outputs[self.program.outputs.index(name)] = self._scalar(value)
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        outer = self.parts[-1][1] if self.parts else ""
+        self.parts.append((len(self.graph.nodes), f"{outer}/{name}" if outer else name))
+        yield
+        self.parts.append((len(self.graph.nodes), outer))
+
+
+def record(program: Program, *, fuse: bool = True) -> Recording:
+    """Runs every phase once over recorded numbers.
+
+    Stores that no phase and no condition ever reads are dropped with all that only they need; then, unless `fuse` is
+    false, products are fused into sums (`met.trace.fuse`).
+    """
+    sections: list[Section] = []
+    made: dict[tuple[tuple[int, ...], str], int] = {}
+
+    def section(phases: list[Phase], where: str) -> int:
+        key = (tuple(map(id, phases)), where)
+        if key not in made:
+            tape = RecordingTape(program, where)
+            for phase in phases:
+                with tape.part(phase.name):
+                    phase.body(tape)
+            made[key] = len(sections)
+            names = list(dict.fromkeys(phase.name for phase in phases))
+            sections.append(Section(
+                "+".join(names[:3] + ["..."] * (len(names) > 3)), tuple(tape.graph.nodes),
+                tuple((name, value.ref) for name, value in tape.written.items()
+                      if tape.graph.nodes[value.ref >> 1] != ("cell", name) or value.ref & 1),
+                tuple((column, value.ref) for column, value in sorted(tape.records.items())),
+                tuple((number, value.ref) for number, value in sorted(tape.outputs.items())), tuple(tape.parts)))
+        return made[key]
+
+    def steps(body: tuple[Control, ...], where: str) -> tuple[Step, ...]:
+        result: list[Step] = []
+        waiting: list[Phase] = []
+
+        def flush() -> None:
+            if waiting:
+                result.append(Straight(section(waiting, where)))
+                waiting.clear()
+
+        for node in _flat(body):
+            if isinstance(node, Run):
+                waiting.append(node.phase)
+                continue
+            flush()
+            if isinstance(node, Call):
+                result.append(Straight(section([node.phase], where)))
+            elif isinstance(node, Record):
+                if where != "tick":
+                    raise ValueError(f"{node.phase.name} records in `{where}`; rows belong to ticks")
+                result.append(Recorded(section([node.phase], "record"), node.divisor))
+            else:
+                result.append(Block(node, steps(node.body, where)))
+        flush()
+        return tuple(result)
+
+    _refuse_nested_records(program)
+    start, tick, end = (steps(body, where) for body, where in
+                        ((program.start, "start"), (program.tick, "tick"), (program.end, "end")))
+    _check_complete(program, sections)
+    asked = {node.cell for node in walk((*program.start, *program.tick, *program.end)) if isinstance(node, WhileAny)}
+    kept = _without_dead_stores(sections, asked)
+    if fuse:
+        kept = [_fused(one) for one in kept]
+    return Recording(program, tuple(kept), start, tick, end, _cells(kept, asked))
+
+
+def _flat(body: tuple[Control, ...]) -> Iterator[Control]:
+    """The body, with what stands in an `Every(1, ...)` in its place."""
+    for node in body:
+        if isinstance(node, Every) and node.divisor == 1:
+            yield from _flat(node.body)
+        else:
+            yield node
+
+
+def _refuse_nested_records(program: Program) -> None:
+    """A row has all its columns at every `divisor`th tick, so a `Record` depends on nothing else."""
+    for node in walk((*program.start, *_flat(program.tick), *program.end)):
+        if isinstance(node, (Every, Unless0, WhileAny)) and any(isinstance(inner, Record) for inner in walk(node.body)):
+            raise ValueError("a Record stands within another condition; its own divisor says when it records")
+
+
+def _check_complete(program: Program, sections: list[Section]) -> None:
+    columns = {column for one in sections for column, _ in one.records}
+    missing = sorted(set(range(program.columns)) - columns)
+    if missing:
+        raise ValueError(f"no phase records columns {missing}")
+    missing = sorted(set(range(len(program.outputs))) - {number for one in sections for number, _ in one.outputs})
+    if missing:
+        raise ValueError(f"no phase writes the outputs {[program.outputs[number] for number in missing]}")
+    if program.record_divisor < 1:
+        raise ValueError("a record divisor is at least 1")
+
+
+def _without_dead_stores(sections: list[Section], asked: set[str]) -> list[Section]:
+    """The sections without stores to cells that nothing live reads."""
+    read = set(asked)
+    kept = [_storing(one, read) for one in sections]
+    while True:
+        now = {one.nodes[i][1] for one in kept for i in one.order if one.nodes[i][0] == "cell"} | asked
+        if now == read:
+            return kept
+        more = now - read
+        read |= now
+        kept = [_storing(one, read) if any(name in more for name, _ in one.stores) else old
+                for one, old in zip(sections, kept, strict=True)]
+
+
+def _storing(section: Section, read: set[str]) -> Section:
+    """The section with its stores to these cells alone."""
+    stores = tuple(store for store in section.stores if store[0] in read)
+    return Section(section.name, section.nodes, stores, section.records, section.outputs, section.parts)
+
+
+def _fused(section: Section) -> Section:
+    nodes = fused(section.nodes, section.roots)
+    return Section(section.name, tuple(nodes), section.stores, section.records, section.outputs, section.parts)
+
+
+def _cells(sections: list[Section], asked: set[str]) -> tuple[str, ...]:
+    """Every cell in use, in order of first use over the program, so that neighbours in time are in memory."""
+    names: dict[str, None] = {}
+    for one in sections:
+        for i in one.order:
+            if one.nodes[i][0] == "cell":
+                names.setdefault(one.nodes[i][1])
+        for name, _ in one.stores:
+            names.setdefault(name)
+    for name in sorted(asked):
+        names.setdefault(name)
+    return tuple(names)
