@@ -86,6 +86,7 @@ class Builder:
                 *(COORDINATE + path for path in coordinates),
                 *self.step.beds.wire_outputs,
             ),
+            state_outputs=(*OUTPUTS, *self.step.beds.wire_outputs),
         )
 
     # The run's two ends.

@@ -11,14 +11,29 @@ from collections.abc import Iterable, Sequence
 from met.trace.graph import OPERANDS, Node, live
 
 
-def fused(nodes: Sequence[Node], roots: Iterable[int]) -> list[Node]:
-    """The nodes with every product that is used by sums alone fused into them.
+def fused(nodes: Sequence[Node], roots: Iterable[int], leading: Iterable[int] | None = None) -> list[Node]:
+    """The nodes with every product that is used by one sum alone fused into it.
 
     Positions stay, so references and roots hold. Where both operands of a sum are such products the later one is
     fused. A product used by anything else stays a product for all.
+
+    leading  those of the roots whose sums are decided as if there were no others, so that what is only watched never
+             changes what is watched; None: all of them
     """
     roots = list(roots)
     result = list(nodes)
+    if leading is not None:
+        leading = list(leading)
+        _fuse(nodes, leading, result, frozenset())
+        decided = frozenset(live(nodes, leading))
+    else:
+        decided = frozenset()
+    _fuse(nodes, roots, result, decided)
+    return result
+
+
+def _fuse(nodes: Sequence[Node], roots: Sequence[int], result: list[Node], decided: frozenset[int]) -> None:
+    """Fuse, in `result`, the sums that the roots need, all but those at positions that are decided already."""
     order = live(nodes, roots)
     # How often each node is used, by whom last; a product that leaves the section counts as used by others too.
     uses = [0] * len(nodes)
@@ -36,7 +51,7 @@ def fused(nodes: Sequence[Node], roots: Iterable[int]) -> list[Node]:
 
     for i in order:
         node = nodes[i]
-        if node[0] not in ("add", "sub"):
+        if node[0] not in ("add", "sub") or i in decided:
             continue
         a, b = node[1], node[2] ^ (node[0] == "sub")
         if fusable(b >> 1):
@@ -47,4 +62,3 @@ def fused(nodes: Sequence[Node], roots: Iterable[int]) -> list[Node]:
             continue
         _, x, y = nodes[product >> 1]
         result[i] = ("fma", x ^ product & 1, y, rest)
-    return result

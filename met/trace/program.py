@@ -117,7 +117,11 @@ Control = Run | Call | Every | Unless0 | WhileAny | Record
 
 @frozen
 class Program:
-    """What a kernel runs: control at the start, at each tick and at the end, inputs, columns of a row, outputs."""
+    """What a kernel runs: control at the start, at each tick and at the end, inputs, columns of a row, outputs.
+
+    state_outputs  the outputs that tell how the run itself went. What they depend on is the program's state, and its
+                   bits are the same whatever else is recorded or put out; None: all outputs and rows are one
+    """
 
     base_hz: float
     start: tuple[Control, ...]
@@ -126,6 +130,7 @@ class Program:
     inputs: tuple[str, ...] = ()
     columns: int = 0
     outputs: tuple[str, ...] = ()
+    state_outputs: tuple[str, ...] | None = None
 
     @property
     def record_divisor(self) -> int:

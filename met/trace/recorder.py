@@ -10,6 +10,7 @@ from met.trace.graph import Graph, Real, Truth
 from met.trace.program import Call, Control, Every, Phase, Program, Record, Run, Unless0, WhileAny, walk
 from met.trace.recording import Block, Recorded, Recording, Section, Step, Straight
 from met.trace.scalar import Mask, Scalar
+from met.trace.slicing import cells_behind, slice_roots
 
 
 class RecordingTape:
@@ -135,7 +136,7 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
     asked = {node.cell for node in walk((*program.start, *program.tick, *program.end)) if isinstance(node, WhileAny)}
     kept = _without_dead_stores(sections, asked)
     if fuse:
-        kept = [_fused(one) for one in kept]
+        kept = _fused(kept, program, (*start, *tick, *end))
     return Recording(program, tuple(kept), start, tick, end, _cells(kept, asked))
 
 
@@ -187,9 +188,19 @@ def _storing(section: Section, read: set[str]) -> Section:
     return Section(section.name, section.nodes, stores, section.records, section.outputs, section.parts)
 
 
-def _fused(section: Section) -> Section:
-    nodes = fused(section.nodes, section.roots)
-    return Section(section.name, tuple(nodes), section.stores, section.records, section.outputs, section.parts)
+def _fused(sections: list[Section], program: Program, body: tuple[Step, ...]) -> list[Section]:
+    """The sections with products fused into sums, those of the state as if nothing but the state were computed."""
+    outputs: frozenset[int] = frozenset()
+    cells: frozenset[str] = frozenset()
+    if program.state_outputs is not None:
+        outputs = frozenset(program.outputs.index(name) for name in program.state_outputs)
+        cells = cells_behind(sections, body, outputs)
+    result = []
+    for one in sections:
+        leading = None if program.state_outputs is None else slice_roots(one, cells, outputs)
+        nodes = fused(one.nodes, one.roots, leading)
+        result.append(Section(one.name, tuple(nodes), one.stores, one.records, one.outputs, one.parts))
+    return result
 
 
 def _cells(sections: list[Section], asked: set[str]) -> tuple[str, ...]:

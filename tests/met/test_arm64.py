@@ -21,7 +21,7 @@ from met.trace import atan2, cos, exp, floor, fma, gather, llvm, log, rint, sin,
 from met.trace.ir import emit
 from met.trace.noise import Stream, normal
 from met.trace.program import Phase, Program, Record, Run, Tape
-from met.trace.program import record as recorded
+from met.trace.recorder import record as recorded
 
 pytestmark = pytest.mark.slow
 

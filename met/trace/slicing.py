@@ -1,0 +1,68 @@
+"""Which part of a recorded program some of its outputs depend on (a backward slice, Weiser 1981)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+
+from met.trace.graph import live
+from met.trace.program import WhileAny
+from met.trace.recording import Block, Section, Step
+
+
+def sections_in(body: Iterable[Step]) -> Iterator[int]:
+    """The numbers of the sections that a body of control runs, in order; one that it runs twice comes twice."""
+    for step in body:
+        if isinstance(step, Block):
+            yield from sections_in(step.body)
+        else:
+            yield step.section
+
+
+def loops_in(body: Iterable[Step]) -> Iterator[tuple[str, frozenset[int]]]:
+    """The loops in a body of control, inner ones too: the cell that each goes by, and the sections that it runs."""
+    for step in body:
+        if isinstance(step, Block):
+            if isinstance(step.condition, WhileAny):
+                yield step.condition.cell, frozenset(sections_in(step.body))
+            yield from loops_in(step.body)
+
+
+def slice_roots(
+    section: Section, cells: Collection[str], outputs: Collection[int], columns: Collection[int] = ()
+) -> list[int]:
+    """References of what a section does for these outputs and columns of a row, which need these cells."""
+    return [
+        *(ref for cell, ref in section.stores if cell in cells),
+        *(ref for number, ref in section.outputs if number in outputs),
+        *(ref for column, ref in section.records if column in columns),
+    ]
+
+
+def cells_behind(
+    sections: Iterable[Section],
+    body: Iterable[Step],
+    outputs: Collection[int],
+    columns: Collection[int] = (),
+    *,
+    known: frozenset[str] = frozenset(),
+) -> frozenset[str]:
+    """The cells that these outputs and columns of a row depend on, at any tick, through other cells and through what
+    loops go by.
+
+    known  cells that are not gone into, and not among the answer
+    """
+    sections = list(sections)
+    loops = list(loops_in(body))
+    needed: set[str] = set()
+    done: dict[int, list[int]] = {}
+    while True:
+        before = len(needed)
+        for number, section in enumerate(sections):
+            roots = slice_roots(section, needed, outputs, columns)
+            if done.get(number, []) != roots:
+                done[number] = roots
+                reads = (section.nodes[i][1] for i in live(section.nodes, roots) if section.nodes[i][0] == "cell")
+                needed.update(cell for cell in reads if cell not in known)
+        needed.update(cell for cell, inside in loops if cell not in known and any(done.get(n) for n in inside))
+        if len(needed) == before:
+            return frozenset(needed)
