@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from met.kernel import Block
+from met.backends.backend import Block
 from met.plan import Experiment
 from met.program.plant import bed_values, servo_period
 from met.run import Prepared, inputs

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
+from met.backends.reference.plain import PlainTape, follow
 from met.frozen import frozen
 from met.plan import Experiment
 from met.program.build import Builder
 from met.program.machine import Machine
 from met.program.world import environment_values
 from met.run import inputs
-from met.trace.reference import PlainTape, follow
 
 
 @frozen

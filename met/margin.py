@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from met.backends.reference.plain import PlainTape, follow
 from met.frozen import frozen
 from met.plan import Experiment
 from met.program.build import Builder
@@ -22,7 +23,6 @@ from met.program.machine import Machine
 from met.program.substituted import Mounted
 from met.run import inputs
 from met.servos.servo import Asked
-from met.trace.reference import PlainTape, follow
 
 GROWS = 1.0 + 1e-6
 """Eigenvalues above it grow; the slow modes of a servo with a heavy arm come that near to one."""

@@ -20,18 +20,18 @@ from typing import Any
 
 import numpy as np
 
-from met import kernel
+from met import backends
+from met.backends.backend import Block as Cases
+from met.backends.backend import Kernel
+from met.backends.llvm.pieces import operations
 from met.frozen import frozen
-from met.kernel import Block as Cases
-from met.kernel import Kernel
 from met.plan import Experiment, Formula
 from met.program.build import build
 from met.program.machine import PARAMETER, TREE
 from met.run import inputs
-from met.trace import fma, llvm
+from met.trace import fma
 from met.trace.counting import counting
 from met.trace.graph import LEAVES, OPERANDS
-from met.trace.pieces import cut, operations
 from met.trace.program import Every, Phase, Program, Record, Run, Tape, Unless0, WhileAny, walk
 from met.trace.recorder import record
 from met.trace.recording import Block, Recorded, Recording, Section, Step, Straight
@@ -144,7 +144,7 @@ def profile(experiment: Experiment) -> Profile:
     begun = time.perf_counter()
     recording = record(build(experiment))
     recorded = time.perf_counter()
-    made = kernel.from_recording(recording)
+    made = backends.load(recording)
     compiled = time.perf_counter()
 
     schedule = experiment.structure.schedule
@@ -166,10 +166,10 @@ def profile(experiment: Experiment) -> Profile:
         cases=experiment.cases.count,
         joints=len(experiment.structure.moving),
         lanes=made.lanes,
-        vector=min(made.lanes, made.machine.width),
-        cpu=made.machine.cpu,
-        code_bytes=llvm.size(made.loaded.code),
-        pieces=sum(len(cut(section)) for section in recording.sections),
+        vector=made.vector,
+        cpu=made.processor,
+        code_bytes=made.code_bytes,
+        pieces=made.functions,
         cached=made.cached,
         recording_s=recorded - begun,
         compiling_s=compiled - recorded,
@@ -206,7 +206,7 @@ def _chains() -> tuple[Work, int]:
     program = Program(
         1.0, (Run(Phase("start", start)),), (Run(Phase("chains", tick)),), (Run(Phase("end", end)),), ("x",), 0, names
     )
-    made = kernel.compile(program)
+    made = backends.load(record(program))
     cases = np.ones((blocks * made.lanes, 1))
     work = partial(made.run, cases, ticks - 1, record=False, threads=1)
     return work, chains * length * ticks * len(cases)
@@ -297,7 +297,7 @@ def _place(part: Part) -> tuple[bool, int, int]:
 def _calls(made: Kernel, cases: np.ndarray, ticks: int) -> dict[tuple[int, bool], float]:
     """How often each section was called in a run, by (section, whether within a loop), on average over the blocks."""
     program, loops = counting(made.program)
-    counter = kernel.compile(program, lanes=made.lanes)
+    counter = backends.load(record(program), made.lanes)
     _, outputs = counter.run(cases, ticks, record=False, threads=1)
     turns = iter([float(outputs[:: made.lanes, program.outputs.index(loop.turns)].mean()) for loop in loops])
     found: dict[tuple[int, bool], float] = {}
@@ -340,7 +340,7 @@ def _alone(made: Kernel, number: int, state: Cases) -> Work:
         program = replace(program, tick=())
     single = Recording(program, (section,), (), (step,), (), recording.cells)
     # Not inlined: within a loop of its own, a compiler would find that nothing changes, and do much of it once.
-    alone = kernel.from_recording(single, lanes=made.lanes, inline=False).block(state.inputs.T)
+    alone = backends.find().load(single, lanes=made.lanes, inline=False).block(state.inputs.T)
 
     def work() -> None:
         for _ in range(_STARTS):

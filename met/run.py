@@ -10,13 +10,14 @@ from functools import cached_property
 
 import numpy as np
 
-from met import keys, models
+from met import backends, keys, models
+from met.backends.backend import Kernel
+from met.backends.llvm.emit import emit
 from met.frozen import frozen
 from met.plan import REPEAT, Experiment
 from met.program.build import COORDINATE, METRIC, OUTPUTS, build
 from met.program.step import ASTRAY, EVENTS, NOT_FINITE, SINGULAR
 from met.program.substituted import LIMITED
-from met.trace.ir import emit
 from met.trace.program import Program
 from met.trace.recorder import record
 from met.trace.recording import Recording
@@ -83,10 +84,8 @@ class Prepared:
         return record(self.program)
 
     @cached_property
-    def kernel(self):  # type: ignore[no-untyped-def]
-        from met.kernel import from_recording
-
-        return from_recording(self.recording, self.lanes)
+    def kernel(self) -> Kernel:
+        return backends.load(self.recording, self.lanes)
 
     @cached_property
     def code_key(self) -> str:

@@ -15,7 +15,7 @@ from benchmarks.__main__ import SUBJECTS, main
 from benchmarks.benchmark import Benchmark, Derived, Target, Untaken, ratio, take, with_sources
 
 import ic
-from met import kernel
+from met.backends.llvm import kernel
 
 pytestmark = pytest.mark.slow
 

@@ -19,7 +19,7 @@ from batch.archive.hdf5 import LIBVER, h5py
 from batch.archive.layout import Layout, Variable
 from batch.archive.provenance import Revision, version
 from batch.archive.sink import Sink
-from met import keys, models, plan_file
+from met import backends, keys, models, plan_file
 from met.frozen import frozen
 from met.plan import Experiment, Plan
 
@@ -143,7 +143,7 @@ class Writer:
         """The deck, the plan and the versions that made the numbers."""
         group = self._file.create_group("provenance", track_order=True)
         commit, changed = self._revision.read()
-        versions = {"met": _met_version(), "llvmlite": version("llvmlite"), "numpy": np.__version__}
+        versions = {"met": _met_version(), **backends.find().libraries(), "numpy": np.__version__}
         versions |= {name: version(name) for name in models.packages(e.structure for e in self.plan.experiments)}
         for name, value in versions.items():
             group.attrs[f"version_{name}"] = value

@@ -15,7 +15,8 @@ from functools import lru_cache
 import numpy as np
 
 from hw.identify.series import Series
-from met.kernel import Kernel, from_recording
+from met import backends
+from met.backends.backend import Kernel
 from met.servos.motor import damping, torque
 from met.substitution import butterworth, shaft
 from met.substitution.emulated import SUBSTEP
@@ -70,7 +71,7 @@ def _kernel(count: int) -> Kernel:
         base_hz=1000.0, start=(Call(Phase("begin", begin)),), tick=(Unless0((Call(Phase("advance", advance)),)),),
         end=(Call(Phase("read", read)),), inputs=(*_GIVEN, *PARAMETERS), outputs=("rate", "drive_current"),
     )  # fmt: skip
-    return from_recording(record(program), LANES)
+    return backends.load(record(program), LANES)
 
 
 def simulated(found: Series, sets: np.ndarray) -> np.ndarray:

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from met import backends
+from met.backends.c.emit import emit, literal
 from met.frozen import frozen
-from met.kernel import from_recording
 from met.plan import Experiment, Formula
 from met.program.build import build
 from met.program.machine import PARAMETER, Machine
 from met.program.substituted import Mounted, Substituted
 from met.trace import Real
-from met.trace.c import emit, literal
 from met.trace.graph import evaluate
 from met.trace.program import Call, Phase, Program, Tape, Unless0
 from met.trace.recorder import record
@@ -59,7 +59,7 @@ class Plant:
     def __init__(self, experiment: Experiment, joint: str, *, case: int = 0, period: float | None = None) -> None:
         self.period = servo_period(experiment) if period is None else period
         program = plant_program(experiment, joint, case=case, period=self.period)
-        self._block = from_recording(record(program), 2).block(np.zeros((1, len(_INPUTS))))
+        self._block = backends.load(record(program), 2).block(np.zeros((1, len(_INPUTS))))
         self._inputs, self._outputs = self._block.inputs, self._block.outputs
         self._tick = 0
 

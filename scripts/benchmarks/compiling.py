@@ -17,7 +17,7 @@ from functools import partial
 from benchmarks import decks, evaluation
 from benchmarks.arms import ARMS, CHAIN, Arm
 from benchmarks.benchmark import Benchmark, Target
-from met import kernel
+from met.backends.llvm import kernel
 from met.plan import Experiment
 from met.run import prepare
 

@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks import peer
 from benchmarks.arms import ARMS, GRAVITY, Arm
 from benchmarks.benchmark import Benchmark, Derived, Target, Untaken, ratio
-from met import kernel
+from met.backends.llvm import kernel
 from met.dynamics.recursion import solve
 from met.dynamics.tree import Tree
 from met.trace.program import Phase, Program, Run, Tape

@@ -17,7 +17,7 @@ import numpy as np
 
 import ic
 from benchmarks.benchmark import Benchmark, Derived
-from met import kernel
+from met.backends.llvm import kernel
 from met.program import build
 from met.run import inputs
 

@@ -17,7 +17,7 @@ from benchmarks import decks
 from benchmarks.arms import SEVEN
 from benchmarks.benchmark import Benchmark, Derived
 from benchmarks.decks import Variant
-from met import kernel
+from met.backends.llvm import kernel
 from met.program import build
 
 TITLE = "what each model adds to a step of the Panda, ns per step and case, one core, many cases"

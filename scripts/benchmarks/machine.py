@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 
 def machine() -> dict[str, Any]:
     """Processor, cores that this process may use, load before the first figure, versions and MET's commit."""
-    from met.trace import llvm
+    from met.backends.llvm import machine as llvm
 
     target = llvm.machine()
     return {

@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks import decks
 from benchmarks.arms import ARMS, SEVEN, Arm
 from benchmarks.benchmark import Benchmark, Derived, Target
-from met import kernel
+from met.backends.llvm import kernel
 from met.program import build
 from met.trace.counting import counting
 

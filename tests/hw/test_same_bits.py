@@ -11,7 +11,7 @@ import ic
 from hw.bed import Bed
 from hw.beds import emulated
 from hw.beds.emulated import EmulatedBed
-from met import kernel
+from met.backends.llvm import kernel
 from met.plan import Experiment
 from met.program import build
 from met.program.plant import Plant as DeckPlant

@@ -14,10 +14,10 @@ import pytest
 
 from met import models
 from met import run as engine
+from met.backends.reference.plain import execute
 from met.channel import COMMAND_UNIT
 from met.parameter import Parameter
 from met.program import build
-from met.trace.reference import execute
 from met.units import parse_unit
 from tests.ic.small_decks import experiment
 from tests.met.small_models import EVERY, SMALLEST, Use, smallest

@@ -17,12 +17,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from met import kernel
+from met import cache
+from met.backends.llvm import kernel
+from met.backends.reference.plain import execute
+from met.cache import folder
 from met.diagnostic import Problem
 from met.trace import (
     atan2,
     both,
-    cache,
     clip,
     cos,
     either,
@@ -43,11 +45,9 @@ from met.trace import (
     tanh,
     where,
 )
-from met.trace.cache import folder
 from met.trace.graph import evaluate, live
 from met.trace.program import Every, Phase, Program, Record, Run, Unless0, WhileAny
 from met.trace.recorder import record
-from met.trace.reference import execute
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -163,7 +163,7 @@ def test_bits_do_not_depend_on_optimisation(level, lanes):
 
 @pytest.mark.parametrize("cpu", ["haswell", "znver3", "skylake-avx512"])
 def test_bits_do_not_depend_on_the_instruction_set(cpu):
-    from met.trace import llvm
+    from met.backends.llvm import machine as llvm
 
     if cpu == "skylake-avx512" and llvm.machine().width < 8:
         cpu = "haswell"  # what this machine cannot run is compared between the two that it can
@@ -331,8 +331,8 @@ def test_the_compiler_fuses_nothing_by_itself():
 
 @pytest.mark.slow
 def test_a_long_section_cut_into_pieces_has_the_same_bits():
-    from met.trace import llvm
-    from met.trace.ir import emit
+    from met.backends.llvm import machine as llvm
+    from met.backends.llvm.emit import emit
 
     def body(t):
         x = [t.read(f"x{i}") for i in range(12)]
@@ -578,7 +578,7 @@ def test_many_processes_may_share_a_cache(empty_cache):
 
 
 def test_a_hit_loads_without_the_optimiser(empty_cache, monkeypatch):
-    from met.trace import llvm
+    from met.backends.llvm import machine as llvm
 
     program = machine_like_program()
     kernel.compile(program)
@@ -590,6 +590,6 @@ def test_a_hit_loads_without_the_optimiser(empty_cache, monkeypatch):
 
 
 def test_importing_the_kernel_does_not_import_llvm():
-    code = "import sys, met.kernel; sys.exit('llvmlite' in sys.modules)"
+    code = "import sys, met.backends.llvm.kernel; sys.exit('llvmlite' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, env={**os.environ, "PYTHONPATH": os.pathsep.join(
         sys.path)}).returncode == 0

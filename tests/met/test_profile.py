@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import ic
-from met import kernel
+from met.backends.llvm import kernel
+from met.backends.llvm.pieces import operations
 from met.plan import Experiment
 from met.profile import FLOPS, Profile, as_data, by_part, hoisted, profile
 from met.program.build import build
-from met.trace.pieces import operations
 from met.trace.recorder import record
 
 

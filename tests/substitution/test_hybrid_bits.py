@@ -10,13 +10,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from met import kernel
 from met import run as engine
+from met.backends.llvm import kernel
+from met.backends.reference.plain import execute
 from met.plan import Cases, Experiment
 from met.program import build
 from met.trace.recorder import record
 from met.trace.recording import Recording
-from met.trace.reference import execute
 from tests.substitution.hybrid import compiled, deck
 
 slow = pytest.mark.slow

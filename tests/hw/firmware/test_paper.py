@@ -17,7 +17,7 @@ import pytest
 
 from hw.bed import Capability, Scales
 from hw.build import Config, build
-from met import kernel
+from met.backends.llvm import kernel
 from met.plan import Experiment
 from met.program import build as build_kernel
 from met.program.plant import Plant, plant_c

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from met import kernel
+from met.backends.llvm import kernel
 from met.dynamics.effective_inertia import effective_inertia
 from met.dynamics.recursion import reactions, solve
 from met.dynamics.tree import Tree

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import ic
-from met import kernel
 from met import run as engine
+from met.backends.llvm import kernel
+from met.backends.llvm import machine as llvm
 from met.plan import Experiment
 from met.program import build
-from met.trace import llvm
 from met.trace.recorder import record
 from met.trace.recording import Recording
 from tests.oracles.friction_deck import friction_deck

@@ -16,6 +16,7 @@ import pytest
 import met.servos
 from met import models
 from met import run as engine
+from met.backends.reference.plain import execute
 from met.parameter import Memory, Parameter
 from met.plan import Experiment
 from met.program import build
@@ -24,7 +25,6 @@ from met.servos.servo import Control as Law
 from met.servos.servo import Drive
 from met.trace import maximum, sin, where
 from met.trace.program import Control, Every, Unless0, WhileAny
-from met.trace.reference import execute
 from tests.ic.small_decks import changed, experiment
 
 

@@ -14,11 +14,11 @@ from scipy.spatial.transform import Rotation
 
 import ic
 from met import run as engine
+from met.backends.reference.plain import execute
 from met.plan import Experiment, Formula
 from met.program import build
 from met.program.build import METRIC
 from met.trace.recorder import record
-from met.trace.reference import execute
 from tests.oracles import dense, plan_tree
 from tests.oracles.random_deck import random_deck
 

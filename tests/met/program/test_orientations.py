@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from met import run as engine
+from met.backends.reference.plain import execute
 from met.program.build import build
-from met.trace.reference import execute
 from tests.ic.small_decks import changed, experiment
 from tests.met.program.free_flyers import ARM
 from tests.met.program.free_flyers import RUN as FREE

@@ -10,9 +10,9 @@ import pytest
 
 from met import models
 from met import run as engine
+from met.backends.reference.plain import execute
 from met.program.build import build
 from met.run import Run
-from met.trace.reference import execute
 from tests.ic.small_decks import changed, experiment
 from tests.met.program.free_flyers import ARM
 from tests.met.program.payload_decks import BOX, RUN

@@ -9,10 +9,10 @@ import pytest
 
 import ic
 from met import run as engine
+from met.backends.reference.plain import execute
 from met.plan import Experiment
 from met.program import build
 from met.program.build import METRIC
-from met.trace.reference import execute
 from tests.oracles.random_deck import random_deck
 
 

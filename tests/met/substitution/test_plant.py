@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import ic
-from met import kernel
+from met.backends.llvm import kernel
 from met.plan import REPEAT, Experiment
 from met.program import build
 from met.program.plant import Plant, plant_c

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import ic
-from met import kernel
+from met.backends.llvm import kernel
 from met.program import build
 from met.run import prepare, run
 from met.substitution import emulated

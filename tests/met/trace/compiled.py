@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from met.trace.c import emit
+from met.backends.c.emit import emit
 from met.trace.program import Program
 from met.trace.recorder import record
 

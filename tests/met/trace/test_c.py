@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import ic
-from met import kernel
+from met.backends.c.emit import emit, literal
+from met.backends.llvm import kernel
 from met.program import build
 from met.run import inputs
 from met.trace import (
@@ -42,7 +43,6 @@ from met.trace import (
     tanh,
     where,
 )
-from met.trace.c import emit, literal
 from met.trace.functions import philox
 from met.trace.graph import evaluate
 from met.trace.noise import Stream, normal_pair

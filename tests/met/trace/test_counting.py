@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from met import kernel
+from met.backends.llvm import kernel
 from met.trace import maximum, where
 from met.trace.counting import counting
 from met.trace.program import Every, Phase, Program, Run, Tape, WhileAny

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from met import kernel
+from met.backends.llvm import kernel
+from met.backends.reference.plain import execute
 from met.trace.noise import Stream, channel_number, normal, normal_pair, uniform, uniform_pair
 from met.trace.primitives import PLAIN
 from met.trace.program import Every, Phase, Program, Record, Run
-from met.trace.reference import execute
 
 # A generator without a flaw fails a comparison of statistics at this rate, and one of the five hundred below with a
 # chance of half a percent. Seeds are fixed: what passes once passes always.
@@ -108,7 +108,7 @@ def test_machine_code_draws_what_plain_numbers_draw():
 @pytest.mark.parametrize(("lanes", "cpu", "level"), [
     (2, None, 2), (4, "haswell", 2), (16, None, 3), (32, "haswell", 0), (8, "skylake-avx512", 1)])
 def test_draws_have_the_same_bits_whatever_they_are_compiled_for(lanes, cpu, level):
-    from met.trace import llvm
+    from met.backends.llvm import machine as llvm
 
     if cpu == "skylake-avx512" and llvm.machine().width < 8:
         cpu = "haswell"  # what this machine cannot run is compared between the two that it can

@@ -8,10 +8,10 @@ import math
 import numpy as np
 import pytest
 
-from met import kernel
+from met.backends.llvm import kernel
+from met.backends.llvm.emit import emit
 from met.trace import Formulas, Graph, llvm
 from met.trace.functions import philox
-from met.trace.ir import emit
 from met.trace.primitives import ARRAYS, PLAIN
 from met.trace.program import Phase, Program, Run
 from met.trace.recorder import record

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from met.kernel import from_recording
+from met.backends.llvm.kernel import from_recording
+from met.backends.llvm.pieces import cut, operations
+from met.backends.reference.plain import execute
 from met.trace import sin, where
 from met.trace.graph import OPERANDS
-from met.trace.pieces import cut, operations
 from met.trace.program import Call, Every, Phase, Program, Record, Run, Unless0, WhileAny
 from met.trace.recorder import record
-from met.trace.reference import execute
 
 
 def run(*bodies):

@@ -1,4 +1,7 @@
-"""The plain run of a program: one case, Python floats, phase by phase. Slow, and what a debugger can step through."""
+"""A program run as it is written: one case, Python floats, phase by phase, for a debugger to step through.
+
+Nothing is recorded or fused and sines are the platform's, so its bits are not those of the back ends.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recorded program as C, as text: one case, for computers that `met.trace.llvm` does not reach.
+"""A recorded program as C, as text: one case, for computers that `met.backends.llvm.machine` does not reach.
 
 C11 that asks for no library and no header but stdint.h and float.h, so that it is compiled for a bare controller too.
 Each section is a function, each node of its graph a constant of that function, under its number: the same operations,
@@ -18,8 +18,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 
+from met.backends.c.functions import HEAD, functions
 from met.frozen import frozen
-from met.trace.c_functions import HEAD, functions
 from met.trace.graph import OPERANDS, TRUTHS, Node
 from met.trace.primitives import bits_of
 from met.trace.program import Every, Unless0, WhileAny
@@ -30,11 +30,12 @@ _INFIX = {"mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "and": "&&"
 
 @frozen
 class Source:
-    """A program in C: its text, and what its inputs and outputs are called there, by name."""
+    """A program in C: its text, and what its inputs, outputs and cells are called there, by name."""
 
     text: str
     inputs: Mapping[str, str]
     outputs: Mapping[str, str]
+    cells: Mapping[str, str]
 
 
 def emit(recording: Recording) -> Source:
@@ -87,7 +88,7 @@ class _Emitter:
         parts = [HEAD, functions(self.called), self._memory(), *tables, *sections, *entries]
         return Source("\n".join(part for part in parts if part),
                       *({name: f"met.{member}" for name, member in names.items()}
-                        for names in (self.inputs, self.outputs)))  # fmt: skip
+                        for names in (self.inputs, self.outputs, self.cells)))  # fmt: skip
 
     def _memory(self) -> str:
         members = [*self.inputs.values(), *self.cells.values(), *self.outputs.values()]

@@ -1,4 +1,4 @@
-"""The C functions that `met.trace.c` calls: operations that C has not, or leaves to a library, to the last bit.
+"""The C functions that `met.backends.c.emit` calls: operations that C has not, or leaves to a library, to the last bit.
 
 They need no library and no header but stdint.h and float.h, so they hold on a bare controller too. Doubles are IEEE's,
 rounded to nearest; `met_fma` and `met_sqrt` are rounded correctly, with whole numbers alone.

@@ -1,6 +1,7 @@
 """Machine code: IR text to object bytes to an address. The only file that knows llvmlite.
 
-Where results could depend on the compiler nothing is left to it (met/trace/ir.py); here only speed is decided.
+Where results could depend on the compiler nothing is left to it (met/backends/llvm/emit.py); only speed is decided
+here.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from typing import Any
 import llvmlite
 import llvmlite.binding as llvm
 
+from met.backends.llvm.entry import ENTRY
 from met.frozen import frozen
-from met.trace.entry import ENTRY
 
 
 @frozen

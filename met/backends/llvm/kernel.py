@@ -17,17 +17,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from met import cache
+from met.backends.llvm.emit import emit, numbered
+from met.backends.llvm.pieces import cut, operations
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.trace import cache
-from met.trace.ir import emit
-from met.trace.pieces import operations
 from met.trace.program import Program
 from met.trace.recorder import record
 from met.trace.recording import Recording
 
 if TYPE_CHECKING:
-    from met.trace.llvm import Machine
+    from met.backends.llvm.machine import Machine
 
 # live operations of the largest section up to which a block is four registers wide, two of them side by side in each
 # piece of code: the shorter the code, the more of it fits into registers and is in flight at once
@@ -44,7 +44,7 @@ def compile(program: Program, lanes: int | None = None, cpu: str | None = None, 
 
     lanes   cases a block: 2, 4, 8, 16 or 32; by default what is fastest here. Decides nothing but speed.
     cpu     one of LLVM's names of processors; the one we run on by default
-    level   of LLVM's optimisation, 0 to 3; None: its code generator alone (met.trace.llvm.assemble)
+    level   of LLVM's optimisation, 0 to 3; None: its code generator alone (met.backends.llvm.machine.assemble)
     """
     recording = record(program)
     return from_recording(recording, lanes, cpu, level=level)
@@ -58,14 +58,14 @@ def from_recording(
     level: int | None = None,
     inline: bool = True,
 ) -> Kernel:
-    """Machine code of a program that is recorded already. inline: as `met.trace.ir.emit` has it."""
-    from met.trace import llvm
+    """Machine code of a program that is recorded already. inline: as `met.backends.llvm.emit.emit` has it."""
+    from met.backends.llvm import machine as llvm
 
     machine = llvm.machine(cpu)
     if not machine.fma:
         _refuse_or_warn(machine)
     lanes, text = written(recording, machine, lanes, inline=inline)
-    name = cache.key(text, llvm.versions(), machine.cpu, machine.features, str(level))
+    name = cache.key(numbered(text), llvm.versions(), machine.cpu, machine.features, str(level))
     code, hit = cache.kept(name, lambda: llvm.assemble(text, machine, level=level))
     return Kernel(recording, lanes, machine, llvm.Loaded(code, machine), hit)
 
@@ -111,8 +111,30 @@ class Kernel:
         return self.recording.program
 
     @property
+    def vector(self) -> int:
+        """Cases that a register holds."""
+        return min(self.lanes, self.machine.width)
+
+    @property
+    def processor(self) -> str:
+        """LLVM's name of the processor that the code was made for."""
+        return self.machine.cpu
+
+    @property
+    def code_bytes(self) -> int:
+        """Bytes of instructions."""
+        from met.backends.llvm import machine
+
+        return machine.size(self.loaded.code)
+
+    @property
+    def functions(self) -> int:
+        """Functions that the sections became."""
+        return sum(len(cut(section)) for section in self.recording.sections)
+
+    @property
     def entry(self) -> Callable[..., None]:
-        """The entry function (met/trace/entry.py says what it takes); runs without Python's lock."""
+        """The entry function (met/backends/llvm/entry.py says what it takes); runs without Python's lock."""
         return _SIGNATURE(self.loaded.address)
 
     def rows(self, first: int, last: int) -> int:

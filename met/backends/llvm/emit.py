@@ -7,13 +7,14 @@ an `llvm.fma` that `met.trace.fuse` asked for. So the bits are the same for any 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Any
 
-from met.trace.entry import entry, number, spread
+from met.backends.llvm.entry import ENTRY, entry, number, spread
+from met.backends.llvm.philox import PhiloxWriter
+from met.backends.llvm.pieces import CUT_ABOVE, LONGEST, SHORTEST, Piece, cut
 from met.trace.graph import OPERANDS, TRUTHS
-from met.trace.philox import Written
-from met.trace.pieces import CUT_ABOVE, LONGEST, SHORTEST, Piece, cut
 from met.trace.recording import Recording, Section
 
 _CALLS = {"sqrt": "llvm.sqrt", "floor": "llvm.floor", "rint": "llvm.roundeven", "abs": "llvm.fabs", "fma": "llvm.fma"}
@@ -33,9 +34,48 @@ def emit(recording: Recording, lanes: int, *, vector: int | None = None, width: 
             other, so that they hide each other's latency without sharing registers. By default all of a block
     width   doubles in one register of the machine it is for
     inline  whether short code may be put in its caller's place; never where its time alone is asked for
-    above, shortest, longest   operations of a section that is cut, and of its pieces (met/trace/pieces.py)
+    above, shortest, longest   operations of a section that is cut, and of its pieces (met/backends/llvm/pieces.py)
     """
     return _Emitter(recording, lanes, vector or lanes, width, inline, (above, shortest, longest)).text()
+
+
+_NAME = re.compile(r'[%@](?:"[^"]*"|[\w.$#-]+)|^[\w.$-]+(?=:)|  ;.*', re.MULTILINE)
+_KEPT = ("@llvm.", "@malloc", "@free", f"@{ENTRY}")
+
+
+class _Numbers(dict[str, str]):
+    """What stands for each name in a function, in order of appearance.
+
+    symbols  what stands for the module's own names: one table for all functions. Names of LLVM and of C stay
+    """
+
+    def __init__(self, symbols: dict[str, str]) -> None:
+        self.symbols = symbols
+        self.locals: dict[str, str] = {}
+
+    def __missing__(self, name: str) -> str:
+        if name.startswith("  ;"):
+            number = ""
+        elif name.startswith(_KEPT):
+            number = name
+        elif name[0] == "@":
+            number = self.symbols.setdefault(name, f"@{len(self.symbols)}")
+        else:  # a label is written with and without its sign
+            bare = name.removeprefix("%")
+            number = name[: len(name) - len(bare)] + self.locals.setdefault(bare, str(len(self.locals)))
+        self[name] = number
+        return number
+
+
+def numbered(text: str) -> str:
+    """The text of a module without remarks, its names replaced by numbers: what decides the code that it becomes."""
+    symbols: dict[str, str] = {}
+
+    def of(part: str) -> str:
+        names = _Numbers(symbols)
+        return _NAME.sub(lambda match: names[match[0]], part)
+
+    return "\ndefine ".join(map(of, text.split("\ndefine ")))
 
 
 def _remark(name: str) -> str:
@@ -104,7 +144,7 @@ class _Emitter:
         suffix = f"v{L}f64"
         have: dict[int, str] = {}
         turned: dict[int, str] = {}
-        drawn: dict[tuple[int, ...], Written] = {}
+        drawn: dict[tuple[int, ...], PhiloxWriter] = {}
 
         def slot(base: str, i: int, label: str) -> str:
             put(f"  %{label} = getelementptr i8, ptr %{base}, i64 {8 * self.lanes * i}")
@@ -211,7 +251,7 @@ class _Emitter:
             elif op == "philox":
                 refs, word = node[1:7], node[7]
                 if refs not in drawn:
-                    drawn[refs] = Written(put, f"r{i}", operands, L)
+                    drawn[refs] = PhiloxWriter(put, f"r{i}", operands, L)
                 to = drawn[refs].word(word)
             else:
                 assert op == "gather", op

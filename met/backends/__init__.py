@@ -1,0 +1,34 @@
+"""Back ends: what a recorded program becomes so that a computer can carry it out.
+
+A back end is a folder here, and a line in `HOMES`; `met.backends.backend` says what it offers. All of them give the
+same bits for the same recording, but the reference, which is for debugging.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from met.backends.backend import Backend, Kernel
+    from met.trace.recording import Recording
+
+HOMES = {
+    "llvm": "met.backends.llvm",
+    "c": "met.backends.c",
+    "reference": "met.backends.reference",
+}
+"""The module of each back end, by name; its `BACKEND` is the back end."""
+
+DEFAULT = "llvm"
+
+
+def find(name: str = DEFAULT) -> Backend:
+    """The back end of that name; it is imported when it is first asked for. Raises KeyError."""
+    found: Backend = import_module(HOMES[name]).BACKEND
+    return found
+
+
+def load(recording: Recording, lanes: int | None = None, *, name: str = DEFAULT) -> Kernel:
+    """A recorded program, ready to run. lanes: cases a block; None for what is fastest here."""
+    return find(name).load(recording, lanes=lanes)

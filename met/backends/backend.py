@@ -1,0 +1,112 @@
+"""What a back end offers (`Backend`), and what it makes of a recorded program (`Kernel`, `Block`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+import numpy as np
+
+from met.trace.program import Program
+from met.trace.recording import Recording
+
+
+class Block(Protocol):
+    """A few cases whose state stays from call to call: a motor bed's loop, a debugger.
+
+    inputs   [input, lane], to be changed at will between steps
+    outputs  [output, lane], as of the last step
+    state    [cell, lane], in the order of `Recording.cells`, to be read or changed
+    """
+
+    inputs: np.ndarray
+    outputs: np.ndarray
+    state: np.ndarray
+
+    def step(self, first: int, last: int) -> None:
+        """Ticks first to last, both done, then `end`. Tick 0 starts afresh."""
+
+    def recorded(self, first: int, last: int) -> np.ndarray:
+        """The same, with the rows [case, row, column] of those ticks."""
+
+    def cells(self) -> Mapping[str, np.ndarray]:
+        """The state by name, [lane] each: views. Cells that nothing reads are not kept."""
+
+
+class Kernel(Protocol):
+    """A program that is ready to run many cases.
+
+    lanes       cases of a block;  vector: cases that one register holds
+    cached      whether it was found in the cache rather than made
+    processor   what it was made for;  code_bytes, functions: how large it is
+    """
+
+    @property
+    def recording(self) -> Recording:
+        """What it was made of."""
+
+    @property
+    def program(self) -> Program:
+        """What it runs."""
+
+    @property
+    def lanes(self) -> int: ...
+
+    @property
+    def vector(self) -> int: ...
+
+    @property
+    def cached(self) -> bool: ...
+
+    @property
+    def processor(self) -> str: ...
+
+    @property
+    def code_bytes(self) -> int: ...
+
+    @property
+    def functions(self) -> int: ...
+
+    def run(
+        self,
+        inputs: np.ndarray,
+        ticks: int,
+        record: bool = True,
+        threads: int | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> tuple[np.ndarray | None, np.ndarray]:
+        """Runs cases from tick 0 to tick `ticks`, both done.
+
+        inputs    [case, input], in the order of `program.inputs`
+        threads   None: as many as this process may use
+        progress  called with the number of cases done so far, from the thread that called
+        Returns rows [case, row, column], or None without `record`, and outputs [case, output].
+        """
+
+    def block(self, inputs: np.ndarray) -> Block:
+        """A block of at most `lanes` cases to step by hand. inputs: [case, input]."""
+
+
+class Backend(Protocol):
+    """A back end.
+
+    version  of its lowering: it is part of every code key, and is raised when the bits that a recording gives change
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def version(self) -> int: ...
+
+    def emit(self, recording: Recording) -> str:
+        """The program as text, as `load` would compile it here; for people, and for `met dump kernel`."""
+
+    def listing(self, recording: Recording) -> str:
+        """What the processor is given, as text, for `met dump assembly`; `emit`'s text where there is no other."""
+
+    def load(self, recording: Recording, *, lanes: int | None = None, inline: bool = True) -> Kernel:
+        """The program, ready to run. inline: False where the time of each section by itself is asked for."""
+
+    def libraries(self) -> Mapping[str, str]:
+        """Versions of the libraries that decide what is computed, by name, as archives name them."""

@@ -1,0 +1,40 @@
+"""The reference back end: a recording carried out operation by operation over numpy arrays, with the others' bits.
+
+    listing    a recording as text
+    interpret  running it;  plain: a program by itself, phase by phase over floats
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from met.backends.backend import Kernel
+from met.frozen import frozen
+from met.trace.recording import Recording
+
+
+@frozen
+class Reference:
+    """The interpreter, as `met.backends.backend.Backend` has it. Thousands of times slower than machine code."""
+
+    name: str = "reference"
+    version: int = 1
+
+    def emit(self, recording: Recording) -> str:
+        from met.backends.reference.listing import lines
+
+        return "\n".join([*lines(recording), ""])
+
+    def listing(self, recording: Recording) -> str:
+        return self.emit(recording)
+
+    def load(self, recording: Recording, *, lanes: int | None = None, inline: bool = True) -> Kernel:
+        from met.backends.reference.interpret import Interpreter
+
+        return Interpreter(recording, lanes or 1)
+
+    def libraries(self) -> Mapping[str, str]:
+        return {}
+
+
+BACKEND = Reference()

@@ -1,0 +1,70 @@
+"""Every back end: the same bits of the same recording, state that stays between steps, and what is asked of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ic
+from met import backends
+from met.backends.backend import Kernel
+from met.run import inputs, prepare
+from met.trace.recording import Recording
+
+DECK = Path(ic.__file__).parent / "decks" / "two_link.ic"
+NAMES = [pytest.param("c", marks=pytest.mark.compiler) if name == "c" else name for name in backends.HOMES]
+
+
+def two_link(run: str = "nominal") -> tuple[Recording, np.ndarray]:
+    """The program of a run of the paper's arm, and the inputs of some of its cases."""
+    (experiment,) = ic.compile(DECK, select=[run]).experiments
+    rows = np.arange(min(3, experiment.cases.count))
+    return prepare(experiment).recording, inputs(experiment, rows)
+
+
+def bits(numbers: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(numbers).view(np.int64)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("run", ["nominal", "hybrid"])
+def test_all_have_the_bits_of_the_default(name: str, run: str) -> None:
+    recording, given = two_link(run)
+    rows, outputs = backends.load(recording).run(given, 60)
+    other_rows, other_outputs = backends.load(recording, name=name).run(given, 60)
+    assert rows is not None and other_rows is not None and rows.any()
+    assert np.array_equal(bits(rows), bits(other_rows))
+    assert np.array_equal(bits(outputs), bits(other_outputs))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_block_goes_on_where_it_stands(name: str) -> None:
+    recording, given = two_link()
+    kernel: Kernel = backends.load(recording, name=name)
+    whole = kernel.block(given[:1])
+    rows = whole.recorded(0, 40)
+    parts = kernel.block(given[:1])
+    pieces = [parts.recorded(0, 13), parts.recorded(14, 14), parts.recorded(15, 40)]
+    assert np.array_equal(bits(rows[:1]), bits(np.concatenate([piece[:1] for piece in pieces], axis=1)))
+    assert np.array_equal(whole.outputs[:, 0], parts.outputs[:, 0])
+    assert list(whole.cells()) == list(recording.cells)
+    parts.cells()["shoulder.qd"][:] += 0.5
+    assert parts.recorded(41, 80)[0, -1].tolist() != whole.recorded(41, 80)[0, -1].tolist()
+
+
+@pytest.mark.parametrize("name", list(backends.HOMES))
+def test_each_writes_the_program_as_text(name: str) -> None:
+    recording, _ = two_link()
+    backend = backends.find(name)
+    assert backend.name == name and backend.version >= 1
+    assert len(backend.emit(recording).splitlines()) > 500
+    assert len(backend.listing(recording).splitlines()) > 500
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_inputs_of_another_shape_are_refused(name: str) -> None:
+    recording, given = two_link()
+    with pytest.raises(ValueError, match="inputs of shape"):
+        backends.load(recording, name=name).run(np.zeros((1, given.shape[1] + 1)), 1)
