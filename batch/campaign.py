@@ -223,6 +223,6 @@ def histories_section(campaign: Campaign, values: Section, results: Callable[[],
     if not len(kept):
         return None
     number = len(campaign.parts) + values.number
-    return Section(number, values.number, values.prepared, part.rows[kept], True, part.single)
+    return Section(number, values.number, values.prepared, part.rows[kept], True, part.single, values.begun)
 
 

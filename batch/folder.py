@@ -162,7 +162,7 @@ class Folder:
             told.append({
                 "number": section.number, "name": section.name, "again": section.number != section.experiment,
                 "experiment": section.experiment, "cases": len(section.rows), "rows": rows,
-                "recorded": section.recorded, "single": section.single, "code": section.prepared.code_key,
+                "recorded": section.recorded, "single": section.single, "code": section.code,
             })  # fmt: skip
         data = {"schema": SCHEMA, "version": FORMAT, "met": VERSION, "deck": plan.deck, "sections": told, **about}
         put(self.path / "campaign.json", data)
@@ -189,10 +189,10 @@ class Folder:
             number, of = told["number"], told["experiment"]
             if of >= len(experiments):
                 raise self._damaged(self.path / "campaign.json")
-            if told["code"] != experiments[of].code_key:
+            if told["code"] not in (experiments[of].work_key, experiments[of].old_code_key):
                 raise Problem(_other_code(experiments[of].experiment.name, self.path, described))
             rows = self._rows(told, experiments[of].experiment.cases.count)
-            out[number] = Section(number, of, experiments[of], rows, told["recorded"], told["single"])
+            out[number] = Section(number, of, experiments[of], rows, told["recorded"], told["single"], told["code"])
         return out
 
     def _rows(self, told: dict[str, Any], count: int) -> np.ndarray:

@@ -75,7 +75,7 @@ def perform(
     say           told, as it comes, what is found of an earlier run
     more          what else stands beside the archive, asked when all cases are done
     """
-    values = values_sections(campaign)
+    values = resuming.as_begun(Folder(beside(campaign.output)), campaign, values_sections(campaign))
     key = resuming.campaign_key(values)
     there = resuming.there(campaign, key)
     if there == resuming.WHOLE and not fresh:
@@ -229,7 +229,10 @@ class _Work:
                     again = f"`met run {quoted(self.campaign.output)} --case '#{case}'` tries again"
                     self._note(f"no history of case #{case} of `{values.name}` is kept: {why}; {again}")
                 kept = np.searchsorted(part.rows, rows[~np.isin(rows, list(lost))])
-            parts.append(Part(part.experiment, part.rows, kept, part.single, values.prepared.code_key))
+            program = values.prepared
+            parts.append(
+                Part(part.experiment, part.rows, kept, part.single, program.code_key, program.result_keys)
+            )
         temporary = temporary_of(self.campaign.output)
         writer = Writer(temporary, self.campaign.plan, parts)
         try:

@@ -12,6 +12,7 @@ from batch.show import chosen, picked
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Experiment, Plan
+from met.run import comparable
 
 MOST_TOLD = 8
 """Differences that are named."""
@@ -100,7 +101,7 @@ def differences(before: str | Path, after: str | Path) -> list[str]:
                     case = new.values("case")[place]
                     out.append(f"#{case} of {new.name}: {name} was {_plain(a[place])}, is {_plain(b[place])}")
             old_code, new_code = (group.attributes.get("code_key") for group in (old, new))
-            if out and old_code not in (None, new_code):  # older archives have none
+            if out and comparable(old_code, new_code) and old_code != new_code:  # older archives have none
                 what = f"the program of `{new.name}` is another"
                 out.insert(0, f"{what}: MET's code, or that of models, has changed since")
     return out[:MOST_TOLD] + ([f"and {len(out) - MOST_TOLD} more"] if len(out) > MOST_TOLD else [])

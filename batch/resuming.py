@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,27 @@ def campaign_key(values: Sequence[Section]) -> str:
     """Of all that decides the numbers of a campaign: code, and what goes into it. Which cases are run again for
     their histories may change on the way."""
     return hashlib.sha256(json.dumps([[section.name, section.key()] for section in values]).encode()).hexdigest()
+
+
+def as_begun(folder: Folder, campaign: Campaign, values: list[Section]) -> list[Section]:
+    """The sections with the keys of programs that an older MET wrote, where what stands in the folder, or beside the
+    archive, is this campaign under those keys; else as they are."""
+    key = campaign_key(values)
+    begun = _begun_key(folder, campaign)
+    if begun in ("", key):
+        return values
+    older = [replace(section, begun=section.prepared.old_code_key) for section in values]
+    return older if campaign_key(older) == begun else values
+
+
+def _begun_key(folder: Folder, campaign: Campaign) -> str:
+    """The key of what was begun in the folder, else of what made the archive; "" where neither can be read."""
+    try:
+        if folder.exists():
+            return str(folder.described()["key"])
+        return str(read_json(sidecar_path(campaign.output))["campaign"])
+    except (Problem, OSError, ValueError, LookupError, TypeError):
+        return ""
 
 
 def proof(campaign: Campaign, key: str, archive: Path) -> dict[str, str]:
@@ -166,7 +188,7 @@ def _other_work(campaign: Campaign, values: Sequence[Section], told: dict[str, A
     before = told["sections"][: len(values)]
     if [len(section.rows) for section in values] != [each.get("cases") for each in before]:
         return ["other cases were asked for"]
-    if [section.prepared.code_key for section in values] != [each.get("code") for each in before]:
+    if [section.code for section in values] != [each.get("code") for each in before]:
         return [f"MET's own models or code (it was begun by version {told.get('met')})"]
     if [(section.recorded, section.single) for section in values] != [
         (each.get("recorded"), each.get("single")) for each in before

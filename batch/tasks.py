@@ -35,6 +35,7 @@ class Section:
     number      in its campaign;  experiment: its number in the plan
     rows        of the case table, [case]
     recorded    whether histories are kept;  single: as numbers of four bytes
+    begun       key of the program that the campaign was begun with, where it is of an older kind than ours for the same
     """
 
     number: int
@@ -43,6 +44,12 @@ class Section:
     rows: np.ndarray
     recorded: bool
     single: bool = False
+    begun: str = ""
+
+    @property
+    def code(self) -> str:
+        """Key of the program, as the campaign has it."""
+        return self.begun or self.prepared.work_key
 
     @property
     def name(self) -> str:
@@ -62,7 +69,7 @@ class Section:
         experiment = self.prepared.experiment
         inputs = engine.inputs(experiment, self.rows[first:last])
         kept = ("recorded" if self.recorded else "outputs", "f4" if self.single else "f8")
-        told = (self.prepared.code_key, experiment.structure.schedule.ticks, *kept, inputs.shape)
+        told = (self.code, experiment.structure.schedule.ticks, *kept, inputs.shape)
         return hashlib.sha256(f"{told}\n".encode() + inputs.tobytes()).hexdigest()
 
 

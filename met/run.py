@@ -12,12 +12,12 @@ import numpy as np
 
 from met import backends, keys, models
 from met.backends.backend import Kernel
-from met.backends.llvm.emit import emit
 from met.frozen import frozen
 from met.plan import REPEAT, Experiment
 from met.program.build import COORDINATE, METRIC, OUTPUTS, build
 from met.program.step import ASTRAY, EVENTS, NOT_FINITE, SINGULAR
 from met.program.substituted import LIMITED
+from met.trace.identity import result_keys, state_key
 from met.trace.program import Program
 from met.trace.recorder import record
 from met.trace.recording import Recording
@@ -27,10 +27,6 @@ DONE, FAILED, TIMED_OUT, LOST = range(4)
 
 STOPPED = 3.0
 """Of the output `failure`, beside the engine's own: something else ended the case, and a fate says why."""
-
-CANONICAL_LANES = 8
-"""Of the code that `Prepared.code_key` is made from; what runs has those that suit the machine."""
-
 
 @frozen
 class Run:
@@ -89,8 +85,49 @@ class Prepared:
 
     @cached_property
     def code_key(self) -> str:
-        """Key of all that is computed: where it is equal, equal inputs give equal bits. The same on any machine."""
-        return hashlib.sha256(emit(self.recording, CANONICAL_LANES).encode()).hexdigest()
+        """Key of what decides the state: where it is equal, equal inputs give equal bits of it. The same on any machine
+        (`met.trace.identity`)."""
+        return _code_key(state_key(self.recording))
+
+    @cached_property
+    def result_keys(self) -> dict[str, str]:
+        """Keys of what each metric and each recorded signal computes beyond the state, by `metrics.NAME` and
+        `record.NAME`."""
+        structure, columns, first = self.experiment.structure, {}, 0
+        for recorded in structure.record:
+            columns[f"record.{recorded.name}"] = range(first, first + len(recorded.channels))
+            first += len(recorded.channels)
+        outputs = {f"metrics.{use.name}": METRIC + use.name for use in structure.metrics}
+        keys = result_keys(self.recording, {**columns, **outputs})
+        return {name: _code_key(key) for name, key in keys.items()}
+
+    @cached_property
+    def work_key(self) -> str:
+        """Key of all that a case gives, in its order: the state, every recorded signal and every metric."""
+        keys = [self.code_key, *(f"{name} {key}" for name, key in self.result_keys.items())]
+        return _code_key(hashlib.sha256("\n".join(keys).encode()).hexdigest())
+
+    @cached_property
+    def old_code_key(self) -> str:
+        """The key of all that a case gives, as MET made it before keys had a version: of the emitted text, for blocks
+        of 8 cases."""
+        from met.backends.llvm.emit import emit
+
+        return hashlib.sha256(emit(self.recording, 8).encode()).hexdigest()
+
+
+KEY_VERSION = 2
+"""Of code keys, which they begin with: of what they are made. Keys of before have no version."""
+
+
+def _code_key(of: str) -> str:
+    """A key of a recording, with what else decides its bits: how the back end carries it out."""
+    return f"{KEY_VERSION}:{hashlib.sha256(f'{of} {backends.find().version}'.encode()).hexdigest()}"
+
+
+def comparable(key: str | None, other: str | None) -> bool:
+    """Whether two code keys are both there, and are made of the same."""
+    return key is not None and other is not None and key.partition(":")[1] == other.partition(":")[1]
 
 
 def prepare(

@@ -8,7 +8,8 @@ folder until it is whole and on the disk.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,13 +33,18 @@ KINDS = {"float64": np.float64, "float32": np.float32, "int64": np.int64, "int8"
 @frozen
 class Part:
     """One experiment of an archive. rows: of its case table, rising; kept: places among them of the cases whose
-    histories are here; single: as numbers of four bytes; code: key of the program (`met.run.Prepared.code_key`)."""
+    histories are here; single: as numbers of four bytes.
+
+    code     key of the program (`met.run.Prepared.code_key`)
+    results  keys of what metrics and signals compute beyond the state (`met.run.Prepared.result_keys`)
+    """
 
     experiment: Experiment
     rows: np.ndarray
     kept: np.ndarray
     single: bool = False
     code: str = ""
+    results: Mapping[str, str] = field(default_factory=dict)
 
 
 @frozen
@@ -129,6 +135,11 @@ class Writer:
         for name, value in {**layout.attributes, "code_key": part.code}.items():
             node.attrs[name] = value
         made = {variable.name: _make(node, layout, variable) for variable in layout.variables}
+        for variable in layout.variables:
+            kind = {"metric": "metrics", "signal": "record"}.get(variable.role)
+            key = part.results.get(f"{kind}.{variable.key}")
+            if key is not None:
+                made[variable.name].attrs["code_key"] = key
         for variable in layout.role("dimension"):
             made[variable.name].make_scale(variable.name)
         for variable in layout.variables:

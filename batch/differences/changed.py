@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from batch.archive.read import ArchiveFile, Group
 from batch.changes import Change, between
 from batch.differences.decks import Deck, Decks, decks
 from met.frozen import frozen
 from met.plan import Experiment, Plan
+from met.run import comparable
 
 
 @frozen
@@ -22,6 +24,7 @@ class Changed:
     defaults   parameters that a model has got since, and their defaults
     structure  experiments whose structures differ (models, rates, what is varied)
     code       experiments whose programs differ: where none does, equal inputs give equal bits
+    results    metrics and signals of the others that are computed otherwise, by experiment and name
     """
 
     versions: tuple[str, ...] = ()
@@ -31,6 +34,7 @@ class Changed:
     defaults: tuple[str, ...] = ()
     structure: tuple[str, ...] = ()
     code: tuple[str, ...] = ()
+    results: tuple[tuple[str, str], ...] = ()
 
 
 def changed(
@@ -47,8 +51,24 @@ def changed(
         follows=tuple(follows) if meaning or causes else (),
         defaults=tuple(defaults),
         structure=tuple(one.name for one, two in pairs if _unlike(one, two, "structure_key")),
-        code=tuple(one.name for one, two in pairs if _unlike(one, two, "code_key")),
+        code=tuple(one.name for one, two in pairs if _other_code(one.attributes, two.attributes)),
+        results=tuple((one.name, name) for one, two in pairs for name in _other_results(one, two)),
     )
+
+
+def _other_code(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
+    """Whether two code keys differ; not so where one archive has none, or one of another kind."""
+    one, two = a.get("code_key"), b.get("code_key")
+    return comparable(one, two) and one != two
+
+
+def _other_results(a: Group, b: Group) -> Iterator[str]:
+    """The metrics and signals that two groups of one program compute otherwise."""
+    if not _other_code(a.attributes, b.attributes):
+        for name, variable in a.variables.items():
+            other = b.variables.get(name)
+            if other is not None and _other_code(variable.attributes, other.attributes):
+                yield name
 
 
 def _unlike(a: Group, b: Group, name: str) -> bool:

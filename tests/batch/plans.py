@@ -158,7 +158,8 @@ class Answering:
 
     def __init__(self, experiment: Experiment) -> None:
         self.experiment = experiment
-        self.code_key = f"answers of {experiment.name}"
+        self.code_key = self.work_key = self.old_code_key = f"answers of {experiment.name}"
+        self.result_keys: dict[str, str] = {}
         columns = sum(len(recorded.channels) for recorded in experiment.structure.record)
         self.program = SimpleNamespace(outputs=("failure",), columns=columns)
 

@@ -52,7 +52,7 @@ def made(
     plan = ic.compile(folder / "deck.ic", select=[select], **options)  # type: ignore[arg-type]
     texts = {each.name: each.text for each in plan.sources}
     [experiment] = plan.experiments
-    group = SimpleNamespace(name=experiment.name, attributes={})
+    group = SimpleNamespace(name=experiment.name, attributes={}, variables={})
     return SimpleNamespace(plan=plan, group=group, provenance={}, sources=lambda: texts)
 
 
@@ -182,7 +182,7 @@ def test_what_is_set_on_the_command_line_was_written_there(here: Path) -> None:
 def test_more_than_a_screen_is_cut_with_the_command_that_shows_it() -> None:
     lines = tuple(f"p{i}: 1 -> 2" for i in range(9))
     found = SimpleNamespace(changed=SimpleNamespace(
-        versions=(), decks=(), meaning=("let x: 1 -> 2",), follows=lines, defaults=(), structure=(), code=()
+        versions=(), decks=(), meaning=("let x: 1 -> 2",), follows=lines, defaults=(), structure=(), code=(), results=()
     ))  # fmt: skip
     short = list(_changed(found, Cut(remedy="`met diff a.h5 b.h5 --all`")))  # type: ignore[arg-type]
     assert short[-1] == "  follows    and 3 more: `met diff a.h5 b.h5 --all`" and len(short) == 9
@@ -251,6 +251,6 @@ def test_a_deck_that_is_none_is_no_traceback(text: str) -> None:
 def test_what_cannot_be_seen_is_made_visible() -> None:
     found = decks({"d.ic": "a\n"}, {"d.ic": "\x1b[31mred\n"})
     lines = words.made(SimpleNamespace(changed=SimpleNamespace(  # type: ignore[arg-type]
-        versions=(), decks=found.files, meaning=(), follows=(), defaults=(), structure=(), code=()
+        versions=(), decks=found.files, meaning=(), follows=(), defaults=(), structure=(), code=(), results=()
     )))  # fmt: skip
     assert lines[0][1][-1] == "  +\\x1b[31mred"
