@@ -14,6 +14,7 @@ def pytest_configure() -> None:
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    os.environ["MET_CHECK_RECORDINGS"] = "1"  # also of the processes that tests start
 
 
 @pytest.hookimpl(wrapper=True)

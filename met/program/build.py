@@ -87,6 +87,7 @@ class Builder:
                 *self.step.beds.wire_outputs,
             ),
             state_outputs=(*OUTPUTS, *self.step.beds.wire_outputs),
+            counters=(*EVENTS, LIMITED),
         )
 
     # The run's two ends.

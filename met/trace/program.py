@@ -30,7 +30,7 @@ class Tape(Protocol):
         """k / base_hz, s, by one division."""
 
     def read(self, name: str) -> Real:
-        """A cell: what this phase wrote, else what it held before; 0 where nothing ever wrote it."""
+        """A cell: what this phase wrote, else what it held before, 0 at first. That nothing writes it is an error."""
 
     def write(self, name: str, value: Real) -> None:
         """Sets a cell."""
@@ -121,6 +121,7 @@ class Program:
 
     state_outputs  the outputs that tell how the run itself went. What they depend on is the program's state, and its
                    bits are the same whatever else is recorded or put out; None: all outputs and rows are one
+    counters       cells that may be read although nothing writes them: they are 0
     """
 
     base_hz: float
@@ -131,6 +132,7 @@ class Program:
     columns: int = 0
     outputs: tuple[str, ...] = ()
     state_outputs: tuple[str, ...] | None = None
+    counters: tuple[str, ...] = ()
 
     @property
     def record_divisor(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from met.trace import check
 from met.trace.fuse import fused
 from met.trace.graph import Graph, Real, Truth
 from met.trace.program import Call, Control, Every, Phase, Program, Record, Run, Unless0, WhileAny, walk
@@ -135,9 +136,16 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
     _check_complete(program, sections)
     asked = {node.cell for node in walk((*program.start, *program.tick, *program.end)) if isinstance(node, WhileAny)}
     kept = _without_dead_stores(sections, asked)
+    _check_written(program, kept, asked)
+    cells = _cells(kept, asked)
+    if check.wanted():
+        check.check(Recording(program, tuple(kept), start, tick, end, cells))
     if fuse:
         kept = _fused(kept, program, (*start, *tick, *end))
-    return Recording(program, tuple(kept), start, tick, end, _cells(kept, asked))
+    recording = Recording(program, tuple(kept), start, tick, end, cells)
+    if check.wanted():
+        check.check(recording)
+    return recording
 
 
 def _flat(body: tuple[Control, ...]) -> Iterator[Control]:
@@ -166,6 +174,17 @@ def _check_complete(program: Program, sections: list[Section]) -> None:
         raise ValueError(f"no phase writes the outputs {[program.outputs[number] for number in missing]}")
     if program.record_divisor < 1:
         raise ValueError("a record divisor is at least 1")
+
+
+def _check_written(program: Program, sections: list[Section], asked: set[str]) -> None:
+    """Raises ValueError where a cell is read that nothing writes: a name that is misspelt would be 0 for ever."""
+    written = {cell for one in sections for cell, _ in one.stores}.union(program.counters)
+    for one in sections:
+        for i in one.order:
+            if one.nodes[i][0] == "cell" and one.nodes[i][1] not in written:
+                raise ValueError(f"{one.name!r} reads the cell {one.nodes[i][1]!r}, which nothing writes")
+    for cell in sorted(asked - written):
+        raise ValueError(f"a loop goes by the cell {cell!r}, which nothing writes")
 
 
 def _without_dead_stores(sections: list[Section], asked: set[str]) -> list[Section]:

@@ -15,10 +15,11 @@ import pytest
 
 import ic
 from met.backends.llvm import kernel
+from met.backends.llvm import machine as llvm
 from met.backends.llvm.emit import emit
 from met.program.build import build
 from met.run import inputs
-from met.trace import atan2, cos, exp, floor, fma, gather, llvm, log, rint, sin, sqrt, tanh, where
+from met.trace import atan2, cos, exp, floor, fma, gather, log, rint, sin, sqrt, tanh, where
 from met.trace.noise import Stream, normal
 from met.trace.program import Phase, Program, Record, Run, Tape
 from met.trace.recorder import record as recorded

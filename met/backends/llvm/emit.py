@@ -14,6 +14,8 @@ from typing import Any
 from met.backends.llvm.entry import ENTRY, entry, number, spread
 from met.backends.llvm.philox import PhiloxWriter
 from met.backends.llvm.pieces import CUT_ABOVE, LONGEST, SHORTEST, Piece, cut
+from met.backends.llvm.pieces import check as check_pieces
+from met.trace import check
 from met.trace.graph import OPERANDS, TRUTHS
 from met.trace.recording import Recording, Section
 
@@ -114,6 +116,8 @@ class _Emitter:
                 name = f"{base}.{n}"
             names.add(name)
             pieces = cut(section, *self.sizes)
+            if check.wanted():
+                check_pieces(section, pieces)
             self.scratch = max(self.scratch, max(piece.slots for piece in pieces))
             self.calls.append([])
             for i, piece in enumerate(pieces):

@@ -15,6 +15,7 @@ import llvmlite.binding as llvm
 
 from met.backends.llvm.entry import ENTRY
 from met.frozen import frozen
+from met.trace import check
 
 
 @frozen
@@ -100,6 +101,8 @@ def listing(text: str, target: Machine, *, level: int | None = None) -> str:
 
 def _prepared(text: str, machine_: Any, level: int | None) -> Any:
     module = llvm.parse_assembly(text)
+    if check.wanted():
+        module.verify()
     module.triple = machine_.triple
     module.data_layout = str(machine_.target_data)
     if level is None:

@@ -94,6 +94,36 @@ def cut(section: Section, above: int = CUT_ABOVE, shortest: int = SHORTEST, long
     return pieces
 
 
+def check(section: Section, pieces: list[Piece]) -> None:
+    """Raises ValueError where the pieces are not the section: an operation or a store that is missing, or a value that
+    a piece takes and does not have."""
+    nodes = section.nodes
+    if [i for piece in pieces for _, i in piece.body] != operations(section):
+        raise ValueError(f"{section.name}: its pieces are not its operations, once and in order")
+    held: dict[int, int] = {}
+    for number, piece in enumerate(pieces):
+        here: set[int] = set()
+
+        def taken(ref: int, piece: Piece = piece, here: set[int] = here, number: int = number) -> None:
+            i = ref >> 1
+            if nodes[i][0] not in LEAVES and i not in here and held.get(piece.kept.get(i, -1)) != i:
+                raise ValueError(f"{section.name}: piece {number} takes node {i}, which it does not have")
+
+        for n, i in piece.body:
+            for ref in nodes[i][1:1 + OPERANDS[nodes[i][0]]]:
+                taken(ref)
+            here.add(i)
+            if i in piece.keep:
+                held[piece.keep[i]] = i
+            for _, _, ref in piece.stores.get(n, ()):
+                taken(ref)
+        for _, _, ref in piece.tail:
+            taken(ref)
+    stores = [store for piece in pieces for group in (*piece.stores.values(), piece.tail) for store in group]
+    if sorted(ref for _, _, ref in stores) != sorted(section.roots):
+        raise ValueError(f"{section.name}: its pieces do not store what it stores")
+
+
 def _bounds(section: Section, body: list[int], number: dict[int, int], shortest: int, longest: int) -> list[int]:
     """Where to cut: each piece ends where the fewest values cross, within its bounds."""
     nodes = section.nodes

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from met.backends.llvm import kernel
+from met.backends.llvm import machine as llvm
 from met.backends.llvm.emit import emit
-from met.trace import Formulas, Graph, llvm
+from met.trace import Formulas, Graph
 from met.trace.functions import philox
 from met.trace.primitives import ARRAYS, PLAIN
 from met.trace.program import Phase, Program, Run
