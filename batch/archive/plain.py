@@ -22,6 +22,9 @@ from met.files import open_regular
 DEEPEST = 64
 """Groups that one may be in: whoever opens a file of thousands takes minutes."""
 
+MOST_ATTRIBUTES = 1000
+"""Attributes that a thing may have; MET writes some dozens. HDF5 finds each anew: of thousands it takes minutes."""
+
 SCALES = ("DIMENSION_LIST", "REFERENCE_LIST")
 """Attributes by which HDF5 itself says what a dataset's dimensions are: references to datasets of the same file."""
 
@@ -104,7 +107,11 @@ def _attributes(where: str, node: Any) -> Iterator[tuple[str, str]]:
     """The attributes of a thing that are neither numbers nor strings, nor what HDF5 itself writes."""
     module = h5py()
     plain = (module.h5t.INTEGER, module.h5t.FLOAT, module.h5t.STRING, module.h5t.ENUM)
-    for number in range(module.h5a.get_num_attrs(node)):
+    count = module.h5a.get_num_attrs(node)
+    if count > MOST_ATTRIBUTES:
+        yield where, f"has {count:,} attributes"
+        return
+    for number in range(count):
         attribute = module.h5a.open(node, index=number)
         kind = attribute.get_type()
         if kind.get_class() in plain:

@@ -171,6 +171,17 @@ def test_groups_within_groups_are_followed_so_far_and_no_further(archive: Path, 
     assert said.status == 2 and "many/many` is in more than 64 groups, one in another\n" in said.text
 
 
+def test_thousands_of_attributes_are_not_looked_through(single: Path, tmp_path: Path) -> None:
+    with changed(single, tmp_path) as (copy, file):
+        for number in range(1, 1002):
+            file["repeat"].attrs[f"a{number}"] = number
+        count = len(file["repeat"].attrs)
+    said = met("show", str(copy))
+    assert (said.status, said.text.splitlines()[0]) == (
+        2, f"error[E308]: the archive {copy} holds what MET writes into none: `repeat` has {count:,} attributes"
+    )  # fmt: skip
+
+
 def test_a_role_that_is_no_word_is_told(single: Path, tmp_path: Path) -> None:
     with changed(single, tmp_path) as (copy, file):
         file["end"].attrs["role"] = np.zeros(3)
