@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import logging
 import os
 import tempfile
@@ -15,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from met.diagnostic import Problem, error
+from met.files import read_json
 
 CONNECT_SECONDS = 5.0
 """How long we try to reach a scheduler."""
@@ -79,7 +79,7 @@ def _address(called: str) -> str:
         return called
     helps = f"`dask scheduler --scheduler-file {called}` writes it"
     try:
-        return str(json.loads(path.read_text(encoding="utf-8"))["address"])
+        return str(read_json(path)["address"])
     except OSError as reason:
         message = f"cannot read the Dask scheduler file {called}: {(reason.strerror or str(reason)).lower()}"
         raise Problem(error("E356", message, help=helps)) from None

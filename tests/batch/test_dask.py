@@ -104,7 +104,15 @@ class TestWhatItIsCalled:
             "\n1 error\n"
         )  # fmt: skip
 
-    @pytest.mark.parametrize("text", ["", "[]", "{}", "\udcff"])
+    def test_a_pipe_in_the_place_of_a_scheduler_file_is_not_waited_for(self, many: Any, here: Path) -> None:
+        os.mkfifo("s.json")
+        with pytest.raises(Problem) as caught:
+            Dask("s.json").open(*many, lambda: None)
+        assert refused(caught).startswith(
+            "error[E356]: cannot read the Dask scheduler file s.json: it is a named pipe, not a regular file\n"
+        )
+
+    @pytest.mark.parametrize("text", ["", "[]", "{}", "\udcff", '{"a":' * 50_000])
     def test_a_file_that_is_no_schedulers(self, many: Any, here: Path, text: str) -> None:
         Path("s.json").write_bytes(text.encode(errors="surrogateescape"))
         with pytest.raises(Problem) as caught:
