@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import io
 import os
+import shlex
 import stat
 import sys
 import tempfile
@@ -104,9 +105,13 @@ def _laid_out(file: FoundFile, data: bytes) -> LaidOut:
 def write(path: str, text: str) -> None:
     """Puts the text in the place of the file, all at once; its permissions stay, and a link to it stays a link.
 
-    Raises Problem E338, and leaves the file as it was, where the system refuses.
+    Raises Problem E338, and leaves the file as it was, where the system refuses, or where a link leads to a file that
+    is not called a deck: a folder that somebody gave may hold a link to any file.
     """
     target = os.path.realpath(path)
+    if os.path.islink(path) and not target.endswith(".ic"):
+        help = f"links are followed to `.ic` files alone; `met fmt {shlex.quote(target)}` names the file itself"
+        raise Problem(error("E338", f"cannot write `{path}`: it is a link to `{target}`", help=help))
     try:
         if not os.access(target, os.W_OK):
             raise PermissionError(13, os.strerror(13))

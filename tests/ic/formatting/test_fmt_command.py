@@ -121,6 +121,21 @@ def test_permissions_and_links_stay_and_nothing_is_left_beside(capsys: pytest.Ca
     assert os.listdir("real") == ["a.ic"]
 
 
+def test_a_link_to_what_is_no_deck_is_not_written_through(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("given").mkdir()
+    Path("passwords").write_text("root:x:0:0:root:/root\n")
+    Path("given/a.ic").symlink_to("../passwords")
+    target = Path("passwords").resolve()
+    for path in ("given", "given/a.ic"):
+        status, _, complaint = fmt(capsys, path)
+        assert status == 2 and complaint == (
+            f"error[E338]: cannot write `given/a.ic`: it is a link to `{target}`\n"
+            f" = help: links are followed to `.ic` files alone; `met fmt {target}` names the file itself\n"
+            "\n1 error\n"
+        )
+    assert Path("passwords").read_text() == "root:x:0:0:root:/root\n"
+
+
 def test_from_standard_input_to_standard_output(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
