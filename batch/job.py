@@ -10,6 +10,7 @@ again.
 
 from __future__ import annotations
 
+import itertools
 import os
 import sys
 from collections.abc import Sequence
@@ -27,7 +28,7 @@ from batch.status import Reporter
 from batch.tasks import Task
 from batch.termination import TERMINATED, Terminated, terminable
 from met.diagnostic import Problem
-from met.files import read_json
+from met.files import is_count, read_json
 from met.visible import say
 
 
@@ -46,10 +47,16 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
         asked = read_json(tasks_file)
         dealt = [[Task(*each) for each in tasks] for tasks in asked["shares"]]
         timeout = asked["timeout"]
+        sections = folder.sections()
+        for task in itertools.chain(*dealt):
+            if not (is_count(task.section, len(sections) - 1) and is_count(task.first, task.last - 1)
+                    and is_count(task.last, len(sections[task.section].rows))):  # fmt: skip
+                raise ValueError(task)
+        if timeout is not None and not (isinstance(timeout, int | float) and timeout > 0):
+            raise ValueError(timeout)
     except (OSError, ValueError, LookupError, TypeError):
         say(f"met: {tasks_file} is gone or damaged: submit again", err=True)
         return 1
-    sections = folder.sections()
     if not 0 <= number < len(dealt):
         say(f"met: {tasks_file} has no share {number}: it was submitted again since", err=True)
         return 0

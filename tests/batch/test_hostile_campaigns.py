@@ -277,7 +277,12 @@ def test_odd_words_of_the_queue_stop_no_share(
     assert run_job(submitted, "share", str(number), str(submitted / "jobs.json")) in (0, 1)
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"shares": [[[0]]], "timeout": null}'])
+@pytest.mark.parametrize(
+    "text",
+    ["{", "[]", '{"shares": [[[0]]], "timeout": null}', '{"shares": [[["a", null, {}]]], "timeout": null}',
+     '{"shares": [[[0, 3, 1]]], "timeout": null}', '{"shares": [[[0, 0, 1000000000000]]], "timeout": null}',
+     '{"shares": [[[7, 0, 1]]], "timeout": null}', '{"shares": [[[0, 0, 1]]], "timeout": "soon"}'],
+)  # fmt: skip
 def test_damaged_shares_are_told(submitted: Path, capsys: pytest.CaptureFixture[str], text: str) -> None:
     (submitted / "jobs.json").write_text(text)
     assert run_job(submitted, "share", "0", str(submitted / "jobs.json")) == 1
