@@ -213,6 +213,8 @@ def _check_targets(path: Path, files: dict[Path, bytes]) -> None:
     """Nothing is written over but a plan of MET's, and the tables that it names."""
     before = _plan_there(path)
     for target, data in files.items():
+        if target.exists() and not target.is_file():
+            raise Problem(error("E300", f"cannot write {target}: it is not a regular file"))
         if target == path or not target.exists() or f'"{target.name}"' in before or read_regular(target) == data:
             continue
         message = f"cannot write {target}: it exists, and is no case table of {path}; it is not written over"

@@ -67,6 +67,18 @@ def test_a_pipe_in_the_place_of_a_plan_and_of_its_table(here: Path) -> None:
     assert said.status == 2 and "cannot be read: it is a named pipe, not a regular file" in said.text
 
 
+def test_a_pipe_where_a_plans_table_is_to_be_written(here: Path) -> None:
+    [plan_there, table] = sorted(plan_file.write(plans.plan(plans.gains(plan_file.INLINE_ROWS + 1)), "big.json"),
+                                 key=lambda path: path.suffix)  # fmt: skip
+    table.unlink()
+    os.mkfifo(table)
+    with pytest.raises(Problem) as caught:
+        plan_file.write(plans.plan(plans.gains(plan_file.INLINE_ROWS + 1)), plan_there)
+    assert render(caught.value.diagnostics) == (
+        "error[E300]: cannot write big.gains.cases.npy: it is not a regular file\n\n1 error\n"
+    )
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("output", ["a.h5", "a.mcap", "a.parquet", "a.html", "a.svg", "a.json"])
 def test_a_pipe_where_something_is_to_be_written(output: str, archive: Path, here: Path) -> None:
