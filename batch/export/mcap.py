@@ -51,6 +51,9 @@ BLOCK_ROWS = 1000
 
 SECOND = 1_000_000_000
 
+LONGEST = 1 << 63
+"""Nanoseconds that times stay below: they are counted in 64 bits, one of them a sign."""
+
 Message = tuple[int, int, int, bytes]
 """Time, ns; the case and channel, by which messages of one time are ordered; content."""
 
@@ -63,7 +66,13 @@ def own(path: Path) -> bool:
 
 
 def arms(file: ArchiveFile, cases: Sequence[Case], *, named: bool) -> list[Arm]:
-    """The arms of the cases. named: whether the cases were asked for one by one. Raises Problem E370, E372."""
+    """The arms of the cases. named: whether the cases were asked for one by one. Raises Problem E370, E372,
+    E376."""
+    for case in cases:
+        end = max(case.time, default=0.0)
+        if end * SECOND >= LONGEST:
+            message = f"`{case.asked}` ends at {end:g} s: times of an MCAP file are below {LONGEST / SECOND:.3g} s"
+            raise Problem(error("E376", message, help="`-o FILE.csv` has times of any length"))
     if len(cases) > OVERLAID and not named:
         helps = (f"`--case '#{cases[0].number}' --case '#{cases[1].number}'` shows these over one another",
                  f"`met show {quoted(file.path)}` lists the cases, the worst first")  # fmt: skip

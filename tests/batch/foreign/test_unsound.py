@@ -120,6 +120,18 @@ def test_any_number_may_be_in_a_signal(value: float, archive: Path, tmp_path: Pa
         assert met(*readers(copy, tmp_path, archive)[name]).status in (0, 1), name
 
 
+def test_times_beyond_those_of_an_mcap_file_are_told(single: Path, tmp_path: Path) -> None:
+    with changed(single, tmp_path) as (copy, file):
+        file["time"][...] = np.arange(len(file["time"])) * 1e14
+    said = met("export", str(copy), "-o", str(tmp_path / "a.mcap"))
+    assert said.status == 2 and not (tmp_path / "a.mcap").exists()
+    assert said.text == (
+        "error[E376]: `open` ends at 4e+14 s: times of an MCAP file are below 9.22e+09 s\n"
+        " = help: `-o FILE.csv` has times of any length\n"
+        "\n1 error\n"
+    )
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_an_archive_with_something_else_in_it_is_read_or_told(
