@@ -92,7 +92,10 @@ class OnBeds:
         folder.beds.mkdir(exist_ok=True)
         for path in folder.beds.glob("*.records"):
             with contextlib.suppress(records.Unsound, OSError):
-                self.check(records.read(path).head.get("ports", {}), f"{folder.path} holds cases of this campaign")
+                ports = records.read(path).head.get("ports", {})
+                if not isinstance(ports, dict) or not all(isinstance(port, str) for port in ports.values()):
+                    raise records.Unsound("has a head that is damaged")
+                self.check(ports, f"{folder.path} holds cases of this campaign")
 
     def know_all(self) -> None:
         """Know of the cases, too, that an earlier run of the campaign has done."""

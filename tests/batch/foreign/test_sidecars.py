@@ -16,6 +16,7 @@ import pytest
 
 import batch
 from batch import job, shard
+from batch.beds.executor import OnBeds, Ports
 from batch.beds.made import check_head
 from batch.folder import Folder
 from hw import records, transcript
@@ -277,3 +278,13 @@ def test_records_with_a_head_that_is_none_count_as_none(name: str, value: Any) -
     check_head(records.Records(GOOD_HEAD, rows, 0))
     with pytest.raises(records.Unsound, match="has a head that is damaged"):
         check_head(records.Records({**GOOD_HEAD, name: value}, rows, 0))
+
+
+@pytest.mark.parametrize("ports", [[], "x", {"shoulder": 3}, {"shoulder": []}])
+def test_records_with_ports_that_are_none_count_as_none(ports: Any, here: Path) -> None:
+    folder = Folder(Path("a.h5.campaign"))
+    folder.path.mkdir()
+    folder.beds.mkdir()
+    with open(folder.beds / "0-0.records", "xb") as file:
+        records.begin(file, {**GOOD_HEAD, "ports": ports})
+    OnBeds(Ports({"shoulder": "emulated"}, 921_600), lambda _: None).open(folder, {}, lambda: None)
