@@ -48,6 +48,9 @@ OURS = re.compile(
 )
 SHARD = re.compile(r"(\d+)-(\d+)-(\d+)")
 
+NPY_HEAD_BYTES = 4096
+"""Before the numbers of a `.npy` file; numpy writes 128."""
+
 
 class Busy(Exception):
     """Somebody else works in the folder."""
@@ -202,9 +205,9 @@ class Folder:
         else:
             path = self.path / told["rows"]
             try:
-                data = io.BytesIO(read_regular(path))
+                data = io.BytesIO(read_regular(path, count * np.dtype(np.int64).itemsize + NPY_HEAD_BYTES))
                 rows = np.lib.format.read_array(data, allow_pickle=False)
-            except (OSError, ValueError, TypeError, EOFError, OverflowError) as reason:
+            except (OSError, ValueError, TypeError, EOFError, OverflowError, MemoryError) as reason:
                 raise self._damaged(path) from reason
             if rows.dtype != np.int64 or rows.ndim != 1 or not _rise(rows, count):
                 raise self._damaged(path)
@@ -230,7 +233,7 @@ class Folder:
 
     def read(self, section: Section, task: Task) -> shard.Shard:
         """A task's shard. Raises shard.Unsound where it is none of this section's, OSError."""
-        found = shard.read(self.shards / task.name)
+        found = shard.read(self.shards / task.name, task.cases * _bytes_of_case(section))
         if not 0 <= task.first < task.last <= len(section.rows) or len(found.outputs) != task.cases:
             raise shard.Unsound("holds other cases than its name says")
         if found.key != section.key(task.first, task.last):
@@ -341,6 +344,13 @@ def _checked(data: Any) -> dict[str, Any]:
 def _rise(rows: np.ndarray, count: int) -> bool:
     """Whether these are rows of a case table with so many cases, each once and in order."""
     return len(rows) == 0 or bool(rows[0] >= 0 and rows[-1] < count and (np.diff(rows) > 0).all())
+
+
+def _bytes_of_case(section: Section) -> int:
+    """What a case of a section takes in a shard."""
+    program = section.prepared.program
+    rows = section.prepared.experiment.structure.schedule.rows if section.recorded else 0
+    return np.dtype(float).itemsize * (len(program.outputs) + rows * program.columns)
 
 
 def _fits(section: Section, found: shard.Shard) -> bool:

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from met.files import is_count, new_file, open_regular, parse_json
+from met.files import is_count, memory, new_file, open_regular, parse_json
 from met.frozen import frozen
 from met.run import FAILED, LOST, TIMED_OUT
 
@@ -33,6 +33,9 @@ MAGIC = b"MET shard 1\n"
 SUM = hashlib.sha256
 SUM_BYTES = SUM().digest_size
 TYPES: dict[str, np.dtype[Any]] = {"f8": np.dtype("<f8"), "f4": np.dtype("<f4")}
+
+HEAD_BYTES = 64 << 20
+"""Of what a shard holds besides its arrays: why cases were not run takes most."""
 
 
 class Unsound(Exception):
@@ -94,10 +97,14 @@ def write(path: Path, shard: Shard) -> None:
         raise
 
 
-def read(path: Path) -> Shard:
-    """The shard in a file; its arrays may be written to. Raises Unsound, OSError."""
+def read(path: Path, most: int | None = None) -> Shard:
+    """The shard in a file; its arrays may be written to. most: bytes of them that there may be. Raises Unsound,
+    OSError."""
     with open_regular(path) as file:
-        data = bytearray(os.fstat(file.fileno()).st_size)
+        size = os.fstat(file.fileno()).st_size
+        if size > (memory() if most is None else most + HEAD_BYTES):
+            raise Unsound("is larger than its cases make it")
+        data = bytearray(size)
         got = file.readinto(data)
     if got < len(data) or len(data) < len(MAGIC) + 8 + SUM_BYTES:
         raise Unsound("is cut short")

@@ -44,12 +44,20 @@ def open_regular(path: str | os.PathLike[str]) -> BufferedReader:
 
 
 def read_regular(path: str | os.PathLike[str], most: int | None = None) -> bytes:
-    """All of a regular file. most: bytes that it may have. Raises OSError."""
+    """All of a regular file. most: bytes that it may have; where it is not given, what memory has room for. Raises
+    OSError."""
+    limit = memory() if most is None else most
     with open_regular(path) as file:
-        data = file.read() if most is None else file.read(most + 1)
-    if most is not None and len(data) > most:
-        raise OSError(errno.EFBIG, f"it has more than {most >> 20} MiB", os.fspath(path))
+        large = os.fstat(file.fileno()).st_size > limit  # a file of holes may be larger than any disk
+        data = b"" if large else file.read() if most is None else file.read(most + 1)
+    if large or len(data) > limit:
+        raise OSError(errno.EFBIG, f"it has more than {limit >> 20} MiB", os.fspath(path))
     return data
+
+
+def memory() -> int:
+    """Bytes of a file that is read as a whole, at most: who reads it takes several times as much of this machine's."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 4
 
 
 def new_file(path: str | os.PathLike[str]) -> BufferedWriter:

@@ -57,6 +57,13 @@ def test_no_more_is_read_than_was_allowed(tmp_path: Path) -> None:
         files.read_regular(tmp_path / "a", most=2 << 20)
 
 
+def test_a_file_of_holes_that_is_larger_than_the_memory_is_not_read(tmp_path: Path) -> None:
+    with open(tmp_path / "a", "wb") as file:
+        file.truncate(4 * files.memory())
+    with pytest.raises(OSError, match=r"it has more than [0-9]+ MiB"):
+        files.read_regular(tmp_path / "a")
+
+
 @pytest.mark.parametrize("text", [
     "[" * 100_000, '{"a":' * 100_000, "1" * 30, "-" + "9" * 5000, "NaN", "-Infinity", "1e999", "{", b"\xff", "",
 ])  # fmt: skip

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import batch
-from batch.folder import beside
+from batch.folder import Folder, beside
 from hw.transcript import read
 from met import plan_file
 from met.diagnostic import Problem
@@ -137,6 +137,23 @@ def test_a_pipe_in_the_place_of_a_shard_counts_as_none(campaign: Path) -> None:
     assert f"shard {first.name} cannot be read: it is a named pipe, not a regular file; its 8 cases are run again" in (
         notes
     )
+
+
+def test_a_shard_with_a_hole_of_a_terabyte_counts_as_none(campaign: Path) -> None:
+    first = sorted((campaign / "shards").iterdir())[0]
+    os.truncate(first, 1 << 40)
+    _, notes = go_on(Path("a.h5"))
+    assert f"shard {first.name} is larger than its cases make it; its 8 cases are run again" in notes
+
+
+def test_rows_with_a_hole_of_a_terabyte_are_damaged(
+    here: Path, engine: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short_tasks(monkeypatch)
+    begin(Path("a.h5"), cases=list(range(30)))
+    os.truncate("a.h5.campaign/rows.0.npy", 1 << 40)
+    with pytest.raises(Problem, match=r"a\.h5\.campaign/rows\.0\.npy is damaged"):
+        Folder(Path("a.h5.campaign")).sections()
 
 
 def test_a_folder_in_the_place_of_a_shard_counts_as_none(campaign: Path) -> None:

@@ -146,7 +146,7 @@ def test_an_interrupt_while_shards_are_found_keeps_them(archive: Path, monkeypat
     monkeypatch.setattr(performing, "WORTH_SECONDS", 1e-9)
     kept = begin(archive)
     with monkeypatch.context() as patch:
-        patch.setattr(shard, "read", lambda _: whole.interrupt())
+        patch.setattr(shard, "read", lambda *_: whole.interrupt())
         with pytest.raises(KeyboardInterrupt):
             batch.run(plan(), output=archive)
     assert whole.shards(archive) == kept
