@@ -99,8 +99,9 @@ def _check_output(output: Path, plan: Plan) -> None:
         what = "is a file, not a folder" if output.parent.exists() else "does not exist"
         helps = () if output.parent.exists() else f"make it first: `mkdir -p {quoted(output.parent)}`"
         raise Problem(error("E305", f"cannot write {output}: {output.parent} {what}", help=helps))
-    if output.exists() and not output.is_file():
-        raise Problem(error("E305", f"cannot write {output}: it is not a regular file"))
+    for target in (output, sidecar_path(output)):
+        if target.exists() and not target.is_file():
+            raise Problem(error("E305", f"cannot write {target}: it is not a regular file"))
     if output.exists() and output.stat().st_size > 0 and not is_archive(output):
         helps = "give another name with `-o`, or remove the file"
         raise Problem(error("E305", f"{output} exists and is no archive of MET: it is not written over", help=helps))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -65,7 +66,7 @@ def run_and_tell(
     if names_archive(source):
         again = replay(source, names, cases, failed, everything)
         archive = archive or again.output
-        if archive.resolve() == Path(source).resolve():
+        if os.path.realpath(archive) == os.path.realpath(source):  # Path.resolve has an error for a link to itself
             helps = "`-o FILE` names another place"
             raise Problem(error("E305", f"cannot write {archive}: it is what is run again", help=helps))
         campaign = prepare(

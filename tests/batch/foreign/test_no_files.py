@@ -202,6 +202,23 @@ def test_a_pipe_in_the_place_of_a_sidecar_is_as_if_there_were_none(archive: Path
     assert (said.status, said.text) == (0, "a.h5 is whole: 7 cases\n")
 
 
+def test_a_pipe_in_the_place_of_a_sidecar_is_not_replaced(here: Path, engine: None) -> None:
+    os.mkfifo("a.h5.run.json")
+    with pytest.raises(Problem) as caught:
+        batch.run(plans.plan(), output="a.h5")
+    assert render(caught.value.diagnostics) == (
+        "error[E305]: cannot write a.h5.run.json: it is not a regular file\n\n1 error\n"
+    )
+
+
+@pytest.mark.slow
+def test_an_archive_in_the_place_of_a_link_to_itself_is_written(archive: Path, here: Path) -> None:
+    Path("a.h5").symlink_to("a.h5")
+    said = met("run", str(archive), "open", "--case", "#0", "-o", "a.h5", "--no-picture")
+    assert said.status == 0, said.text
+    assert Path("a.h5").is_file() and not Path("a.h5").is_symlink()
+
+
 def test_a_link_in_the_place_of_a_campaigns_rows_is_not_written_through(
     here: Path, engine: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
