@@ -80,7 +80,7 @@ def identify_and_tell(
     sheet = sheet_of(which.experiment, which.joint, kt_load)
     deck = Path(output or f"{which.joint}.identified.ic")
     records = deck.with_suffix(".records")
-    _check_output(deck)
+    _check_output(deck, records)
     _check_sheet(sheet, which.joint)
     if which.simulated is None and not sheet.said:
         message = f"joint `{which.joint}`: the load motor's constant, by which torques are measured, is nowhere said"
@@ -116,13 +116,15 @@ def _check_sheet(sheet: Sheet, joint: str) -> None:
             raise Problem(error("E424", message, help=helps))
 
 
-def _check_output(deck: Path) -> None:
-    """Raises Problem E305 where the deck would not be written, or over another."""
+def _check_output(deck: Path, records: Path) -> None:
+    """Raises Problem E305 where the deck would not be written, or over another, or the records over what is no file."""
     wrong, helps = "", "give another name with `-o`"
     if deck.suffix != ".ic":
         wrong, helps = f"cannot write {deck}: it is to be a deck, which ends in .ic", f"`-o {deck.with_suffix('.ic')}`"
     elif os.path.lexists(deck):
         wrong, helps = f"{deck} is there already: it is not written over", f"{helps}, or remove it"
+    elif os.path.lexists(records) and (records.is_symlink() or not records.is_file()):
+        wrong = f"cannot write {records}: it is not a regular file"
     elif not deck.parent.is_dir():
         wrong, helps = f"cannot write {deck}: {deck.parent} does not exist", f"make it first: `mkdir -p {deck.parent}`"
     if wrong:

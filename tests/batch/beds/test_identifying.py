@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -56,6 +57,21 @@ def identify(met_bed: Callable[..., tuple[int, str, str]]) -> Callable[..., tupl
 
 def wired() -> Experiment:
     return ic.compile("deck.ic", select=["wired"]).experiments[0]
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("deck.ic", path)])
+def test_what_is_no_file_in_the_place_of_the_records_is_left_there(
+    identify: Callable[..., tuple[int, str, str]], make: Callable[[str], None]
+) -> None:
+    make("shoulder.identified.records")
+    before = os.lstat("shoulder.identified.records").st_mode
+    status, _, complaint = identify("--port", "emulated")
+    assert status == cli.BAD_INPUT and complaint == (
+        "error[E305]: cannot write shoulder.identified.records: it is not a regular file\n"
+        " = help: give another name with `-o`\n"
+        "\n1 error\n"
+    )
+    assert os.lstat("shoulder.identified.records").st_mode == before
 
 
 def test_the_deck_that_is_written_holds_the_truth_and_can_be_included(
