@@ -1,0 +1,89 @@
+"""How a block of the deck language is declared: what may stand in it, as models declare their parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+from met.frozen import frozen
+from met.parameter import Parameter
+
+Varies = Literal["number", "choice", "never"]
+"""What a sweep may do with an entry: vary it over numbers, choose one of several (each makes a program of its own), or
+nothing; what stands inside a block or a model may vary by itself all the same."""
+
+
+@frozen(kw_only=True)
+class Entry:
+    """What may stand in a block: a key (`mass = 2 kg;`, `rates { ... }`), something with a name of the deck's
+    (`payload NAME { ... }`), or a statement (`require ...;`).
+
+    name       the word it begins with
+    form       "key", "named" or "statement"
+    written    how a deck writes it
+    doc        what it is, in a few words
+    default    what holds where it is left out, in words; `needed` where it may not be
+    parameter  its type, unit and bounds, where it is a number, numbers or a word
+    varies     what a sweep may do with it;  path: what sweeps and `--set` call it; "" where they do not
+    """
+
+    name: str
+    form: Literal["key", "named", "statement"] = "key"
+    written: str
+    doc: str
+    default: str = "needed"
+    parameter: Parameter | None = None
+    varies: Varies = "never"
+    path: str = ""
+
+    @property
+    def unit(self) -> str:
+        """Its unit; "" where it is no number."""
+        if self.parameter is None or self.parameter.shape in ("word", "words"):
+            return ""
+        return self.parameter.unit
+
+
+@frozen(kw_only=True)
+class Block:
+    """A block of the deck language.
+
+    name     the word it begins with;  written: how a deck writes it;  within: the block that it stands in, "" for a
+             deck's own definitions
+    doc      what it is, in a sentence
+    head     the first word of the paths of what stands in it, such as `links`; "" where that is a name of the deck's
+    free     what else may stand in it under names of the deck's or of models, in words
+    """
+
+    name: str
+    written: str
+    within: str = ""
+    doc: str
+    entries: tuple[Entry, ...] = ()
+    head: str = ""
+    free: str = ""
+
+    def __getitem__(self, name: str) -> Entry:
+        """The entry of that name. Raises KeyError."""
+        for entry in self.entries:
+            if entry.name == name:
+                return entry
+        raise KeyError(name)
+
+    def _of(self, form: str) -> Iterator[str]:
+        return (entry.name for entry in self.entries if entry.form == form)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The names of its keys, in order."""
+        return tuple(self._of("key"))
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The words of what has a name of the deck's in it, in order."""
+        return tuple(self._of("named"))
+
+    @property
+    def statements(self) -> tuple[str, ...]:
+        """The words of its statements, in order."""
+        return tuple(self._of("statement"))

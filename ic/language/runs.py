@@ -1,0 +1,162 @@
+"""What a deck says of a run and of a sweep."""
+
+from __future__ import annotations
+
+from ic.language.declaration import Block, Entry
+from met.parameter import Parameter
+
+DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
+SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")
+VELOCITY_PRODUCTS = Parameter(name="velocity_products", shape="word", words=("on", "off"), default="on",
+                              doc="Coriolis, centrifugal and gyroscopic torques")  # fmt: skip
+BALANCED = Parameter(name="servos", shape="word", words=("unloaded", "balanced"), default="unloaded",
+                     doc="whether servos begin with what keeps their joints from accelerating")  # fmt: skip
+BASE_KINDS = ("fixed", "prescribed", "free")
+BED, LAW = "emulated", "velocity_tracking"
+"""The models of a bed and of its law where a deck names none."""
+
+
+def _rate(name: str, doc: str, default: str) -> Entry:
+    return Entry(name=name, written=f"{name} = 500 Hz;", default=default, varies="choice", path=f"rates.{name}",
+                 parameter=Parameter(name=name, unit="Hz", above=0.0, doc=doc), doc=doc)  # fmt: skip
+
+
+RATES = Block(
+    name="rates",
+    written="rates { ... }",
+    within="run",
+    head="rates",
+    doc="How often what is computed; each rate divides a common base rate.",
+    entries=(
+        _rate("dynamics", "steps of the arm's motion", "needed"),
+        _rate("servos", "ticks of the servos that write no `rate` of their own, or `continuous`",
+              "needed where there are such"),
+        _rate("record", "recorded rows", "that of the dynamics"),
+        _rate("base", "the common rate that all others divide", "the fastest of the others"),
+    ),
+)  # fmt: skip
+
+INITIAL = Block(
+    name="initial",
+    written="initial { ... }",
+    within="run",
+    head="initial",
+    doc="The state at the start.",
+    entries=(
+        Entry(name="q", written="q = 0 rad;", default="0", varies="number", path="initial.JOINT.q",
+              doc="position of every joint, or of one: `swing.q = 5 deg;`"),
+        Entry(name="qd", written="qd = 0 rad/s;", default="0", varies="number", path="initial.JOINT.qd",
+              doc="rate of every joint, or of one"),
+        Entry(name="servos", written="servos = balanced;", default="`unloaded`", parameter=BALANCED, varies="choice",
+              path="initial.servos", doc=BALANCED.doc),
+    ),
+    free="`base.position`, `base.rpy`, `base.velocity` and `base.rate` of a base that is free",
+)  # fmt: skip
+
+ENVIRONMENT = Block(
+    name="environment",
+    written="environment { ... }",
+    within="run",
+    head="environment",
+    doc="What acts on the arm from outside.",
+    entries=(
+        Entry(name="velocity_products", written="velocity_products = off;", default="`on`",
+              parameter=VELOCITY_PRODUCTS, varies="choice", path="environment.velocity_products",
+              doc=VELOCITY_PRODUCTS.doc),
+    ),
+    free="`NAME = MODEL { ... }`: models, `met doc environment`; none act unless they are written",
+)  # fmt: skip
+
+SUBSTITUTE = Block(
+    name="substitute",
+    written="substitute JOINT { ... }",
+    within="run",
+    doc="Puts the motor of a joint on a motor bed. The servo stays what it is; what its motor does is the bed's.",
+    entries=(
+        Entry(name="bed", written="bed = MODEL(...);", default=f"`{BED}`", varies="choice", path="JOINT.bed",
+              doc="the model of the bed; `met doc beds`"),
+        Entry(name="law", written="law = MODEL(...);", default=f"`{LAW}`", varies="choice", path="JOINT.law",
+              doc="how the load motor is driven, one for all substituted joints; `met doc laws`"),
+    ),
+)  # fmt: skip
+
+TOLERANCES = Block(
+    name="tolerances",
+    written="tolerances { ... }",
+    within="run",
+    head="tolerances",
+    doc="By how much another version may differ before `met diff` says so.",
+    entries=(
+        Entry(name="rel", written="rel = 1e-9;", default="none: not in a bit", doc="a share of every value"),
+        Entry(name="time", written="time = 1 ms;", default="none", doc="how much earlier or later"),
+    ),
+    free="`NAME = SIZE;` of a signal, `qd`, a joint's part of one, `elbow.q`, or a metric",
+)  # fmt: skip
+
+RUN = Block(
+    name="run",
+    written="run NAME { ... }",
+    doc="Everything that one simulation needs.",
+    entries=(
+        Entry(name="arm", written="arm = NAME;", varies="choice", path="arm", doc="the arm"),
+        Entry(name="base", written="base = fixed;", default="`fixed`", varies="choice", path="base",
+              doc="`fixed`, `free`, or `prescribed { ... }`: how the base moves; see below"),
+        Entry(name="servos", written="servos { JOINT = SERVO; }", default="none: a joint without one is free",
+              varies="choice", path="JOINT.servo",
+              doc="servos on joints; `SERVO { ... }` overrides for this joint"),
+        Entry(name="guide", form="named", written="guide NAME = MODEL { ... }", default="none", path="guides.NAME",
+              doc="commands several joints together; see below"),
+        Entry(name="substitute", form="named", written="substitute JOINT { ... }", default="none",
+              doc="puts the joint's motor on a motor bed; see below"),
+        Entry(name="sensor", form="named", written="sensor NAME = MODEL { ... }", default="none",
+              path="sensors.NAME", doc="a sensor on a link; see below"),
+        Entry(name="payload", form="named", written="payload NAME { ... }", default="none", path="payloads.NAME",
+              doc="a body that a link carries, grapples or releases; see below"),
+        Entry(name="initial", written="initial { ... }", default="0, `unloaded`",
+              doc="`q` and `qd` of all joints or one: `swing.q = 5 deg;` whether servos begin `balanced`"),
+        Entry(name="environment", written="environment { ... }", default="no gravity; velocity products on",
+              doc="gravity, models, `velocity_products`"),
+        Entry(name="rates", written="rates { ... }", default="`dynamics` is needed; see below",
+              doc="`dynamics`, `servos`, `record`, `base`"),
+        Entry(name="integrator", written="integrator = NAME;", default="`modified_euler`", varies="choice",
+              path="integrator", doc="`modified_euler`, `midpoint`, `semi_implicit_euler`, `rk4`"),
+        Entry(name="duration", written="duration = 3 s;", parameter=DURATION, varies="choice", path="duration",
+              doc="a whole number of steps of the dynamics"),
+        Entry(name="record", written="record = [...];", default="needed; `[]` keeps metrics alone",
+              doc="channels to keep"),
+        Entry(name="metric", form="named", written="metric NAME = MODEL { ... }", default="none",
+              path="metrics.NAME", doc="one number of a case"),
+        Entry(name="require", form="statement", written="require METRIC < LIMIT;", default="none",
+              doc="a limit that counts for the exit code; also `<=`, `>`, `>=`"),
+        Entry(name="tolerances", written="tolerances { ... }", default="none: not in a bit",
+              doc="by how much another version may differ before `met diff` says so"),
+        Entry(name="seed", written="seed = 7;", default="0", parameter=SEED, path="seed",
+              doc="seed of the run's noise, which sensors and a bed's tachometer have"),
+    ),
+)  # fmt: skip
+
+SWEEP = Block(
+    name="sweep",
+    written="sweep NAME of RUN { ... }",
+    doc="What of a run varies. The cases are the product of its axes.",
+    entries=(
+        Entry(name="vary", form="statement", written="vary PATH = LIST;", default="none",
+              doc="an axis: one case or more for each value"),
+        Entry(name="zip", form="statement", written="zip { PATH = LIST;  PATH = LIST; }", default="none",
+              doc="an axis of several parameters in step, as many values each"),
+        Entry(name="from", form="statement", written='from "cases.csv";', default="none",
+              doc="an axis of the rows of a file"),
+        Entry(name="sample", form="statement", written="sample DESIGN(COUNT) { PATH = DISTRIBUTION; }",
+              default="none", doc="an axis of values drawn at random"),
+        Entry(name="repeat", form="statement", written="repeat COUNT;", default="none",
+              doc="each case so many times, with noise of its own"),
+        Entry(name="exclude when", form="statement", written="exclude when CONDITION;", default="none",
+              doc="leaves out the cases for which it holds"),
+        Entry(name="seed", written="seed = 7;", default="the run's", parameter=SEED,
+              doc="of the noise, and of what is drawn"),
+        Entry(name="seeds", written="seeds = independent;", default="`common`",
+              doc="each case has noise of its own, not that of its position alone",
+              parameter=Parameter(name="seeds", shape="word", words=("common", "independent"), default="common",
+                                  doc="whether each case has noise of its own")),
+    ),
+)  # fmt: skip

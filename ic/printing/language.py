@@ -1,0 +1,120 @@
+"""What `met doc run` and the like say, and the tables of docs/deck.md: the blocks of the deck language, as declared.
+
+`python -m ic.printing.language` writes the tables of docs/deck.md anew.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ic.language import BLOCKS, Block, Entry
+from ic.printing.columns import columns, exactly
+from met.parameter import Parameter
+
+PAGE = Path(__file__).parents[2] / "docs" / "deck.md"
+MARK = "<!-- table of {} -->"
+"""What stands above a table of docs/deck.md that is made here, with the block's name."""
+
+
+def print_block(block: Block) -> Iterator[str]:
+    """The page of a block, for a terminal."""
+    yield f"{block.name}: {_plain(block.doc)}"
+    yield ""
+    yield f"In a deck: {block.written}" + (f", in {_an(block.within)}" if block.within else "")
+    yield ""
+    told = [(each.written, default(each), _plain(each.doc)) for each in block.entries]
+    yield from columns([("written", "default", "meaning"), *told])
+    if block.free:
+        yield ""
+        yield f"Also {_plain(block.free)}."
+    numbers = [each for each in block.entries if each.parameter is not None]
+    if numbers:
+        yield ""
+        yield from columns([("type", "", ""), *((each.name, type_of(each), _bounds(each.parameter)) for each in numbers)])
+    varying = [(each.path, _varies(each)) for each in block.entries if each.path and each.varies != "never"]
+    if varying:
+        yield ""
+        yield "In a sweep, and by `--set`"
+        yield from columns(varying)
+
+
+def block_json(block: Block) -> list[dict[str, Any]]:
+    """The entries of a block, for programs."""
+    return [
+        {
+            "name": each.name, "form": each.form, "written": each.written, "doc": each.doc, "default": each.default,
+            "type": type_of(each), "unit": each.unit, "varies": each.varies, "path": each.path,
+        }
+        for each in block.entries
+    ]  # fmt: skip
+
+
+def table(block: Block) -> Iterator[str]:
+    """The block's entries as a table in Markdown."""
+    by_key = block.within and not block.named and not block.statements
+    yield f"| {'key' if by_key else 'entry'} of {_an(block.name)} | is | default |"
+    yield "|---|---|---|"
+    for each in block.entries:
+        first = each.name if by_key else each.written
+        yield f"| `{first}` | {each.doc} | {each.default} |"
+    if block.free:
+        yield f"| others | {block.free} | |"
+
+
+def type_of(entry: Entry) -> str:
+    """What an entry takes, in words: `number, kg`, `3 numbers, m`, `on or off`; "" where it is no value."""
+    wanted = entry.parameter
+    if wanted is None:
+        return ""
+    if wanted.shape == "word":
+        return " or ".join(wanted.words)
+    kind = {"vector": "3 numbers", "list": "numbers"}.get(wanted.shape, "number")
+    return f"{kind}, {wanted.unit}" if wanted.unit != "1" else kind
+
+
+def default(entry: Entry) -> str:
+    """What holds where an entry is left out, without the marks of Markdown."""
+    return _plain(entry.default)
+
+
+def _bounds(wanted: Parameter | None) -> str:
+    if wanted is None:
+        return ""
+    above = f"above {exactly(wanted.above)}" if wanted.above is not None else ""
+    least = f"at least {exactly(wanted.at_least)}" if wanted.at_least is not None else ""
+    return above or least
+
+
+def _varies(entry: Entry) -> str:
+    return "over numbers" if entry.varies == "number" else "over choices, each a program of its own"
+
+
+def _an(name: str) -> str:
+    return f"{'an' if name[0] in 'aeio' else 'a'} {name}"
+
+
+def _plain(text: str) -> str:
+    """Without what points to another place of a page."""
+    return text.replace("; see below", "")
+
+
+def with_tables(text: str) -> str:
+    """The page with each table that has a mark above it made anew. Raises KeyError where a mark names no block."""
+
+    def made(match: re.Match[str]) -> str:
+        return f"{match[1]}\n" + "".join(f"{line}\n" for line in table(BLOCKS[match[2]]))
+
+    mark = re.escape(MARK).replace(r"\{\}", r"(\w+)")
+    return re.sub(rf"({mark})\n(?:\|.*\n)*", made, text)
+
+
+def main() -> None:
+    PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    print(f"wrote {PAGE}")
+
+
+if __name__ == "__main__":
+    main()
