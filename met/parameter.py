@@ -47,6 +47,7 @@ class Parameter:
     less_than    of a number: the parameter that it is less than, in every case
     rises        of a list: its numbers rise, and there is one at least
     share        of a number: part of a whole, which is seldom above 1; a bare number above that is warned of
+    ticks        of a frequency: how often something is done, which turns no angle: 1/s is as plain there as Hz
     as_many_as   of a list: the list that it has a number for each of; it may be empty where that is its default
     """
 
@@ -72,6 +73,7 @@ class Parameter:
     less_than: str = ""
     rises: bool = False
     share: bool = False
+    ticks: bool = False
     as_many_as: str = ""
     only: Only | None = None
 

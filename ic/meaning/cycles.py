@@ -35,6 +35,8 @@ def doubt(value: Value, text: str, wanted: Measure) -> Doubt | None:
     if value.hertz is None:
         return None
     if value.hertz != wanted.hertz:
+        if mine.rad and mine == declared and not (mine.kg or mine.m or mine.A or mine.K):
+            return None  # an angle times a frequency: 15 deg * 2 Hz
         if wanted.hertz:
             return _no_hertz(value) if mine == declared == _RATE and not value.hertz else None
         if declared.rad:

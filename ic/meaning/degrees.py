@@ -10,7 +10,7 @@ from ic.grammar.syntax import Call, Deck, Entry, Expression, Group, Number, chil
 from ic.meaning.complaints import Complaints
 from ic.meaning.names import Names
 from ic.meaning.resolve import Definitions
-from ic.meaning.values import PURE, Value, place_of
+from ic.meaning.values import Value, place_of
 from met.diagnostic import Problem
 from met.trace import Scalar
 
@@ -28,7 +28,7 @@ def remark_degrees(deck: Deck, definitions: Definitions, complaints: Complaints)
             found = names.evaluate(argument)
         except Problem:
             continue  # it is told where the value is used
-        if not isinstance(found, Value) or found.dimension != PURE or found.hertz is None:
+        if not isinstance(found, Value) or not found.bare or found.hertz is None:
             continue
         if isinstance(found.number, Scalar) or abs(found.number) <= 2.0 * math.pi:
             continue

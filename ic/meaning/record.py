@@ -267,10 +267,15 @@ def _is_metric(expression: Expression, metrics: set[str]) -> bool:
     return isinstance(expression, Name) and expression.text in metrics
 
 
+def share_metrics(structure: Structure) -> set[str]:
+    """The metrics that are a share of something, such as an overshoot."""
+    return {use.name for use in structure.metrics if models.find("metric", use.model, use.place).share}
+
+
 def resolve_requirements(scope: Scope, read: list[Comparison], structure: Structure) -> tuple[Requirement, ...]:
     """The requirements with their limits in SI."""
     metrics = metric_units(structure)
-    shares = {use.name for use in structure.metrics if models.find("metric", use.model, use.place).unit == "1"}
+    shares = share_metrics(structure)
     found = []
     for each in read:
         if each.metric not in metrics:

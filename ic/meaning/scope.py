@@ -460,12 +460,7 @@ class Scope:
         text, dimension = self.unit(owner, wanted)
         if units.same(value.dimension, dimension):
             self._remark_cycles(owner, wanted, value, text)
-            if wanted.share and value.bare and not isinstance(value.number, Scalar) and abs(value.number) > 1.0:
-                number = f"{value.number:.12g}"
-                self.complaints.warn(
-                    "D307", f"{owner.what(wanted)} is a share, and {number} is {100.0 * value.number:.12g} %",
-                    value.place, help=[f"if per cent are meant, write `{number} %`",
-                                       f"if that is meant, write `{100.0 * value.number:.12g} %`"])
+            self._remark_share(owner, wanted, value)
             return
         what = owner.what(wanted)
         also = self.names.label(value)
@@ -502,10 +497,30 @@ class Scope:
 
     def _remark_cycles(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> None:
         """Tells of a unit that may mean cycles where radians count, or the reverse."""
+        if wanted.ticks:
+            return
         found = doubt(value, text, measure_here(wanted.unit, owner.joint, owner.command, owner.of))
         if found is not None:
             self.complaints.warn("D305", f"{owner.what(wanted)} is {found.taken}", value.place,
                                    also=self.names.label(value), help=found.helps)
+
+    def _remark_share(self, owner: Owner, wanted: Parameter, value: Value) -> None:
+        """Tells of a bare number above 1 where a share is meant, which may have been meant in per cent."""
+        if not wanted.share or not value.bare:
+            return
+        number = value.number
+        if isinstance(number, Scalar):
+            found = (each.values for each in self.varied.values() if each.value.number is value.number)
+            number = max(next(found, np.zeros(1)).tolist(), key=abs, default=0.0)
+        if abs(number) <= 1.0:
+            return
+        shown, per_cent = f"{number:.12g}", f"{100.0 * number:.12g} %"
+        helps = [f"if per cent are meant, write `{shown} %`", f"if that is meant, write `{per_cent}`"]
+        if isinstance(value.number, Scalar):
+            helps = ["if per cent are meant, write `%` behind the values",
+                     f"if that is meant, write the values in per cent, such as `{per_cent}`"]
+        self.complaints.warn("D307", f"{owner.what(wanted)} is a share, and {shown} is {per_cent}", value.place,
+                             help=helps)
 
     def _other(self, owner: Owner, wanted: Parameter, value: Value) -> list[str]:
         """The one optional parameter of the model that a number with this unit may be meant for."""

@@ -43,7 +43,8 @@ APART, DIGITS = 1e-9, 1e-5
 """Positions are the same place within APART (rad or m: far above rounding of a deck's numbers, far below what anyone
 sees) and a unit of the sixth digit: so many are printed, and a position that was copied from there is the one meant."""
 
-RATE = Parameter(name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, doc="how often the servo's computer ticks")
+RATE = Parameter(name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, ticks=True,
+                 doc="how often the servo's computer ticks")
 NOT_PARAMETERS = ("model", "command", "rate")
 ASKED: Mapping[str, Mapping[str, str]] = MappingProxyType({
     "revolute": {"rate": "0.03 rad/s", "position": "30 deg", "torque": "2 N*m", "acceleration": "0.1 rad/s^2"},

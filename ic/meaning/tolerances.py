@@ -6,6 +6,7 @@ from ic.grammar.spell import spell
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
 from ic.meaning.owner import Owner
+from ic.meaning.record import share_metrics
 from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
 from met.channel import recordable
@@ -47,7 +48,8 @@ def _tolerance(
         return None
     path = f"tolerances.{name}"
     owner = Owner("the tolerances", item.place, "tolerances", called=f"the tolerance of `{name}`")
-    wanted = Parameter(name=name, unit=known[name][0], at_least=0.0, doc="what a diff allows")
+    wanted = Parameter(name=name, unit=known[name][0], at_least=0.0, doc="what a diff allows",
+                       share=name == "rel" or name in share_metrics(structure))
     size = scope.number(owner, wanted, item, record=False)
     if isinstance(size, Scalar):
         at = scope.varied[path].place if path in scope.varied else place_of(item.value)

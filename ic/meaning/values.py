@@ -119,9 +119,19 @@ def _leaf(expression: Expression, lookup: Lookup) -> Value | Values:
 
 def _number(number: Number) -> Value:
     if number.unit is None:
-        return Value(_sound(number.value, number.place), PURE, number.place, bare=True, decimal=number.text)
+        hertz = None if _of_pi(number.text) else 0
+        return Value(_sound(number.value, number.place), PURE, number.place, True, decimal=number.text, hertz=hertz)
     place = spanned(number.place, number.unit.place)
     return _in_unit(Value(number.value, PURE, place, decimal=number.text), number.unit)
+
+
+def _of_pi(decimal: str) -> bool:
+    """Whether a number is pi or 2 pi to the places that are written, rounded or cut off: `3.14`, `6.2832`."""
+    places = decimal.partition(".")[2]
+    if len(places) < 2 or not places.isdigit():
+        return False
+    return any(decimal in (f"{exact:.{len(places)}f}", f"{exact:.{len(places) + 5}f}"[:-5])
+               for exact in (math.pi, 2.0 * math.pi))
 
 
 def _in_unit(value: Value, unit: Unit) -> Value:
@@ -368,11 +378,14 @@ USAGE = {"sqrt": ("x",), "sin": ("x",), "cos": ("x",), "min": ("a", "b"), "max":
 
 
 def _sqrt(call: Call, value: Value) -> Value:
-    if any(exponent % 2 for exponent in value.dimension):
+    exponents = value.dimension
+    if any(exponent % 2 for exponent in exponents):
+        exponents = units.counted(exponents)  # beside a mass or a length a radian counts as one: sqrt(stiffness * j)
+    if any(exponent % 2 for exponent in exponents):
         raise Problem(error("D068", f"the root of {_named(value)} is of no dimension", value.place))
     if not isinstance(value.number, Scalar) and value.number < 0.0:
         raise Problem(error("D066", "the root of a negative number", value.place))
-    dimension = Dimension(*(exponent // 2 for exponent in value.dimension))
+    dimension = Dimension(*(exponent // 2 for exponent in exponents))
     hertz = None if value.hertz is None else value.hertz // 2
     return Value(_plain(sqrt(value.number)), dimension, call.place, hertz=hertz)
 

@@ -19,6 +19,7 @@ class Metric:
     """The declaration of a metric; one a file.
 
     unit    of the result: "of" is the channel's, "s" a time, "1" a pure number
+    share   whether it is part of a whole, seldom above 1: a limit above that without a `%` is warned of
     update  (p, held, x, t, dt) -> new memory: x the channel at time t (s), dt s since the sample before (0 at first)
     result  (p, held, t) -> the metric, at the run's last sample, time t
     """
@@ -26,6 +27,7 @@ class Metric:
     name: str
     doc: str
     unit: str
+    share: bool = False
     parameters: tuple[Parameter, ...] = ()
     memory: tuple[Memory, ...]
     update: Callable[[Any, Any, Real, Real, Real], Mapping[str, Real]]

@@ -33,6 +33,7 @@ METRIC = Metric(
     name="overshoot",
     doc=__doc__,
     unit="1",
+    share=True,
     parameters=(
         Parameter(name="target", unit="of", doc="value to be reached"),
     ),

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from met import models
 from tests.ic.small_decks import check, codes, told
 
 DECK = """\
@@ -78,9 +80,10 @@ DOUBTS = {
     "volts a hertz": (("kp = 0.1 V*s/rad", "kp = {}"), "0.05 V/Hz", "", (0.05, 0.025 / math.pi)),
     "1/mm for an angle over a length": (("ratio = 10 cycle/m", "ratio = {}"), "0.1 1/mm", "", (100.0, 200 * math.pi)),
     "a quotient": (("ratio = 10 cycle/m", "ratio = {}"), "1/(10 mm)", "", (100.0, 200 * math.pi)),
-    "a rate of steps": (("dynamics = 1 kHz", "dynamics = {}"), "1000 1/s", "", ()),
+    "an integral gain of a corner in Hz": (("ki = 1 V/rad", "ki = {}"), "0.1 V*s/rad * 2 Hz", "", (0.2,)),
 }
-PATHS = {"bandwidth": "hinge.servo.bandwidth", "frequency": "hinge.servo.command.frequency", "kp": "lift.servo.kp",
+PATHS = {"ki": "lift.servo.ki",
+         "bandwidth": "hinge.servo.bandwidth", "frequency": "hinge.servo.command.frequency", "kp": "lift.servo.kp",
          "ratio": "lift.servo.ratio"}  # fmt: skip
 
 
@@ -105,13 +108,41 @@ PLAIN = [
     ("kp = 0.1 V*s/rad", "kp = 0.1 V/rpm"), ("kp = 0.1 V*s/rad", "kp = 0.1 V*s"), ("ki = 1 V/rad", "ki = 1 V"),
     ("kt = 0.05 N*m/A", "kt = 0.05 V*s/rad"), ("kt = 0.05 N*m/A", "kt = 0.01 V/rpm"),
     ("dynamics = 1 kHz", "dynamics = 1/(1 ms)"), ("ratio = 10 cycle/m", "ratio = 1 cycle / 5 mm"),
-    ("ratio = 10 cycle/m", "ratio = 100 rad/m"),
+    ("ratio = 10 cycle/m", "ratio = 100 rad/m"), ("dynamics = 1 kHz", "dynamics = 1000 1/s"),
+    ("bandwidth = 5 s^-1", "bandwidth = 6.2832 * 5 Hz"), ("bandwidth = 5 s^-1", "bandwidth = 2 * 3.14 * 5 Hz"),
+    ("bandwidth = 5 s^-1", "bandwidth = 6.28 * quick"), ("bandwidth = 5 s^-1", "bandwidth = quick"),
+    ("bandwidth = 5 s^-1", "bandwidth = 0.02/(4 ms)"), ("ki = 1 V/rad", "ki = 0.1 V*s/rad * 2*pi*1.5 Hz"),
+    ("ratio = 10 cycle/m", "ratio = 2*pi/(5 mm)"), ("ratio = 10 cycle/m", "ratio = 10 rad/(20 mm)"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize("change", PLAIN, ids=lambda change: change[1])
 def test_what_is_plain_is_not_told(tmp_path: Path, change: tuple[str, str]) -> None:
     assert "D305" not in found(tmp_path, change)[0]
+
+
+@pytest.mark.parametrize("written", [
+    "rate(0.1 Hz * 1 cycle)", "rate(15 deg * 2 Hz)", "rate(sine(amplitude = 2*pi*beat*20 deg, frequency = beat))",
+    "acceleration(30 deg/s * beat)", "acceleration(3 deg * (2*pi*beat)^2)", "acceleration(3 deg * beat^2)",
+])  # fmt: skip
+def test_an_angle_times_a_frequency_is_plain(tmp_path: Path, written: str) -> None:
+    command = ("command = position(sine(amplitude = 1 rad, frequency = 1 Hz))", f"command = {written}")
+    assert "D305" not in codes(tmp_path, "let beat = 2 Hz;\n" + deck(command))
+
+
+@pytest.mark.parametrize("written", ["3.15", "6.2", "3.143", "6.29", "31.4"])
+def test_what_is_not_pi_makes_no_cycles_of_hertz(tmp_path: Path, written: str) -> None:
+    assert found(tmp_path, ("bandwidth = 5 s^-1", f"bandwidth = {written} * 5 Hz"))[0] == ["D305"]
+
+
+def test_damping_of_stiffness_and_inertia_is_plain(tmp_path: Path) -> None:
+    text = deck(("arm swing", "let k = 100 N*m/rad;\nlet j = 0.64 kg*m^2;\nlet w0 = 20 rad/s;\narm swing"),
+                ("model = ideal; bandwidth = 5 s^-1; command = position(sine(amplitude = 1 rad, frequency = 1 Hz))",
+                 "model = passive; stiffness = j*w0^2; damping = 2*sqrt(k*j)"))  # fmt: skip
+    compiled = check(tmp_path, text)
+    assert compiled.plan is not None, told(compiled)
+    assert not [each.code for each in compiled.diagnostics if each.code == "D305"]
+    assert compiled.plan.experiments[0].parameters["hinge.servo.damping"].value == pytest.approx(16.0, rel=1e-15)
 
 
 @pytest.mark.parametrize("written", ["quick", "2 * quick", "quick / 2", "-(-quick)", "min(quick, 9 Hz)"])
@@ -148,7 +179,8 @@ def test_a_sine_of_more_than_a_turn_of_bare_radians(tmp_path: Path, written: str
 
 
 @pytest.mark.parametrize("written", [
-    "sin(90 deg)", "sin(6)", "cos(2*pi*9)", "sin(100 rad)", "(sin(0.5) * 90) deg", "sqrt(90)",
+    "sin(90 deg)", "sin(6)", "cos(2*pi*9)", "sin(100 rad)", "(sin(0.5) * 90) deg", "sqrt(90)", "sin(3 1/s * 5 s)",
+    "cos(7 m / 90 cm)", "sin(3 rad/s * 5 s)", "cos(4 * 3.1416)",
 ])  # fmt: skip
 def test_a_sine_that_is_plain(tmp_path: Path, written: str) -> None:
     assert codes(tmp_path, f"let it = {written};\n" + deck()) == []
@@ -175,6 +207,31 @@ def test_the_band_of_a_settling_time_is_a_share_too(tmp_path: Path) -> None:
     seen, helps = found(tmp_path, (LAST[0], metric))
     assert seen == ["D307"]
     assert helps == [("if per cent are meant, write `2 %`", "if that is meant, write `200 %`")]
+
+
+@pytest.mark.parametrize("axis", [
+    "vary metrics.done.band = [1, 2, 5];", "sample random(3) { metrics.done.band = uniform(1.5, 5); }",
+    "zip { metrics.done.band = linspace(1, 5, 3); }",
+])  # fmt: skip
+def test_a_share_that_varies(tmp_path: Path, axis: str) -> None:
+    text = deck((LAST[0], "    metric done = settling_time { of = hinge.q; target = 1 rad; band = 2 %; }\n"))
+    assert codes(tmp_path, text + f"sweep bands of hold {{ {axis} }}\n", select="all") == ["D307"]
+    assert codes(tmp_path, text + f"sweep bands of hold {{ {axis.replace(';', ' %;')} }}\n", select="all") == []
+
+
+@pytest.mark.parametrize(("name", "seen"), [("rel", ["D307"]), ("over", ["D307"]), ("most", [])])
+def test_a_tolerance_that_is_a_share(tmp_path: Path, name: str, seen: list[str]) -> None:
+    size = "5 deg" if name == "most" else "5"
+    change = (LAST[0], LAST[0] + SHARES + f"    tolerances {{ {name} = {size}; }}\n")
+    assert found(tmp_path, change)[0] == seen
+    assert found(tmp_path, (change[0], change[1].replace("5;", "5 %;")))[0] == []
+
+
+def test_a_metric_that_counts_is_no_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = models.find_own("metric") | {"overshoot": replace(models.find("metric", "overshoot"), share=False)}
+    before = models.find_own
+    monkeypatch.setattr(models, "find_own", lambda kind: own if kind == "metric" else before(kind))
+    assert found(tmp_path, (LAST[0], LAST[1].replace("{}", "5")))[0] == []
 
 
 def test_a_mistake_elsewhere_does_not_hide_them(tmp_path: Path) -> None:
