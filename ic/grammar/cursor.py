@@ -54,6 +54,7 @@ class Cursor:
         self.operators = 0
         self.peak = 0
         self.misindented: tuple[Token, Token] | None = None
+        self.unbalanced = False  # whether a brace is missing somewhere, or a bracket too many
 
     @property
     def token(self) -> Token:
@@ -192,3 +193,4 @@ class Cursor:
             elif braces == 0 and rounds <= 0 and self.at > start and self.begins_entry(self.at):
                 return
             self.advance()
+        self.unbalanced = True

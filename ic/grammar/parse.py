@@ -45,7 +45,7 @@ def parse_on(tokens: Sequence[Token], findings: Findings) -> tuple[tuple[Entry, 
     sound = False
     with without_collection(), suppress(GiveUp, Ended):
         parser.entries(entries)
-        sound = not any(each.code == "D022" for each in findings.all)
+        sound = not parser.unbalanced
     return tuple(entries), tuple(parser.wrecks), sound
 
 
@@ -95,6 +95,8 @@ class _Parser(Expressions):
         end = last.expansions[-1].use if last.expansions else last.place
         at = first.expansions[-1].use if first.expansions else first.place
         known = [each.text for each in names[1:] or names]
+        if len(names) == 1 and behind == 1 and tokens[behind:] and tokens[behind].text == "(":  # likewise, misspelt
+            known += [token.text for token in tokens if token.kind == NAME]
         if any(token.kind == BAD for token in tokens):  # a macro's use, perhaps: its arguments may be names
             known += re.findall(r"[A-Za-z_]\w*", last.source.rest_of_line(first.offset if first.source is last.source
                                                                          else last.offset))  # fmt: skip
@@ -128,12 +130,14 @@ class _Parser(Expressions):
             also = [
                 Label(inner.place, f"perhaps this one: the `}}` on line {closing.line} that closes it is indented less")
             ]
+        self.unbalanced = True
         self.tell("D022", f"this `{opening.text}` is not closed", opening, also=also,
                   help=f"write the `{OPENING[opening.text]}` where it ends")  # fmt: skip
         raise Ended
 
     def closes_nothing(self) -> None:
         token = self.advance()
+        self.unbalanced = True
         self.tell("D022", f"this `{token.text}` closes nothing", token, help=_NOT_OPEN)
 
     # entries
@@ -196,6 +200,7 @@ class _Parser(Expressions):
     def not_an_entry(self) -> None:
         token = self.token
         if token.text in (")", "]"):
+            self.unbalanced = True
             self.fail("D022", f"this `{token.text}` closes nothing", token, help=_NOT_OPEN)
         if token.text == "{":
             self.unexpected("a name before the block", help="a block is written `kind name { ... }`")
@@ -345,6 +350,7 @@ class _Parser(Expressions):
             self.advance()
             return
         if token.text in (")", "]"):
+            self.unbalanced = True
             self.fail("D022", f"this `{token.text}` closes nothing", token, help=_NOT_OPEN)
         if token.kind == NAME and self.following.text in ("=", "+=", "{", "."):
             self.tell("D021", "expected `;`", self.behind(self.previous), help=_SEMICOLON)

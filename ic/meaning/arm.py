@@ -13,13 +13,13 @@ from ic.meaning.complaints import belongs, known_words
 from ic.meaning.dh import use_dh
 from ic.meaning.foreign import refused
 from ic.meaning.matter import MATTER_KEYS, use_matter
-from ic.meaning.merge import Block, Item
+from ic.meaning.merge import Block, Item, as_meant
 from ic.meaning.models import check_keys, value_at, word_of
 from ic.meaning.owner import Owner
 from ic.meaning.relations import no_direction
 from ic.meaning.resolve import RESERVED, Definition
 from ic.meaning.scope import Scope
-from met.diagnostic import Label, Place, did_you_mean
+from met.diagnostic import Label, Place, did_you_mean, meant
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import BASE, Joint, Link
@@ -65,6 +65,7 @@ def resolve_arm(scope: Scope, definition: Definition) -> Arm | None:
     for item in block.items.values():
         if item.kind not in ("link", "joint"):
             _stray(scope, item, block)
+    block = as_meant(block, (), ("link", "joint"))
     for statement in block.statements:
         scope.complaints.error("D080", "an arm holds links and joints; this is neither", statement.place,
                                help="move it to the run")
@@ -137,7 +138,9 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str,
         scope.complaints.error("D090", message, place,
                                help=[*(did_you_mean(kind, JOINT_KINDS) if kind else ()),
                                      f"write `joint {item.name} revolute {{ ... }}`, or prismatic, or fixed"])
-        return None
+        kind = meant(kind, JOINT_KINDS) if kind else None
+        if kind is None or (kind != "fixed" and item.body.get("axis") is None and item.body.get("dh") is None):
+            return None
     if item.name in (*RESERVED, BASE):
         scope.complaints.error("D166", f"`{item.name}` begins paths of its own, so no joint may be called so",
                                item.place, help="give the joint another name")

@@ -6,12 +6,12 @@ that name. `+=` appends, `remove` takes away.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field, replace
 
 from ic.grammar.syntax import Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
 from ic.meaning.complaints import Complaints, known_words
-from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error
+from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error, meant
 from met.frozen import frozen
 
 
@@ -250,6 +250,30 @@ def overlay(base: Block, over: Block, complaints: Complaints) -> Block:
 def _of_name(items: Mapping[str, Item], name: str) -> Item | None:
     """The plain entry of a name, else the one that was added with a kind."""
     return items.get(name) or next((item for item in items.values() if item.name == name), None)
+
+
+def as_meant(block: Block, keys: Iterable[str], kinds: Iterable[str]) -> Block:
+    """The block with entries that nobody knows, which is told, under the names that are meant: what is in them is
+    looked at, too, and nothing is missing besides.
+
+    keys, kinds  what the block may have; an entry that it has stays
+    """
+    items: dict[str, Item] = {}
+    keys, kinds, names = tuple(keys), tuple(kinds), [item.name for item in block.items.values() if item.kind]
+    for key, item in block.items.items():
+        near = None
+        if item.kind and item.kind not in kinds:
+            near = meant(item.kind, kinds)
+            item = replace(item, kind=near) if near is not None else item
+        elif not item.kind and item.name not in keys:
+            near = meant(item.name, (*keys, *names))
+            near = near if near in keys else None
+            item = replace(item, name=near) if near is not None else item
+        if near is None or item.key in block.items or item.key in items:
+            items[key] = block.items[key]
+        else:
+            items[item.key] = item
+    return replace(block, items=items)
 
 
 def refuse_pending(block: Block, complaints: Complaints) -> None:

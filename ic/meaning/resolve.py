@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 
 from ic.grammar.syntax import Binary, Call, Deck, Entry, Group, Let, Name, Setting, Word
 from ic.meaning.complaints import Complaints, an, belongs, known_words
@@ -14,7 +15,7 @@ from ic.meaning.csv_files import csv_files
 from ic.meaning.merge import Block, merge, twice
 from ic.robots.files import RobotFiles
 from ic.text.files import library_defines
-from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.diagnostic import Label, Place, Problem, did_you_mean, error, meant
 from met.frozen import frozen
 from met.render import shown_place
 
@@ -58,6 +59,7 @@ class Definitions:
         self._by_kind: dict[str, dict[str, Definition]] = {kind: {} for kind in KINDS}
         self._merged: dict[tuple[str, str], Block] = {}
         self._failed: set[tuple[str, str]] = set()
+        self._meant: dict[tuple[str, str], str] = {}  # by kind and name that there is not, the name that was meant
         self._complaints = complaints
         self._file = deck.file
         for entry in deck.entries:
@@ -75,7 +77,7 @@ class Definitions:
         other = copy(self)
         other.lets = {**self.lets, **{let.name.text: let for let in lets}}
         other._by_kind = {kind: dict(known) for kind, known in self._by_kind.items()}
-        other._merged, other._failed = {}, set()
+        other._merged, other._failed, other._meant = {}, set(), dict(self._meant)
         for each in changed:
             other._by_kind[each.kind][each.name] = each
         return other
@@ -99,6 +101,25 @@ class Definitions:
         raise Problem(error("D041", f"no {kind} `{name.text}`", name.place,
                             help=[*include, known_words(f"{kind}s of this deck", known)]))
 
+    def find_or_meant(self, kind: str, name: Word, complaints: Complaints, *, user: Definition | None = None,
+                      ) -> Definition:
+        """The definition of this name, else the one of the nearest name, which is told: then what it is used with is
+        looked at, too. Raises D041 where there is no near one.
+
+        user  what is like it, which itself is not meant
+        """
+        try:
+            return self.find(kind, name)
+        except Problem as problem:
+            known = [each for each in self._by_kind[kind] if user is None or user.name not in self.homes(
+                self._by_kind[kind][each])]
+            near = meant(name.text, known)
+            if near is None or any(each.code != "D041" for each in problem.diagnostics):
+                raise
+            complaints.add(*problem.diagnostics)
+            self._meant[(kind, name.text)] = near
+            return self._by_kind[kind][near]
+
     def block(self, definition: Definition) -> Block | None:
         """The definition merged with its bases; None where that failed (and was told)."""
         chain: list[Definition] = []
@@ -119,7 +140,7 @@ class Definitions:
             base = None
             if at.group.like is not None:
                 try:
-                    base = self.find(at.kind, _single(at.group.like))
+                    base = self.find_or_meant(at.kind, _single(at.group.like), self._complaints, user=at)
                 except Problem as problem:
                     self._complaints.add(*problem.diagnostics)
                     self._failed.update((d.kind, d.name) for d in chain)
@@ -158,7 +179,8 @@ class Definitions:
         names = [definition.name]
         at = definition
         while at.group.like is not None:
-            base = self._by_kind[at.kind].get(at.group.like.text)
+            like = at.group.like.text
+            base = self._by_kind[at.kind].get(self._meant.get((at.kind, like), like))
             if base is None or base.name in names:
                 break
             names.append(base.name)
@@ -184,19 +206,29 @@ class Definitions:
 
     def _define(self, group: Group) -> None:
         words = list(group.words)
+        if len(words) > 2 and words[1].text in KINDS and meant(words[0].text, ("default",)) is not None \
+                and words[0].text != "default":
+            self._complaints.error("D045", f"no kind of definition `{words[0].text}`", words[0].place,
+                                   help="did you mean `default`?")
+            words[0] = replace(words[0], text="default")
         default = len(words) > 1 and words[0].text == "default"
         if default:
             words.pop(0)
         kind = words[0]
         lower = [word.text.lower() for word in group.words[:2]]
         if kind.text not in KINDS and (lower[0] in KINDS or (lower[0] == "default" and lower[-1] in KINDS)):
-            meant = f"{lower[0]} {lower[-1]}" if lower[0] == "default" else lower[0]
+            written = f"{lower[0]} {lower[-1]}" if lower[0] == "default" else lower[0]
             raise Problem(error("D045", f"no kind of definition `{kind.text}`", kind.place,
-                                help=f"write `{meant}`: the language's words are in lower case"))
+                                help=f"write `{written}`: the language's words are in lower case"))
         if kind.text not in KINDS:
-            raise Problem(error("D045", f"no kind of definition `{kind.text}`", kind.place,
-                                help=[*did_you_mean(kind.text, KINDS), *belongs(kind.text),
-                                      "kinds: arm, servo, run, sweep"]))
+            unknown = error("D045", f"no kind of definition `{kind.text}`", kind.place,
+                            help=[*did_you_mean(kind.text, KINDS), *belongs(kind.text),
+                                  "kinds: arm, servo, run, sweep"])
+            near = meant(kind.text, KINDS)
+            if near is None or len(words) != 2:
+                raise Problem(unknown)
+            self._complaints.add(unknown)  # what is in it is looked at, too
+            kind = replace(kind, text=near)
         if len(words) == 1:
             raise Problem(error("D046", f"this {kind.text} has no name", kind.place,
                                 help=f"write `{kind.text} NAME {{ ... }}`"))

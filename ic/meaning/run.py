@@ -22,7 +22,7 @@ from ic.meaning.guides import (
 )
 from ic.meaning.idle import remark_beginnings, remark_idle, remark_kinds
 from ic.meaning.link_sensors import resolve_link_sensors
-from ic.meaning.merge import Block, Item
+from ic.meaning.merge import Block, Item, as_meant
 from ic.meaning.models import check_keys, find_bare_model, find_model, refuse_values, upon, use_model, word_of
 from ic.meaning.owner import Owner
 from ic.meaning.payloads import check_payloads, resolve_payloads
@@ -65,6 +65,7 @@ KINDS = ("metric", "guide", "sensor", "payload", "substitute")
 BLOCKS = ("servos", "initial", "environment", "rates", "tolerances")
 
 RATES = ("dynamics", "servos", "record", "base")
+ANY_RATE = 1000  # Hz, where the deck's could not be had
 DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
 SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")
 ON_OFF = Parameter(name="velocity_products", shape="word", words=("on", "off"), default="on",
@@ -95,6 +96,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         return None
     run = Owner(f"run `{definition.name}`", definition.place, "")
     _check_entries(scope, block, definition)
+    block = as_meant(block, KEYS, KINDS)
     comparisons = read_requirements(scope, block)
     arm = _arm(scope, run, block.get("arm"))
     integrator = _integrator(scope, block.get("integrator"))
@@ -126,9 +128,8 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         check_rest(scope, use)
         check_start(scope, use)
     schedule, ticks, others = _schedule(scope, run, block, rates, uses, [*guides, *sensors], duration)
-    if schedule is None:
-        return None
-    known = integrator is not None  # else its mistake was told: what depends on it is not looked at, and all else is
+    # else a mistake in one of them was told: what depends on it is not looked at, and all else is
+    known = integrator is not None and "dynamics" in rates
     integrator = integrator or models.find_own("integrator")["modified_euler"]
     check_ticks(scope, substitutions, ticks, schedule)
     check_brakes(scope, substitutions, environment)
@@ -186,7 +187,7 @@ def _keep_settings(scope: Scope, block: Block, arm: Arm, integrator: Any, rates:
     if "rates.base" not in scope.beside:
         scope.setting("rates.base", schedule.base_hz, "Hz", note="the fastest of the rates")
     if "rates.record" not in scope.beside:
-        scope.setting("rates.record", rates["dynamics"].hz, "Hz", note="that of the dynamics")
+        scope.setting("rates.record", schedule.base_hz / schedule.dynamics, "Hz", note="that of the dynamics")
     if "environment.velocity_products" not in scope.beside:
         scope.setting("environment.velocity_products", "on")
     if "initial.servos" not in scope.beside:
@@ -274,7 +275,8 @@ def _arm(scope: Scope, run: Owner, item: Item | None) -> Arm | None:
                                help=f"define `arm NAME like {name} {{ ... }}`, and write `arm = NAME;`")
         return None
     with scope.complaints.gather():
-        return resolve_arm(scope, scope.definitions.find("arm", Word(name, item.value.place)))
+        definition = scope.definitions.find_or_meant("arm", Word(name, item.value.place), scope.complaints)
+        return resolve_arm(scope, definition)
     return None
 
 
@@ -482,7 +484,7 @@ def _rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate]:
 
 def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], uses: list[Use],
               ticking: Sequence[Ticking], duration: float | None,
-              ) -> tuple[Schedule | None, dict[str, Ticks], dict[str, int]]:
+              ) -> tuple[Schedule, dict[str, Ticks], dict[str, int]]:
     """The schedule, when each servo's law acts, and base ticks a tick of guides and of links' sensors, by path."""
     dynamics = rates.get("dynamics")
     rates_item = block.get("rates")
@@ -492,16 +494,18 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
             assert rates_item is not None
             scope.complaints.missing(rates_item.place, ("servos",), "D118", "no rate of the servos",
                                      help="write `servos = 1 kHz;`, or a `rate` in each servo's definition")
-    if dynamics is None or duration is None:
-        return None, {}, {}
+    if dynamics is None:  # which was told: nothing is said of rates, and what does not depend on them is looked at
+        ticks = {use.joint: Ticks(1, continuous=False) for use in uses}
+        return Schedule(ANY_RATE, 1, 1, ANY_RATE), ticks, dict.fromkeys((each.path for each in ticking), 1)
     shared = rates.get("servos")
     own = [rate for rate in (*(use.rate for use in uses), *(each.rate for each in ticking)) if rate is not None]
     others = [rate for rate in (shared, *own) if rate is not None and rate.hz != CONTINUOUS]
     record = rates.get("record") or dynamics
     base = base_rate([dynamics, record, *others], rates.get("base"))
+    item = block.get("duration")
     written = "base" in rates
     schedule = make_schedule(scope.complaints, dynamics, record, base, others, duration,
-                             place_of(block.items["duration"].value or Name((), block.items["duration"].place)),
+                             place_of(item.value or Name((), item.place)) if item is not None else run.place,
                              base_written=written)
     ticks = {}
     everyone = [dynamics, record, *others]

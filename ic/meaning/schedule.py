@@ -105,11 +105,13 @@ def _common(rates: list[Fraction]) -> str | None:
 
 
 def make_schedule(complaints: Complaints, dynamics: Rate, record: Rate, base: Rate, others: list[Rate],
-                  duration: float, duration_place: Place, *, base_written: bool) -> Schedule:
-    """The schedule. Tells what does not fit."""
+                  duration: float | None, duration_place: Place, *, base_written: bool) -> Schedule:
+    """The schedule. Tells what does not fit. duration: of the run, s; None: unknown, which was told."""
     all_rates = [dynamics, record, *others]
     step = divisor(complaints, dynamics, base, all_rates, written=base_written)
     row = step if record == dynamics else divisor(complaints, record, base, all_rates, written=base_written)
+    if duration is None:
+        return Schedule(base.hz, step, row, step * row)
     if duration * base.hz > MOST_TICKS:
         ticks_in_words = f"{min(duration * base.hz, 1e308):.3g}"
         complaints.error("D103", f"a run of {ticks_in_words} ticks of the base rate", duration_place,

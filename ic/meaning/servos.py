@@ -129,7 +129,7 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
         scope.complaints.error("D147", f"`{name}` is a servo model; a servo definition is needed here", place,
                                help=[*include, f"`servo NAME {{ model = {name}; ... }}`, and `{item.name} = NAME;`"])
         return None
-    definition = scope.definitions.find("servo", Word(name, place))
+    definition = scope.definitions.find_or_meant("servo", Word(name, place), scope.complaints)
     block = scope.definitions.block(definition)
     if block is None:
         return None
@@ -180,6 +180,9 @@ def _tell_no_model(scope: Scope, block: Block, owner: Owner, used: Place) -> Non
 def moving_kind(scope: Scope, item: Item, arm: Arm, so: str) -> str | None:
     """The kind of the joint that an entry names; None where it is none or fixed, which was told. so: if it is fixed."""
     kind = arm.kind(item.name) if item.kind in ("", "substitute") else None
+    definition = scope.definitions.of_kind("arm").get(arm.name)
+    if kind is None and definition is not None and scope.complaints.lacks(definition.place):
+        return None  # an entry of the arm could not be read, which may have been this joint
     if kind is None:
         moving = [joint.name for joint in arm.moving]
         scope.complaints.error("D144", f"no joint `{item.name}` in arm `{arm.name}`", item.place,

@@ -300,6 +300,11 @@ def _paths(definitions: Definitions, entry: object) -> list[tuple[str, Place]]:
     return []
 
 
+def paths_of(definitions: Definitions, definition: Definition) -> set[str]:
+    """Everything that a sweep's block varies."""
+    return {path for entry in definition.group.body for path, _ in _paths(definitions, entry)}
+
+
 def _refuse(entry: object, words: list[str], base: str) -> None:
     """Tells that an entry has no business in a sweep."""
     place = entry.place  # type: ignore[attr-defined]  # every entry has one

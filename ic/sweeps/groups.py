@@ -8,14 +8,14 @@ from dataclasses import field, replace
 
 import numpy as np
 
-from ic.grammar.syntax import Deck, Word
+from ic.grammar.syntax import Deck, Expression, Name, Word, children
 from ic.meaning.complaints import Complaints, known_words
 from ic.meaning.experiment import experiment
 from ic.meaning.resolve import Definition, Definitions
 from ic.meaning.run import resolve_run
 from ic.meaning.scope import Scope
 from ic.meaning.stops import check_stops
-from ic.sweeps.axes import Sweep, read_sweep, whole
+from ic.sweeps.axes import Sweep, paths_of, read_sweep, whole
 from ic.sweeps.choices import Choices, put_in
 from ic.sweeps.effects import Effects
 from ic.sweeps.reach import check_coordinates, coordinates, idle
@@ -91,7 +91,7 @@ class _Sweep:
         read = self._read(self.definitions, self.definition)
         sweep = read.sweep
         if self.complaints.faults > before:
-            resolve_run(Scope(read.definitions, self.complaints), read.base)
+            self._tell_the_rest(read)
             return []
         self.read_so_far[()] = read
         found = structures(sweep)
@@ -121,9 +121,25 @@ class _Sweep:
         self._tell_of_idle_choices(sweep, [group for group, _ in made])
         return _numbered(sweep.name, made)
 
+    def _tell_the_rest(self, read: _Read) -> None:
+        """What is wrong in the run, and in entries of the sweep that do not hang on one that could not be read."""
+        sweep = read.sweep
+        if self.source.settings != Settings():  # of which one may set what varies, as was told
+            resolve_run(Scope(read.definitions, self.complaints), read.base)
+            return
+        varied = {each.path: each for each in sweep.varied}
+        scope = Scope(read.definitions, self.complaints, varied, read.graph)
+        resolved = resolve_run(scope, read.base)
+        check_coordinates(scope, complete=resolved is not None)
+        lost = paths_of(read.definitions, self.definition) - set(varied)
+        excludes = [each for each in sweep.excludes if not names_in(each.value) & lost]
+        if resolved is not None and excludes and not self.complaints.lacks(read.base.place):
+            first = np.zeros(1, dtype=np.int64)
+            kept(scope, replace(sweep, excludes=tuple(excludes)), columns(sweep, first), (), 1, resolved.structure)
+
     def _read(self, definitions: Definitions, definition: Definition) -> _Read:
         settings = self.source.settings
-        definitions, base = settings.in_run(definitions, _base(definitions, definition))
+        definitions, base = settings.in_run(definitions, _base(definitions, definition, self.complaints))
         graph = Graph()
         sweep = read_sweep(definitions, self.complaints, definition, graph, seed=_seed_of(definitions, base))
         settings.check_sweep(sweep, self.complaints, definitions)
@@ -215,13 +231,13 @@ def _what_varies(sweep: Sweep) -> list[list[list[str]]]:
             for axis in sweep.axes]
 
 
-def _base(definitions: Definitions, definition: Definition) -> Definition:
+def _base(definitions: Definitions, definition: Definition, complaints: Complaints) -> Definition:
     of = definition.group.of
     assert of is not None  # a sweep without one is no definition
     if len(of.path) > 1:
         raise Problem(error("D059", f"`{of.text}` is a path; the name of a run is needed", of.place,
                             help=f"write `{of.path[0].text}`"))
-    return definitions.find("run", Word(of.text, of.place))
+    return definitions.find_or_meant("run", Word(of.text, of.place), complaints)
 
 
 def _seed_of(definitions: Definitions, run: Definition) -> int:
@@ -232,6 +248,17 @@ def _seed_of(definitions: Definitions, run: Definition) -> int:
         return whole(definitions, item.value, "a seed", least=0) if item is not None and item.value else 0
     except Problem:
         return 0
+
+
+def names_in(expression: Expression) -> set[str]:
+    """The paths that a condition names."""
+    waiting, found = [expression], set()
+    while waiting:
+        part = waiting.pop()
+        waiting += children(part)
+        if isinstance(part, Name):
+            found.add(part.text)
+    return found
 
 
 def _dependents(scope: Scope) -> dict[str, list[str]]:

@@ -173,15 +173,7 @@ error[D108]: no `guides` in a run
    = help: did you mean `guide`?
    = help: a run has: arm, base, servos, initial, environment, rates, integrator, duration, record, tolerances, seed, metric NAME, guide NAME, sensor NAME, payload NAME, substitute JOINT, require
 
-error[D125]: no channel `guides.tip.error`
-  --> deck.ic:19:18
-   |
-19 |     record = [q, guides.tip.error];
-   |                  ^^^^^^^^^^^^^^^^
-   = help: channels of all joints: q, qd, qdd, tau, tau_load, J_eff, b, mode, reaction, servo.command, servo.value, servo.slope, servo.since
-   = help: channels of the arm, and of a link: energy, momentum, links.one.position, links.one.orientation, links.one.velocity, links.one.rate, links.one.jacobian
-
-3 errors
+2 errors
 """),
     ("link = two;", "link = tow;", """\
 error[D159]: no link `tow` in arm `pair`
