@@ -7,7 +7,6 @@ Hz and 1/s are one dimension, and beside metres or kilograms a radian counts as 
 from __future__ import annotations
 
 from ic.grammar.syntax import Unit
-from ic.meaning.unit_words import in_deck
 from ic.meaning.values import Value, measure_of
 from met import units
 from met.frozen import frozen
@@ -57,10 +56,10 @@ def _hertz_for_rate(value: Value) -> Doubt:
     number = _number(value)
     if isinstance(value.number, Scalar):
         return Doubt("in 1/s, and Hz is taken as 1/s", (
-            "if that is meant, write `s^-1`", "if cycles a second are meant, write `s^-1`, and 2 pi times each number"))
+            "if that is meant, write `1/s`", "if cycles a second are meant, write `1/s`, and 2 pi times each number"))
     return Doubt(f"in 1/s, and {_written(value)} is taken as {number} 1/s", (
-        f"if that is meant, write `{number} s^-1`",
-        f"if cycles a second are meant, write `(2*pi*{number}) s^-1`"))
+        f"if that is meant, write `{number} 1/s`",
+        f"if cycles a second are meant, write `(2*pi*{number}) 1/s`"))
 
 
 def _no_hertz(value: Value) -> Doubt | None:
@@ -113,7 +112,7 @@ def _angle_for_none(value: Value, text: str) -> Doubt | None:
         return None
     number = _number(value)
     return Doubt(f"in {text}, and {_written(value)} is taken as {number} {text}: angles count in radians", (
-        f"write `{number} {in_deck(text)}`",))
+        f"write `{number} {text}`",))
 
 
 def _unit(value: Value) -> Unit | None:

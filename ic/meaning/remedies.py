@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ic.grammar.syntax import Expression, List, Number, WithUnit
 from ic.meaning.merge import Item
-from ic.meaning.unit_words import in_deck, in_degrees, units_of
+from ic.meaning.unit_words import in_degrees, units_of
 from ic.meaning.values import Value
 from met.trace import Scalar
 from met.units import PURE, Dimension
@@ -39,6 +39,6 @@ def mended(value: Value, text: str, dimension: Dimension) -> str:
         if text == "Hz":
             shown = "" if number is None else f": write `{number / (2.0 * math.pi):g} Hz`"
             return f"a frequency counts cycles, without an angle{shown}"
-        return f"leave the angle out: write `{'...' if number is None else f'{number:g}'} {in_deck(text)}`"
-    known = list(dict.fromkeys((in_deck(text), *sorted(map(in_deck, in_degrees(text))), *units_of(dimension))))
+        return f"leave the angle out: write `{'...' if number is None else f'{number:g}'} {text}`"
+    known = list(dict.fromkeys((text, *sorted(in_degrees(text)), *units_of(dimension))))
     return f"write it in {', '.join(known[:-1])} or {known[-1]}" if len(known) > 1 else f"write it in {known[0]}"

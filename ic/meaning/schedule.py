@@ -107,7 +107,7 @@ def _common(rates: list[Fraction]) -> str | None:
 def make_schedule(complaints: Complaints, dynamics: Rate, record: Rate, base: Rate, others: list[Rate],
                   duration: float | None, duration_place: Place, *, base_written: bool) -> Schedule:
     """The schedule. Tells what does not fit. duration: of the run, s; None: unknown, which was told."""
-    all_rates = [dynamics, record, *others]
+    all_rates, before = [dynamics, record, *others], complaints.faults
     step = divisor(complaints, dynamics, base, all_rates, written=base_written)
     row = step if record == dynamics else divisor(complaints, record, base, all_rates, written=base_written)
     if duration is None:
@@ -118,8 +118,11 @@ def make_schedule(complaints: Complaints, dynamics: Rate, record: Rate, base: Ra
                          also=[Label(base.place, "the base rate")], help="at most 1e12 are possible: shorten the run")
         return Schedule(base.hz, step, row, 1)
     in_whole = duration.is_integer() and base.hz.is_integer()
+    refused = complaints.faults > before  # and so are the steps that a duration would be made of
     ticks = int(duration) * int(base.hz) if in_whole else exact(duration) * exact(base.hz)
     whole = round(ticks)
+    if refused:
+        return Schedule(base.hz, step, row, max(1, whole))
     if ticks.denominator != 1 or whole % step:
         length, per_step = exact(duration), step / exact(base.hz)
         count = max(1, math.floor(length / per_step))

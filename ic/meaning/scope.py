@@ -24,7 +24,7 @@ from ic.meaning.names import Names
 from ic.meaning.owner import XYZ, Owner, Settled
 from ic.meaning.remedies import components, mended
 from ic.meaning.resolve import Definitions
-from ic.meaning.unit_words import either, in_deck, in_degrees, measure_here, unit_here
+from ic.meaning.unit_words import either, in_degrees, measure_here, unit_here
 from ic.meaning.values import Value, Values, place_of
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
@@ -131,7 +131,7 @@ class Scope:
         text, dimension = self.unit(owner, wanted)
         expected = f"{short} or {count}" if short else f"{count}"
         if isinstance(found, Value):
-            unit = "" if text == "1" else f" {in_deck(text)}"
+            unit = "" if text == "1" else f" {text}"
             raise Problem(error("D071", f"{owner.what(wanted)} is a list of {expected} numbers", found.place,
                                 help=f"write `{item.name} = [...]{unit};`"))
         if len(found.items) not in (short, count):
@@ -337,7 +337,7 @@ class Scope:
         self.complaints.lacking.add((lacks, wanted.name))
         unit = self.unit(owner, wanted)[0]
         shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
-        shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {in_deck(unit)}"
+        shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {unit}"
         also = [Label(owner.place, f"{owner.label} stands here")] if removed is not None else []
         at = Label(removed, "removed here") if removed is not None else owner.place
         self.complaints.error("D075", f"{owner.label} has no `{wanted.name}`", at, also=also,
@@ -468,9 +468,9 @@ class Scope:
         if value.dimension == PURE:
             shown = f"a number in {text}"
             if not isinstance(value.number, Scalar):
-                shown = either(f"{value.number:.12g} {in_deck(each)}" for each in in_degrees(text))
+                shown = either(f"{value.number:.12g} {each}" for each in in_degrees(text))
             if value.bare and any(source.name == value.place.file for source in self.definitions.csv_files.sources):
-                shown = f"the unit in square brackets behind the column's name: `[{in_deck(text)}]`"
+                shown = f"the unit in square brackets behind the column's name: `[{text}]`"
             raise Problem(error(
                 "D060", f"{what} is in {text}, and this is a {'bare' if value.bare else 'pure'} number", value.place,
                 also=also,
@@ -490,9 +490,9 @@ class Scope:
             value.dimension, unit_here(wanted.unit, owner.joint, kind, owner.of)[1])]
         found = units.text(value.dimension)
         if not owner.label.startswith("`"):  # no course: the command is this number
-            return [f"`{owner.command}(...)` takes {in_deck(text)}; `{kind}(...)` takes {found}" for kind in fits]
+            return [f"`{owner.command}(...)` takes {text}; `{kind}(...)` takes {found}" for kind in fits]
         course = owner.label.strip("`")
-        return [f"of a `{owner.command}` command it is in {in_deck(text)}; with `{kind}({course}(...))` it would be in "
+        return [f"of a `{owner.command}` command it is in {text}; with `{kind}({course}(...))` it would be in "
                 f"{found}, like all of that course" for kind in fits]
 
     def _remark_cycles(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> None:
@@ -528,7 +528,7 @@ class Scope:
                  and each.name != wanted.name and units.same(value.dimension, self.unit(owner, each)[1])]
         if len(found) != 1:
             return []
-        return [f"`{found[0].name}` is what is in {in_deck(self.unit(owner, found[0])[0])}: {found[0].doc}"]
+        return [f"`{found[0].name}` is what is in {self.unit(owner, found[0])[0]}: {found[0].doc}"]
 
     def _of_its_own(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> str:
         """The remedy where a value is right for the other joints of its servo definition, which move otherwise."""
@@ -539,7 +539,7 @@ class Scope:
         joint = owner.path.partition(".servo")[0]
         key = wanted.name if owner.command is None else "command"
         shown = f"{value.number:g}" if value.bare and not isinstance(value.number, Scalar) else "..."
-        shown += "" if text == "1" else f" {in_deck(text)}"
+        shown += "" if text == "1" else f" {text}"
         written = f"{key} = {shown};" if owner.command is None else f"{key} = {owner.command}(...);"
         moves, others = ("slides", "turn") if owner.joint == "prismatic" else ("turns", "slide")
         why = f"joint `{joint}` {moves}, and others of servo `{both[-1]}` {others}"

@@ -27,7 +27,6 @@ from ic.meaning.schedule import CONTINUOUS, Rate
 from ic.meaning.scope import Scope
 from ic.meaning.sensors import use_sensor, without_sensors
 from ic.meaning.trajectories import use_file, with_file_named
-from ic.meaning.unit_words import in_deck
 from ic.meaning.values import measure_of, place_of
 from ic.text.files import library_defines
 from met import models, units
@@ -211,7 +210,7 @@ def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, bloc
                 "D160",
                 message,
                 place,
-                help=f"write `{parameter.name} = ... {in_deck(scope.unit(owner, parameter)[0])};`: {parameter.doc}",
+                help=f"write `{parameter.name} = ... {scope.unit(owner, parameter)[0]};`: {parameter.doc}",
             )
         elif command.kind in parameter.needed_for and parameter.above_where_needed is not None:
             _check_above(scope, owner, parameter, command, parameter.above_where_needed)

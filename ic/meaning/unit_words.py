@@ -1,4 +1,4 @@
-"""Units as declarations write them, `joint/s`, put in the words of one use, `rad/s`; and as a deck can write them."""
+"""Units as declarations write them, `joint/s`, put in the words of one use, `rad/s`."""
 
 from __future__ import annotations
 
@@ -10,12 +10,6 @@ from met import units
 from met.channel import joint_unit
 from met.plan import Joint, JointKind
 from met.units import PURE, Dimension
-
-
-def in_deck(unit: str) -> str:
-    """A unit as a deck can write it after a number: `1/s` is `s^-1` there."""
-    match = re.fullmatch(r"1/(\w+)(?:\^(\d+))?", unit)
-    return f"{match[1]}^-{match[2] or 1}" if match else unit
 
 
 def in_degrees(unit: str) -> tuple[str, ...]:

@@ -28,7 +28,6 @@ from ic.grammar.syntax import (
 )
 from ic.meaning import series
 from ic.meaning.complaints import known_words
-from ic.meaning.unit_words import in_deck
 from met import other_units, units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
@@ -242,7 +241,7 @@ def _made_alike(node: Binary, left: Value, right: Value) -> str:
     other, bare_one, written = (right, left, node.left) if left.bare else (left, right, node.right)
     if not bare_one.bare or isinstance(bare_one.number, Scalar):
         return "both must be of one dimension"
-    unit = in_deck(units.text(other.dimension))
+    unit = units.text(other.dimension)
     return f"write `{written.text} {unit}`" if isinstance(written, Number) else f"write `({spell(written)}) {unit}`"
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ic.meaning.complaints import known_words
 from ic.meaning.given import GIVEN
+from ic.printing.codes import is_code
 from ic.printing.columns import columns, number, quantity, vector
 from ic.printing.settings import settings
 from met import models, render
@@ -81,6 +82,9 @@ def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[st
     if rest.partition(".")[0] == "servo" and definition in {each.name for each in experiment.structure.moving} - driven:
         raise Problem(error("D170", f"no parameter `{path}` in `{experiment.name}`",
                             help=f"joint `{definition}` has no servo here: it is free"))
+    if is_code(path):
+        raise Problem(error("D170", f"no parameter `{path}` in `{experiment.name}`",
+                            help=f"`met doc {path}` says what this message means"))
     near = _three_nearest(path, known)
     helps = [f"did you mean `{'`, `'.join(near)}`?"] if near else []
     last = path.rpartition(".")[2]

@@ -22,7 +22,6 @@ from ic.meaning.names import Names
 from ic.meaning.remedies import mended
 from ic.meaning.resolve import Definition, Definitions
 from ic.meaning.scope import VARIES
-from ic.meaning.unit_words import in_deck
 from ic.meaning.values import PURE, Value, place_of
 from ic.sweeps.axes import Sweep
 from ic.sweeps.choices import OF_RUN, ONE_OF_TWO, SENSOR, decides, in_servo, inside, keys_of
@@ -133,7 +132,7 @@ def _of_another_dimension(path: str, old: Value, new: Value, defined) -> Problem
     wanted, also = units.text(old.dimension), [Label(defined, "defined here")]
     if new.bare:
         number = "..." if isinstance(new.number, Scalar) else f"{new.number:g}"
-        unit = old.unit.text if old.unit is not None else in_deck(wanted)
+        unit = old.unit.text if old.unit is not None else wanted
         return Problem(error("D060", f"`{path}` is in {wanted}, and this is a bare number", new.place, also=also,
                              help=f"write `{number} {unit}`"))
     is_in = "a pure number" if old.dimension == PURE else f"in {wanted}"

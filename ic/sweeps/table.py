@@ -145,7 +145,7 @@ class _Truths:
             scope.complaints.warn(
                 "D305", f"`{expression.operator}` of Hz and 1/s, which are taken for one", expression.place,
                 help=["if that is meant, write both sides in the same of the two",
-                      "if cycles a second are meant, write 2 pi times the number of Hz, in `s^-1`"])
+                      "if cycles a second are meant, write 2 pi times the number of Hz, in `1/s`"])
         formulas = Formulas.of(scope.graph, [side.number for side in sides])
         left, right = (np.broadcast_to(np.asarray(x, dtype=float), count) for x in formulas.replay(self.values))
         lost = asked & (np.isnan(left) | np.isnan(right))

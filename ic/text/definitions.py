@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
 
-from ic.text.lexer import BAD, NAME, NUMBERS, PASTE, SPACE, Token
+from ic.text.lexer import BAD, COMMAND_LINE, NAME, NUMBERS, PASTE, SPACE, Token
 from ic.text.limits import LONGEST_NAME, MOST_MACRO_BODY, Findings
 from ic.text.strays import complain_of_stray
 from ic.text.substitute import OPTIONAL, REST, Macro, closing
@@ -203,6 +203,8 @@ def warn_of_quantity(name: Token, body: list[Token], findings: Findings) -> None
     quantity = "".join(token.text for token in body).strip()
     why = f"a macro is put in as text, so `{name.text}^2` would be `{quantity}^2`"
     help = f"write `let {name.text} = {quantity};`: {why}"
+    if name.source.name == COMMAND_LINE:
+        help = f"write `let {name.text} = ...;` in the deck, and `--set '{name.text}={quantity}'`: {why}"
     findings.warn("D017", f"macro `{name.text}` is a quantity", name.place, help=help)
 
 

@@ -108,6 +108,7 @@ class _Preprocessor(Macros):
         self._including: list[tuple[FoundFile, Text]] = []
         self._entered: list[Place] = []
         self._ifs: list[list[_If]] = []
+        self._misspelt_ifs = 0  # such as `#ifdfe`, that no `#endif` has closed
         self._once: set[str] = set()
         self._included = 0
         self._tokens = 0
@@ -321,6 +322,7 @@ class _Preprocessor(Macros):
         else:
             meant = "elif" if name in ("elseif", "elsif") else name
             near = did_you_mean(meant, CONDITIONALS if name.startswith(("if", "el", "end")) else DIRECTIVES)
+            self._misspelt_ifs += any(f"`{each}`?" in " ".join(near) for each in ("if", "ifdef", "ifndef"))
             apart = directive.source.text[directive.offset - 1] != "#"
             self.findings.error("D007", f"`#{name}` is not a directive", directive.place,
                                 help=[*near, *(["a comment begins with `//`"] if apart or not near else [])])
@@ -345,6 +347,9 @@ class _Preprocessor(Macros):
             if len(ifs) > CONDITION_DEPTH:
                 self._give_up("D018", f"`#if` goes deeper than {CONDITION_DEPTH}", directive.place)
             return
+        if not ifs and self._misspelt_ifs:  # which was told: this belongs to it
+            self._misspelt_ifs -= name == "endif"
+            raise OutputDirective(Action.IgnoreAndRemove)
         if not ifs:
             self.findings.error("D007", f"`#{_shown(directive)}` without an `#if`", directive.place,
                                 help="leave it out, or write the `#if` that it belongs to")  # fmt: skip

@@ -66,8 +66,8 @@ warning[D305]: `bandwidth` of servo `still` is in 1/s, and 5 Hz is taken as 5 1/
   |
 7 | servo still { model = ideal; bandwidth = 5 Hz; command = position(sine(amplitude = 1 rad, frequency = 1 Hz)); }
   |                                          ^^^^
-  = help: if that is meant, write `5 s^-1`
-  = help: if cycles a second are meant, write `(2*pi*5) s^-1`
+  = help: if that is meant, write `5 1/s`
+  = help: if cycles a second are meant, write `(2*pi*5) 1/s`
 
 1 warning
 """

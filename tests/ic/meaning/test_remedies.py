@@ -39,7 +39,7 @@ def only_help(folder: Path, *parts: str) -> tuple[str, tuple[str, ...]]:
         (("2 kg", "2 m"), None, None, "write it in kg, g or t"),
         (None, ("0.1 rad/s", "sine(amplitude = 1 rad/s, frequency = 0.5 cycle/s)"), None,
          "a frequency counts cycles, without an angle: write `0.5 Hz`"),
-        (None, ("kp = ", "k_position = 15 rad/s; kp = "), None, "leave the angle out: write `15 s^-1`"),
+        (None, ("kp = ", "k_position = 15 rad/s; kp = "), None, "leave the angle out: write `15 1/s`"),
         (("axis = z", "axis = w"), None, None,
          "an axis is x, y, z, -x, -y or -z, or three numbers such as [0, 0.6, 0.8]"),
         (("axis = z", "axis = -w"), None, None,
