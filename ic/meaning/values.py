@@ -306,15 +306,26 @@ def _range(expression: Range, lookup: Lookup) -> Values:
         raise Problem(error("D121", "the values of a sweep depend on what the sweep varies", place,
                             help="write numbers that stand still"))
     a, b, by = (float(value.number) for value in (first, last, step))
-    points = _steps(a, b, by, expression, first)
+    turning = measure_of(step.unit) if step.unit is not None else units.ONE
+    if turning.turns and turning.dimension == step.dimension:  # a multiple of pi is no decimal: steps are of the unit
+        scale = turning.scale
+        low, high, stride = (float(f"{x / scale:.15g}") for x in (a, b, by))
+        between = list(_steps(low, high, stride, expression, first, scale))[1:-1]
+        points: Iterable[float] = (a, *(turning.to_si(x) for x in between), *((b,) if low != high else ()))
+    else:
+        points = _steps(a, b, by, expression, first)
     bare = first.bare and last.bare and step.bare
     made = (Value(x, first.dimension, place, bare, first.unit, hertz=first.hertz) for x in points)
     return Values(tuple(made), place, first.unit)
 
 
-def _steps(a: float, b: float, step: float, expression: Range, first: Value) -> Iterable[float]:
+def _steps(
+    a: float, b: float, step: float, expression: Range, first: Value, scale: float = 1.0
+) -> Iterable[float]:
+    """The points of a range. scale: SI units in one of what the numbers are in."""
     def shown(number: float) -> str:
         """In the unit of the first value, where it has one of its own."""
+        number *= scale
         if first.unit is None or measure_of(first.unit).dimension != first.dimension:
             return f"{number:g}"
         return f"{number / measure_of(first.unit).scale:g} {first.unit.text}"
