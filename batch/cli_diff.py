@@ -26,7 +26,7 @@ def diff(
     Cases are matched by what is varied in them. First what made the two: the decks' lines, what they change and what
     follows from that. Then status, then signals and metrics:
     identical to the bit, equivalent within a tolerance, different, or incomparable. Exit status: 0 they are as
-    required; 1 they differ, or cannot be compared; 2 the input is wrong.
+    required; 1 they differ, require something else, or cannot be compared; 2 the input is wrong.
     """
     import json
 

@@ -24,11 +24,11 @@ from batch.differences.compare import (
     spans,
     unlike_bits,
 )
-from batch.differences.found import Diff, Ended, Experiment, Place, Ranked, Required, Signal
+from batch.differences.demands import compare_requirements
+from batch.differences.found import Diff, Ended, Experiment, Place, Ranked, Signal
 from batch.differences.matching import Cases
 from batch.differences.samples import samples
 from batch.differences.tolerance import Tolerance, Tolerances, check, fits, of_deck
-from batch.requirements import required
 from batch.signals import deck_unit
 from met.diagnostic import Problem
 from met.distinct import distinct
@@ -112,7 +112,7 @@ def _experiment(a: Group, b: Group, given: Tolerances, plan: Plan | str, distrib
     out.signals += _signals(a, b, matched, allowed, scores, out)
     if not out.signals:
         out.notes.append("neither has a metric or a history: nothing is compared but how cases end")
-    _requirements(a, b, matched, out)
+    compare_requirements(a, b, matched, out)
     _counts(a, b, matched, out)
     out.worst = scores.ranked(a, b, matched, out.signals)
     out.cases_different = int(scores.beyond.sum())
@@ -156,29 +156,6 @@ def _ended(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
         ))  # fmt: skip
 
 
-def _requirements(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
-    """How many matched cases meet each requirement in a, and in b; one whose limit is another is taken for the same.
-    Those of one alone are noted."""
-    met_a, met_b = _met(a, matched.a), _met(b, matched.b)
-    now = {text: text for text in met_a if text in met_b}
-    for one in required(a):
-        alike = [other.text for other in required(b) if (other.metric, other.comparison[:1]) == (
-            one.metric, one.comparison[:1]) and other.text not in met_a and other.text not in now.values()]  # fmt: skip
-        if one.text not in now and alike:
-            now[one.text] = alike[0]
-    for text, here in met_a.items():
-        if text in now:
-            there = met_b[now[text]]
-            out.requirements.append(Required(text, now[text], int(here.sum()), int(there.sum())))
-            if here.sum() == there.sum() and (here != there).any():
-                count = int((here & ~there).sum())
-                out.notes.append(f"require {now[text]} is met by as many as before, but by others: "
-                                 f"{count:,} no more, {count:,} now")  # fmt: skip
-    for mine, others, path in ((met_a, now, a.path), (met_b, now.values(), b.path)):
-        out.notes += [f"require {text} is only in {path}, met by {int(met.sum()):,} of {matched.count:,}"
-                      for text, met in mine.items() if text not in others]  # fmt: skip
-
-
 COUNTS = {
     "friction_splits": "steps that friction split", "friction_clamped": "rates that friction clamped",
     "friction_undecided": "modes of friction that were left open", "bed_limited": "ticks at a bed's limit",
@@ -196,14 +173,6 @@ def _counts(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
             if unlike:
                 out.notes.append(f"the number of {words} is another in {unlike:,} of {matched.count:,} cases")
                 out.partial = True
-
-
-def _met(group: Group, cases: np.ndarray) -> dict[str, np.ndarray]:
-    """By requirement whether each of these cases meets it."""
-    if "met" not in group.variables:
-        return {}
-    met = group.values("met")[cases] == 1
-    return {str(text): met[:, column] for column, text in enumerate(group.values("requirement"))}
 
 
 class _Scores:

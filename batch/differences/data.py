@@ -33,9 +33,11 @@ def _experiment(found: Experiment) -> dict[str, Any]:
         "cases_different": found.cases_different, "only_a": found.only_a, "only_b": found.only_b,
         "ended": [dataclasses.asdict(each) for each in found.ended],
         "requirements": [
-            {"text": each.now, "text_a": each.before, "met_a": each.met_before, "met_b": each.met_now}
+            {"text": each.now, "text_a": each.before, "met_a": each.met_before, "met_b": each.met_now,
+             "gained": each.gained, "lost": each.lost, "other": each.other}
             for each in found.requirements
         ],
+        "required_in_one": found.required_in_one,
         "signals": [_signal(each) for each in found.signals],
         "worst": [dataclasses.asdict(each) for each in found.worst],
         "distributions": [{**dataclasses.asdict(each), "unlike": each.unlike} for each in found.samples],

@@ -119,23 +119,35 @@ class Ranked:
 
 @frozen
 class Required:
-    """A requirement of both: its text in a and in b, which differ where its limit does; matched cases that meet it."""
+    """A requirement of both archives.
+
+    before, now          its text in a and in b
+    met_before, met_now  how many matched cases meet it
+    gained, lost         how many meet it in b alone, and in a alone
+    other                whether its limit or its comparison is another
+    limits               its limits in a and in b, where they differ and the text does not; else ""
+    """
 
     before: str
     now: str
     met_before: int
     met_now: int
+    gained: int = 0
+    lost: int = 0
+    other: bool = False
+    limits: tuple[str, str] = ("", "")
 
     @property
     def told(self) -> bool:
         """Whether it is another, or met by another number of cases."""
-        return self.before != self.now or self.met_before != self.met_now
+        return self.other or self.before != self.now or self.met_before != self.met_now
 
 
 @dataclass
 class Experiment:
     """Two matched experiments. tolerances: what the deck of b and the command line allow; partial: whether one has
-    instants or histories that the other lacks, or something that is counted differs, so that they are not identical."""
+    instants or histories that the other lacks, or something that is counted differs, so that they are not identical;
+    required_in_one: requirements that one archive has alone, in words."""
 
     name_a: str
     name_b: str
@@ -145,6 +157,7 @@ class Experiment:
     partial: bool = False
     ended: list[Ended] = field(default_factory=list)
     requirements: list[Required] = field(default_factory=list)
+    required_in_one: list[str] = field(default_factory=list)
     worst: list[Ranked] = field(default_factory=list)
     samples: list[Sample] = field(default_factory=list)
     only_a: list[int] = field(default_factory=list)
@@ -154,7 +167,17 @@ class Experiment:
     how: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int8))
 
     @property
+    def other_requirements(self) -> bool:
+        """Whether the two do not require the same."""
+        return bool(self.required_in_one) or any(each.other for each in self.requirements)
+
+    @property
     def verdict(self) -> str:
+        return DIFFERENT if self.other_requirements else self.of_values
+
+    @property
+    def of_values(self) -> str:
+        """The verdict on cases, how they end, and values, whatever is required of them."""
         found = [signal.verdict for signal in self.signals]
         if self.ended or self.only_a or self.only_b:
             found.append(DIFFERENT)
@@ -182,7 +205,13 @@ class Diff:
     @property
     def verdict(self) -> str:
         """identical, equivalent, different or incomparable: the worst of all, but different where anything differs."""
-        found = [experiment.verdict for experiment in self.experiments]
+        other = any(experiment.other_requirements for experiment in self.experiments)
+        return DIFFERENT if other else self.of_values
+
+    @property
+    def of_values(self) -> str:
+        """The same, whatever is required."""
+        found = [experiment.of_values for experiment in self.experiments]
         if not found:
             return INCOMPARABLE
         if DIFFERENT in found or self.only_a or self.only_b:

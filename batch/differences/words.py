@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE
-from batch.differences.found import Diff, Ended, Experiment, Ranked, Signal
+from batch.differences.found import Diff, Ended, Experiment, Ranked, Required, Signal
 from batch.differences.samples import LEVEL, Sample
 from batch.failures import STATUS, ranges
 from batch.output import quoted
@@ -45,7 +45,10 @@ def alone(found: Diff) -> list[str]:
 def heading(experiment: Experiment) -> str:
     names = dict.fromkeys([experiment.name_a, experiment.name_b])
     count = experiment.cases.count
-    return f"{' and '.join(names)}: {count:,} case{'s' if count != 1 else ''} in both, {experiment.verdict}"
+    how = experiment.of_values
+    if how != experiment.verdict:
+        how = f"{how}, with other requirements"
+    return f"{' and '.join(names)}: {count:,} case{'s' if count != 1 else ''} in both, {how}"
 
 
 def missing(found: Diff, experiment: Experiment) -> list[str]:
@@ -65,12 +68,16 @@ def allowed(found: Diff, experiment: Experiment) -> list[str]:
 
 def requirements(experiment: Experiment) -> list[str]:
     """Those that are others, or are met by another number of cases."""
-    out = []
-    for each in experiment.requirements:
-        text = each.now if each.before == each.now else f"{each.now} (before: {each.before})"
-        if each.told:
-            out.append(f"require {text}  {requirement(each.met_before, each.met_now, experiment.cases.count)}")
-    return out
+    count = experiment.cases.count
+    return [f"require {required(each)}  {requirement(each.met_before, each.met_now, count)}"
+            for each in experiment.requirements if each.told]  # fmt: skip
+
+
+def required(each: Required) -> str:
+    """A requirement, and what it was before where it is another."""
+    before, now = each.limits
+    text = each.now if each.before == each.now else f"{each.now} (before: {each.before})"
+    return f"{text} (limit before: {before}, now: {now})" if now else text
 
 
 def requirement(before: int, now: int, of: int) -> str:
@@ -244,22 +251,51 @@ def apart(before: float, after: float) -> tuple[str, str]:
     return texts
 
 
+MOST_REQUIREMENTS = 3
+"""Requirements that the verdict names."""
+
+
 def verdict(found: Diff) -> str:
+    """The verdict in a sentence: on values, and where requirements are others, on these first."""
+    others = [text for experiment in found.experiments for text in _other_requirements(experiment)]
+    if not others:
+        return _of_values(found)
+    left = len(others) - MOST_REQUIREMENTS
+    said = ", ".join([*others[:MOST_REQUIREMENTS], *([f"and {left:,} more"] if left > 0 else [])])
+    return f"{DIFFERENT}; requirements differ: {said}; values: {_of_values(found)}"
+
+
+def _other_requirements(experiment: Experiment) -> list[str]:
+    """`settle < 10 s -> settle < 1 s (30 of 36 cases no longer meet it)`"""
+    out, of = [], f" of {experiment.cases.count:,}"
+    for each in experiment.requirements:
+        if each.other:
+            before, now = each.limits
+            change = f"{each.now}, limit {before} -> {now}" if now else f"{each.before} -> {each.now}"
+            moved = [f"{count:,}{of} cases {text}" for count, text in (
+                (each.lost, "no longer meet it"), (each.gained, "meet it now")) if count]  # fmt: skip
+            out.append(f"{change} ({', '.join(moved) or 'met by the same cases'})")
+    return [*out, *(text.removeprefix("require ") for text in experiment.required_in_one)]
+
+
+def _of_values(found: Diff) -> str:
+    """The verdict on all but what is required."""
+    of_values = found.of_values
     said = {
         IDENTICAL: "identical, to the bit",
         EQUIVALENT: "equivalent: bits differ, and no value by more than its tolerance",
         DIFFERENT: "different",
         INCOMPARABLE: "incomparable",
-    }[found.verdict]
-    if found.verdict == EQUIVALENT and not any(
+    }[of_values]
+    if of_values == EQUIVALENT and not any(
         signal.equivalent for experiment in found.experiments for signal in experiment.signals
     ):
         return "equivalent: identical, to the bit, in what both have"
     signals = [signal for experiment in found.experiments for signal in experiment.signals]
     lost = sum(signal.verdict == INCOMPARABLE for signal in signals)
-    if found.verdict == INCOMPARABLE and lost < len(signals):
+    if of_values == INCOMPARABLE and lost < len(signals):
         return f"incomparable: {lost} of {len(signals)} signals and metrics; no other is different"
     given = any(experiment.tolerances.given for experiment in found.experiments)
-    if found.verdict in (EQUIVALENT, DIFFERENT) and not given:
+    if of_values in (EQUIVALENT, DIFFERENT) and not given:
         said += "; no tolerance was given"
     return said

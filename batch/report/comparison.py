@@ -134,12 +134,15 @@ def _figure(both: Sequence[tuple[Pool, Before]]) -> tuple[int, int, int] | None:
 def _flows(pool: Pool, before: Before, *, named: bool) -> list[Flow]:
     """By requirement of both: which cases meet it now, and which no longer. named: whether to say of which run."""
     out = []
+    pairs = {each.now: each for _, _, experiment in before.pairs for each in experiment.requirements}
     for place, text in enumerate(pool.requirements):
-        if text not in before.pool.requirements or not before.there.any():
+        if text not in pairs or not before.there.any():
             continue
-        was = before.there & (before.pool.outcomes[before.place, before.pool.requirements.index(text)] == 1)
+        column = before.pool.requirements.index(pairs[text].before)
+        was = before.there & (before.pool.outcomes[before.place, column] == 1)
         now = before.there & (pool.outcomes[:, place] == 1)
         met = words.requirement(int(was.sum()), int(now.sum()), int(before.there.sum()))
+        said = words.required(pairs[text])
         gained, lost = (ranges(pool.cases[which].tolist()) for which in (now & ~was, was & ~now))
-        out.append(Flow(f"{pool.name}: {text}" if named else text, met, gained, lost))
+        out.append(Flow(f"{pool.name}: {said}" if named else said, met, gained, lost))
     return out

@@ -36,7 +36,7 @@ def test_the_mended_servo_stops_at_once(folder: Path) -> None:
     assert found.verdict == "different" and not found.changed.meaning and not found.changed.decks
     [experiment] = found.experiments
     assert experiment.cases.count == 28 and not experiment.ended
-    assert experiment.requirements == [Required("creep < 0.001 rad/s", "creep < 0.001 rad/s", 20, 23)]
+    assert experiment.requirements == [Required("creep < 0.001 rad/s", "creep < 0.001 rad/s", 20, 23, 3, 0)]
     before, after = (batch.open(folder / name).sel(recorded_case=27, joint="shoulder").qd for name in
                      ("before.h5", "after.h5"))  # fmt: skip
     at_rest = [float(qd.time[np.abs(qd) > 0.01][-1]) for qd in (before, after)]
@@ -57,3 +57,17 @@ def test_the_deck_with_tolerances_compiles(tmp_path: Path) -> None:
     (tmp_path / "allowed.ic").write_text(found[1])
     [experiment] = ic.compile(tmp_path / "allowed.ic").experiments
     assert [each.of for each in experiment.tolerances] == ["qd", "elbow.q", "settle", "rel", "time"]
+
+
+def test_the_page_says_what_another_limit_makes_of_the_standard_sweep(tmp_path: Path) -> None:
+    import batch
+    import ic
+    from batch.differences.words import verdict
+    from ic.text.files import LIBRARY
+
+    deck = (LIBRARY / "two_link.ic").read_text(encoding="utf-8")
+    before, after = (tmp_path / name for name in ("before.h5", "after.h5"))
+    for path, limit in ((before, "10 s"), (after, "1 s")):
+        (tmp_path / "arm.ic").write_text(deck.replace("require settle < 10 s", f"require settle < {limit}"))
+        batch.run(ic.compile(tmp_path / "arm.ic", select=["gains"]), output=path)
+    assert f"\n{verdict(batch.diff(before, after))}\n" in PAGE

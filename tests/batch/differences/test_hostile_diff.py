@@ -24,7 +24,7 @@ from batch.differences.decks import decks
 from batch.differences.found import Diff, Experiment, Required, Signal
 from batch.differences.told import told
 from batch.differences.tolerance import Tolerance, tolerances
-from batch.differences.words import requirements
+from batch.differences.words import heading, requirements, verdict
 from met import cli
 from met.diagnostic import Problem
 from tests.batch import plans
@@ -47,6 +47,9 @@ run slower like turning { rates { record = 10 Hz; } initial { one.qd = 0.5 rad/s
 run half like turning { rates { record = 20 Hz; } duration = 0.5 s; }
 run bounded like turning { metric top = max { of = one.qd; } require top < 5 rad/s; }
 run strict like turning { metric top = max { of = one.qd; } require top < 0.5 rad/s; }
+run milli like turning { metric top = max { of = one.qd; } require top < 5000 mrad/s; }
+let fastest = 0.5 rad/s;
+run lettered like turning { metric top = max { of = one.qd; } require top < fastest; }
 run free like turning { metric top = max { of = one.qd; } }
 run named like turning { record = [q, tau]; metric tau = max { of = one.tau; } }
 run fewer like named { record = [q]; }
@@ -292,16 +295,58 @@ def test_a_requirement_that_other_cases_meet_is_told(two: Callable[..., tuple[Pa
     assert only(found).notes == ["require settle < 10 s is met by as many as before, but by others: 1 no more, 1 now"]
 
 
-def test_a_requirement_whose_limit_is_another_is_told(ran: Callable[..., Path]) -> None:
-    found = only(diff(ran("a.h5", "bounded"), ran("b.h5", "strict")))
-    assert found.requirements == [Required("top < 5 rad/s", "top < 0.5 rad/s", 1, 0)] and not found.notes
+def test_a_requirement_whose_limit_is_another_is_a_difference(ran: Callable[..., Path]) -> None:
+    whole = diff(ran("a.h5", "bounded"), ran("b.h5", "strict"))
+    found = only(whole)
+    assert found.requirements == [Required("top < 5 rad/s", "top < 0.5 rad/s", 1, 0, 0, 1, True)] and not found.notes
     assert requirements(found) == ["require top < 0.5 rad/s (before: top < 5 rad/s)  met by 1, now by 0 of 1"]
+    assert (whole.verdict, whole.of_values, found.how.tolist()) == ("different", "identical", [0])
+    assert heading(found) == "bounded and strict: 1 case in both, identical, with other requirements"
+    assert verdict(whole) == (
+        "different; requirements differ: top < 5 rad/s -> top < 0.5 rad/s (1 of 1 cases no longer meet it); "
+        "values: identical, to the bit"
+    )
 
 
-def test_a_requirement_in_one_alone_is_told(ran: Callable[..., Path]) -> None:
+def test_a_limit_that_a_name_stands_for_is_compared_too(ran: Callable[..., Path]) -> None:
+    a = ran("a.h5", "lettered")
+    whole = diff(a, ran("b.h5", "lettered", change=("let fastest = 0.5 rad/s", "let fastest = 9 rad/s")))
+    assert requirements(only(whole)) == [
+        "require top < fastest (limit before: 0.5 rad/s, now: 9 rad/s)  met by 0, now by 1 of 1"
+    ]  # fmt: skip
+    assert verdict(whole).startswith(
+        "different; requirements differ: top < fastest, limit 0.5 rad/s -> 9 rad/s (1 of 1 cases meet it now); values: "
+    )
+
+
+def test_a_limit_in_another_unit_is_no_difference(ran: Callable[..., Path]) -> None:
+    whole = diff(ran("a.h5", "bounded"), ran("b.h5", "milli"))
+    assert (whole.verdict, verdict(whole)) == ("identical", "identical, to the bit")
+    assert requirements(only(whole)) == [
+        "require top < 5000 mrad/s (before: top < 5 rad/s)  met by 1, now by 1 of 1"
+    ]  # fmt: skip
+
+
+def test_a_requirement_in_one_alone_is_a_difference(ran: Callable[..., Path]) -> None:
     a, b = ran("a.h5", "bounded"), ran("b.h5", "free")
-    assert only(diff(a, b)).notes == ["require top < 5 rad/s is only in a.h5, met by 1 of 1"]
-    assert only(diff(b, a)).notes == ["require top < 5 rad/s is only in a.h5, met by 1 of 1"]
+    for found in (diff(a, b), diff(b, a)):
+        assert only(found).notes == ["require top < 5 rad/s is only in a.h5, met by 1 of 1"]
+        assert found.verdict == "different"
+        assert verdict(found) == (
+            "different; requirements differ: top < 5 rad/s is only in a.h5, met by 1 of 1; "
+            "values: identical, to the bit"
+        )
+
+
+def test_the_exit_status_of_another_requirement_is_that_of_a_difference(
+    ran: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    a, b = map(str, (ran("a.h5", "bounded"), ran("b.h5", "strict")))
+    assert (cli.main(["diff", a, a]), cli.main(["diff", a, b])) == (0, 1)
+    capsys.readouterr()
+    assert cli.main(["diff", a, b, "--format", "json"]) == 1
+    [found] = json.loads(capsys.readouterr().out)["experiments"]
+    assert (found["verdict"], found["requirements"][0]["lost"], found["required_in_one"]) == ("different", 1, [])
 
 
 def test_a_deck_in_which_every_line_changed_is_told_at_once() -> None:

@@ -399,6 +399,21 @@ class TestTheCommand:
         assert not Path("b.html").exists()
 
 
+def test_says_which_cases_meet_a_requirement_whose_limit_is_another(here: Path) -> None:
+    for name, limit in (("a.h5", "5 s"), ("b.h5", "1 us")):
+        brief = "run brief like nominal { "
+        deck = archives.DECK.replace(brief, f"{brief}require settle < {limit}; ")
+        batch.run(archives.compiled(here, "brief", deck=deck), output=name)
+    found = gathered(Path("a.h5"), Path("b.h5"))
+    verdict = found.verdicts[-1]
+    flow = next(each for each in verdict.flows if "before" in each.text)
+    assert (flow.text, flow.met, flow.gained, flow.lost) == (
+        "settle < 1 us (before: settle < 5 s)", "met by 1, now by 0 of 1", "", "#0"
+    )  # fmt: skip
+    assert verdict.headline.startswith("Requirements differ: settle < 5 s -> settle < 1 us (1 of 1 cases no longer")
+    assert verdict.headline in words(page(found))
+
+
 @pytest.mark.slow
 def test_a_structure_says_how_many_met_all_before(here: Path) -> None:
     batch.run(archives.compiled(here, "ways"), output="a.h5")

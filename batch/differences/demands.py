@@ -1,0 +1,65 @@
+"""What is required of two archives: which requirements are others, and which cases meet them before and now."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from batch import requirements
+from batch.archive.read import Group
+from batch.differences.found import Experiment, Required
+from batch.differences.matching import Cases
+from batch.differences.words import apart
+from batch.signals import deck_unit
+
+
+def compare_requirements(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
+    """How many matched cases meet each requirement in a, and in b; one whose limit is another is taken for the same.
+    Those of one alone are noted."""
+    met_a, met_b = _met(a, matched.a), _met(b, matched.b)
+    known_a, known_b = ({each.text: each for each in requirements.required(group)} for group in (a, b))
+    now = {text: text for text in met_a if text in met_b}
+    for mine in known_a.values():
+        alike = [each.text for each in known_b.values() if (each.metric, each.comparison[:1]) == (
+            mine.metric, mine.comparison[:1]) and each.text not in met_a and each.text not in now.values()]  # fmt: skip
+        if mine.text not in now and alike:
+            now[mine.text] = alike[0]
+    for text, here in met_a.items():
+        if text in now:
+            there = met_b[now[text]]
+            one, other = known_a.get(text), known_b.get(now[text])
+            gained, lost = int((there & ~here).sum()), int((here & ~there).sum())
+            out.requirements.append(Required(
+                text, now[text], int(here.sum()), int(there.sum()), gained, lost, _unlike(one, other),
+                _limits(b, one, other) if text == now[text] else ("", ""),
+            ))  # fmt: skip
+            if gained == lost > 0:
+                out.notes.append(f"require {now[text]} is met by as many as before, but by others: "
+                                 f"{lost:,} no more, {gained:,} now")  # fmt: skip
+    for known, others, path in ((met_a, now, a.path), (met_b, now.values(), b.path)):
+        for text, met in known.items():
+            if text not in others:
+                said = f"require {text} is only in {path}, met by {int(met.sum()):,} of {matched.count:,}"
+                out.notes.append(said)
+                out.required_in_one.append(said)
+
+
+def _met(group: Group, cases: np.ndarray) -> dict[str, np.ndarray]:
+    """By requirement whether each of these cases meets it."""
+    met = requirements.outcomes(group, cases) == 1
+    return {text: met[:, column] for column, text in enumerate(requirements.texts(group))} if met.shape[1] else {}
+
+
+def _unlike(one: requirements.Required | None, other: requirements.Required | None) -> bool:
+    """Whether two requirements ask for something else; those of which no limit is known differ in their texts alone."""
+    return one is not None and other is not None and (one.comparison, one.limit) != (other.comparison, other.limit)
+
+
+def _limits(
+    group: Group, one: requirements.Required | None, other: requirements.Required | None
+) -> tuple[str, str]:
+    """The limits of two requirements in the deck's unit, where one text stands for both, as `settle < longest`."""
+    if one is None or other is None or one.limit == other.limit:
+        return "", ""
+    scale, unit = deck_unit(group.variables[other.metric])
+    before, now = (f"{text} {unit}".rstrip() for text in apart(one.limit / scale, other.limit / scale))
+    return before, now
