@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -65,9 +66,12 @@ def between(before: Experiment, now: Experiment, *, ordered: bool) -> list[Chang
 
 def _parameters(before: Experiment, now: Experiment, new: set[str]) -> Iterator[Change]:
     """new: beginnings of the paths of what is new or gone, or of another kind, as a whole."""
+    computed = _Computed(before, now)
     for path, old in sorted(before.parameters.items()):
         if path in now.parameters and _unlike(old, now.parameters[path]):
             yield _changed(path, old, now.parameters[path])
+        elif path in now.parameters:
+            yield from computed.change(path)
     for word, mine, other in (("new", now, before), ("gone", before, now)):
         for name, members in _vectors(sorted(mine.parameters.keys() - other.parameters.keys())).items():
             first, *_ = quantities = [mine.parameters[each] for each in members]
@@ -85,6 +89,46 @@ def _changed(path: str, old: Quantity, new: Quantity) -> Change:
     beside it."""
     follows = new.origin.kind == "derived" or isinstance(old.value, Formula) or isinstance(new.value, Formula)
     return Change(f"{path}: {' -> '.join(_apart(old, new))}{_at(new)}", follows, old.origin.place, new.origin.place)
+
+
+MOST_CASES = 10_000
+"""Cases, spread over the table, in which parameters that vary with the case are compared."""
+
+
+class _Computed:
+    """Parameters that vary with the case in both, computed for the same cases by the formulas of each."""
+
+    def __init__(self, before: Experiment, now: Experiment) -> None:
+        self.before, self.now = before, now
+        self.values: tuple[list[Any], list[Any]] = ([], [])
+        if before.formulas != now.formulas:
+            cases = _some_cases(before.cases, now.cases)
+            self.values = before.formulas.replay(cases), now.formulas.replay(cases)
+
+    def change(self, path: str) -> Iterator[Change]:
+        """How a parameter is computed otherwise; nothing where it has the same values."""
+        old, new = self.before.parameters[path], self.now.parameters[path]
+        if not self.values[0] or not isinstance(old.value, Formula) or not isinstance(new.value, Formula):
+            return
+        pair = ((self.values[0], old.value), (self.values[1], new.value))
+        one, two = (np.atleast_1d(np.asarray(values[formula.output], dtype=float)) for values, formula in pair)
+        if ((one == two) | (np.isnan(one) & np.isnan(two))).all():
+            return
+        sides = ((replace(old, unit="1"), one), (replace(new, unit="1"), two))
+        ends = [_apart(*(replace(each, value=float(end(column))) for each, column in sides))
+                for end in (np.min, np.max)]  # fmt: skip
+        unit = "" if new.unit == "1" else f" {new.unit}"
+        texts = [f"{low if low == high else f'{low} to {high}'}{unit}" for low, high in zip(*ends, strict=True)]
+        text = " -> ".join(texts) if texts[0] != texts[1] else f"other values of {texts[0]}"
+        follows = new.origin.kind == "derived"
+        yield Change(f"{path}: {text}, varied{_at(new)}", follows, old.origin.place, new.origin.place)
+
+
+def _some_cases(before: Cases, now: Cases) -> dict[str, np.ndarray]:
+    """Values of all that is varied, of the cases of `now`; what it does not vary has the values that it had before."""
+    rows = np.unique(np.linspace(0, max(0, now.count - 1), MOST_CASES, dtype=np.int64)) if now.count else np.arange(0)
+    found = {each.path: np.resize(each.values, len(rows)) for each in before.coordinates}
+    return found | {each.path: each.values[rows] for each in now.coordinates}
 
 
 def _at(quantity: Quantity) -> str:

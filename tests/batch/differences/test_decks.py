@@ -171,6 +171,40 @@ def test_an_axis_with_more_values_is_one_change_beside_their_number(here: Path) 
     ]
 
 
+def test_what_follows_is_told_of_parameters_that_vary_with_the_case_too(here: Path) -> None:
+    axis = ("vary gearbox.kp = linspace(0.010, 0.040, 4) V*s/rad;", "vary links.fore.mass = [10, 20, 40] kg;")
+    varied = DECK.replace(*axis)
+    a, b = made(Path(), deck=varied, select="gains"), made(
+        Path(), deck=varied, arm=ARM.replace("fore_l  = 3 m", "fore_l  = 6 m"), select="gains"
+    )  # fmt: skip
+    assert told(a, b) == [
+        "changed: let fore_l: 3 m -> 6 m (arm.ic:1)",
+        "follows: links.fore.com.x: 1.5 m -> 3 m (arm.ic:3)",
+        "follows: links.fore.inertia.yy: 7.5 to 30 kg*m^2 -> 30 to 120 kg*m^2, varied (arm.ic:3)",
+        "follows: links.fore.inertia.zz: 7.5 to 30 kg*m^2 -> 30 to 120 kg*m^2, varied (arm.ic:3)",
+        "follows: wrist.at.x: 3 m -> 6 m (arm.ic:10)",
+    ]
+    more = DECK.replace(axis[0], "vary links.fore.mass = [10, 20, 30, 40] kg;")
+    assert told(a, made(Path(), deck=more, select="gains")) == [
+        "changed: 3 cases -> 4 cases",
+        "changed: links.fore.mass: [10, 20, 40] kg -> 4 values from 10 to 40 kg",
+    ]  # other values of what is varied change no formula
+
+
+def test_a_parameter_that_one_axis_fewer_enters_is_told(here: Path) -> None:
+    axis = "vary gearbox.kp = linspace(0.010, 0.040, 4) V*s/rad;"
+    mass, length = "vary links.fore.mass = [10, 20] kg;", "vary fore_l = [3, 6] m;"
+    both, one = (DECK.replace(axis, axes) for axes in (mass + length, mass))
+    assert told(made(Path(), deck=both, select="gains"), made(Path(), deck=one, select="gains")) == [
+        "changed: 4 cases -> 2 cases",
+        "changed: fore_l is not varied any more",
+        "follows: links.fore.com.x: varied -> 1.5 m (arm.ic:3)",
+        "follows: links.fore.inertia.yy: 7.5 to 60 kg*m^2 -> 7.5 to 15 kg*m^2, varied (arm.ic:3)",
+        "follows: links.fore.inertia.zz: 7.5 to 60 kg*m^2 -> 7.5 to 15 kg*m^2, varied (arm.ic:3)",
+        "follows: wrist.at.x: varied -> 3 m (arm.ic:10)",
+    ]
+
+
 def test_what_is_set_on_the_command_line_was_written_there(here: Path) -> None:
     a, b = made(Path()), made(Path(), set=["gearbox.kp=0.03 V*s/rad"])
     assert [line.partition(" (")[0] for line in told(a, b)] == [
