@@ -61,11 +61,14 @@ class Reach:
         )
 
 
-def reach(values: np.ndarray, limits: Sequence[float] = (), *, parting: bool = False) -> Reach | None:
+def reach(
+    values: np.ndarray, limits: Sequence[float] = (), *, parting: bool = False, by_factors: bool = False
+) -> Reach | None:
     """The range of the colours of some values; None where no value is finite.
 
-    limits   within the colours where they are near
-    parting  of changes: as far below zero as above it
+    limits      within the colours where they are near
+    parting     of changes: as far below zero as above it
+    by_factors  of a parameter whose values rise by factors: colours are logarithmic, from the least to the greatest
 
     All values are within, unless they are hardly told apart then: nine in ten of them in a tenth of the range, or some
     of them beyond a gap many times wider than the range of all others. Then the fewest are left out by which the others
@@ -74,6 +77,8 @@ def reach(values: np.ndarray, limits: Sequence[float] = (), *, parting: bool = F
     finite = np.sort(values[np.isfinite(values)])
     if not len(finite):
         return None
+    if by_factors and finite[0] > 0.0:
+        return Reach(float(finite[0]), float(finite[-1]), True, least=float(finite[0]), most=float(finite[-1]))
     with np.errstate(over="ignore"):
         low, high, log = _reach(finite, limits, parting=parting)
     below, above = int((finite < low).sum()), int((finite > high).sum())

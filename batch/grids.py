@@ -3,6 +3,7 @@ and which case stands for a cell. Pictures and reports take the same from here."
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Literal
@@ -28,6 +29,10 @@ logarithms: 1, 3, 10 do, 1, 2, 5, 10 do not."""
 
 SPAN, METRIC_SPAN = 100.0, 1000.0
 """Largest value against the smallest, from which on an axis of points is logarithmic: of a parameter, of a metric."""
+
+
+ROUND = ((1, 2, 5), (1, 3), (1,))
+"""Steps within a power of ten of a logarithmic axis, the densest first."""
 
 
 @frozen
@@ -127,6 +132,13 @@ def edges_of(found: np.ndarray, scale: Scale) -> np.ndarray:
         return np.asarray(np.exp(edges_of(np.log(found), "linear")))
     middles = (found[1:] + found[:-1]) / 2
     return np.concatenate([[1.5 * found[0] - 0.5 * found[1]], middles, [1.5 * found[-1] - 0.5 * found[-2]]])
+
+
+def round_numbers(low: float, high: float, steps: Sequence[int]) -> list[float]:
+    """The numbers from low to high that are one of these, times a power of ten."""
+    powers = range(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
+    found = (float(f"{step}e{power}") for power in powers for step in steps)
+    return [x for x in found if low <= x <= high]
 
 
 def _even(values: np.ndarray, share: float) -> bool:

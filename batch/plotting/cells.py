@@ -81,7 +81,7 @@ def draw(ax: Any, found: Picked, x: Side, y: Side, colours: Any, norm: Any, shee
             _fill(ax, x, y, wanted & among, facecolors="none", edgecolors=tone, linewidth=0.0, hatch=hatch)
     size, room = _sign(ax, shape)
     for which, text in ((found.failed, "x"), (np.isposinf(values), "∞"), (np.isneginf(values), "−∞")):
-        _signs(ax, x, y, _spaced(which.reshape(shape), room), text, size, INK)
+        _signs(ax, x, y, which.reshape(shape), room, text, size)
     return mapped
 
 
@@ -91,14 +91,18 @@ def _fill(ax: Any, x: Side, y: Side, which: np.ndarray, **style: Any) -> None:
 
     if not which.any():
         return
-    rows = which.reshape(len(y.levels.texts), len(x.levels.texts))
+    corners = _corners(x, y, which.reshape(len(y.levels.texts), len(x.levels.texts)))
+    ax.add_collection(PolyCollection(list(corners), rasterized=which.size > FINE, **style), autolim=False)
+
+
+def _corners(x: Side, y: Side, rows: np.ndarray) -> np.ndarray:
+    """[stretch, corner, 2] of the stretches of neighbouring cells in each row."""
     steps = np.diff(np.pad(rows, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     up, first = np.nonzero(steps > 0)
     end = np.nonzero(steps < 0)[1]
     left, right, low, high = x.edges[first], x.edges[end], y.edges[up], y.edges[up + 1]
-    corners = np.stack([np.stack([left, low], 1), np.stack([right, low], 1), np.stack([right, high], 1),
-                        np.stack([left, high], 1)], axis=1)  # fmt: skip
-    ax.add_collection(PolyCollection(list(corners), rasterized=which.size > FINE, **style), autolim=False)
+    return np.stack([np.stack([left, low], 1), np.stack([right, low], 1), np.stack([right, high], 1),
+                     np.stack([left, high], 1)], axis=1)  # fmt: skip
 
 
 def _lightness(colours: np.ndarray) -> np.ndarray:
@@ -129,19 +133,33 @@ def _spaced(which: np.ndarray, room: tuple[int, int]) -> np.ndarray:
     return out
 
 
-def _signs(ax: Any, x: Side, y: Side, which: np.ndarray, text: str, size: float, tone: str) -> None:
+def _signs(ax: Any, x: Side, y: Side, which: np.ndarray, room: tuple[int, int], text: str, size: float) -> None:
+    """Signs over some of these cells. What is around an infinity sign covers no other cell, and a sign in a stretch
+    that is narrower than itself stands in the stretch's middle, whole also at the map's edge."""
     if not which.any():
         return
-    up, across = np.nonzero(which)
-    style: dict[str, Any] = {"color": tone, "zorder": 3}
+    up, across = np.nonzero(_spaced(which, room))
+    centres = _in_stretch(x, which, room[1])[up, across], y.centres[up]
     if text == "x":
-        style |= {"s": size**2, "marker": "x", "linewidths": 0.8}
-    else:
-        from matplotlib.patheffects import withStroke
+        ax.scatter(*centres, s=size**2, marker="x", linewidths=0.8, color=INK, zorder=3, clip_on=False)
+        return
+    from matplotlib.path import Path
 
-        style |= {"s": 4.0 * len(text) ** 2 * size**2, "marker": infinity(text), "linewidths": 0.0,
-                  "path_effects": [withStroke(linewidth=2.5, foreground=INFINITE)]}  # fmt: skip
-    ax.scatter(x.centres[across], y.centres[up], **style)
+    style: dict[str, Any] = {"s": 4.0 * len(text) ** 2 * size**2, "marker": infinity(text)}
+    around = ax.scatter(*centres, facecolors=INFINITE, edgecolors=INFINITE, linewidths=2.5, zorder=2.9, **style)
+    around.set_clip_path(Path.make_compound_path_from_polys(_corners(x, y, which)), ax.transData)
+    ax.scatter(*centres, color=INK, linewidths=0.0, zorder=3, clip_on=False, **style)
+
+
+def _in_stretch(x: Side, which: np.ndarray, most: int) -> np.ndarray:
+    """Where a sign over each cell stands: in the middle of the stretch of neighbours, if these are at most so many."""
+    place = np.arange(which.shape[1])
+    beside = np.pad(which, ((0, 0), (1, 1)))
+    first = np.maximum.accumulate(np.where(which & ~beside[:, :-2], place, 0), axis=1)
+    end = np.minimum.accumulate(np.where(which & ~beside[:, 2:], place + 1, len(place))[:, ::-1], axis=1)[:, ::-1]
+    few = end - first <= most
+    left, right = x.edges[np.where(few, first, place)], x.edges[np.where(few, end, place + 1)]
+    return np.asarray(np.sqrt(left * right) if x.scale == "log" else (left + right) / 2)
 
 
 def infinity(text: str = "∞") -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,9 @@ RASTERED = 2000
 """More points than these are a raster within an SVG or a PDF."""
 
 BEHIND, PALE = 3.0, 0.3
+
+BAR = 0.7
+"""Of a picture's height, what a colour bar has at least."""
 
 PANEL = 0.6
 """Of a picture's width, what a panel beside a legend has at least."""
@@ -51,7 +55,8 @@ def scatter(ax: Any, each: Measured, x: Column, by: Column | None, sheet: Sheet)
     if by is not None and not any(one.text for one in sets):
         mapped = _scale(by)
     if not sets and by is not None:
-        mapped = ax.scatter(x.values[drawn], each.values[drawn], c=by.values[drawn], cmap="viridis", **style)
+        style |= {"cmap": "viridis", "norm": _scale(by).norm}
+        mapped = ax.scatter(x.values[drawn], each.values[drawn], c=by.values[drawn], **style)
     for one in sets:
         here = drawn[np.isin(drawn, one.places)] if len(sets) > 1 else drawn
         if one.joined:
@@ -89,12 +94,12 @@ def _sets(x: Column, by: Column | None) -> list[Set]:
 
 
 def _scale(by: Column) -> Any:
-    """Colours by value, where there are too many to name."""
+    """Colours by value, where there are too many to name; by its logarithm where its axis would be logarithmic."""
     from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
+    from matplotlib.colors import LogNorm, Normalize
 
     finite = levels(by.values)
-    return ScalarMappable(Normalize(finite[0], finite[-1]), "viridis")
+    return ScalarMappable((LogNorm if is_log(by) else Normalize)(finite[0], finite[-1]), "viridis")
 
 
 def _curves(x: Column, by: Column) -> bool:
@@ -130,7 +135,11 @@ def _reach(ax: Any, x: np.ndarray) -> None:
 
 
 def _edge(ax: Any, values: np.ndarray, x: np.ndarray, size: float, *, hollow: bool = False) -> None:
-    """What is no number, on the panel's edges: ▲ infinite, ▼ infinite below, × no value. hollow: of another archive."""
+    """What is no number, within the panel at its edges: ▲ infinite, ▼ infinite below, × no value. hollow: of another
+    archive."""
+    from matplotlib.transforms import ScaledTranslation
+
+    size = max(12.0, size)
     style = {"facecolors": "none", "edgecolors": INK, "zorder": 3.9} if hollow else {"color": INK, "zorder": 4}
     for there, marker, at in ((np.isposinf(values), "^", 1.0), (np.isneginf(values), "v", 0.0),
                               (np.isnan(values), "x", 1.0)):  # fmt: skip
@@ -138,8 +147,10 @@ def _edge(ax: Any, values: np.ndarray, x: np.ndarray, size: float, *, hollow: bo
         if len(where):
             where = where[_apart(where, np.zeros(len(where)))]
             tone = {"color": INK, "zorder": 3.9} if hollow and marker == "x" else style  # a cross has no face
-            ax.scatter(where, np.full(len(where), at), marker=marker, s=max(12.0, size), linewidths=0.8,
-                       transform=ax.get_xaxis_transform(), clip_on=False, **tone)  # fmt: skip
+            inside = (1.0 - 2.0 * at) * (0.5 * size**0.5 + 1.0) / 72
+            place = ax.get_xaxis_transform() + ScaledTranslation(0.0, inside, ax.figure.dpi_scale_trans)
+            ax.scatter(where, np.full(len(where), at), marker=marker, s=size, linewidths=0.8, transform=place,
+                       clip_on=False, **tone)  # fmt: skip
 
 
 def lost(values: np.ndarray) -> str:
@@ -196,6 +207,10 @@ def legend_of(known: Mapping[str, Any], other: tuple[str, str] | None) -> dict[s
 
 def bar(figure: Any, mapped: Any, axes: list[Any], by: Column, sheet: Sheet) -> None:
     drawn = figure.colorbar(mapped, ax=axes, pad=0.01, aspect=18 * len(axes))
+    if is_log(by):
+        found = line(by)
+        height = BAR * figure.get_figheight()
+        write_log(drawn.ax.yaxis, replace(found, edges=levels(by.values)[[0, -1]]), height, sheet, upright=True)
     drawn.set_label(f"{by.label}  ({by.unit})" if by.unit else by.label, fontsize=sheet.small)
     drawn.outline.set_visible(False)
 

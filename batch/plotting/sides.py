@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from batch import grids
-from batch.grids import Levels, Scale, edges_of, levelled, levels
+from batch.grids import ROUND, Levels, Scale, edges_of, levelled, levels, round_numbers
 from batch.plotting.layout import LETTER
 from batch.plotting.sheet import Sheet
 from batch.pool import Column
@@ -22,9 +22,6 @@ MOST_CELLS = 300
 
 SHORT = 5
 """Letters of values that are written rather than round numbers between them."""
-
-ROUND = ((1, 2, 5), (1, 3), (1,))
-"""Steps within a power of ten of a logarithmic axis, the densest first."""
 
 APART = 0.1
 """Inches between numbers on an axis."""
@@ -115,7 +112,7 @@ def write_log(axis: Any, found: Side, inches: float, sheet: Sheet, *, upright: b
 
     axis.set_minor_locator(NullLocator())
     low, high = float(found.edges[0]), float(found.edges[-1])
-    tries = [_round(low, high, steps) for steps in ROUND]
+    tries = [round_numbers(low, high, steps) for steps in ROUND]
     if max(map(len, found.levels.texts)) <= SHORT and not found.levels.stretches:
         tries.insert(0, found.levels.values.tolist())
     values = next((each for each in tries if _apart(each, low, high, inches, sheet, upright=upright)), tries[-1])
@@ -124,13 +121,6 @@ def write_log(axis: Any, found: Side, inches: float, sheet: Sheet, *, upright: b
     if len(values) < 2:  # less than a factor of 2.5: rises nearly as a linear axis does
         values = [x for x in _even_numbers(low, high, inches, sheet) if low <= x <= high]
     axis.set_ticks(values, [number_text(x) for x in values])
-
-
-def _round(low: float, high: float, steps: Sequence[int]) -> list[float]:
-    """The numbers from low to high that are one of these, times a power of ten."""
-    powers = range(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
-    found = (float(f"{step}e{power}") for power in powers for step in steps)
-    return [x for x in found if low <= x <= high]
 
 
 def _even_numbers(low: float, high: float, inches: float, sheet: Sheet) -> list[float]:

@@ -192,10 +192,23 @@ class ParameterRow:
 
 
 @frozen
+class Ruler:
+    """A side of a map: where the cells end on it, from 0 to 1, and what may be written there.
+
+    edges  one more than cells
+    ticks  of several choices, the densest first, each (where, text)
+    """
+
+    edges: tuple[float, ...]
+    ticks: tuple[tuple[tuple[float, str], ...], ...]
+
+
+@frozen
 class Map:
     """Two parameters that make a grid, and of each metric what its cells hold.
 
     x_levels, y_levels   values, or stretches of them where there are many
+    x_ruler, y_ruler     where these lie in a drawing
     values   by metric's key: (y, x), the worst case of the cell by the metric's first limit, or its middle one
     cases    by metric's key: (y, x), which case that is; -1 where there is none
     counts   (y, x): cases in the cell
@@ -214,6 +227,8 @@ class Map:
     missed: dict[str, np.ndarray]
     failed: np.ndarray
     reaches: dict[str, Reach | None]
+    x_ruler: Ruler
+    y_ruler: Ruler
 
 
 @frozen

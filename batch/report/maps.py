@@ -8,9 +8,10 @@ from itertools import combinations
 import numpy as np
 
 from batch.colours import reach
-from batch.grids import cells_of, is_grid, levelled, standing
+from batch.grids import ROUND, Levels, cells_of, edges_of, is_grid, levelled, round_numbers, standing
 from batch.pool import Column, Pool
-from batch.report.content import Map
+from batch.report.content import Map, Ruler
+from batch.signals import number_text
 from met.run import DONE
 
 MOST_MAPS = 6
@@ -49,4 +50,37 @@ def _map(pool: Pool, x: Column, y: Column, metrics: Sequence[Column]) -> Map:
     counts, failed = (
         np.bincount(cells[which], minlength=shape[0] * shape[1]).reshape(shape) for which in (there, there & ~done)
     )
-    return Map(x.key, y.key, across.texts, up.texts, counts, values, cases, missed, failed, reaches)
+    return Map(x.key, y.key, across.texts, up.texts, counts, values, cases, missed, failed, reaches,
+               ruler(across), ruler(up))  # fmt: skip
+
+
+def ruler(found: Levels) -> Ruler:
+    """By the values' steps or factors, as in `met plot`: of stretches of values round numbers are written."""
+    count = len(found.texts)
+    if found.scale == "place":
+        edges = np.linspace(0.0, 1.0, count + 1)
+        heads = [text.partition(" … ")[0] for text in found.texts]
+        return Ruler(tuple(edges.tolist()), (tuple(zip((edges[1:] + edges[:-1]) / 2, heads, strict=True)),))
+    ends = found.values if found.stretches else edges_of(found.values, found.scale)
+    low, high = float(ends[0]), float(ends[-1])
+
+    def where(values: np.ndarray) -> np.ndarray:
+        if found.scale == "log":
+            return np.asarray(np.log(values / low) / np.log(high / low))
+        return (values - low) / (high - low)
+
+    choices = [found.values] if not found.stretches else []
+    if found.scale == "log":
+        choices += [np.array(round_numbers(low, high, steps)) for steps in ROUND]
+    choices = [each for each in choices if len(each) > 1] or [_steps(low, high)]
+    if found.scale == "linear":
+        choices.append(_steps(low, high))
+    ticks = tuple(tuple(zip(where(each).tolist(), map(number_text, each.tolist()), strict=True)) for each in choices)
+    return Ruler(tuple(where(ends).tolist()), ticks)
+
+
+def _steps(low: float, high: float) -> np.ndarray:
+    """Five to twelve round numbers by equal steps."""
+    size = 10.0 ** np.floor(np.log10((high - low) / 5))
+    step = next(each for each in (5 * size, 2 * size, size) if (high - low) / each >= 5)
+    return np.asarray(np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step)

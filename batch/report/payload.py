@@ -11,7 +11,7 @@ import numpy as np
 from batch.colours import Reach, reach
 from batch.pool import ENDED, Column
 from batch.report.changes import Comparison
-from batch.report.content import History, Map, Overview, Section, Signals, Stability
+from batch.report.content import History, Map, Overview, Ruler, Section, Signals, Stability
 from batch.report.markup import Html
 from batch.signals import pretty_unit
 from met.visible import visible
@@ -77,7 +77,8 @@ def _column(column: Column) -> dict[str, Any]:
         "about": visible(column.about),
         "words": [visible(word) for word in column.words],
         "log": column.log,
-        "reach": _reach(reach(column.values, [e.value for e in column.limits], parting=column.role == "change")),
+        "reach": _reach(reach(column.values, [e.value for e in column.limits], parting=column.role == "change",
+                              by_factors=column.role == "parameter" and column.log)),
         "values": packed(column.values),
         "before": None if column.before is None else packed(column.before),
         "limits": [{"text": visible(e.text), "value": e.value, "sense": e.sense}
@@ -104,6 +105,8 @@ def _map(each: Map) -> dict[str, Any]:
         "y": visible(each.y),
         "xLevels": [visible(level) for level in each.x_levels],
         "yLevels": [visible(level) for level in each.y_levels],
+        "xRuler": _ruler(each.x_ruler),
+        "yRuler": _ruler(each.y_ruler),
         "counts": packed(each.counts),
         "failed": packed(each.failed),
         "of": {
@@ -114,6 +117,10 @@ def _map(each: Map) -> dict[str, Any]:
             for key in each.values
         },
     }  # fmt: skip
+
+
+def _ruler(found: Ruler) -> dict[str, Any]:
+    return {"edges": list(found.edges), "ticks": [[[at, visible(text)] for at, text in each] for each in found.ticks]}
 
 
 def _reach(found: Reach | None) -> dict[str, Any] | None:

@@ -14,17 +14,17 @@ MET.cells = (() => {
     const wide = MET.width(box);
     const px = devicePixelRatio;
     const high = Math.round(Math.min(Math.max(HIGH / up, CELL[0]), CELL[1]) * up);
-    const head = (level) => level.split(" … ")[0];
-    const left = Math.min(0.3 * wide, 12 + LETTER * Math.max(...map.yLevels.map((level) => head(level).length)));
+    const rows = fitting(map.yRuler.ticks, high, () => 18);
+    const left = Math.min(0.3 * wide, 12 + LETTER * Math.max(...rows.map(([, text]) => text.length)));
+    const columns = fitting(map.xRuler.ticks, wide - left - 2, (text) => LETTER * text.length + 16);
     const canvas = node("canvas", { tabindex: 0, role: "application", style: { width: `${wide}px`, height: `${high + 22}px` },
       "aria-label": `${titled(found.m)} over ${titled(x)} and ${titled(y)}. Arrow keys go from cell to cell, Enter chooses the case that one shows.` });
     [canvas.width, canvas.height] = [wide * px, (high + 22) * px];
     box.replaceChildren(node("div", { class: "axes" }, node("span", null, `${titled(y)} ↑`), node("span", null, `${titled(x)} →`)), canvas);
-    const edge = (n, count, size) => Math.round((n * size * px) / count);
     const area = (n) => {
-      const [column, row] = [n % across, up - 1 - Math.floor(n / across)];
-      const [l, r] = [0, 1].map((one) => Math.round(left * px) + edge(column + one, across, wide - left - 2));
-      const [t, b] = [0, 1].map((one) => edge(row + one, up, high));
+      const [column, row] = [n % across, Math.floor(n / across)];
+      const [l, r] = [0, 1].map((one) => Math.round((left + map.xRuler.edges[column + one] * (wide - left - 2)) * px));
+      const [b, t] = [0, 1].map((one) => Math.round((1 - map.yRuler.edges[row + one]) * high * px));
       return [l, t, r - l, b - t];
     };
     let at = -1;
@@ -90,25 +90,19 @@ MET.cells = (() => {
       ctx.fillStyle = colours.muted;
       ctx.textAlign = "right";
       ctx.textBaseline = "middle";
-      for (let row = 0; row < up; row += Math.ceil((18 * up) / high)) {
-        const [, t, , h] = area(row * across);
-        ctx.fillText(head(map.yLevels[row]), (left - 6) * px, t + h / 2);
-      }
-      const texts = map.xLevels.map(head);
-      const every = Math.max(1, Math.ceil(((LETTER * Math.max(...texts.map((text) => text.length)) + 16) * across) / (wide - left)));
+      for (const [at, text] of rows) ctx.fillText(text, (left - 6) * px, (1 - at) * high * px);
       ctx.textBaseline = "top";
-      for (let column = 0; column < across; column += every) {
-        const [l, , w] = area(column);
-        const half = ctx.measureText(texts[column]).width / 2;
-        ctx.textAlign = "center";
-        ctx.fillText(texts[column], Math.min(Math.max(l + w / 2, half), canvas.width - half), (high + 7) * px);
+      ctx.textAlign = "center";
+      for (const [at, text] of columns) {
+        const half = ctx.measureText(text).width / 2;
+        ctx.fillText(text, Math.min(Math.max((left + at * (wide - left - 2)) * px, half), canvas.width - half), (high + 7) * px);
       }
     }
 
     function cellAt(event) {
       const frame = canvas.getBoundingClientRect();
-      const column = Math.floor(((event.clientX - frame.left - left) / (wide - left - 2)) * across);
-      const row = up - 1 - Math.floor(((event.clientY - frame.top) / high) * up);
+      const column = within(map.xRuler.edges, (event.clientX - frame.left - left) / (wide - left - 2));
+      const row = within(map.yRuler.edges, 1 - (event.clientY - frame.top) / high);
       return column < 0 || column >= across || row < 0 || row >= up ? -1 : row * across + column;
     }
 
@@ -140,6 +134,21 @@ MET.cells = (() => {
     });
     draw();
     return { choose: draw, wide };
+  }
+
+  // Between which edges something lies; -1 beyond them.
+  const within = (edges, at) => (at < edges[0] || at >= edges[edges.length - 1] ? -1 : edges.findIndex((edge) => edge > at) - 1);
+
+  // The densest choice of ticks that have room; else every second, third ... of the last one.
+  function fitting(choices, size, room) {
+    const clear = (ticks) => ticks.every(([at, text], n) => !n || (at - ticks[n - 1][0]) * size >= (room(text) + room(ticks[n - 1][1])) / 2);
+    const found = choices.find(clear);
+    if (found) return found;
+    const last = choices[choices.length - 1];
+    for (let every = 2; ; every++) {
+      const some = last.filter((_, n) => n % every === 0);
+      if (clear(some)) return some;
+    }
   }
 
   // Stripes that run through neighbouring cells.

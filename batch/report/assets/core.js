@@ -23,7 +23,7 @@ const MET = (() => {
     if (!Number.isFinite(value)) return "no value";
     if (value === 0) return "0";
     const size = Math.floor(Math.log10(Math.abs(value)) + 1e-12);
-    if (size <= -4 || size >= 7) return value.toExponential(3).replace(/\.?0+e/, "e").replace("e+", "e");
+    if (size < -4 || size >= 7) return value.toExponential(3).replace(/\.?0+e/, "e").replace("e+", "e");
     const text = value.toFixed(Math.max(0, 3 - size));
     return text.includes(".") ? text.replace(/\.?0+$/, "") : text;
   }

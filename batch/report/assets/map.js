@@ -42,12 +42,15 @@ MET.map = (() => {
       const kinds = Array.from(values, (_, n) => of(n));
       const greys = [["infinite", "infinite"], ["failed", "failed"], ["lacking", "no value"], ["void", "no case"]].map(([key, words]) => {
         const count = kinds.filter((each) => each === key).length;
-        return count ? node("span", { class: "item tight" }, node("span", { class: `patch ${key}` }), `${words} (${count.toLocaleString("en")})`) : null;
+        return count ? node("span", { class: "item tight" }, node("span", { class: `patch ${key}` }), `${words} (${cells(count)})`) : null;
       });
       const bad = missed.reduce((sum, n) => sum + (n > 0), 0);
-      scale.replaceChildren(...[node("span", null, `${titled(m)}:`), ...(reach ? MET.overview.scale(reach, change) : ["no value"]),
+      const [misses, all] = [missed, counts].map((each) => each.reduce((sum, n) => sum + n, 0));
+      const filled = counts.reduce((sum, n) => sum + (n > 0), 0);
+      const told = several ? `${grouped(misses)} of ${grouped(all)} cases miss, in ${grouped(bad)} of ${cells(filled)}` : `missed (${grouped(misses)} of ${grouped(all)} cases)`;
+      scale.replaceChildren(...[node("span", null, `${titled(m)}:`), ...(reach ? MET.overview.scale(reach, change, several ? cells : grouped) : ["no value"]),
         ...judged.map((words) => node("span", null, words)), ...greys,
-        bad ? node("span", { class: "item tight bad-text" }, many ? node("span", { class: "patch striped" }) : "✗ ", `a case misses (${bad.toLocaleString("en")})`) : null,
+        bad ? node("span", { class: "item tight bad-text" }, many ? node("span", { class: "patch striped" }) : "✗ ", told) : null,
         several ? node("span", null, `each cell shows ${rule}`) : null].filter(Boolean));
     }
 
@@ -56,6 +59,9 @@ MET.map = (() => {
     model.watch((chosen) => drawn.choose(chosen));
     new ResizeObserver(() => { if (drawn.wide !== MET.width(box)) draw(); }).observe(root);
   }
+
+  const grouped = (count) => count.toLocaleString("en");
+  const cells = (count) => `${grouped(count)} cell${count === 1 ? "" : "s"}`;
 
   // What a cell holds: a number, or why it has none.
   function kind({ counts, values, failed }, n) {

@@ -126,11 +126,11 @@ MET.overview = (() => {
   }
 
   // Colours from end to end, and how many values lie beyond; of changes from less to more.
-  function scale(reach, parting) {
+  function scale(reach, parting, counted = (n) => n.toLocaleString("en")) {
     const stops = [...Array(9).keys()].map((n) => (parting ? MET.diverging(n / 4 - 1) : MET.ramp(n / 8))).join(",");
     const beyond = (words, sign, colour) => (words ? node("span", { class: "item tight" }, node("span", { class: "beyond", style: { color: colour } }, sign), words) : null);
     const [low, high] = [reach.low, reach.high].map(parting ? MET.signed : number);
-    const count = (n, words, value) => n && `${n.toLocaleString("en")} ${words} ${number(value)}`;
+    const count = (n, words, value) => n && `${counted(n)} ${words} ${number(value)}`;
     return [beyond(count(reach.below, "below, down to", reach.least), "◀", parting ? MET.diverging(-1) : MET.BELOW),
       node("span", { class: "item" }, low, node("span", { class: "ramp", style: { background: `linear-gradient(90deg,${stops})` } }), high),
       beyond(count(reach.above, "above, up to", reach.most), "▶", parting ? MET.diverging(1) : MET.ABOVE), reach.log ? "logarithmic" : null].filter(Boolean);

@@ -44,8 +44,8 @@ MET.points = (() => {
         series: [{}, { scale: "y", paths: () => null, points: { show: false } }],
         axes: [
           { ...axis, label: (u) => MET.fitted(MET.titled(plot.x), font, u.width - 90), size: 34, space: 64, incrs: counts ? COUNTS : undefined, ...(few ? { splits: () => few, values: labels(true) } : words.length ? { splits: () => words.map((_, n) => n),
-            values: () => words.map((word) => (word.length > 18 ? word.slice(0, 17) + "…" : word)) } : { values: labels(logX) }) },
-          { ...axis, label: MET.fitted(MET.titled(plot.y), font, plot.height - 50), size: 58, values: labels(logY), ...(logY && decades(ys) < 1.3 ? { filter: (u, splits) => splits.map((v) => (round(v) ? v : null)) } : {}) },
+            values: () => words.map((word) => (word.length > 18 ? word.slice(0, 17) + "…" : word)) } : { values: labels(logX), ...(logX ? logarithmic : {}) }) },
+          { ...axis, label: MET.fitted(MET.titled(plot.y), font, plot.height - 50), size: 58, values: labels(logY), ...(logY ? logarithmic : {}) },
         ],
         hooks: { draw: [draw], setCursor: [hover] },
       };
@@ -228,13 +228,35 @@ MET.points = (() => {
   const rank = (value) => (Number.isFinite(value) ? value : Infinity);
   const labels = (log) => (u, values) => (log ? values.map((v) => (v === null ? "" : MET.number(v))) : ticks(values));
 
-  // One digit: what a logarithmic axis has beside its ends.
-  const round = (v) => Math.abs(+v.toPrecision(1) - v) < 1e-9 * v;
-
-  const decades = (values) => {
-    const numbers = values.filter((v) => v > 0);
-    return numbers.length ? Math.log10(numbers.reduce((a, b) => Math.max(a, b)) / numbers.reduce((a, b) => Math.min(a, b))) : 0;
+  // Of a logarithmic axis: ticks at one digit times a power of ten, by equal steps where it is short, and numbers at as
+  // many of them as have room: at all, at 1, 2 and 5, at 1 and 3, or at powers of ten.
+  const DIGITS = [[1, 2, 3, 4, 5, 6, 7, 8, 9], [1, 2, 5], [1, 3], [1]];
+  const logarithmic = {
+    splits: (u, axis, low, high, step) => {
+      const found = [];
+      for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) DIGITS[0].forEach((digit) => found.push(+`${digit}e${power}`));
+      const within = found.filter((v) => v >= low && v <= high);
+      return within.length > 2 ? within : even(low, high);
+    },
+    filter: (u, splits, axis) => {
+      const upright = axis === 1;
+      const at = (v) => u.valToPos(v, upright ? "y" : "x");
+      const room = (v) => (upright ? 22 : 6.8 * MET.number(v).length + 14);
+      const clear = (some) => some.every((v, n) => !n || Math.abs(at(v) - at(some[n - 1])) >= (room(v) + room(some[n - 1])) / 2);
+      const sets = DIGITS.map((digits) => splits.filter((v) => digits.includes(+v.toExponential(0)[0])));
+      const shown = [splits, ...sets].find((some) => some.length > 1 && clear(some)) || splits.filter((v, n) => n === 0 || n === splits.length - 1);
+      return splits.map((v) => (shown.includes(v) ? v : null));
+    },
   };
+
+  // Round numbers by equal steps, five to twelve of them.
+  function even(low, high) {
+    const size = 10 ** Math.floor(Math.log10((high - low) / 5));
+    const step = [5, 2, 1].map((n) => n * size).find((each) => (high - low) / each >= 5);
+    const found = [];
+    for (let n = Math.ceil(low / step); n * step <= high; n++) found.push(n * step);
+    return found;
+  }
 
   // Few values that stand well apart are the ticks themselves; else none.
   function apart(values, width) {

@@ -127,7 +127,7 @@ class TestMapsOfADifference:
         made(monkeypatch, "a.h5", archives.grid(KP, MASS), [1.0, np.inf, 1.0, 1.0, 1.0])
         made(monkeypatch, "b.h5", archives.grid(KP, MASS), [1.0, 1.0, np.inf, 1.0, 1.0])
         plot("a.h5", names=["settle"], against="b.h5")
-        marks = [each for each in shown(figures[0])[0].collections if each.get_path_effects()]
+        marks = [each for each in shown(figures[0])[0].collections if not each.get_clip_on()]
         assert [len(each.get_offsets()) for each in marks] == [5, 5]
 
 

@@ -58,6 +58,10 @@ class TestPoints:
         heights = np.concatenate([np.ma.filled(each.get_offsets(), np.nan)[:, 1] for each in points])
         assert np.isfinite(heights).sum() == 35
         assert (infinite.get_offsets()[:, 1] == 1.0).all() and len(infinite.get_offsets()) == 2
+        figures[0].draw_without_rendering()
+        box = infinite.get_offset_transform().transform(infinite.get_offsets())[:, 1]
+        half = 0.5 * infinite.get_sizes()[0] ** 0.5 * figures[0].dpi / 72
+        assert (box + half < ax.bbox.y1).all()  # clear of what stands above the panel
         assert len(lost.get_offsets()) == 3
 
     @pytest.mark.slow
@@ -74,6 +78,18 @@ class TestPoints:
         plot("a.h5", over=["gearbox.kp"])
         assert [ax.get_ylabel() for ax in figures[0].axes] == ["settle  (s)", "volts  (V)", "links.lower.mass  (g)"]
         assert not figures[0].legends
+
+    def test_of_a_logarithmic_sweep_have_logarithmic_colours_with_round_numbers(
+        self, here: Path, figures: list[Any]
+    ) -> None:
+        made(kps=np.geomspace(0.001, 0.1, NAMED + 1).tolist(), masses=MASS)
+        plot("a.h5", over=["links.lower.mass"])
+        bar = figures[0].axes[-1]
+        assert (bar.get_ylabel(), bar.get_yscale()) == ("gearbox.kp  (V·s/rad)", "log")
+        assert bar.get_ylim() == pytest.approx((0.001, 0.1), rel=1e-12)
+        assert [text.get_text() for text in bar.get_yticklabels()] == [
+            "0.001", "0.002", "0.005", "0.01", "0.02", "0.05", "0.1",
+        ]  # fmt: skip
 
     def test_have_the_limit_as_a_line_where_it_is_near(self, here: Path, figures: list[Any]) -> None:
         def limits(ax: Any) -> list[float]:
@@ -150,10 +166,27 @@ class TestMaps:
         assert (cells(volts, face=INFINITE), cells(volts, face=FAILED)) == (0, 1)
         assert settle.get_title("left").endswith("\ninfinite in 5, failed: 1")
         marks = [len(each.get_offsets()) for each in settle.collections if isinstance(each, PathCollection)]
-        assert marks == [1, 5]
+        assert marks == [1, 5, 5]  # what is around an infinity sign is drawn by itself
         assert [text.get_text() for text in figures[0].legends[0].get_texts()] == [
             "misses what is required", "infinite", "failed",
         ]  # fmt: skip
+
+    def test_have_signs_that_are_whole_at_the_edge_and_cover_no_other_cell(
+        self, here: Path, figures: list[Any]
+    ) -> None:
+        made(kps=np.geomspace(0.001, 0.01, 40).tolist())
+        plot("a.h5")
+        figures[0].draw_without_rendering()
+        ax = shown(figures[0])[0]
+        around, signs = (each for each in ax.collections if isinstance(each, PathCollection))
+        assert not signs.get_clip_on()
+        np.testing.assert_array_equal(around.get_offsets(), signs.get_offsets())
+        clip, affine = around.get_transformed_clip_path_and_affine()
+        greys = np.isinf(np.where(np.isnan(mesh(ax)), np.inf, mesh(ax)))
+        [drawn] = (each for each in ax.collections if isinstance(each, QuadMesh))
+        edges = drawn.get_coordinates()[0, :, 0]
+        right = ax.transData.transform((edges[np.flatnonzero(greys[0])[-1] + 1], MASS[0]))[0]
+        assert affine.transform_path(clip).get_extents().x1 == pytest.approx(right, abs=1e-6)
 
     def test_leave_cells_white_that_have_no_case(self, here: Path, figures: list[Any]) -> None:
         one = archives.grid(KP, MASS)

@@ -11,10 +11,13 @@ import pytest
 import batch
 from batch import ordering
 from batch.archive.read import ArchiveFile
-from batch.pool import ENDED, Pool, pools
+from batch.grids import levelled
+from batch.pool import ENDED, Column, Pool, pools
 from batch.report import histories, overview, stability
 from batch.report.content import Part, Report
 from batch.report.data import gather
+from batch.report.maps import ruler
+from batch.report.payload import _column
 from batch.report.thinning import thin, thin_clock
 from met.margin import margins
 from tests.batch import plans
@@ -171,6 +174,29 @@ class TestMaps:
         assert found is not None
         [map_] = found.maps
         assert map_.counts.shape == (3, 48) and map_.counts.sum() == 300
+
+    def test_of_many_values_have_round_numbers_where_these_lie(self) -> None:
+        steps = ruler(levelled(np.linspace(0.0, 70.0, 71)))
+        assert len(steps.edges) == 49 and (steps.edges[0], steps.edges[-1]) == (0.0, 1.0)
+        assert [text for _, text in steps.ticks[0]] == ["0", "10", "20", "30", "40", "50", "60", "70"]
+        assert [at for at, _ in steps.ticks[0]] == pytest.approx([(x + 0.5) / 71 for x in range(0, 71, 10)])
+        factors = ruler(levelled(np.geomspace(0.01, 100.0, 81)))
+        assert [text for _, text in factors.ticks[0]] == [
+            "0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50", "100",
+        ]  # fmt: skip
+        assert {text: at for at, text in factors.ticks[0]}["1"] == pytest.approx(0.5)
+        few = ruler(levelled(np.array([1.0, 10.0, 100.0])))
+        assert [text for _, text in few.ticks[0]] == ["1", "10", "100"]
+        assert [at for at, _ in few.ticks[0]] == pytest.approx([1 / 6, 1 / 2, 5 / 6])
+
+
+def test_colours_of_a_logarithmic_sweep_are_logarithmic() -> None:
+    kp = Column("parameter:kp", "kp", "", "parameter", np.geomspace(1e-3, 1e-1, 9), log=True)
+    assert _column(kp)["reach"] == {
+        "low": pytest.approx(1e-3), "high": pytest.approx(1e-1), "log": True, "below": 0, "above": 0,
+        "least": pytest.approx(1e-3), "most": pytest.approx(1e-1),
+    }  # fmt: skip
+    assert not _column(replace(kp, values=np.linspace(1e-3, 1e-1, 9), log=False))["reach"]["log"]
 
 
 class TestSignals:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -153,7 +154,11 @@ def test_a_dense_map_is_drawn_without_gaps_and_says_what_strays(chromium: Chromi
     )
     assert bare == 0
     said = page.run("document.querySelector('.map .scale').textContent")
-    assert "1 above, up to 1e12" in said and "infinite (1)" in said and "failed (1)" in said
+    assert "1 cell above, up to 1e12" in said and "infinite (1 cell)" in said and "failed (1 cell)" in said
+    counted = re.search(r"([\d,]+) of 1,800 cases miss, in ([\d,]+) of 1,440 cells", said)
+    assert counted is not None
+    missed, cells = (int(each.replace(",", "")) for each in counted.groups())
+    assert 0 < cells < missed < 1800
     assert "no case" not in said
     page.run("document.querySelector('.map canvas').focus()")
     for key in ("ArrowRight", "ArrowRight", "ArrowUp", "Enter"):
@@ -166,4 +171,22 @@ def test_a_dense_map_is_drawn_without_gaps_and_says_what_strays(chromium: Chromi
 def test_points_of_a_logarithmic_sweep_lie_on_a_logarithmic_axis(chromium: Chromium, dense: Path) -> None:
     page = opened(chromium, dense)
     assert page.run("MET.models[0].plot.u.scales.x.distr") == 3
+    page.close()
+
+
+@pytest.fixture(scope="module")
+def sparse(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report of a logarithmic sweep of four values."""
+    folder = tmp_path_factory.mktemp("sparse")
+    (folder / "arm.ic").write_text(
+        "#include <two_link.ic>\nsweep few of nominal { vary gearbox.kp = logspace(0.004, 0.04, 4) V*s/rad; }\n"
+    )
+    batch.run(ic.compile(folder / "arm.ic", select=["few"]), output=folder / "few.h5")
+    return report(folder / "few.h5", folder / "few.html")
+
+
+def test_a_short_logarithmic_axis_has_several_numbers(chromium: Chromium, sparse: Path) -> None:
+    page = opened(chromium, sparse)
+    said = page.run("MET.models[0].plot.u.axes[0]._values.filter((text) => text)")
+    assert said == ["0.005", "0.01", "0.02"]
     page.close()
