@@ -94,9 +94,13 @@ def title(group: Group, most: int | None = None, *, by: By | None = None) -> str
         return found.title
     outcomes = requirements.outcomes(group)
     number = f"{min(most, group.count)} " if most is not None else ""
-    if (group.values("status") != 0).any() or (outcomes != 1).any():
-        return f"the {number}worst cases:" if number else "cases, worst first:"
-    near = f"the {number}cases closest to a limit:" if number else "cases, closest to a limit first:"
+    failed = bool((group.values("status") != 0).any())
+    equal = ordering.ranking(group).equal(SHOWN_CASES if most is None else most) if failed or outcomes.shape[1] else 0
+    if failed or (outcomes != 1).any():
+        many = f" ({equal:,} are equally bad)" if equal else ""
+        return f"the {number}worst cases{many}:" if number else f"cases, worst first{many}:"
+    many = f" ({equal:,} are equally close)" if equal else ""
+    near = f"the {number}cases closest to a limit{many}:" if number else f"cases, closest to a limit first{many}:"
     return near if outcomes.shape[1] else "cases:"
 
 

@@ -105,12 +105,20 @@ def within(group: Group, by: By | None) -> By | None:
 
 
 def worst_first(group: Group) -> np.ndarray:
-    """Positions of the cases: failed ones, then those that miss most requirements, then by how far they miss.
+    """Positions of the cases as `ranking` has them."""
+    return ranking(group).order
+
+
+def ranking(group: Group) -> requirements.Ranking:
+    """The cases: failed ones, then those that miss most requirements, then by how far they miss.
 
     How far is relative to the limit (to the largest value where the limit is 0); a case that meets all requirements
-    stands by how close it comes to one. Without requirements the order is the case table's.
+    stands by how close it comes to one. Without requirements the order is the case table's. Of equal ones those that
+    are far from one another in what is varied come first.
     """
-    return requirements.worst_first(group.values("status"), requirements.outcomes(group), _far(group))
+    names = [variable.name for variable in group.role("coordinate")]
+    return requirements.ranking(group.values("status"), requirements.outcomes(group), _far(group),
+                                lambda at: [group.values(name)[at] for name in names])  # fmt: skip
 
 
 def _far(group: Group) -> np.ndarray:

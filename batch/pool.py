@@ -12,6 +12,7 @@ from batch import requirements
 from batch.archive.read import Group, Stored
 from batch.failures import STATUS
 from batch.grids import METRIC_SPAN, is_log, levels, spans
+from batch.requirements import Ranking
 from batch.signals import deck_unit, number_text
 from met.distinct import distinct
 from met.frozen import frozen
@@ -133,10 +134,16 @@ class Pool:
         return {metric: tuple(found.values()) for metric, found in out.items()}
 
     @cached_property
+    def ranking(self) -> Ranking:
+        """The cases: failed ones, then those that miss most requirements, then by how far they miss, relative to the
+        limit; as `batch.ordering.ranking` has it of one group."""
+        varied = [column.values for column in self.columns if column.role in ("choice", "parameter")]
+        return requirements.ranking(self.status, self.outcomes, self._far(), lambda at: [each[at] for each in varied])
+
+    @property
     def worst_first(self) -> np.ndarray:
-        """Places of the cases: failed ones, then those that miss most requirements, then by how far they miss, relative
-        to the limit; as `batch.ordering.worst_first` has it of one group."""
-        return requirements.worst_first(self.status, self.outcomes, self._far())
+        """Places of the cases in that order."""
+        return self.ranking.order
 
     def _far(self) -> np.ndarray:
         worst = np.full(self.count, -np.inf)

@@ -3,9 +3,12 @@ miss them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from batch.archive.read import Group
+from met.distinct import distinct
 from met.frozen import frozen
 from met.run import DONE
 
@@ -61,14 +64,66 @@ def beyond(values: np.ndarray, comparison: str, limit: float) -> np.ndarray:
     return np.where(np.isnan(far), np.inf, far)
 
 
-def worst_first(status: np.ndarray, met: np.ndarray, far: np.ndarray) -> np.ndarray:
-    """Places of the cases: failed ones, then those that miss most requirements, then by how far they miss.
+SPREAD = 20
+"""Places at the head of an order in which cases that are equally bad are spread over what is varied: as many as a table
+shows."""
 
-    met  (case, requirement), as `outcomes`;  far: how far a case is beyond the limit that it misses most, as `beyond`
+
+@frozen
+class Ranking:
+    """Cases, the worst first. order: their places; tie: of each place of the order, which tie it is of, rising."""
+
+    order: np.ndarray
+    tie: np.ndarray
+
+    def equal(self, most: int) -> int:
+        """How many cases are as bad as the last of the first `most`, if not all of them are among these; else 0."""
+        if not 0 < most < len(self.tie) or self.tie[most - 1] != self.tie[most]:
+            return 0
+        return int((self.tie == self.tie[most - 1]).sum())
+
+
+def ranking(
+    status: np.ndarray, met: np.ndarray, far: np.ndarray, varied: Callable[[np.ndarray], Sequence[np.ndarray]]
+) -> Ranking:
+    """The cases: failed ones, then those that miss most requirements, then by how far they miss.
+
+    met     (case, requirement), as `outcomes`
+    far     how far a case is beyond the limit that it misses most, as `beyond`
+    varied  what is varied in the cases at some places, an array each
     A case that meets all requirements stands by how close it comes to one; without requirements the order is the case
-    table's.
+    table's. Of equal ones the first few are far from one another in what is varied, the others in the table's order.
     """
-    keys = [np.arange(len(status))]
+    keys = [status == DONE]
     if met.shape[1]:
-        keys += [-far, -(met != 1).sum(axis=1)]
-    return np.lexsort((*keys, status == DONE))
+        keys += [-(met != 1).sum(axis=1), -far]
+    order = np.lexsort((np.arange(len(status)), *keys[::-1]))
+    unlike = np.zeros(len(order), bool)
+    for key in keys:
+        unlike[1:] |= key[order[1:]] != key[order[:-1]]
+    tie = np.cumsum(unlike)
+    judged = met.shape[1] > 0 or not (status == DONE).all()
+    for number in distinct(tie[:SPREAD]).tolist() if judged else ():
+        first, end = np.searchsorted(tie, [number, number + 1])
+        count = min(SPREAD, end) - first
+        if end - first > count:
+            here = order[first:end]
+            chosen = _spread(varied(here), len(here), count)
+            order[first:end] = np.concatenate([here[chosen], np.delete(here, chosen)])
+    return Ranking(order, tie)
+
+
+def _spread(varied: Sequence[np.ndarray], cases: int, count: int) -> np.ndarray:
+    """Places of so many cases, the first one and then always one that is furthest from those before, by the ranks of
+    what is varied."""
+    ranks = np.zeros((cases, len(varied)))
+    for column, values in enumerate(varied):
+        _, place = np.unique(values, return_inverse=True)
+        ranks[:, column] = place / max(1, int(place.max(initial=0)))
+    chosen = [0]
+    far = ((ranks - ranks[0]) ** 2).sum(axis=1)
+    while len(chosen) < count:
+        far[chosen] = -1.0
+        chosen.append(int(far.argmax()))
+        far = np.minimum(far, ((ranks - ranks[chosen[-1]]) ** 2).sum(axis=1))
+    return np.array(chosen)

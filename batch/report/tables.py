@@ -69,12 +69,14 @@ def _misses(pool: Pool, column: Column, place: int) -> bool:
 
 
 def _title(pool: Pool, shown: int) -> str:
-    every = shown == pool.count
+    every, equal = shown == pool.count, pool.ranking.equal(shown)
     if any(ENDED[each] not in ("met", "done") for each in distinct(pool.ended)):
-        return "Cases, worst first" if every else "Worst cases"
+        many = f" ({equal:,} are equally bad)" if equal else ""
+        return "Cases, worst first" if every else f"Worst cases{many}"
     if not pool.requirements:
         return "Cases" if every else "The first cases"
-    return "Cases, closest to a limit first" if every else "Cases closest to a limit"
+    many = f" ({equal:,} are equally close)" if equal else ""
+    return "Cases, closest to a limit first" if every else f"Cases closest to a limit{many}"
 
 
 def structures(pool: Pool, before: Before | None = None) -> Table | None:

@@ -61,6 +61,23 @@ def test_where_all_requirements_are_met_the_closest_to_a_limit_is_first(here: Pa
         assert cases.title(group) == "cases, closest to a limit first:"
 
 
+def test_of_cases_that_are_equally_bad_the_first_are_far_from_one_another(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tests.batch.report import archives
+
+    archives.failing(monkeypatch, *range(90))
+    with made(archives.grid([0.01 * n for n in range(1, 11)], [10.0 * n for n in range(1, 11)])) as file:
+        group = file.groups[0]
+        order = ordering.worst_first(group).tolist()
+        assert order[:4] == [0, 89, 9, 80]  # the corners of the 90 that fail: kp in tens, mass in ones
+        assert sorted(order) == list(range(100)) and set(order[:90]) == set(range(90))
+        assert order[cases.SHOWN_CASES : 90] == sorted(order[cases.SHOWN_CASES : 90])
+        assert cases.title(group, 3) == "the 3 worst cases (90 are equally bad):"
+        assert cases.title(group) == "cases, worst first (90 are equally bad):"
+        assert cases.title(group, 90) == "the 90 worst cases:"
+
+
 def test_a_limit_of_zero_has_an_order_too(here: Path) -> None:
     with made(required(plans.gains(9), Requirement("volts < 0 V", "volts", "<", 0.0))) as file:
         group = file.groups[0]
