@@ -45,7 +45,7 @@ def by_names(names: Sequence[str], *, reverse: bool = False) -> By | None:
     largest first of all that do not say it themselves. Raises Problem E329."""
     keys: list[By] = []
     for each in names:
-        name, colon, way = each.partition(":")
+        name, colon, way = (each, "", "") if "," in each else each.partition(":")  # `check` tells of several in one
         if colon and way not in WAYS:
             helps = f"`--sort {name}:largest`, or `--sort {name}:smallest`"
             raise Problem(error("E329", f"`{each}` is no order of cases: `{way}` is neither largest nor smallest",
@@ -67,7 +67,11 @@ def check(groups: Sequence[Group], by: By | None) -> None:
     known = list(dict.fromkeys(name for group in groups for name in _names(group)))
     for key in by.keys:
         if key.name not in known:
-            helps = [*did_you_mean(key.name, known), *([f"here: {', '.join(known)}"] if known else [])]
+            parts = [part.strip() for part in key.name.split(",")]
+            if len(parts) > 1 and all(part.partition(":")[0] in known for part in parts):
+                helps = [f"one name each: `{' '.join(f'--sort {part}' for part in parts)}`"]
+            else:
+                helps = [*did_you_mean(key.name, known), *([f"here: {', '.join(known)}"] if known else [])]
             raise Problem(error("E329", f"no metric or varied parameter `{key.name}`", help=helps))
     if all(len(pool.cases) == 1 for pool in pools(groups)):
         names = " and ".join(f"`{group.name}`" for group in groups)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import shlex
 from binascii import unhexlify
@@ -319,6 +320,10 @@ class ArchiveFile:
                 raise Unlike(f"the plan of `{group.name}` has not its cases")
 
 
+WRITTEN = "archives are written by `met run DECK`"
+IN_A_FILE = "an archive is read from a file: save it as NAME.h5 first"
+
+
 def check_signature(path: Path) -> None:
     """Refuse kindly what is no HDF5 file at all."""
     try:
@@ -326,11 +331,12 @@ def check_signature(path: Path) -> None:
             begins = file.read(len(SIGNATURE))
     except OSError as reason:
         why = (reason.strerror or str(reason)).lower()
-        deck = f"`met run {path}` writes one" if path.suffix == ".ic" else "archives are written by `met run DECK`"
-        helps = deck if isinstance(reason, FileNotFoundError) else ()
+        deck = f"`met run {path}` writes one" if path.suffix == ".ic" else WRITTEN
+        irregular = reason.errno == errno.EINVAL
+        helps = deck if isinstance(reason, FileNotFoundError) else IN_A_FILE if irregular else ()
         raise Problem(error("E301", f"cannot read the archive {path}: {why}", help=helps)) from reason
     if begins != SIGNATURE:
-        helps = f"`met run {path}` runs a deck into one" if path.suffix == ".ic" else ()
+        helps = f"`met run {path}` runs a deck into one" if path.suffix == ".ic" else WRITTEN
         raise Problem(error("E302", f"{path} is no archive of MET: it is not an HDF5 file", help=helps))
 
 

@@ -142,7 +142,7 @@ def what(done: Exported) -> str:
     cases = f"{done.cases:,} case{'s' if done.cases != 1 else ''}"
     if done.table == "metrics":
         return f": metrics of {cases}, a row each" + ("; `--histories` writes signals" if done.cases != 1 else "")
-    return f": histories of {cases}, {done.rows:,} rows" if done.cases != 1 else ""
+    return f": histories of {cases}, {done.rows:,} row{'s' if done.rows != 1 else ''}"
 
 
 def settled(

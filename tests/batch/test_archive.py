@@ -303,6 +303,16 @@ def test_what_is_no_archive_is_refused(here: Path, content: bytes | None, said: 
     assert [f"{d.code}: {d.message}" for d in caught.value.diagnostics] == [said]
 
 
+def test_what_is_no_archive_is_told_what_makes_one(here: Path) -> None:
+    Path("a.txt").write_text("hello")
+    with pytest.raises(Problem) as caught:
+        batch.open("a.txt")
+    [told] = caught.value.diagnostics
+    assert (told.message, told.help) == (
+        "a.txt is no archive of MET: it is not an HDF5 file", ("archives are written by `met run DECK`",)
+    )  # fmt: skip
+
+
 def test_a_truncated_archive_is_refused(here: Path) -> None:
     batch.run(plans.plan(plans.gains(3)), output="a.h5")
     whole = Path("a.h5").read_bytes()

@@ -14,8 +14,10 @@ import pytest
 
 import batch
 from batch.archive.read import ArchiveFile
-from batch.export import export
+from batch.export import Exported, export, what
 from batch.export import parquet as module
+from batch.export.cases import Field
+from batch.export.csv import _column
 from met import run as engine
 from met.diagnostic import Problem
 from tests.batch import plans
@@ -183,7 +185,19 @@ def test_without_pyarrow_it_is_said_where_it_comes_from(here: Path, monkeypatch:
     assert sorted(path.name for path in here.iterdir()) == ["a.h5", "a.h5.run.json"]
 
 
+def test_says_how_many_rows_of_one_case() -> None:
+    assert what(Exported(Path("a.csv"), None, 1, 501, "histories")) == ": histories of 1 case, 501 rows"
+    assert what(Exported(Path("a.csv"), None, 3, 1503, "histories")) == ": histories of 3 cases, 1,503 rows"
+
+
 # A row a case
+
+
+def test_a_case_id_that_reads_as_a_number_stays_a_word() -> None:
+    field = Field("case_id", "", "", "str", "case_id")
+    ids = ["0751325775669632", "93556390810e0238", "948a9b4a612000ce", "12e45e6789012345"]
+    assert _column(field, ids) == ["'0751325775669632", "'93556390810e0238", *ids[2:]]
+    assert _column(Field("macro LINKS", "", "", "str", "LINKS"), ["3"]) == ["3"]
 
 
 @pytest.mark.usefixtures("engine")

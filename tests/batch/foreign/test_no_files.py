@@ -49,7 +49,10 @@ def test_a_socket_in_the_place_of_an_archive(here: Path) -> None:
         made.bind("a.h5")
         said = met("show", "a.h5")
     assert said.status == 2
-    assert said.text == "error[E301]: cannot read the archive a.h5: it is a socket, not a regular file\n\n1 error\n"
+    assert said.text == (
+        "error[E301]: cannot read the archive a.h5: it is a socket, not a regular file\n"
+        " = help: an archive is read from a file: save it as NAME.h5 first\n\n1 error\n"
+    )
 
 
 def test_a_pipe_in_the_place_of_a_plan_and_of_its_table(here: Path) -> None:
