@@ -196,13 +196,15 @@ def explain(
 def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
     """Show the models there are and what each declares.
 
-    KIND is servo, command, environment, metric, integrator, bed or law; MODEL one of them by name. Also:
-    `met doc channels`, what can be recorded; `dh`, Denavit-Hartenberg numbers; `shapes`, of links; `substitute`, motors
-    on beds; `units`; `functions`; `sweep`, its `designs` and `distributions`; and the code of a message, as in
-    `met doc D060`.
+    KIND is servo, command, environment, metric, integrator, bed or law; MODEL one of them by name. Also: the blocks of
+    a deck, such as `met doc run` or `joint`; `channels`, what can be recorded; `dh`, Denavit-Hartenberg numbers;
+    `shapes`, of links; `units`; `functions`; `designs` and `distributions` of samples; and the code of a message, as
+    in `met doc D060`.
     """
+    from ic.language import BLOCKS
     from ic.printing import models as print_models
     from ic.printing.codes import is_code, print_code
+    from ic.printing.language import print_block
     from ic.printing.subjects import SUBJECTS
     from met import models
 
@@ -231,6 +233,9 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
     if form == "json":
         _print_json([print_models.model_json(kind, model) for kind, model in found])
     elif not words or (words[0].removesuffix("s") in models.GROUPS and len(words) == 1):
+        kind = words[0].removesuffix("s") if words else ""
+        if kind in BLOCKS:
+            _print([*print_block(BLOCKS[kind]), ""])
         _print(print_models.print_list(found))
     else:
         for position, (kind, model) in enumerate(found):

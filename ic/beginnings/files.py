@@ -11,7 +11,7 @@ from typing import get_args
 
 from ic.beginnings.deck import DECK
 from ic.beginnings.models import MODELS, PROJECT, TRIAL, Beginning
-from ic.meaning.resolve import RESERVED
+from ic.language import HEADS
 from met import models, units
 from met.diagnostic import Problem, error
 from met.files import new_file
@@ -62,7 +62,7 @@ def _meaning(what: str, name: str) -> str:
     """What else a name means, so that it cannot be given; nothing where it can."""
     if units.is_unit(name):
         return f"that is the unit {units.UNITS[name].word}"
-    return "with that word paths of a run begin" if what == "an arm" and name in RESERVED else ""
+    return "with that word paths of a run begin" if what == "an arm" and name in HEADS else ""
 
 
 def write(texts: Mapping[str, str], *, force: bool) -> None:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from ic.language.bodies import ARM, JOINT, LINK, PAYLOAD
 from ic.language.declaration import Block, Entry
-from ic.language.runs import ENVIRONMENT, INITIAL, RATES, RUN, SUBSTITUTE, SWEEP, TOLERANCES
+from ic.language.runs import ENVIRONMENT, INITIAL, METRIC, RATES, RUN, SUBSTITUTE, SWEEP, TOLERANCES
 from ic.language.servos import SERVO
 
 BLOCKS = {
     block.name: block
     for block in (
-        ARM, LINK, JOINT, SERVO, RUN, RATES, INITIAL, ENVIRONMENT, PAYLOAD, SUBSTITUTE, TOLERANCES, SWEEP
+        ARM, LINK, JOINT, SERVO, RUN, RATES, INITIAL, ENVIRONMENT, PAYLOAD, SUBSTITUTE, METRIC, TOLERANCES, SWEEP
     )
 }  # fmt: skip
 """All blocks, by name, in the order in which a reader meets them."""
@@ -22,10 +22,21 @@ BLOCKS = {
 DEFINITIONS = tuple(block.name for block in BLOCKS.values() if not block.within)
 """The words that definitions of a deck begin with."""
 
-HEADS = (*dict.fromkeys(
-    entry.path.partition(".")[0] for block in BLOCKS.values() for entry in block.entries
-    if entry.path.partition(".")[0] not in ("", "JOINT", "SERVO") and "." in entry.path
-),)  # fmt: skip
-"""The first words of paths that no name of a deck's may be."""
+NAMED = ("JOINT", "SERVO")
+"""What stands in declared paths for a name of the deck's with which a path begins."""
 
-__all__ = ["BLOCKS", "DEFINITIONS", "HEADS", "Block", "Entry"]
+HEADS = tuple(sorted({
+    entry.path.partition(".")[0] for block in BLOCKS.values() for entry in block.entries if "." in entry.path
+}.difference(NAMED)))  # fmt: skip
+"""The first words of paths in a run, which are no names of joints, arms or servos."""
+
+
+def choices(head: str) -> tuple[str, ...]:
+    """What a sweep chooses under this first word of a path, such as `JOINT`, `SERVO` or `rates`; under "" whole paths
+    of one word."""
+    found = (entry for block in BLOCKS.values() for entry in block.entries if entry.varies == "choice")
+    split = (entry.path.rpartition(".") for entry in found)
+    return tuple(last for first, _, last in split if first == head)
+
+
+__all__ = ["BLOCKS", "DEFINITIONS", "HEADS", "Block", "Entry", "choices"]

@@ -80,6 +80,18 @@ SUBSTITUTE = Block(
     ),
 )  # fmt: skip
 
+METRIC = Block(
+    name="metric",
+    written="metric NAME = MODEL { of = CHANNEL; ... }",
+    within="run",
+    head="metrics",
+    doc="One number of a case, of a channel that it watches.",
+    entries=(
+        Entry(name="of", written="of = swing.q;", path="", doc="the channel: `met doc channels`"),
+    ),
+    free="parameters of the model: `met doc metric` lists the models",
+)
+
 TOLERANCES = Block(
     name="tolerances",
     written="tolerances { ... }",

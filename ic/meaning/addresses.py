@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from ic.grammar.spell import spell
+from ic.language.bodies import JOINT, LINK
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import word_of
 from ic.meaning.resolve import Definitions
 
-OF_LINK = ("mass", "com", "inertia", "shape")
-OF_JOINT = ("parent", "child", "axis", "at", "rpy", "pivot")
+OF_JOINT = (*JOINT.keys, "pivot")
 
 
 def in_run(definitions: Definitions, block: Block, item: Item, rates: tuple[str, ...]) -> list[str]:
@@ -29,7 +29,7 @@ def in_run(definitions: Definitions, block: Block, item: Item, rates: tuple[str,
             return [f"write `environment {{ {model} {{ {key} = {value}; }} }}`"]
         case ["links", thing, key] if thing in links:
             return _in_arm(arm, thing, key, value)
-        case [thing, key] if (thing in joints and key in OF_JOINT) or (thing in links and key in OF_LINK):
+        case [thing, key] if (thing in joints and key in OF_JOINT) or (thing in links and key in LINK.keys):
             return _in_arm(arm, thing, key, value)
         case [rate] if rate in rates:
             return [f"write `rates {{ {rate} = {value}; }}`"]

@@ -7,33 +7,26 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ic.grammar.syntax import Call, Expression, Name, Unary
+from ic.language import HEADS
+from ic.language.bodies import ARM, AT, AXIS, JOINT, JOINT_KINDS, LINK, RPY
 from ic.meaning.addresses import in_arm
 from ic.meaning.bodies import check_moved
 from ic.meaning.complaints import belongs, known_words
 from ic.meaning.dh import use_dh
 from ic.meaning.foreign import refused
-from ic.meaning.matter import MATTER_KEYS, use_matter
+from ic.meaning.matter import use_matter
 from ic.meaning.merge import Block, Item, as_meant
 from ic.meaning.models import check_keys, value_at, word_of
 from ic.meaning.owner import Owner
 from ic.meaning.relations import no_direction
-from ic.meaning.resolve import RESERVED, Definition
+from ic.meaning.resolve import Definition
 from ic.meaning.scope import Scope
 from met.diagnostic import Label, Place, did_you_mean, meant
 from met.frozen import frozen
-from met.parameter import Parameter
 from met.plan import BASE, Joint, Link
 from met.trace import Scalar, sqrt
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-JOINT_KINDS = ("revolute", "prismatic", "fixed")
-
-AT = Parameter(name="at", unit="m", shape="vector", doc="origin of the joint frame, parent link's frame")
-RPY = Parameter(name="rpy", unit="rad", shape="vector", doc="turn of the joint frame, fixed x-y-z")
-AXIS = Parameter(name="axis", unit="1", shape="vector", doc="axis of motion, joint frame")
-
-LINK_KEYS = MATTER_KEYS
-JOINT_KEYS = ("parent", "child", "at", "rpy", "axis", "dh")
 NO_STOPS = "a joint has no stops in this version; a metric with `require` tells where it goes beyond"
 NOT_OF_A_JOINT = dict.fromkeys(("limit", "limits", "range", "stops"), NO_STOPS)
 
@@ -63,9 +56,9 @@ def resolve_arm(scope: Scope, definition: Definition) -> Arm | None:
         return None
     homes = scope.definitions.homes(definition)
     for item in block.items.values():
-        if item.kind not in ("link", "joint"):
+        if item.kind not in ARM.named:
             _stray(scope, item, block)
-    block = as_meant(block, (), ("link", "joint"))
+    block = as_meant(block, (), ARM.named)
     for statement in block.statements:
         scope.complaints.error("D080", "an arm holds links and joints; this is neither", statement.place,
                                help="move it to the run")
@@ -79,7 +72,7 @@ def resolve_arm(scope: Scope, definition: Definition) -> Arm | None:
     complete = len(joints) == len(made) and not scope.complaints.lacks(definition.place, "joint")
     check_tree(scope, definition.name, links, joints, complete=complete)
     whole = not scope.complaints.errors
-    written = {item.name for kind in ("link", "joint") for item in block.of_kind(kind)}
+    written = {item.name for kind in ARM.named for item in block.of_kind(kind)}
     lost = frozenset(written - {link.name for link in links} - {joint.name for joint in joints})
     return Arm(definition.name, tuple(links), tuple(joints), lost, whole)
 
@@ -92,10 +85,10 @@ def check_arm(scope: Scope, definition: Definition) -> None:
 
 
 def _stray(scope: Scope, item: Item, block: Block) -> None:
-    known = [other.name for other in block.items.values() if other.kind in ("link", "joint")]
+    known = [other.name for other in block.items.values() if other.kind in ARM.named]
     if item.kind:
         scope.complaints.error("D082", f"no `{item.kind}` in an arm", item.place,
-                               help=[*did_you_mean(item.kind, ("link", "joint")), *belongs(item.kind),
+                               help=[*did_you_mean(item.kind, ARM.named), *belongs(item.kind),
                                      "an arm holds links and joints"])
     else:
         adds = f"`link {item.name} {{ ... }}` or `joint {item.name} revolute {{ ... }}` would add one"
@@ -116,7 +109,7 @@ def _link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
         scope.complaints.error("D085", f"link `{item.name}` needs a block", item.place,
                                help=f"write `link {item.name} {{ mass = ...; shape = ...; }}`")
         return None
-    check_keys(scope, item.body, LINK_KEYS, owner)
+    check_keys(scope, item.body, LINK.keys, owner)
     return Link(item.name, item.place, use_matter(scope, owner, "link", item.name, item.body))
 
 
@@ -141,12 +134,12 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str,
         kind = meant(kind, JOINT_KINDS) if kind else None
         if kind is None or (kind != "fixed" and item.body.get("axis") is None and item.body.get("dh") is None):
             return None
-    if item.name in (*RESERVED, BASE):
+    if item.name in (*HEADS, BASE):
         scope.complaints.error("D166", f"`{item.name}` begins paths of its own, so no joint may be called so",
                                item.place, help="give the joint another name")
         return None
     body = item.body
-    check_keys(scope, body, JOINT_KEYS, owner, NOT_OF_A_JOINT)
+    check_keys(scope, body, JOINT.keys, owner, NOT_OF_A_JOINT)
     parent = _end(scope, owner, "parent", body.get("parent"), {BASE: None, **links})
     child = _end(scope, owner, "child", body.get("child"), {name: None for name in links if name != BASE})
     if body.get("dh") is not None:
@@ -161,8 +154,7 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str,
 def _frame(scope: Scope, owner: Owner, kind: str, body: Block) -> None:
     """The joint's frame as `at`, `rpy` and `axis` say."""
     for wanted in (AT, RPY):
-        default = Parameter(name=wanted.name, unit=wanted.unit, shape="vector", doc=wanted.doc, default=(0.0, 0.0, 0.0))
-        scope.vector(owner, default, body.get(wanted.name))
+        scope.vector(owner, wanted, body.get(wanted.name))
     _axis(scope, owner, kind, body.get("axis"))
 
 

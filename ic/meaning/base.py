@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from ic.grammar.syntax import Call, Expression
+from ic.language.runs import BASE_KINDS
 from ic.meaning.arm import Arm
 from ic.meaning.bodies import carried_loads
 from ic.meaning.complaints import known_words
@@ -23,9 +24,8 @@ from met.parameter import WORLD, Parameter
 from met.plan import BASE, COMPONENTS, Base, Course, Link, Payload, Structure, ground
 from met.plan_defaults import INERTIA, OF_FREE_BASE, component
 
-KINDS = ("fixed", "prescribed", "free")
 USAGE = "write `base = fixed;`, `base = free;` or `base = prescribed { x = sine(amplitude = 1 cm, frequency = 2 Hz); }`"
-INITIAL = tuple(f"{BASE}.{name}" for name, _ in OF_FREE_BASE)
+INITIAL_OF_BASE = tuple(f"{BASE}.{name}" for name, _ in OF_FREE_BASE)
 """What `initial` may say of a free base."""
 
 DOCS = {
@@ -46,11 +46,11 @@ def resolve_base(scope: Scope, item: Item | None, arm: Arm) -> tuple[Base | None
     if item is None:
         scope.setting(BASE, "fixed")
         return None, arm
-    if kind not in KINDS or item.appended:
+    if kind not in BASE_KINDS or item.appended:
         wrong = item.appended[0] if item.appended else item.value
         place = place_of(wrong) if wrong is not None else item.place
         told = "a base is fixed, prescribed or free" if kind is None or item.appended else f"no base `{kind}`"
-        meant = did_you_mean(kind, KINDS) if kind is not None and kind not in KINDS else ()
+        meant = did_you_mean(kind, BASE_KINDS) if kind is not None and kind not in BASE_KINDS else ()
         scope.complaints.error("D250", told, place, help=[*meant, USAGE])
         return None, arm
     scope.setting(BASE, kind, item=item)
@@ -59,7 +59,7 @@ def resolve_base(scope: Scope, item: Item | None, arm: Arm) -> tuple[Base | None
         if item.body is not None or (isinstance(item.value, Call) and item.value.positional):
             help = "leave the block out"
             if kind == "free":
-                help = f"its state at the start stands in `initial`: {', '.join(INITIAL)}"
+                help = f"its state at the start stands in `initial`: {', '.join(INITIAL_OF_BASE)}"
             scope.complaints.error("D250", f"a {kind} base takes no block", item.place, help=help)
         return (Base("free", (), item.place), _standing(scope, item, arm)) if kind == "free" else (None, arm)
     courses = () if refuse_values(scope, item.value, COMPONENTS) else _courses(scope, item, body)

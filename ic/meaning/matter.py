@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ic.language.bodies import COM, INERTIA, MASS
 from ic.meaning.bodies import check_body
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, refuse_values, value_at, word_of
@@ -14,11 +15,7 @@ from met.diagnostic import did_you_mean
 from met.parameter import Parameter
 from met.trace import Real
 
-MATTER_KEYS = ("mass", "com", "inertia", "shape")
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
-MASS = Parameter(name="mass", unit="kg", at_least=0.0, doc="mass of the {}")
-COM = Parameter(name="com", unit="m", shape="vector", doc="centre of mass, {} frame")
-INERTIA = Parameter(name="inertia", unit="kg*m^2", shape="list", doc="inertia about the centre of mass, {} axes")
 
 Shape = tuple[str, tuple[tuple[str, float], ...]]
 """A shape as a plan has it: kind, and numbers in SI."""

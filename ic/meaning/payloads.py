@@ -8,35 +8,32 @@ from collections.abc import Collection
 import numpy as np
 
 from ic.grammar.syntax import Name
+from ic.language.bodies import (
+    ATTITUDE,
+    GRAPPLE,
+    PAYLOAD,
+    PAYLOAD_AT,
+    PAYLOAD_RPY,
+    POSITION,
+    RATE,
+    RELEASE,
+    VELOCITY,
+)
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
-from ic.meaning.matter import MATTER_KEYS, use_matter
+from ic.meaning.matter import use_matter
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, value_at
 from ic.meaning.owner import Owner
 from ic.meaning.scope import Scope
 from met.diagnostic import Label, Place, did_you_mean
-from met.parameter import WORLD, ZEROS, Parameter
+from met.parameter import WORLD
 from met.plan import BASE, INSTANT, Payload, Structure
 from met.plan_defaults import INERTIA
 from met.trace import Real
 
-AT = Parameter(name="at", unit="m", shape="vector", default=ZEROS, doc="the payload's frame in the link's")
-RPY = Parameter(
-    name="rpy", unit="rad", shape="vector", default=ZEROS, doc="turns of the payload's frame about fixed x, y, z of "
-    "the link's",
-)  # fmt: skip
-EVENTS = tuple(
-    Parameter(name=name, unit="s", at_least=0.0, doc=f"time at which the link {does} it")
-    for name, does in (("grapple", "grapples"), ("release", "releases"))
-)
-FLIGHT = (
-    Parameter(name="position", unit="m", shape="vector", doc="the payload's frame at the start, world axes"),
-    Parameter(name="attitude", unit="rad", shape="vector", default=ZEROS, doc="its turns about fixed x, y, z"),
-    Parameter(name="velocity", unit="m/s", shape="vector", default=ZEROS, doc="of its frame, world axes"),
-    Parameter(name="rate", unit="rad/s", shape="vector", default=ZEROS, doc="its angular velocity, world axes"),
-)
-KEYS = (*MATTER_KEYS, "on", "at", "rpy", *(each.name for each in (*EVENTS, *FLIGHT)))
+EVENTS = (GRAPPLE, RELEASE)
+FLIGHT = (POSITION, ATTITUDE, VELOCITY, RATE)
 USAGE = "write `payload NAME { mass = 20 kg;  shape = sphere(radius = 0.2 m);  on = LINK; }`"
 
 
@@ -78,14 +75,14 @@ def _payload(scope: Scope, item: Item, arm: Arm, taken: Collection[str]) -> Payl
         scope.complaints.error("D262", f"`{item.name}` is {what}, so no payload may be called so", item.place,
                                help="give the payload another name")
     body = item.body
-    check_keys(scope, body, KEYS, owner)
+    check_keys(scope, body, PAYLOAD.keys, owner)
     shape = use_matter(scope, owner, "payload", item.name, body)
     link = _link(scope, owner, body.get("on"), arm)
     grappled, released = (body.get(wanted.name) is not None for wanted in EVENTS)
     _check_unused(scope, item, body, grappled)
-    scope.vector(owner, AT, body.get("at"))
+    scope.vector(owner, PAYLOAD_AT, body.get("at"))
     if not grappled:
-        scope.vector(owner, RPY, body.get("rpy"))
+        scope.vector(owner, PAYLOAD_RPY, body.get("rpy"))
     for wanted in FLIGHT if grappled else ():
         scope.vector(owner, wanted, body.get(wanted.name))
     times = [scope.number(owner, wanted, given) for wanted in EVENTS if (given := body.get(wanted.name)) is not None]

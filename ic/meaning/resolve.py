@@ -10,6 +10,7 @@ from copy import copy
 from dataclasses import replace
 
 from ic.grammar.syntax import Binary, Call, Deck, Entry, Group, Let, Name, Setting, Word
+from ic.language import DEFINITIONS, HEADS
 from ic.meaning.complaints import Complaints, an, belongs, known_words
 from ic.meaning.csv_files import csv_files
 from ic.meaning.merge import Block, merge, twice
@@ -19,8 +20,6 @@ from met.diagnostic import Label, Place, Problem, did_you_mean, error, meant
 from met.frozen import frozen
 from met.render import shown_place
 
-KINDS = ("arm", "servo", "run", "sweep")
-RESERVED = ("links", "initial", "environment", "guides", "metrics", "payloads", "rates", "sensors")
 """What paths of a run begin with, besides joints."""
 
 
@@ -56,7 +55,7 @@ class Definitions:
         self.lets: dict[str, Let] = {}
         self.csv_files = csv_files(deck)
         self.robot_files = RobotFiles(deck)
-        self._by_kind: dict[str, dict[str, Definition]] = {kind: {} for kind in KINDS}
+        self._by_kind: dict[str, dict[str, Definition]] = {kind: {} for kind in DEFINITIONS}
         self._merged: dict[tuple[str, str], Block] = {}
         self._failed: set[tuple[str, str]] = set()
         self._meant: dict[tuple[str, str], str] = {}  # by kind and name that there is not, the name that was meant
@@ -206,7 +205,7 @@ class Definitions:
 
     def _define(self, group: Group) -> None:
         words = list(group.words)
-        if len(words) > 2 and words[1].text in KINDS and meant(words[0].text, ("default",)) is not None \
+        if len(words) > 2 and words[1].text in DEFINITIONS and meant(words[0].text, ("default",)) is not None \
                 and words[0].text != "default":
             self._complaints.error("D045", f"no kind of definition `{words[0].text}`", words[0].place,
                                    help="did you mean `default`?")
@@ -216,15 +215,16 @@ class Definitions:
             words.pop(0)
         kind = words[0]
         lower = [word.text.lower() for word in group.words[:2]]
-        if kind.text not in KINDS and (lower[0] in KINDS or (lower[0] == "default" and lower[-1] in KINDS)):
+        meant_kind = lower[-1] if lower[0] == "default" else lower[0]
+        if kind.text not in DEFINITIONS and meant_kind in DEFINITIONS:
             written = f"{lower[0]} {lower[-1]}" if lower[0] == "default" else lower[0]
             raise Problem(error("D045", f"no kind of definition `{kind.text}`", kind.place,
                                 help=f"write `{written}`: the language's words are in lower case"))
-        if kind.text not in KINDS:
+        if kind.text not in DEFINITIONS:
             unknown = error("D045", f"no kind of definition `{kind.text}`", kind.place,
-                            help=[*did_you_mean(kind.text, KINDS), *belongs(kind.text),
+                            help=[*did_you_mean(kind.text, DEFINITIONS), *belongs(kind.text),
                                   "kinds: arm, servo, run, sweep"])
-            near = meant(kind.text, KINDS)
+            near = meant(kind.text, DEFINITIONS)
             if near is None or len(words) != 2:
                 raise Problem(unknown)
             self._complaints.add(unknown)  # what is in it is looked at, too
@@ -249,7 +249,7 @@ class Definitions:
             raise Problem(error("D214", f"{an(kind.text)} is not made from a file", group.made_from.name.place,
                                 help="`from urdf(...)` makes an arm"))
         name = words[1]
-        if name.text in RESERVED and kind.text in ("arm", "servo"):  # whose names begin paths of parameters
+        if name.text in HEADS and kind.text in ("arm", "servo"):  # whose names begin paths of parameters
             raise Problem(error("D166", f"`{name.text}` begins paths of its own, so no {kind.text} may be called so",
                                 name.place, help=f"give the {kind.text} another name"))
         self._add(Definition(kind.text, name.text, group, default))

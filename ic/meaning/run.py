@@ -7,9 +7,10 @@ from dataclasses import replace
 from typing import Any
 
 from ic.grammar.syntax import Call, Name, Word
+from ic.language.runs import BALANCED, DURATION, ENVIRONMENT, INITIAL, RATES, RUN, SEED, TOLERANCES, VELOCITY_PRODUCTS
 from ic.meaning.addresses import in_run
 from ic.meaning.arm import Arm, resolve_arm
-from ic.meaning.base import INITIAL, check_base, held_by, initial_base, remark_ground, resolve_base
+from ic.meaning.base import INITIAL_OF_BASE, check_base, held_by, initial_base, remark_ground, resolve_base
 from ic.meaning.bodies import check_moved
 from ic.meaning.complaints import an, belongs, known_words
 from ic.meaning.failures import check_failures, check_friction
@@ -57,21 +58,9 @@ from met.plan import BASE, Base, EnvironmentUse, Payload, Requirement, Schedule,
 from met.trace import Real, Scalar
 from met.units import PURE
 
-KEYS = ("arm", "base", "servos", "initial", "environment", "rates", "integrator", "duration", "record", "tolerances",
-        "seed")
-KINDS = ("metric", "guide", "sensor", "payload", "substitute")
-"""Words of entries that have names."""
-
-BLOCKS = ("servos", "initial", "environment", "rates", "tolerances")
-
-RATES = ("dynamics", "servos", "record", "base")
 ANY_RATE = 1000  # Hz, where the deck's could not be had
-DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
-SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")
-ON_OFF = Parameter(name="velocity_products", shape="word", words=("on", "off"), default="on",
-                   doc="Coriolis, centrifugal and gyroscopic torques")
-BEGIN = Parameter(name="servos", shape="word", words=("unloaded", "balanced"), default="unloaded",
-                  doc="whether servos begin with what keeps their joints from accelerating")
+BLOCKS = ("servos", *(block.name for block in (INITIAL, ENVIRONMENT, RATES, TOLERANCES)))
+"""Keys of a run that have a block."""
 
 
 @frozen
@@ -96,7 +85,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         return None
     run = Owner(f"run `{definition.name}`", definition.place, "")
     _check_entries(scope, block, definition)
-    block = as_meant(block, KEYS, KINDS)
+    block = as_meant(block, RUN.keys, RUN.named)
     comparisons = read_requirements(scope, block)
     arm = _arm(scope, run, block.get("arm"))
     integrator = _integrator(scope, block.get("integrator"))
@@ -191,23 +180,24 @@ def _keep_settings(scope: Scope, block: Block, arm: Arm, integrator: Any, rates:
     if "environment.velocity_products" not in scope.beside:
         scope.setting("environment.velocity_products", "on")
     if "initial.servos" not in scope.beside:
-        scope.setting("initial.servos", str(BEGIN.default))
+        scope.setting("initial.servos", str(BALANCED.default))
     if "seed" not in scope.beside:
         scope.setting("seed", 0.0, "1")
 
 
 def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
-    metrics = [item.name for kind in KINDS for item in block.of_kind(kind)]
+    metrics = [item.name for kind in RUN.named for item in block.of_kind(kind)]
     for item in block.items.values():
-        if item.kind in KINDS or (not item.kind and item.name in KEYS):
+        if item.kind in RUN.named or (not item.kind and item.name in RUN.keys):
             continue
-        if item.kind in KEYS:
+        if item.kind in RUN.keys:
             scope.complaints.error("D108", f"`{item.name}` after `{item.kind}`, which takes no name", item.place,
                                    help=f"write `{item.kind} {'= ...;' if item.body is None else '{ ... }'}`")
         elif item.kind:
-            has = (*KEYS, "metric NAME", "guide NAME", "sensor NAME", "payload NAME", "substitute JOINT", "require")
+            has = (*RUN.keys, *(" ".join(RUN[word].written.split()[:2]) for word in RUN.named), *RUN.statements)
             scope.complaints.error("D108", f"no `{item.kind}` in a run", item.place,
-                                   help=[*did_you_mean(item.kind, (*KINDS, *KEYS)), known_words("a run has", has)])
+                                   help=[*did_you_mean(item.kind, (*RUN.named, *RUN.keys)),
+                                         known_words("a run has", has)])
         elif item.body is not None:
             adds = f"`metric {item.name} = ...` would add a metric"
             holder = next((key for key in BLOCKS if item.name in _inside(block, key)), None)
@@ -217,14 +207,14 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
                 adds = f"`substitute {item.name} {{ ... }}` would put this joint's motor on a bed"
             if not {"on", "mass", "grapple", "release"}.isdisjoint(item.body.items):
                 adds = f"`payload {item.name} {{ ... }}` would add a payload"
-            scope.complaints.taken_for(definition.place, item.name, (*metrics, *KEYS))
+            scope.complaints.taken_for(definition.place, item.name, (*metrics, *RUN.keys))
             scope.complaints.error(
                 "D109", f"nothing named `{item.name}` in run `{definition.name}` to change", item.place,
-                help=belongs(item.name) or [*did_you_mean(item.name, (*metrics, *KEYS)), adds])
+                help=belongs(item.name) or [*did_you_mean(item.name, (*metrics, *RUN.keys)), adds])
         else:
-            near = did_you_mean(item.name, (*KEYS, *metrics)) if "." not in item.name else ()
-            helps = in_run(scope.definitions, block, item, RATES) or [*near, known_words("a run has", KEYS)]
-            scope.complaints.taken_for(definition.place, item.name, (*KEYS, *metrics))
+            near = did_you_mean(item.name, (*RUN.keys, *metrics)) if "." not in item.name else ()
+            helps = in_run(scope.definitions, block, item, RATES.keys) or [*near, known_words("a run has", RUN.keys)]
+            scope.complaints.taken_for(definition.place, item.name, (*RUN.keys, *metrics))
             scope.complaints.error("D109", f"a run has no `{item.name}`", item.place, help=helps)
     for statement in block.statements:
         words = " ".join(word.text for word in statement.words)
@@ -313,7 +303,7 @@ def _environment(
                                    help=f"write `{meant} {{ ... }}`")
         elif item.name == "velocity_products":
             owner = Owner("the environment", item.place, "environment")
-            products = scope.word(owner, ON_OFF, item) != "off"
+            products = scope.word(owner, VELOCITY_PRODUCTS, item) != "off"
         else:
             use = _environment_use(scope, item, arm, base, payloads, duration)
             if use is not None:
@@ -388,11 +378,11 @@ def _initial(scope: Scope, body: Block, arm: Arm, uses: Sequence[Use]) -> bool:
     known = dict.fromkeys(("q", "qd"), "")
     known |= {f"{joint.name}.{name}": "" for joint in arm.moving for name in ("q", "qd")}
     known["servos"] = ""
-    of_base = dict.fromkeys(INITIAL if any(link.name == BASE for link in arm.links) else (), "")
+    of_base = dict.fromkeys(INITIAL_OF_BASE if any(link.name == BASE for link in arm.links) else (), "")
     for item in body.items.values():
         if not item.kind and item.name.partition(".")[0] in arm.lost:
             continue
-        if item.kind or item.name not in (*known, *INITIAL):
+        if item.kind or item.name not in (*known, *INITIAL_OF_BASE):
             there = (*known, *of_base)
             scope.complaints.error("D114", f"no initial `{item.name}`", item.place,
                                    help=[*did_you_mean(item.name, there), known_words("there is", there)])
@@ -431,7 +421,7 @@ def _balanced(scope: Scope, item: Item | None, uses: Sequence[Use]) -> bool:
     """Whether servos begin balanced; a remark where none of them can."""
     if item is None:
         return False
-    balanced = scope.word(Owner("the initial state", item.place, "initial"), BEGIN, item) == "balanced"
+    balanced = scope.word(Owner("the initial state", item.place, "initial"), BALANCED, item) == "balanced"
     if balanced and not any(use.servo.balance for use in uses):
         able = [name for name, model in models.available("servo").items() if model.balance]
         scope.complaints.remark("D248", "no servo of this run can begin balanced: this changes nothing", item.place,
@@ -468,10 +458,10 @@ def _rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate]:
     body = _body(scope, item)
     owner = Owner("`rates`", item.place, "rates")
     for part in body.items.values():
-        if part.kind or part.name not in RATES:
-            scope.complaints.taken_for(item.place, part.name, RATES)
+        if part.kind or part.name not in RATES.keys:
+            scope.complaints.taken_for(item.place, part.name, RATES.keys)
             scope.complaints.error("D116", f"no rate `{part.name}`", part.place,
-                                   help=[*did_you_mean(part.name, RATES), known_words("rates", RATES)])
+                                   help=[*did_you_mean(part.name, RATES.keys), known_words("rates", RATES.keys)])
             continue
         rate = fixed_rate(scope, owner, part, f"`{part.name}`", part.name, continuous=part.name == "servos")
         if rate is not None:
@@ -542,4 +532,4 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
     return schedule, ticks, own_ticks
 
 
-__all__ = ["KEYS", "RATE", "RATES", "Call", "Resolved", "resolve_run"]
+__all__ = ["RATE", "Call", "Resolved", "resolve_run"]

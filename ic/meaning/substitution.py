@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ic.grammar.syntax import Call, Expression
+from ic.language.runs import BED, LAW
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
@@ -21,7 +22,7 @@ from met.diagnostic import Label, Place
 from met.parameter import Parameter
 from met.plan import EnvironmentUse, Origin, Schedule, Substitution
 
-DEFAULTS: dict[models.Kind, str] = {"bed": "emulated", "law": "velocity_tracking"}
+DEFAULTS: dict[models.Kind, str] = {"bed": BED, "law": LAW}
 USAGE = "write `substitute JOINT { bed = BED(...);  law = LAW(...); }`"
 
 

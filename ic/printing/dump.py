@@ -89,8 +89,9 @@ def syntax(asked: Asked) -> Iterator[str]:
 def model(asked: Asked) -> Iterator[str]:
     """Definitions with `like`, overrides, `+=` and `remove` carried out, each entry with the places it overrode."""
     from ic.grammar.spell import spell
+    from ic.language import DEFINITIONS
     from ic.meaning.complaints import Complaints
-    from ic.meaning.resolve import KINDS, Definitions
+    from ic.meaning.resolve import Definitions
     from ic.read import read
 
     deck = read(asked.deck, asked.include_dirs, asked.defines)
@@ -98,7 +99,7 @@ def model(asked: Asked) -> Iterator[str]:
     definitions = Definitions(deck, complaints)
     for name, let in definitions.lets.items():
         yield f"let {name} = {spell(let.value)}{_written(let.place)}"
-    for kind in KINDS:
+    for kind in DEFINITIONS:
         for definition in definitions.of_kind(kind).values():
             head = f"{'default ' if definition.default else ''}{kind} {definition.name}"
             if definition.group.of is not None:  # a sweep is not merged: its entries are as written

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ic.language import HEADS
 from ic.meaning.complaints import known_words
 from ic.meaning.given import GIVEN
 from ic.printing.codes import is_code
@@ -27,7 +28,6 @@ SAID = {
     "default": "the default",
     "derived": "computed",
 }
-HEADS = ("links", "metrics", "environment", "guides", "initial", "payloads", "sensors")
 IN_PLAN = "as the plan has it"
 NO_MORE: Mapping[str, Sequence[str]] = MappingProxyType({})
 MOST_NEAR = 12

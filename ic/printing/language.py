@@ -21,20 +21,22 @@ MARK = "<!-- table of {} -->"
 
 def print_block(block: Block) -> Iterator[str]:
     """The page of a block, for a terminal."""
-    yield f"{block.name}: {_plain(block.doc)}"
+    yield f"{block.name}: {plain(block.doc)}"
     yield ""
     yield f"In a deck: {block.written}" + (f", in {_an(block.within)}" if block.within else "")
     yield ""
-    told = [(each.written, default(each), _plain(each.doc)) for each in block.entries]
+    told = [(each.written, default(each), plain(each.doc)) for each in block.entries]
     yield from columns([("written", "default", "meaning"), *told])
     if block.free:
         yield ""
-        yield f"Also {_plain(block.free)}."
+        yield f"Also {plain(block.free)}."
     numbers = [each for each in block.entries if each.parameter is not None]
     if numbers:
         yield ""
-        yield from columns([("type", "", ""), *((each.name, type_of(each), _bounds(each.parameter)) for each in numbers)])
-    varying = [(each.path, _varies(each)) for each in block.entries if each.path and each.varies != "never"]
+        told = [(each.name, type_of(each), _bounds(each.parameter)) for each in numbers]
+        yield "Types, and bounds in SI"
+        yield from columns(told)
+    varying = [(_path(each), _varies(each)) for each in block.entries if each.path and each.varies != "never"]
     if varying:
         yield ""
         yield "In a sweep, and by `--set`"
@@ -77,7 +79,7 @@ def type_of(entry: Entry) -> str:
 
 def default(entry: Entry) -> str:
     """What holds where an entry is left out, without the marks of Markdown."""
-    return _plain(entry.default)
+    return plain(entry.default)
 
 
 def _bounds(wanted: Parameter | None) -> str:
@@ -88,6 +90,12 @@ def _bounds(wanted: Parameter | None) -> str:
     return above or least
 
 
+def _path(entry: Entry) -> str:
+    """What a sweep calls it; of several numbers, one of them."""
+    shape = entry.parameter.shape if entry.parameter is not None else ""
+    return entry.path + {"vector": ".x, .y, .z", "list": ".xx, .yy, ..."}.get(shape, "")
+
+
 def _varies(entry: Entry) -> str:
     return "over numbers" if entry.varies == "number" else "over choices, each a program of its own"
 
@@ -96,7 +104,7 @@ def _an(name: str) -> str:
     return f"{'an' if name[0] in 'aeio' else 'a'} {name}"
 
 
-def _plain(text: str) -> str:
+def plain(text: str) -> str:
     """Without what points to another place of a page."""
     return text.replace("; see below", "")
 

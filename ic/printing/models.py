@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from typing import Any, get_args
 
+from ic.language import BLOCKS
 from ic.printing.columns import columns, exactly
 from met import models
 from met.channel import of_bed, of_law, watched_unit
@@ -29,7 +30,10 @@ HOW = {
 
 ON_LINK = "sensor NAME = MODEL { link = LINK; ... }, in a run"
 
-OTHERS = ("channels", "designs", "dh", "distributions", "functions", "shapes", "substitute", "sweep", "units")
+OF_LANGUAGE = tuple(name for name in BLOCKS if name not in KINDS)
+"""Blocks of the deck language that have no models."""
+
+OTHERS = (*OF_LANGUAGE, "channels", "designs", "dh", "distributions", "functions", "shapes", "units")
 """What else `met doc` has a page on (ic/printing/subjects.py)."""
 
 FIELDS = tuple(field.name for field in fields(Parameter))
@@ -76,7 +80,9 @@ def print_list(found: list[tuple[models.Kind, Any]]) -> Iterator[str]:
             yield from columns(listed)
             yield ""
     yield "`met doc MODEL` says all that one declares; `met doc channels` what can be recorded."
-    yield f"Also: {', '.join(OTHERS[1:])}; and the code of a message, as in `met doc D060`."
+    yield f"Blocks of a deck: {', '.join(OF_LANGUAGE)}."
+    others = [each for each in OTHERS if each not in OF_LANGUAGE and each != "channels"]
+    yield f"Also: {', '.join(others)}; and the code of a message, as in `met doc D060`."
 
 
 def print_model(kind: models.Kind, model: Any) -> Iterator[str]:

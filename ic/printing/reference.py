@@ -7,8 +7,10 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from ic.language import BLOCKS
 from ic.meaning import dh, shapes
 from ic.printing import subjects, sweeps
+from ic.printing.language import plain, type_of
 from ic.printing.models import HOW, KINDS, default, facts, how, rows, shown_of, unit_in_words, words_in
 from met import models
 
@@ -27,11 +29,13 @@ def page() -> Iterator[str]:
     """The lines of the page, of MET's own models."""
     yield from HEAD.splitlines()
     yield ""
+    yield f"- [Blocks of a deck](#blocks-of-a-deck): {', '.join(f'[{name}](#block-{name})' for name in BLOCKS)}"
     for kind in KINDS:
         names = ", ".join(f"[{name}](#{kind}-{name})" for name in models.find_own(kind))
         yield f"- [{_title(kind)}](#{kind}s): {names}"
     for name in TITLES:
         yield f"- [{TITLES[name]}](#{_anchor(TITLES[name])})"
+    yield from _blocks()
     for kind in KINDS:
         yield ""
         yield f"## {_title(kind)}"
@@ -48,9 +52,27 @@ def page() -> Iterator[str]:
         yield from _words(name)
 
 
+def _blocks() -> Iterator[str]:
+    yield ""
+    yield "## Blocks of a deck"
+    for block in BLOCKS.values():
+        yield ""
+        yield f"### block {block.name}"
+        yield ""
+        yield f"{_escaped(block.doc)}"
+        yield ""
+        yield f"In a deck: `{block.written}`"
+        yield ""
+        told = [(each.written, type_of(each) or "-", each.default, plain(each.doc)) for each in block.entries]
+        yield from _table([("written", "type", "default", "meaning"), *told], whole=True)
+        if block.free:
+            yield ""
+            yield f"Also {_escaped(block.free)}."
+
+
 TITLES = {
     "shapes": "Shapes of links", "dh": "Denavit-Hartenberg numbers", "channels": "Channels", "units": "Units",
-    "functions": "Functions", "sweep": "Sweeps", "designs": "Designs of samples", "distributions": "Distributions",
+    "functions": "Functions", "designs": "Designs of samples", "distributions": "Distributions",
 }  # fmt: skip
 
 

@@ -9,10 +9,12 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any
 
+from ic.language import BLOCKS
 from ic.meaning import dh, shapes
 from ic.meaning.substitution import DEFAULTS
 from ic.printing.columns import columns, exactly
-from ic.printing.models import FIELDS, WORDS, default, rows, summary, unit_in_words
+from ic.printing.language import block_json, print_block
+from ic.printing.models import FIELDS, OF_LANGUAGE, WORDS, default, rows, summary, unit_in_words
 from ic.printing.sweeps import print_words, words_json
 from met import channel, models, units
 
@@ -105,11 +107,7 @@ def shapes_json() -> list[dict[str, Any]]:
 
 
 def print_substitute() -> Iterator[str]:
-    yield "substitute: the motor of a joint, put on a motor bed"
-    yield "  The servo stays what it is. What its motor does is the bed's; how the bed's second motor loads it is the"
-    yield "  law's, one for all substituted joints of a run."
-    yield ""
-    yield "In a deck: substitute JOINT { bed = MODEL(...);  law = MODEL(...); }, in a run"
+    yield from print_block(BLOCKS["substitute"])
     for kind, usual in DEFAULTS.items():
         yield ""
         yield f"{kind}s; {usual} unless written"
@@ -120,10 +118,6 @@ def print_substitute() -> Iterator[str]:
                         for name, model in models.available("bed").items() for p in model.parameters if p.of_servo])
     yield ""
     yield "`met doc emulated`, and so for every bed and law, says what it takes and what of it can be recorded."
-
-
-def substitute_json() -> list[dict[str, Any]]:
-    return [{"key": kind, "default": usual, "models": list(models.available(kind))} for kind, usual in DEFAULTS.items()]
 
 
 def unit_table() -> list[dict[str, Any]]:
@@ -154,8 +148,8 @@ SUBJECTS: Mapping[str, Subject] = MappingProxyType({
     "distributions": (partial(print_words, "distributions"), partial(words_json, "distributions")),
     "functions": (partial(print_words, "functions"), partial(words_json, "functions")),
     "shapes": (print_shapes, shapes_json),
-    "substitute": (print_substitute, substitute_json),
-    "sweep": (partial(print_words, "sweep"), partial(words_json, "sweep")),
     "units": (print_units, unit_table),
+    **{name: (partial(print_block, BLOCKS[name]), partial(block_json, BLOCKS[name])) for name in OF_LANGUAGE},
+    "substitute": (print_substitute, partial(block_json, BLOCKS["substitute"])),
 })
 """By the word that `met doc` takes: what it prints, and the same for programs."""

@@ -1,4 +1,4 @@
-"""What `met doc` says of the words in values and sweeps: functions, entries of a sweep, designs, distributions.
+"""What `met doc` says of the words in values and sweeps: functions, designs, distributions.
 
 The names, and what each takes, are those that the compiler reads by; here stands what they mean.
 """
@@ -10,7 +10,6 @@ from types import MappingProxyType
 
 from ic.meaning.values import CONSTANTS, FUNCTIONS, USAGE
 from ic.printing.columns import columns, exactly
-from ic.sweeps.axes import KNOWN
 from ic.sweeps.designs import DESIGNS, DIGITS, DISTRIBUTIONS
 from met.frozen import frozen
 
@@ -22,18 +21,6 @@ OF_FUNCTIONS: Mapping[str, str] = MappingProxyType({
     "min": "least of values of one dimension, two or more", "max": "greatest of values of one dimension, two or more",
     "linspace": "evenly spaced values, both ends included",
     "logspace": "values in one ratio, both ends included (ends, not exponents)",
-})  # fmt: skip
-
-OF_ENTRIES: Mapping[str, tuple[str, str]] = MappingProxyType({
-    "vary": ("vary PATH = LIST;", "an axis: one case or more for each value"),
-    "zip": ("zip { PATH = LIST;  PATH = LIST; }", "an axis of several parameters in step, as many values each"),
-    "from": ('from "cases.csv";', "an axis of the rows of a file"),
-    "sample": ("sample DESIGN(COUNT) { PATH = DISTRIBUTION; }", "an axis of values drawn at random"),
-    "repeat": ("repeat COUNT;", "each case so many times, with noise of its own"),
-    "exclude when": ("exclude when CONDITION;", "leaves out the cases for which it holds"),
-    "seed": ("seed = 7;", "of the noise, and of what is drawn; the run's unless written"),
-    "seeds": ("seeds = independent;", "each case has noise of its own, not that of its position alone; `common` unless "
-                                      "written"),
 })  # fmt: skip
 
 OF_DESIGNS: Mapping[str, str] = MappingProxyType({
@@ -51,10 +38,6 @@ OF_DISTRIBUTIONS: Mapping[str, str] = MappingProxyType({
 def _functions() -> list[Row]:
     calls = [(name, f"{name}({', '.join(USAGE[name])})", OF_FUNCTIONS[name]) for name in FUNCTIONS]
     return [*calls, *((name, name, exactly(value)) for name, value in CONSTANTS.items())]
-
-
-def _entries() -> list[Row]:
-    return [(name, *OF_ENTRIES[name]) for name in KNOWN]
 
 
 def _designs() -> list[Row]:
@@ -79,10 +62,6 @@ SUBJECTS: Mapping[str, Subject] = MappingProxyType({
     "functions": Subject(
         "What values may call, and the constants", "let step = max(1 mm, sqrt(2) * 3 mm);", _functions,
         "The arguments bear units, or the whole has one behind its bracket: `linspace(1, 2, 5) kg`."),
-    "sweep": Subject(
-        "What stands in the block of a sweep; the cases are the product of its axes",
-        "sweep NAME of RUN { vary motor.kp = linspace(0.03, 0.12, 4) V*s/rad; }", _entries,
-        "The first axis is the slowest. `sweep NAME = ONE + OTHER;` joins the cases of several sweeps and runs."),
     "designs": Subject(
         "How the points of a sweep's sample lie", "sample lhs(200) { PATH = normal(20, 1) kg; }", _designs,
         "What values the points become, `met doc distributions` says."),

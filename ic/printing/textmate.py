@@ -16,26 +16,30 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from ic.meaning import arm, dh, payloads, run
-from ic.meaning.resolve import KINDS as DEFINITIONS
+from ic.language import BLOCKS, DEFINITIONS
+from ic.language.bodies import JOINT_KINDS
+from ic.language.runs import BASE_KINDS, VELOCITY_PRODUCTS
+from ic.meaning import dh
 from ic.meaning.shapes import SHAPES
-from ic.meaning.substitution import DEFAULTS
 from ic.meaning.values import CONSTANTS, FUNCTIONS
 from ic.text.preprocess import DIRECTIVES
 from met import models, units
 from met.channel import COMMAND_UNIT
+from met.plan import BASE
 
 SCOPE = "source.met"
 FOLDER = Path(__file__).parents[2] / "docs" / "editors"
 NAMES = ("met.tmLanguage.json", "met.tmLanguage")
 
-STATEMENTS = ("vary", "zip", "sample", "repeat", "exclude", "when", "require", "remove", "macro", "from")
+STATEMENTS = (*dict.fromkeys(
+    word for block in BLOCKS.values() for statement in block.statements for word in statement.split()
+), "remove", "macro")  # fmt: skip
 """Words that begin an entry, or stand in one, and name nothing."""
 
-PARTS = ("link", "joint", "metric", "payload", "substitute", "guide", "sensor")
+PARTS = tuple(dict.fromkeys(word for block in BLOCKS.values() for word in block.named))
 """Words that begin an entry and are followed by a name."""
 
-WORDS = ("on", "off", "base", "faults", "free", "prescribed")
+WORDS = (BASE, "faults", *BASE_KINDS[1:], *VELOCITY_PRODUCTS.words)
 NAME = r"[A-Za-z_][A-Za-z0-9_]*"
 PATH = rf"{NAME}(?:\s*\.\s*{NAME})*"
 NUMBER = r"(?<![A-Za-z0-9_.])(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
@@ -138,7 +142,7 @@ def _entries() -> dict[str, Any]:
         _groups(rf"\b({kinds})\s+({NAME})(?=\s+(?:like|of|from)\b|\s*[{{=;])", "storage.type", "entity.name.type"),
         _groups(rf"\b(like|of)\s+({PATH})(?=\s*(?:[{{;]|\bof\b))", "keyword.other", "entity.other.inherited-class"),
         _groups(rf"\b(let)\s+({NAME})(?=\s*=)", "storage.type", "variable.other.constant"),
-        _groups(rf"\b(joint)\s+({NAME})\s+({_any(arm.JOINT_KINDS)})\b",
+        _groups(rf"\b(joint)\s+({NAME})\s+({_any(JOINT_KINDS)})\b",
                 "storage.type.part", "entity.name.section", "storage.modifier.joint"),
         _groups(rf"\b({_any(PARTS)})\s+({NAME})(?=\s*[={{;])", "storage.type.part", "entity.name.section"),
         _groups(rf"\b({_any(STATEMENTS)})\b(?=\s+[^=\s]|\s*\{{|\s*\(|\s*\")(?!\s*\+=)", "keyword.control"),
@@ -169,9 +173,7 @@ def _keys() -> set[str]:
                 for parameter in models.written(model)}  # fmt: skip
     shaped = {parameter.name for shape in SHAPES.values() for parameter in shape.parameters}
     numbered = {number.name for number in dh.NUMBERS}
-    written = {"model", "command", "rate", "of", "velocity_products", "q", "qd"}
-    keys = {*arm.LINK_KEYS, *arm.JOINT_KEYS, *payloads.KEYS, *run.KEYS, *run.RATES, *DEFAULTS}
-    return declared | shaped | numbered | written | keys
+    return declared | shaped | numbered | {key for block in BLOCKS.values() for key in block.keys}
 
 
 def texts() -> dict[str, bytes]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from ic.meaning.resolve import RESERVED
+from ic.language import HEADS
 from ic.robots.robot import Robot, Written
 from met import units
 from met.frozen import frozen
@@ -80,4 +80,4 @@ def _named(written: Sequence[Written], kind: str, taken: set[str]) -> dict[str, 
 
 def _means_something(name: str, kind: str) -> bool:
     reserved = name == "base" or units.is_unit(name) or _MACRO.fullmatch(name) is not None
-    return reserved or (kind != "link" and name in RESERVED)
+    return reserved or (kind != "link" and name in HEADS)

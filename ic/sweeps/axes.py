@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ic.grammar.syntax import Call, Expression, Group, Name, Setting, Statement, String, Word
+from ic.language.runs import SWEEP
 from ic.meaning.checks import Varied
 from ic.meaning.complaints import Complaints, belongs, known_words
 from ic.meaning.names import Names
@@ -29,7 +30,7 @@ from met.trace import Graph, Scalar
 
 MOST_CASES = 10_000_000
 MOST_COUNTED = 16  # axes that are read of a sweep that has too many cases
-KNOWN = ("vary", "zip", "from", "sample", "repeat", "exclude when", "seed", "seeds")
+KNOWN = tuple(entry.name for entry in SWEEP.entries)
 
 Column = Varied | Chosen
 

@@ -14,11 +14,13 @@ from typing import Any
 
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Call, Entry, Expression, Group, List, Name, Number, Setting, String, Unit, WithUnit, Word
+from ic.language import BLOCKS, choices
 from ic.meaning.merge import Block
 from ic.meaning.names import Names
 from ic.meaning.resolve import Definition, Definitions
+from ic.meaning.shapes import SHAPES
 from ic.meaning.values import FUNCTIONS, Value, Values, evaluate, measure_of, place_of, spanned
-from met import units
+from met import models, units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.trace import Scalar
@@ -26,12 +28,10 @@ from met.trace import Scalar
 MACRO = "macro"
 """What a path of a macro begins with, before a space: `macro PAYLOAD`."""
 
-OF_RUN = ("integrator", "arm", "duration", "base")
-OF_JOINT = ("servo", "law", "bed")
-OF_SERVO = ("model", "command", "rate")
+OF_RUN, OF_JOINT, OF_SERVO = choices(""), choices("JOINT"), choices("SERVO")
 SENSOR = "sensor"
-ONE_OF_TWO = ("environment.velocity_products", "initial.servos")
-NEVER_NUMBERS = ("shape", "along", "of", "parent", "child", "axes", "interpolation", "growth")
+ONE_OF_TWO = tuple(f"{head}.{name}" for head in ("environment", "initial") for name in choices(head))
+"""Paths of words that a sweep chooses from."""
 A_RUN_FOR_EACH = "write a run for each, `like` the first, and `sweep NAME = ONE + OTHER;`"
 
 
@@ -115,9 +115,20 @@ def refuse_words(path: str, place: Place, values: Expression, names: Names) -> N
     word = word_in(values, names)
     if word is not None:
         helps = [A_RUN_FOR_EACH]
-        if isinstance(word, Name) and path.rpartition(".")[2] not in NEVER_NUMBERS:
+        if isinstance(word, Name) and not _is_word(path.rpartition(".")[2]):
             helps.append(f"where a number is meant, define it: `let {word.text} = ...;`")
         raise Problem(error("D122", f"`{path}` cannot vary over words", place_of(word), help=helps))
+
+
+def _is_word(name: str) -> bool:
+    """Whether the language or a model has a key of that name, and none whose value is a number."""
+    of_models = [p for kind in models.GROUPS for model in models.available(kind).values()
+                 for p in models.written(model)]  # fmt: skip
+    of_shapes = [p for shape in SHAPES.values() for p in shape.parameters]
+    of_blocks = [(each.name, each.varies == "number") for block in BLOCKS.values() for each in block.entries]
+    kinds = [*of_blocks, *((p.name, p.shape not in ("word", "words")) for p in (*of_models, *of_shapes))]
+    found = [number for each, number in kinds if each == name]
+    return bool(found) and not any(found)
 
 
 def path_place(entry: Setting) -> Place:

@@ -17,7 +17,8 @@ import xarray
 import batch
 import ic
 from ic.grammar.syntax import Name
-from ic.meaning import arm, payloads, run
+from ic.language.bodies import JOINT, LINK, PAYLOAD
+from ic.language.runs import RATES, RUN
 from ic.meaning.complaints import Complaints
 from ic.meaning.resolve import Definitions
 from ic.meaning.scope import Scope
@@ -208,14 +209,14 @@ def test_every_function_shape_key_and_model_is_on_the_page() -> None:
     assert {name.partition("(")[0] for row in table("function") for name in ticked(row[0])} == {*FUNCTIONS, "pi"}
     shapes = {row[0].strip("`"): {word.split()[0] for word in ticked(row[1])} for row in table("shape")}
     assert shapes == {name: {p.name for p in shape.parameters} for name, shape in SHAPES.items()}
-    assert {word for row in table("key of a link") for word in ticked(row[0])} == set(arm.LINK_KEYS)
-    assert {word for row in table("key of a joint") for word in ticked(row[0])} == set(arm.JOINT_KEYS)
+    assert {word for row in table("key of a link") for word in ticked(row[0])} == set(LINK.keys)
+    assert {word for row in table("key of a joint") for word in ticked(row[0])} == set(JOINT.keys)
     entries = {entry.split()[0] for row in table("entry of a run") for entry in ticked(row[0])}
-    assert {word for row in table("key of `substitute`") for word in ticked(row[0])} == set(DEFAULTS)
-    assert {word for row in table("key of a payload") for word in ticked(row[0])} == set(payloads.KEYS)
-    assert entries == {*run.KEYS, *run.KINDS, "require"}
+    assert {word for row in table("key of a substitute") for word in ticked(row[0])} == set(DEFAULTS)
+    assert {word for row in table("key of a payload") for word in ticked(row[0])} == set(PAYLOAD.keys)
+    assert entries == {*RUN.keys, *RUN.named, *RUN.statements}
     words = ticked(re.sub(r"```.*?```", "", PAGE, flags=re.DOTALL))
-    assert set(run.RATES) <= words
+    assert set(RATES.keys) <= words
     for kind in ("servo", "environment", "guide", "metric", "integrator"):
         assert set(models.find_own(kind)) <= words, kind
     assert set(models.find_own("command")) - {"constant"} <= words

@@ -171,7 +171,7 @@ error[D108]: no `guides` in a run
 11 |     guides tip = resolved_rate {
    |     ^^^^^^^^^^
    = help: did you mean `guide`?
-   = help: a run has: arm, base, servos, initial, environment, rates, integrator, duration, record, tolerances, seed, metric NAME, guide NAME, sensor NAME, payload NAME, substitute JOINT, require
+   = help: a run has: arm, base, servos, initial, environment, rates, integrator, duration, record, tolerances, seed, guide NAME, substitute JOINT, sensor NAME, payload NAME, metric NAME, require
 
 2 errors
 """),

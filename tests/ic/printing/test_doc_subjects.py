@@ -10,7 +10,6 @@ import pytest
 from ic.meaning.shapes import SHAPES
 from ic.meaning.values import CONSTANTS, FUNCTIONS
 from ic.printing import codes
-from ic.sweeps.axes import KNOWN
 from ic.sweeps.designs import DESIGNS, DISTRIBUTIONS
 from met import cli, models, units
 
@@ -39,7 +38,7 @@ def test_substitute_says_its_keys_defaults_models_and_what_is_the_servos(capsys:
     assert "\nbeds; emulated unless written\n" in out and "\nlaws; velocity_tracking unless written\n" in out
     assert all(f"\n  {name} " in out for kind in ("bed", "law") for name in models.find_own(kind))
     assert "the servo's j_m " in out
-    assert [each["key"] for each in json.loads(printed(capsys, "substitute", "--format", "json"))] == ["bed", "law"]
+    assert [each["name"] for each in json.loads(printed(capsys, "substitute", "--format", "json"))] == ["bed", "law"]
 
 
 def test_units_lists_them_all_with_what_they_are_in_si(capsys: pytest.CaptureFixture[str]) -> None:
@@ -50,12 +49,12 @@ def test_units_lists_them_all_with_what_they_are_in_si(capsys: pytest.CaptureFix
 
 def test_the_list_of_models_ends_with_what_else_there_is(capsys: pytest.CaptureFixture[str]) -> None:
     assert printed(capsys).endswith(
-        "Also: designs, dh, distributions, functions, shapes, substitute, sweep, units; and the code of a message, as "
-        "in `met doc D060`.\n"
+        "Blocks of a deck: arm, link, joint, run, rates, initial, payload, substitute, tolerances, sweep.\n"
+        "Also: designs, dh, distributions, functions, shapes, units; and the code of a message, as in `met doc D060`.\n"
     )
 
 
-WORDS = {"functions": FUNCTIONS, "sweep": KNOWN, "designs": DESIGNS, "distributions": tuple(DISTRIBUTIONS)}
+WORDS = {"functions": FUNCTIONS, "designs": DESIGNS, "distributions": tuple(DISTRIBUTIONS)}
 
 
 @pytest.mark.parametrize("subject", WORDS)
