@@ -9,6 +9,7 @@ from typing import Any
 
 from ic.grammar.syntax import Call, Expression
 from ic.language.runs import BASE_KINDS
+from ic.meaning import unvaried
 from ic.meaning.arm import Arm
 from ic.meaning.bodies import carried_loads
 from ic.meaning.complaints import known_words
@@ -41,7 +42,7 @@ NOTHING = (0.0, 0.0, 0.0)
 def resolve_base(scope: Scope, item: Item | None, arm: Arm) -> tuple[Base | None, Arm]:
     """The base, None where it is fixed or something failed, which was told; and the arm, which has it for a link where
     it moves."""
-    scope.whole[BASE] = "decides the program: write `vary base = [fixed, free];`"
+    scope.unvaried[BASE] = unvaried.chosen("write `vary base = [fixed, free];`")
     kind = word_of(item.value) if item is not None and item.value is not None else None
     if item is None:
         scope.setting(BASE, "fixed")
@@ -196,7 +197,7 @@ def _course(scope: Scope, item: Item) -> str | None:
     if model is not None:
         scope.setting(f"{BASE}.{item.name}.model", model, item=item)
         path = f"{BASE}.{item.name}"
-        scope.whole[path] = f"is a course in time: vary a parameter of it, `{path}.PARAMETER`"
+        scope.unvaried[path] = unvaried.model("a course in time", path)
         _check_jumps(scope, item, model, place_of(item.value))
     return model
 

@@ -16,6 +16,7 @@ import math
 from collections.abc import Callable
 
 from ic.grammar.syntax import Call
+from ic.meaning import unvaried
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, word_of
 from ic.meaning.owner import XYZ, Owner
@@ -91,7 +92,7 @@ def use_dh(scope: Scope, owner: Owner, kind: str, item: Item, body: Block) -> No
     inner = Owner(f"the dh of {owner.label}", item.place, owner.join("dh"), homes=owner.homes)
     numbers = item.body or Block()
     check_keys(scope, numbers, [wanted.name for wanted in NUMBERS], inner)
-    scope.whole[owner.join("dh")] = f"is made of 4 numbers; {_vary(owner)}"
+    scope.unvaried[owner.join("dh")] = unvaried.several(_numbers(owner))
     found = [scope.number(inner, wanted, numbers.get(wanted.name), record=False) for wanted in NUMBERS]
     values = [value for value in found if value is not None]
     if len(values) < len(NUMBERS):
@@ -117,11 +118,12 @@ def _refuse_others(scope: Scope, owner: Owner, item: Item, body: Block) -> None:
                 also=[Label(item.place, "the Denavit-Hartenberg numbers")],
                 help=f"`dh` says all of the joint's frame: leave `{name}` out (`remove {name};` where a base has it)")
         for path in (name, *(f"{name}.{axis}" for axis in XYZ)):
-            scope.whole[owner.join(path)] = f"follows from `{owner.join('dh')}`; {_vary(owner)}"
+            scope.unvaried[owner.join(path)] = unvaried.follows(owner.join("dh"), _numbers(owner))
 
 
-def _vary(owner: Owner) -> str:
-    return "vary one of: " + ", ".join(f"`{owner.join(f'dh.{wanted.name}')}`" for wanted in NUMBERS)
+def _numbers(owner: Owner) -> list[str]:
+    """The paths of the numbers that a joint's `dh` is made of."""
+    return [owner.join(f"dh.{wanted.name}") for wanted in NUMBERS]
 
 
 def _convention(scope: Scope, item: Item) -> str | None:

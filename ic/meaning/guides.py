@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from ic.grammar.spell import spell
+from ic.meaning import unvaried
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
@@ -180,10 +181,10 @@ def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use], duration: float 
     guided = guide.components(SimpleNamespace(**values)) if values is not None and paths else ()
     courses = _courses(scope, owner, body, paths, guided if values is not None else COMPONENTS, joints)
     rate = None
-    scope.whole[owner.path] = f"is a guide: vary a parameter of it, `{owner.path}.PARAMETER`"
+    scope.unvaried[owner.path] = unvaried.model("a guide", owner.path)
     if guide.steer is not None and body.get("rate") is not None:
         rate = fixed_rate(scope, owner, body.items["rate"], owner.label)
-    scope.whole[owner.join("rate")] = "decides the program: write a run for each, and `sweep NAME = ONE + OTHER;`"
+    scope.unvaried[owner.join("rate")] = unvaried.COMPILED_ALONE
     fastest = None
     if guide.fastest is not None and values is not None:
         with scope.complaints.gather():
@@ -277,7 +278,7 @@ def _course(scope: Scope, owner: Owner, item: Item) -> str | None:
     model = use_course(scope, spot, inner, item, doc=f"{item.name} of the path", column=item.name, body=item.body)
     if model is not None:
         scope.setting(f"{path}.model", model, item=item)
-        scope.whole[path] = f"is a course in time: vary a parameter of it, `{path}.PARAMETER`"
+        scope.unvaried[path] = unvaried.model("a course in time", path)
     return model
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
+from ic.meaning import unvaried
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
@@ -89,7 +90,7 @@ def _sensor(scope: Scope, item: Item, arm: Arm, payloads: tuple[Payload, ...]) -
     known = {"joint": [joint.name for joint in arm.moving], "link": bodies}
     check_names(scope, owner, sensor.parameters, body, arm=arm.name, known=known, lost=arm.lost)
     values = use_model(scope, owner, sensor.parameters, body, ["rate"])
-    scope.whole[owner.path] = f"is a sensor: vary a parameter of it, `{owner.path}.PARAMETER`"
+    scope.unvaried[owner.path] = unvaried.model("a sensor", owner.path)
     rate = fixed_rate(scope, owner, body.items["rate"], owner.label) if body.get("rate") is not None else None
     words = [each for each in sensor.parameters if each.shape == "word" and not each.names]
     return Sensing(item.name, sensor.name, words_chosen(words, body), rate, values or {}, item.place)

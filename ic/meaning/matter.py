@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ic.language.bodies import COM, INERTIA, MASS
+from ic.meaning import unvaried
 from ic.meaning.bodies import check_body
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, refuse_values, value_at, word_of
@@ -83,7 +84,7 @@ def _com(scope: Scope, owner: Owner, kind: str, item: Item | None, solid: Solid 
     if item is not None or solid is None:
         scope.vector(owner, replace(_of(COM, kind), default=(0.0, 0.0, 0.0)), item)
         return
-    scope.whole[owner.join("com")] = "is made of 3 numbers; vary one of them, such as `" + owner.join("com.x`")
+    scope.unvaried[owner.join("com")] = unvaried.several([owner.join(f"com.{axis}") for axis in "xyz"])
     for axis, value in zip("xyz", solid.com, strict=True):
         scope.derived(owner, f"com.{axis}", value, "m", f"middle of the {solid.kind}")
 
@@ -104,6 +105,6 @@ def _inertia(scope: Scope, owner: Owner, kind: str, item: Item | None, solid: So
     if mass is None:
         scope.checks.fail(owner.join("inertia"))
         return None
-    scope.whole[owner.join("inertia")] = "is made of 6 numbers; vary one of them, such as `" + owner.join("inertia.xx`")
+    scope.unvaried[owner.join("inertia")] = unvaried.several([owner.join(f"inertia.{each}") for each in MOMENTS])
     return tuple(scope.derived(owner, f"inertia.{name}", value, "kg*m^2", f"uniform {solid.kind} of the {kind}'s mass")
                  for name, value in zip(MOMENTS, solid.inertia(mass), strict=True))

@@ -19,6 +19,7 @@ from ic.language.bodies import (
     RELEASE,
     VELOCITY,
 )
+from ic.meaning import unvaried
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.matter import use_matter
@@ -26,6 +27,7 @@ from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, value_at
 from ic.meaning.owner import Owner
 from ic.meaning.scope import Scope
+from ic.meaning.unvaried import Unvaried
 from met.diagnostic import Label, Place, did_you_mean
 from met.parameter import WORLD
 from met.plan import BASE, INSTANT, Payload, Structure
@@ -88,16 +90,17 @@ def _payload(scope: Scope, item: Item, arm: Arm, taken: Collection[str]) -> Payl
     times = [scope.number(owner, wanted, given) for wanted in EVENTS if (given := body.get(wanted.name)) is not None]
     for wanted in EVENTS:
         if body.get(wanted.name) is None:
-            scope.whole[owner.join(wanted.name)] = (
-                f"is not written, and so decides the program: write `{wanted.name} = ...;` in the payload, and it "
-                "varies")
+            scope.unvaried[owner.join(wanted.name)] = Unvaried(
+                "is not written, and so decides the program",
+                f"write `{wanted.name} = ...;` in the payload, and it varies",
+            )
     payload = Payload(item.name, link or BASE, grappled, released, item.place, shape)
     if grappled and released:
         _check_order(scope, item, times, value_at(body.items["release"]))
     if payload.flies:
         _check_solid(scope, owner, payload, item)
     scope.setting(owner.join("on"), link or BASE, item=body.get("on"))
-    scope.whole[owner.join("on")] = "decides the program: write a run for each, and `sweep NAME = ONE + OTHER;`"
+    scope.unvaried[owner.join("on")] = unvaried.COMPILED_ALONE
     return payload
 
 

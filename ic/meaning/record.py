@@ -13,6 +13,7 @@ from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, find_model, refuse_values, use_model, word_of
 from ic.meaning.owner import Owner
 from ic.meaning.scope import Scope
+from ic.meaning.unvaried import Unvaried
 from ic.meaning.values import place_of
 from met import models
 from met.channel import FAMILIES, Channel, carries, channels, recordable
@@ -34,7 +35,7 @@ FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
 def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Structure) -> tuple[Recorded, ...]:
     """The variables that are recorded, in the deck's order."""
-    scope.whole["record"] = "is one for the whole sweep: record all that any case needs"
+    scope.unvaried["record"] = Unvaried("is one for the whole sweep", "record all that any case needs")
     if item is None:
         scope.complaints.missing(run.place, ("record",), "D124", f"{run.label} records nothing",
                                  help="write `record = [q, qd, tau];`, or `record = [];` where metrics are all you "

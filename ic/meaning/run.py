@@ -49,6 +49,7 @@ from ic.meaning.swings import check_circuits, check_sensor
 from ic.meaning.tables import tell_named_lists, use_table
 from ic.meaning.ticking import Ticking, check_instants, rate_of
 from ic.meaning.tolerances import resolve_tolerances
+from ic.meaning.unvaried import Unvaried
 from ic.meaning.values import Value, Values, place_of
 from met import models, units
 from met.diagnostic import Label, Place, did_you_mean
@@ -278,7 +279,7 @@ def _integrator(scope: Scope, item: Item | None):  # type: ignore[no-untyped-def
 
 def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
     number = scope.constant(run, SEED, item) if item is not None else 0.0
-    scope.whole["seed"] = "is one for the whole sweep: `repeat 5;` runs each case with other noise"
+    scope.unvaried["seed"] = Unvaried("is one for the whole sweep", "`repeat 5;` runs each case with other noise")
     if item is None:
         return 0
     if number is not None and not number.is_integer():

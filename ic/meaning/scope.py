@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ic.grammar.syntax import Call, Expression, Name, Setting, String
+from ic.meaning import unvaried
 from ic.meaning.checks import Checks, Varied
 from ic.meaning.complaints import Complaints
 from ic.meaning.cycles import doubt
@@ -25,6 +26,7 @@ from ic.meaning.owner import XYZ, Owner, Settled
 from ic.meaning.remedies import components, mended
 from ic.meaning.resolve import Definitions
 from ic.meaning.unit_words import either, in_degrees, measure_here, unit_here
+from ic.meaning.unvaried import Unvaried
 from ic.meaning.values import Value, Values, place_of
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
@@ -49,7 +51,7 @@ class Scope:
     beside: dict[str, Settled] = field(default_factory=dict)  # what parameters are made of, and settings of the run
     known: dict[str, list[str]] = field(default_factory=dict)  # every path that would set something -> parameters
     sets: dict[str, list[str]] = field(default_factory=dict)  # coordinate -> parameters that took it directly
-    whole: dict[str, str] = field(default_factory=dict)  # paths that cannot vary -> why
+    unvaried: dict[str, Unvaried] = field(default_factory=dict)  # known paths that do not vary over numbers
     notes: list[str] = field(default_factory=list)
     moved: dict[str, set[str]] = field(default_factory=dict)  # servo definition -> kinds of joints it moves
     lost: frozenset[str] = frozenset()  # joints whose servo failed: nothing can be said of its channels
@@ -103,8 +105,7 @@ class Scope:
         """
         heads = [owner.path] * (wanted.name == owner.short) + [owner.join(wanted.name)]
         for head in heads:
-            self.whole.setdefault(head, f"is made of {len(names)} numbers; vary one of them: "
-                                  + ", ".join(f"`{heads[0]}.{name}`" for name in names))
+            self.unvaried.setdefault(head, unvaried.several([f"{heads[0]}.{name}" for name in names]))
         values: list[Value | None] = [None] * len(names)
         if item is not None and given is None:
             with self.complaints.gather():
@@ -154,10 +155,10 @@ class Scope:
         return numbers
 
     def constant(self, owner: Owner, wanted: Parameter, item: Item) -> float | None:
-        """A number that decides the program: no input of it, but what makes another structure where it is another."""
+        """A compile-time constant: another value is another program."""
         path = owner.join(wanted.name)
         for known in owner.paths(wanted.name, item.homes):
-            self.whole[known] = "decides the program"
+            self.unvaried[known] = unvaried.COMPILED
         number = None
         with self.complaints.gather():
             found = self.written(item)
@@ -188,7 +189,7 @@ class Scope:
             self._missing(owner, wanted)
         elif self.constant(owner, wanted, item) is None:
             self.beside.pop(path, None)
-        self.whole[path] = "decides the program: write a run for each, and `sweep NAME = ONE + OTHER;`"
+        self.unvaried[path] = unvaried.COMPILED_ALONE
         if path not in self.beside:
             return None
         self.parameters[path] = self.beside.pop(path)
@@ -197,7 +198,7 @@ class Scope:
     def numbers(self, owner: Owner, wanted: Parameter, item: Item | None) -> tuple[float, ...] | None:
         """A list of any length, the same in all cases."""
         path = owner.join(wanted.name)
-        self.whole[path] = "is a list, which does not vary: write a run for each, and `sweep NAME = ONE + OTHER;`"
+        self.unvaried[path] = unvaried.LIST
         if item is None and isinstance(wanted.default, tuple):
             self.parameters[path] = Settled(wanted.default, self.unit(owner, wanted)[0], Origin("default"), wanted.doc)
             return wanted.default
@@ -231,7 +232,7 @@ class Scope:
     def word(self, owner: Owner, wanted: Parameter, item: Item | None, *, record: bool = False) -> str | None:
         """A word, one of `wanted.words` where it has any."""
         path = owner.join(wanted.name)
-        self.whole[path] = "is a word: vary it over words"
+        self.unvaried[path] = unvaried.WORD
         if item is None:
             if not isinstance(wanted.default, str):
                 self._missing(owner, wanted)

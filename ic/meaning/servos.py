@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, Word
+from ic.meaning import unvaried
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item, open_call, overlay
@@ -158,7 +159,7 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
         rate = fixed_rate(scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`",
                           continuous=True)
     scope.setting(f"{item.name}.servo.model", servo.name, item=model)
-    scope.whole[f"{item.name}.servo.model"] = f"decides the program: vary `{item.name}.servo` over definitions"
+    scope.unvaried[f"{item.name}.servo.model"] = unvaried.chosen(f"vary `{item.name}.servo` over definitions")
     words = words_chosen([each for each in servo.parameters if each.name in servo.deciding], block)
     bare = ServoUse(item.name, name, servo.name, command, 1, words=words)
     sensors = tuple(use for each in sensed if (use := use_sensor(scope, owner, bare, each)) is not None)

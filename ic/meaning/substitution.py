@@ -8,6 +8,7 @@ from typing import Any
 
 from ic.grammar.syntax import Call, Expression
 from ic.language.runs import BED, LAW
+from ic.meaning import unvaried
 from ic.meaning.arm import Arm
 from ic.meaning.complaints import known_words
 from ic.meaning.merge import Block, Item
@@ -128,7 +129,7 @@ def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use])
         part = block.get(each)
         owner = Owner(f"{each} `{model.name}` of joint `{item.name}`", (part or item).place, f"{item.name}.{each}",
                       homes=(part or item).homes, joint=kind)  # type: ignore[arg-type]
-        scope.whole[f"{owner.path}.model"] = f"decides the program: vary `{owner.path}` over models"
+        scope.unvaried[f"{owner.path}.model"] = unvaried.chosen(f"vary `{owner.path}` over models")
         body = (part.body if part is not None else None) or Block()
         if each == "bed":
             _use_bed(scope, owner, model, body, use)

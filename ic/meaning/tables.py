@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 from ic.grammar.syntax import Name, String
+from ic.meaning import unvaried
 from ic.meaning.complaints import known_words
 from ic.meaning.csv_files import Column, Table, missing_column
 from ic.meaning.merge import Block, Item
@@ -19,7 +20,6 @@ from met.parameter import Parameter
 from met.plan import Origin
 
 TIME = "time"
-OF_A_FILE = "is read from a file, and is one for the whole sweep"
 
 
 def use_table(scope: Scope, owner: Owner, environment: Environment, body: Block) -> dict[str, Any] | None:
@@ -36,7 +36,7 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Block)
     values = use_model(scope, owner, [each for each in environment.parameters if each.shape != "list"],
                        Block({key: item for key, item in body.items.items() if key in own}))
     for name in (FILE.name, *(each.name for each in lists)):
-        scope.whole[owner.join(name)] = OF_A_FILE
+        scope.unvaried[owner.join(name)] = unvaried.FILE
     columns: dict[str, tuple[float, ...]] | None = None
     with scope.complaints.gather():
         columns = _columns(scope, owner, lists, body.items[FILE.name])

@@ -7,12 +7,13 @@ from dataclasses import replace
 from typing import Any
 
 from ic.grammar.syntax import Call, Name, String, Word
+from ic.meaning import unvaried
 from ic.meaning.csv_files import missing_column
 from ic.meaning.merge import Block, Item
 from ic.meaning.models import check_keys, use_model
 from ic.meaning.owner import Owner
 from ic.meaning.scope import Scope
-from ic.meaning.tables import OF_A_FILE, TIME, keep_column, named_file
+from ic.meaning.tables import TIME, keep_column, named_file
 from ic.meaning.values import place_of
 from met.commands.profile import COLUMN, FILE, Profile
 from met.diagnostic import Label, Problem, error
@@ -42,7 +43,7 @@ def use_file(
     values = use_model(scope, owner, others, Block({key: item for key, item in body.items.items()
                                                     if key in [each.name for each in others]}))
     for each in (FILE.name, COLUMN.name, *LISTS):
-        scope.whole[owner.join(each)] = OF_A_FILE
+        scope.unvaried[owner.join(each)] = unvaried.FILE
     columns: dict[str, tuple[float, ...]] | None = None
     file = body.get(FILE.name)
     if file is None:

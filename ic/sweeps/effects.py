@@ -80,7 +80,7 @@ class Effects:
                 self._tell(complaints, path, entry, where)
 
     def _tell(self, complaints: Complaints, path: str, entry: Setting, where: str) -> None:
-        scope = next((each for each in self.scopes if path in each.known or path in each.whole), self.scopes[0])
+        scope = next((each for each in self.scopes if path in each.known or path in each.unvaried), self.scopes[0])
         kind = goes(scope.definitions, entry)
         inside = sorted(known for known in scope.known if known.startswith(f"{path}."))
         if any((path in each.given and each.given[path] is None) or each.hangs(path) for each in self.scopes):
@@ -90,8 +90,8 @@ class Effects:
         elif path in (*BLOCKS, "record"):
             complaints.error("D235", f"`{path}` cannot be set", entry.place,
                              help="one value is set, not a block or a list: such as `rates.dynamics=1 kHz`")
-        elif path in scope.whole:
-            complaints.error("D235", f"`{path}` cannot be set", entry.place, help=_why_not(scope.whole[path]))
+        elif path in scope.unvaried:
+            complaints.error("D235", f"`{path}` cannot be set", entry.place, help=scope.unvaried[path].to_set())
         elif inside:
             complaints.error("D235", f"`{path}` cannot be set", entry.place, help=known_words("set one of", inside))
         elif self.complete:
@@ -119,19 +119,12 @@ class Effects:
         elif servo is not None and not any(path.startswith(f"{first}.") for each in self.scopes for path in each.known):
             helps, also = ("no joint has this servo there",), [Label(servo.place, "defined here")]
         else:
-            known = [each for one in self.scopes for each in (*one.known, *one.whole)]
+            known = [each for one in self.scopes for each in (*one.known, *one.unvaried)]
             known += [*scope.definitions.lets, *OF_RUN, *(f"{joint}.servo" for joint in joints)]
             helps = did_you_mean(path, known) or continued(scope, path) or ends(scope, path)
             macro = [] if rest else [f"a macro is defined by `-D {path}=VALUE`"]
             helps = helps or [*macro, *beginnings(scope)]
         complaints.error("D234", f"nothing in {where} is called `{path}`", entry.place, also=also, help=helps)
-
-
-def _why_not(text: str) -> str:
-    """Why a path cannot be set, from what a scope says of why it cannot vary."""
-    if text.startswith(("is made of", "follows")):
-        return f"it {text.replace('vary', 'set')}"
-    return f"it {text.partition(':')[0].partition(',')[0]}: write it in the deck, with a `let` that can be set"
 
 
 # Numbers

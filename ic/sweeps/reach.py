@@ -12,9 +12,6 @@ from met import units
 from met.diagnostic import Label, did_you_mean
 from met.plan import REPEAT, Coordinate, Experiment
 
-DECIDES = "decides the program"
-"""What a scope says of a number that makes another structure where it is another."""
-
 
 def check_coordinates(scope: Scope, *, complete: bool) -> None:
     """Every coordinate sets something.
@@ -28,10 +25,10 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
         if unknown and (not complete or scope.gone or scope.lost):
             continue
         place = varied.place
-        if path in scope.whole:
-            decides = scope.whole[path] == DECIDES
-            scope.complaints.error("D122", f"`{path}` cannot vary{' like this' if decides else ''}", place,
-                                   help=f"it {scope.whole[path]}" + (f": write `vary {path} = [...];`" * decides))
+        if path in scope.unvaried:
+            why = scope.unvaried[path]
+            scope.complaints.error("D122", f"`{path}` cannot vary{' like this' if why.is_choice else ''}", place,
+                                   help=why.to_vary(path))
             continue
         first, _, rest = path.partition(".")
         if path in ("integrator", "arm", "base") or rest in ("servo", "law", "bed", "servo.model", "servo.command"):
@@ -52,7 +49,7 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
             )
         else:
             scope.complaints.error("D128", f"no parameter `{path}` in this run", place,
-                                   help=did_you_mean(path, (*scope.known, *scope.whole, *scope.definitions.lets))
+                                   help=did_you_mean(path, (*scope.known, *scope.unvaried, *scope.definitions.lets))
                                    or continued(scope, path) or ends(scope, path) or beginnings(scope))
 
 

@@ -146,7 +146,7 @@ error[D122]: `hinge.servo.command.values` cannot vary
    |
 18 | sweep several of hold { vary hinge.servo.command.values = [1, 2] rad; vary drive.command.begin = [0, 1] s; }
    |                              ^^^^^^^^^^^^^^^^^^^^^^^^^^
-   = help: it is read from a file, and is one for the whole sweep
+   = help: it is read from a file: it is one for the whole sweep
 
 1 error
 """

@@ -437,7 +437,8 @@ error[D234]: nothing in `hold` is called `hinge.law`
 
 
 @pytest.mark.parametrize(("setting", "helps"), [
-    ("links.bar.com=[0, 0, 1] m", "it is made of 3 numbers; set one of them, such as `links.bar.com.x`"),
+    ("links.bar.com=[0, 0, 1] m", "it is made of 3 numbers; set one of them: "
+     "`links.bar.com.x`, `links.bar.com.y`, `links.bar.com.z`"),
     ("links.bar.shape.along=y", "it is a word: write it in the deck, with a `let` that can be set"),
     ("links.bar.shape=sphere(radius = 1 m)", "set one of: links.bar.shape.length"),
     ("record=[q, qd]", "one value is set, not a block or a list: such as `rates.dynamics=1 kHz`"),
