@@ -13,7 +13,7 @@ import numpy as np
 from met.diagnostic import Place
 from met.distinct import distinct
 from met.frozen import frozen
-from met.keys import LATER_FIELDS, SILENT_FIELDS, inputs, structure_key
+from met.keys import in_key, inputs, structure_key
 from met.plan import BASE, Base, Cases, Command, Course, Experiment, Formula, Plan, Quantity, Schedule, Structure
 
 AXES = ("x", "y", "z")
@@ -237,9 +237,9 @@ WHOLE = {"joints": {"kind"}, "servos": {"model", "command"}, "environment": {"mo
          "guides": {"model"}, "sensors": {"model"}, "substitutions": {"bed", "law"}}  # fmt: skip
 """Fields by whose change a thing has other parameters."""
 
-NOT_TOLD = SILENT_FIELDS - LATER_FIELDS | {"channels", "words", "schedule", "base"}
-"""Fields that are not told by themselves: channels follow from what is recorded, words are parameters too, a schedule
-has rates, and the base is told of first."""
+NOT_TOLD = frozenset({"channels", "words", "schedule", "base"})
+"""Fields that are not told by themselves, besides those in no key: channels follow from what is recorded, words are
+parameters too, a schedule has rates, and the base is told of first."""
 
 
 def _structures(before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
@@ -248,7 +248,7 @@ def _structures(before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
     yield from _base(before.base, now.base)
     for field in dataclasses.fields(Structure):
         old, new = getattr(before, field.name), getattr(now, field.name)
-        if field.name in NOT_TOLD or (old == new and before.schedule == now.schedule):
+        if in_key(field) == "never" or field.name in NOT_TOLD or (old == new and before.schedule == now.schedule):
             continue
         if field.name in ENTITIES:
             yield from _entities(field.name, before, now)
@@ -310,7 +310,7 @@ def _thing(field: str, old: Any, new: Any, before: Structure, now: Structure) ->
             rates = [_rate(divisor, structure.schedule) for divisor, structure in ((one, before), (two, now))]
             if rates[0] != rates[1] and not _with_dynamics(one, two, before, now):
                 yield each.name, f"rate {rates[0]} -> {rates[1]}"
-        elif one == two or each.name in NOT_TOLD:
+        elif one == two or in_key(each) == "never" or each.name in NOT_TOLD:
             continue
         elif each.name == "courses":
             yield from (("courses", text.removeprefix(": ")) for _, text in _courses("", "", one, two))

@@ -9,16 +9,29 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, TypeVar, dataclass_transform, overload
+from typing import Any, Literal, TypeVar, dataclass_transform, overload
 
 T = TypeVar("T")
+
+
+def keyed(when: Literal["never", "where set"], *, default: Any = dataclasses.MISSING) -> Any:
+    """A field of a plan's dataclass that is in no structure key, or only where it is not empty, false or None.
+
+    "never"      what changes no number: places, names and units for the reader
+    "where set"  what plans have got since keys were first made: where it is left out keys are what they were
+    """
+    return dataclasses.field(default=default, metadata={IN_KEY: when})
+
+
+IN_KEY = "in the structure key"
+"""Under which the metadata of a field says when it is in a structure key; always where they say nothing."""
 
 
 @overload
 def frozen(cls: type[T], /) -> type[T]: ...
 @overload
 def frozen(*, kw_only: bool = ...) -> Callable[[type[T]], type[T]]: ...
-@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, keyed))
 def frozen(cls: type[T] | None = None, /, *, kw_only: bool = False) -> type[T] | Callable[[type[T]], type[T]]:
     """Makes a class a frozen dataclass, compared and hashed by its fields."""
 

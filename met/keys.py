@@ -20,17 +20,14 @@ from typing import Any
 
 import numpy as np
 
+from met.frozen import IN_KEY
 from met.plan import Experiment, Formula, Structure
 
 DIGEST_BYTES = 8
 
-SILENT_FIELDS = frozenset({"place", "definition", "shape", "doc", "unit", "components"})
-"""Fields of a structure that change no number: where it was written, its names and units for the reader."""
-
-LATER_FIELDS = frozenset({
-    "substitutions", "words", "continuous", "sensors", "base", "payloads", "guide", "guides", "balanced",
-})  # fmt: skip
-"""Fields that structures have got since: left out where empty or false, so that the keys of older archives stay."""
+def in_key(field: dataclasses.Field[Any]) -> str:
+    """When a field of a structure is in its key: "always", "where set" or "never" (`met.frozen.keyed`)."""
+    return str(field.metadata.get(IN_KEY, "always"))
 
 
 def structure_key(structure: Structure, inputs: Iterable[str] = ()) -> str:
@@ -106,9 +103,8 @@ def _value(value: Any) -> Any:
 def _described(value: Any) -> Any:
     """Plain data of a structure, without what changes no number."""
     if dataclasses.is_dataclass(value):
-        fields = [f.name for f in dataclasses.fields(value) if f.name not in SILENT_FIELDS]
-        told = {name: getattr(value, name) for name in fields}
-        return {name: _described(part) for name, part in told.items() if part or name not in LATER_FIELDS}
+        told = ((field.name, getattr(value, field.name), in_key(field)) for field in dataclasses.fields(value))
+        return {name: _described(part) for name, part, when in told if when == "always" or (part and when != "never")}
     if isinstance(value, tuple):
         return [_described(part) for part in value]
     return value

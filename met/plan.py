@@ -46,7 +46,7 @@ from typing import Literal
 import numpy as np
 
 from met.diagnostic import Place
-from met.frozen import frozen
+from met.frozen import frozen, keyed
 from met.trace.graph import Formulas
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
@@ -99,8 +99,8 @@ class Link:
     """A rigid body; its numbers are parameters. `shape` is what to draw, in words of `ic` (kind, numbers in SI)."""
 
     name: str
-    place: Place | None = None
-    shape: tuple[str, tuple[tuple[str, float], ...]] | None = None
+    place: Place | None = keyed("never", default=None)
+    shape: tuple[str, tuple[tuple[str, float], ...]] | None = keyed("never", default=None)
 
 
 @frozen
@@ -111,7 +111,7 @@ class Joint:
     kind: JointKind
     parent: str
     child: str
-    place: Place | None = None
+    place: Place | None = keyed("never", default=None)
 
 
 @frozen
@@ -128,7 +128,7 @@ class Base:
 
     kind: Literal["prescribed", "free"]
     courses: tuple[Course, ...] = ()
-    place: Place | None = None
+    place: Place | None = keyed("never", default=None)
 
     @property
     def turns(self) -> bool:
@@ -147,7 +147,7 @@ class Command:
 
     kind: str
     model: str
-    guide: str = ""
+    guide: str = keyed("where set", default="")
 
 
 @frozen
@@ -156,8 +156,8 @@ class SensorUse:
 
     of: str
     model: str
-    words: tuple[tuple[str, str], ...] = ()
-    place: Place | None = None
+    words: tuple[tuple[str, str], ...] = keyed("where set", default=())
+    place: Place | None = keyed("never", default=None)
 
 
 @frozen
@@ -173,14 +173,14 @@ class ServoUse:
     """
 
     joint: str
-    definition: str
+    definition: str = keyed("never")
     model: str
     command: Command | None
     divisor: int
-    place: Place | None = None
-    words: tuple[tuple[str, str], ...] = ()
-    continuous: bool = False
-    sensors: tuple[SensorUse, ...] = ()
+    place: Place | None = keyed("never", default=None)
+    words: tuple[tuple[str, str], ...] = keyed("where set", default=())
+    continuous: bool = keyed("where set", default=False)
+    sensors: tuple[SensorUse, ...] = keyed("where set", default=())
 
 
 @frozen
@@ -197,7 +197,7 @@ class GuideUse:
     joints: tuple[str, ...]
     divisor: int
     courses: tuple[Course, ...] = ()
-    place: Place | None = None
+    place: Place | None = keyed("never", default=None)
 
 
 @frozen
@@ -210,8 +210,8 @@ class LinkSensor:
     name: str
     model: str
     divisor: int
-    words: tuple[tuple[str, str], ...] = ()
-    place: Place | None = None
+    words: tuple[tuple[str, str], ...] = keyed("where set", default=())
+    place: Place | None = keyed("never", default=None)
 
 
 @frozen
@@ -224,7 +224,7 @@ class Substitution:
     joint: str
     bed: str
     law: str
-    place: Place | None = None
+    place: Place | None = keyed("never", default=None)
 
 
 @frozen
@@ -234,7 +234,7 @@ class EnvironmentUse:
     name: str
     model: str
     divisor: int | None = None
-    place: Place | None = None
+    place: Place | None = keyed("never", default=None)
 
 
 @frozen
@@ -250,8 +250,8 @@ class Payload:
     link: str
     grappled: bool = False
     released: bool = False
-    place: Place | None = None
-    shape: tuple[str, tuple[tuple[str, float], ...]] | None = None
+    place: Place | None = keyed("never", default=None)
+    shape: tuple[str, tuple[tuple[str, float], ...]] | None = keyed("never", default=None)
 
     @property
     def flies(self) -> bool:
@@ -266,7 +266,7 @@ class MetricUse:
     name: str
     model: str
     of: str
-    place: Place | None = None
+    place: Place | None = keyed("never", default=None)
 
 
 @frozen
@@ -337,9 +337,9 @@ class Recorded:
     name: str
     channels: tuple[str, ...]
     joints: tuple[str, ...] = ()
-    unit: tuple[str, ...] = ("1",)
-    doc: str = ""
-    components: tuple[str, ...] = ()
+    unit: tuple[str, ...] = keyed("never", default=("1",))
+    doc: str = keyed("never", default="")
+    components: tuple[str, ...] = keyed("never", default=())
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -365,12 +365,12 @@ class Structure:
     integrator: str
     schedule: Schedule
     record: tuple[Recorded, ...]
-    substitutions: tuple[Substitution, ...] = ()
-    base: Base | None = None
-    payloads: tuple[Payload, ...] = ()
-    guides: tuple[GuideUse, ...] = ()
-    sensors: tuple[LinkSensor, ...] = ()
-    balanced: bool = False
+    substitutions: tuple[Substitution, ...] = keyed("where set", default=())
+    base: Base | None = keyed("where set", default=None)
+    payloads: tuple[Payload, ...] = keyed("where set", default=())
+    guides: tuple[GuideUse, ...] = keyed("where set", default=())
+    sensors: tuple[LinkSensor, ...] = keyed("where set", default=())
+    balanced: bool = keyed("where set", default=False)
 
     @property
     def free(self) -> bool:

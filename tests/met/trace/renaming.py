@@ -57,5 +57,5 @@ def renamed(program: Program, cell: Name, given: Name = lambda name: name) -> Pr
 
     return replace(
         program, start=body_of(program.start), tick=body_of(program.tick), end=body_of(program.end),
-        inputs=tuple(map(given, program.inputs)),
+        inputs=tuple(map(given, program.inputs)), counters=tuple(map(cell, program.counters)),
     )  # fmt: skip
