@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 from met.frozen import frozen
 
 if TYPE_CHECKING:
+    from batch.campaigns.drive import Progress
     from batch.differences.found import Diff
-    from batch.drive import Progress
     from batch.executors import Executor
-    from batch.summary import Summary
+    from batch.queries.summary import Summary
     from met.plan import Plan
 
 
@@ -79,10 +79,10 @@ def run(
 
     Raises met.diagnostic.Problem for what a user can mend.
     """
-    from batch.campaign import prepare
+    from batch.campaigns.campaign import prepare
+    from batch.campaigns.performing import perform
     from batch.executors.choose import choose
     from batch.export import straight
-    from batch.performing import perform
 
     archive, target = straight.parted(output)
     chosen = executor or choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
@@ -136,7 +136,7 @@ def _plan(given: object) -> Plan:
 def look(path: str | os.PathLike[str], notes: Sequence[str] = ()) -> Archive:
     """An archive that exists, with its summaries."""
     from batch.archive.read import ArchiveFile
-    from batch.summary import summarise
+    from batch.queries.summary import summarise
 
     with ArchiveFile(Path(path)) as file:
         return Archive(Path(path), summarise(file), tuple(notes))

@@ -19,7 +19,7 @@ from batch.archive import plain, sound
 from batch.archive.hdf5 import SIGNATURE, h5py
 from batch.archive.layout import SCHEMA, VERSION
 from batch.archive.sound import Unlike, of_joints
-from batch.rows import row_of
+from batch.queries.rows import row_of
 from met.diagnostic import Problem, error
 from met.distinct import distinct
 from met.files import open_regular

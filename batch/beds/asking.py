@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-from batch.choosing import experiments_named
-from batch.running import read_plan
+from batch.campaigns.choosing import experiments_named
+from batch.terminal.running import read_plan
 from hw.ports import SIMULATED, is_transcript
 from met.diagnostic import Problem, error
 from met.frozen import frozen

@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from batch import shard
 from batch.beds.known import Known
 from batch.beds.made import Made, made
+from batch.campaigns import shard
+from batch.campaigns.folder import Folder
+from batch.campaigns.tasks import Done, Section, Task
 from batch.executors import Outcome
-from batch.folder import Folder
-from batch.tasks import Done, Section, Task
 from hw import records
 from hw.case import Asked, pace_of
 from hw.ports import kind

@@ -10,13 +10,13 @@ from batch.archive.read import ArchiveFile
 from batch.beds.asking import on_beds, on_none, split
 from batch.beds.executor import OnBeds, Ports
 from batch.beds.telling import Telling, beside, kept_time
-from batch.campaign import Campaign, Wires, prepare
-from batch.margin import in_words, remedy
-from batch.output import sidecar_path
-from batch.performing import perform
-from batch.running import first_picture, read_plan
-from batch.summary import summarise
-from batch.verdict import announcement, told, worst_cases, writing
+from batch.campaigns.campaign import Campaign, Wires, prepare
+from batch.campaigns.output import sidecar_path
+from batch.campaigns.performing import perform
+from batch.queries.summary import summarise
+from batch.terminal.margin import in_words, remedy
+from batch.terminal.running import first_picture, read_plan
+from batch.terminal.verdict import announcement, told, worst_cases, writing
 from hw.case import pace_of
 from hw.ports import SIMULATED, in_lock_step
 from met import visible

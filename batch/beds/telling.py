@@ -11,14 +11,14 @@ import numpy as np
 
 from batch.beds.executor import OnBeds
 from batch.beds.jitter import duration, off
-from batch.progress import Bar
+from batch.terminal.progress import Bar
 from hw.records import ANSWERED
 from hw.timing import Spread, Timing, timing
 from met.visible import say
 
 
 class Telling:
-    """The progress of a campaign on beds (batch.drive.Progress), in which a case counts by the time that is driven."""
+    """Progress of a campaign on beds (`batch.campaigns.drive.Progress`): cases count by the time that is driven."""
 
     def __init__(self, executor: OnBeds, *, quiet: bool, bar: Bar | None = None) -> None:
         self._executor, self._quiet = executor, quiet

@@ -29,7 +29,7 @@ from batch.differences.found import Diff, Ended, Experiment, Place, Ranked, Sign
 from batch.differences.matching import Cases
 from batch.differences.samples import samples
 from batch.differences.tolerance import Tolerance, Tolerances, check, fits, of_deck
-from batch.signals import deck_unit
+from batch.queries.signals import deck_unit
 from met.diagnostic import Problem
 from met.distinct import distinct
 from met.outputs import joint_parts

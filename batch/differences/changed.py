@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from batch.archive.read import ArchiveFile, Group
-from batch.changes import Change, between
+from batch.campaigns.changes import Change, between
 from batch.differences.decks import Deck, Decks, decks
 from met.frozen import frozen
 from met.plan import Experiment, Plan

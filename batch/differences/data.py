@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 from batch.differences.found import Diff, Experiment, Signal
-from batch.summary import finite
+from batch.queries.summary import finite
 
 SCHEMA, VERSION = "met.diff", 2
 

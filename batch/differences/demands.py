@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from batch import requirements
 from batch.archive.read import Group
 from batch.differences.found import Experiment, Required
 from batch.differences.matching import Cases
 from batch.differences.words import apart
-from batch.signals import deck_unit
+from batch.queries import requirements
+from batch.queries.signals import deck_unit
 
 
 def compare_requirements(a: Group, b: Group, matched: Cases, out: Experiment) -> None:

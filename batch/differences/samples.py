@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from batch.archive.read import Group
-from batch.summary import spread
+from batch.queries.summary import spread
 from met.frozen import frozen
 
 LEVEL = 0.01

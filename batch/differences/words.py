@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from batch.campaigns.output import quoted
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE
 from batch.differences.found import Diff, Ended, Experiment, Ranked, Required, Signal
 from batch.differences.samples import LEVEL, Sample
-from batch.failures import STATUS, ranges
-from batch.output import quoted
-from batch.signals import number_text
+from batch.queries.failures import STATUS, ranges
+from batch.queries.signals import number_text
 from met.frozen import frozen
 from met.visible import visible
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Literal, Protocol
 
-from batch.folder import Folder
-from batch.tasks import Done, Section, Task
+from batch.campaigns.folder import Folder
+from batch.campaigns.tasks import Done, Section, Task
 from met.frozen import frozen
 
 

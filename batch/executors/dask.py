@@ -17,10 +17,10 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import ExitStack, suppress
 from typing import Any
 
+from batch.campaigns.folder import Folder
+from batch.campaigns.tasks import Done, Section, Task
 from batch.executors import Outcome
 from batch.executors.dask_connection import check, connected
-from batch.folder import Folder
-from batch.tasks import Done, Section, Task
 from met.diagnostic import Problem, error
 from met.version import VERSION
 

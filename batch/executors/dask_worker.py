@@ -2,7 +2,8 @@
 
 So a case that kills its process, or never ends, takes down a child and never the worker. The children of a campaign
 are a plugin of the worker: it goes when the campaign says so, when nobody waits for a running task any more, when
-nothing has come for a while, and with the worker; a worker that is killed takes its children along (batch/child.py).
+nothing has come for a while, and with the worker; a worker that is killed takes its children along
+(batch/executors/child.py).
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from distributed import Reschedule, Worker, WorkerPlugin, get_worker
 from distributed.utils import sync
 from distributed.worker import WORKER_ANY_RUNNING
 
-from batch import shard
-from batch.child import Crew
+from batch.campaigns import shard
+from batch.campaigns.tasks import Task
 from batch.executors import Outcome
-from batch.tasks import Task
+from batch.executors.child import Crew
 from met.version import VERSION
 
 IDLE_SECONDS = 60.0

@@ -6,10 +6,10 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 
-from batch.child import COMMAND, Crew
+from batch.campaigns.folder import Folder
+from batch.campaigns.tasks import Section, Task
 from batch.executors import Outcome
-from batch.folder import Folder
-from batch.tasks import Section, Task
+from batch.executors.child import COMMAND, Crew
 
 TELL_SECONDS = 0.1
 

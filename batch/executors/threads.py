@@ -7,11 +7,11 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 
-from batch import shard, tasks
+from batch.campaigns import shard, tasks
+from batch.campaigns.folder import Folder
+from batch.campaigns.shard import cannot_keep
+from batch.campaigns.tasks import Done, Section, Task
 from batch.executors import Outcome
-from batch.folder import Folder
-from batch.shard import cannot_keep
-from batch.tasks import Done, Section, Task
 
 
 class Threads:

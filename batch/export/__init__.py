@@ -123,7 +123,7 @@ def _fits(form: str, target: Path, table: Rows | None, units: str, signals: Sequ
 
 def _row(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: Sequence[str]) -> Rows:
     """What a row of a table is where nobody says it."""
-    from batch.show import chosen
+    from batch.terminal.show import chosen
 
     groups = chosen(file, tuple(runs) or (file.groups[0].sweep or file.groups[0].name,))
     several = sum(group.count for group in groups) > 1

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from batch import requirements
 from batch.archive.read import ArchiveFile, Group, Stored
 from batch.export.picking import rank
-from batch.failures import STATUS
-from batch.show import chosen, picked
+from batch.queries import requirements
+from batch.queries.failures import STATUS
+from batch.terminal.show import chosen, picked
 from met.frozen import frozen
 
 BLOCK = 10_000

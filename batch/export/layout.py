@@ -14,7 +14,7 @@ from batch.export import mcap, scene
 from batch.export.output import whole
 from batch.export.poses import Arm
 from batch.plotting.sheet import COLOURS
-from batch.signals import pretty_unit
+from batch.queries.signals import pretty_unit
 
 ENDING = ".layout.json"
 PLOTTED = ("q", "qd", "tau")

@@ -23,13 +23,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from batch.archive.read import ArchiveFile
+from batch.campaigns.output import quoted
 from batch.export import scene, wire
 from batch.export.output import whole
 from batch.export.picking import Case, Column
 from batch.export.poses import Arm, arm_of
 from batch.export.said import Line, lines, result, varied
 from batch.export.wire import plain
-from batch.output import quoted
 from met.diagnostic import Diagnostic, Problem, error
 from met.files import open_regular
 from met.frozen import frozen

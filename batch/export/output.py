@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from batch.archive.sink import Busy, Sink, temporary_of
-from batch.output import quoted
+from batch.campaigns.output import quoted
 from met.diagnostic import Problem, error
 
 

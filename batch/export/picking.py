@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group, Stored
-from batch.show import chosen, picked
-from batch.signals import panels
+from batch.queries.signals import panels
+from batch.terminal.show import chosen, picked
 from met.channel import channel_paths
 from met.diagnostic import Problem
 from met.frozen import frozen

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from batch.archive.read import Stored, reading
+from batch.campaigns.output import quoted
 from batch.export.picking import Case
-from batch.output import quoted
 from met.diagnostic import Problem, error
 from met.dynamics.spatial import HERE, IDENTITY, Pose, compose, inverse, rotation_quaternion, sub
 from met.frozen import frozen

@@ -11,8 +11,8 @@ import numpy as np
 from batch.archive.read import Group, Stored
 from batch.export.picking import Case
 from batch.export.wire import Field
-from batch.failures import STATUS
-from batch.signals import case_text, value_text
+from batch.queries.failures import STATUS
+from batch.queries.signals import case_text, value_text
 from met.frozen import frozen
 from met.run import DONE, FAILED
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from batch.campaign import Campaign
+from batch.campaigns.campaign import Campaign
+from batch.campaigns.output import quoted
 from batch.export import FORMATS, Exported, export, owner
 from batch.export.output import check as check_place
-from batch.output import quoted
 from met.diagnostic import Problem, error
 
 

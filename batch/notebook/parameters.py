@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray
 
-from batch import cases
 from batch.notebook.source import experiment, places
+from batch.queries import cases
 
 
 def table(path: Path, data: xarray.Dataset, case: int) -> Any:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import xarray
 
-from batch.failures import STATUS
 from batch.notebook.quantities import in_deck_unit
 from batch.notebook.table import CASE, RECORDED, name_of, varied
+from batch.queries.failures import STATUS
 from met.distinct import distinct
 from met.run import DONE
 

@@ -69,8 +69,8 @@ def draw(
     from batch.plotting.against import beside
     from batch.plotting.asked import asked
     from batch.plotting.sheet import Sheet
-    from batch.pool import pools
-    from batch.show import chosen
+    from batch.queries.pool import pools
+    from batch.terminal.show import chosen
 
     target, sheet = Path(output), sheet or Sheet()
     groups = chosen(archive, (run,) if run else ())

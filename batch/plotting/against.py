@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group
+from batch.campaigns.output import quoted
 from batch.differences import matching
-from batch.output import quoted
-from batch.signals import Panel, pretty_unit
+from batch.queries.signals import Panel, pretty_unit
 from met.channel import channel_paths
 from met.diagnostic import Problem, error
 from met.visible import line

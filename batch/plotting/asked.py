@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group, Stored
-from batch.grids import is_grid, levels
-from batch.output import quoted
-from batch.pool import Column, Pool
-from batch.signals import number_text, panels
+from batch.campaigns.output import quoted
+from batch.queries.grids import is_grid, levels
+from batch.queries.pool import Column, Pool
+from batch.queries.signals import number_text, panels
 from met.diagnostic import Problem, did_you_mean, error
 from met.frozen import frozen
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from batch.grids import standing
 from batch.plotting.measured import Measured
 from batch.plotting.sheet import INK, Sheet
 from batch.plotting.sides import Side
+from batch.queries.grids import standing
 from met.frozen import frozen
 
 INFINITE, FAILED, LACKING = "#c9ced3", "#828c95", "#e9ecee"

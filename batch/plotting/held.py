@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from batch.limits import Mark
 from batch.plotting.layout import BESIDE, LETTER, letters
 from batch.plotting.sheet import Sheet
+from batch.queries.limits import Mark
 
 TONE = "#a33a0a"
 DOTS: dict[str, Any] = {

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group, Stored
-from batch.arrange import Cell, Command, arranged, joints_of, overlaid, spread
-from batch.deck_units import DeckUnits
-from batch.limits import Mark, limits_of
-from batch.output import quoted
+from batch.campaigns.output import quoted
 from batch.plotting import held, layout
 from batch.plotting.against import Beside, lacking
 from batch.plotting.sheet import COLOURS, FAINT, INK, Sheet, sequence
-from batch.signals import Panel, case_text, deck_unit, history, number_text, panels
+from batch.queries.arrange import Cell, Command, arranged, joints_of, overlaid, spread
+from batch.queries.deck_units import DeckUnits
+from batch.queries.limits import Mark, limits_of
+from batch.queries.signals import Panel, case_text, deck_unit, history, number_text, panels
 from met.diagnostic import Problem, error
 from met.distinct import distinct
 

@@ -3,7 +3,8 @@ values of a third parameter.
 
 A colour says what a metric is, rising in lightness, so that it reads in grey; stripes, which cases miss what is
 required; greys, that there is no number (`cells`). Against another archive: own less theirs, in colours that part at
-zero. How far colours reach is of `batch.colours`: what lies beyond has a colour of its own, and the bar says how much.
+zero. How far colours reach `batch.queries.colours` says: what lies beyond has a colour of its own, and the bar says how
+much.
 """
 
 from __future__ import annotations
@@ -13,15 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from batch.colours import Reach, reach
-from batch.grids import FULL, cells_of, levelled
 from batch.plotting import cells, layout, sides
 from batch.plotting.cells import DOTTED, STRIPES, infinity
 from batch.plotting.measured import Measured
 from batch.plotting.points import RASTERED
 from batch.plotting.sheet import FAINT, INK, Sheet
 from batch.plotting.sides import Side
-from batch.pool import Column
+from batch.queries.colours import Reach, reach
+from batch.queries.grids import FULL, cells_of, levelled
+from batch.queries.pool import Column
 from met.distinct import distinct
 from met.frozen import frozen
 

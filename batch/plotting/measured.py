@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from batch import requirements
 from batch.plotting.against import Beside, lacking, unlike
 from batch.plotting.layout import drawable
-from batch.pool import Column, Pool
-from batch.signals import deck_unit
+from batch.queries import requirements
+from batch.queries.pool import Column, Pool
+from batch.queries.signals import deck_unit
 from met.frozen import frozen
 from met.run import DONE
 

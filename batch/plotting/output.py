@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from batch.output import quoted
+from batch.campaigns.output import quoted
 from met.diagnostic import Problem, error
 from met.files import new_file, open_regular
 from met.visible import visible

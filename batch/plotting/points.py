@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from batch.grids import MOST_LEVELS, is_grid, levelled, levels
 from batch.plotting import layout
 from batch.plotting.measured import Measured
 from batch.plotting.sheet import COLOURS, FAINT, INK, Sheet, sequence
 from batch.plotting.sides import is_log, line, write_log
-from batch.pool import Column
+from batch.queries.grids import MOST_LEVELS, is_grid, levelled, levels
+from batch.queries.pool import Column
 from met.frozen import frozen
 
 MARKER, NAMED = 14, 8

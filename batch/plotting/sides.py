@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from batch import grids
-from batch.grids import ROUND, Levels, Scale, edges_of, levelled, levels, round_numbers
 from batch.plotting.layout import LETTER
 from batch.plotting.sheet import Sheet
-from batch.pool import Column
-from batch.signals import number_text
+from batch.queries import grids
+from batch.queries.grids import ROUND, Levels, Scale, edges_of, levelled, levels, round_numbers
+from batch.queries.pool import Column
+from batch.queries.signals import number_text
 from met.frozen import frozen
 
 MOST_CELLS = 300

@@ -41,7 +41,7 @@ def report(
     from batch.report.data import gather
     from batch.report.page import page
     from batch.report.writing import check, default, write
-    from batch.show import chosen
+    from batch.terminal.show import chosen
 
     if tolerances and against is None:
         raise ValueError("tolerances are for a comparison: against which archive?")

@@ -12,8 +12,8 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, Group
 from batch.differences.found import Diff, Experiment
-from batch.pool import ENDED, Column, Pool
-from batch.signals import deck_unit
+from batch.queries.pool import ENDED, Column, Pool
+from batch.queries.signals import deck_unit
 from met.frozen import frozen
 
 GOOD = (ENDED.index("met"), ENDED.index("done"))

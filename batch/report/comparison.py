@@ -9,8 +9,8 @@ import numpy as np
 from batch.differences import words
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, VERDICTS
 from batch.differences.found import Diff, Experiment
-from batch.failures import ranges
-from batch.pool import Pool, shown
+from batch.queries.failures import ranges
+from batch.queries.pool import Pool, shown
 from batch.report.against import GOOD, Against, Before
 from batch.report.changes import ChangedCase, Compared, Comparison, EndedAlike, EndedCase, Made, SignalRow
 from batch.report.content import Flow, Part, Table, Verdict

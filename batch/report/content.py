@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from batch.colours import Reach
-from batch.pool import Column
+from batch.queries.colours import Reach
+from batch.queries.pool import Column
 from met.frozen import frozen
 
 if TYPE_CHECKING:

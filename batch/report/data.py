@@ -9,7 +9,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from batch.archive.read import ArchiveFile, Group
-from batch.pool import Pool, pools
+from batch.queries.pool import Pool, pools
 from batch.report import comparison
 from batch.report.against import Against, Before, narrowed
 from batch.report.comparison import compared
@@ -20,7 +20,7 @@ from batch.report.parameters import parameters, varied
 from batch.report.stability import stability
 from batch.report.tables import replay, structures, worst
 from batch.report.verdicts import metric_rows, verdict
-from batch.show import chosen
+from batch.terminal.show import chosen
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem
 from met.files import open_regular

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from batch.differences.compare import VERDICTS
-from batch.pool import ENDED, Column, Pool
+from batch.queries.pool import ENDED, Column, Pool
 from batch.report.against import GOOD, Before, change
 from batch.report.content import Overview
 from batch.report.maps import maps

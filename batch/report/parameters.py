@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from batch.grids import levels
-from batch.pool import Pool, shown
+from batch.queries.grids import levels
+from batch.queries.pool import Pool, shown
+from batch.queries.signals import pretty_unit
 from batch.report.content import ParameterRow, Spot, Varied
-from batch.signals import pretty_unit
 from ic.printing.columns import number
 from ic.printing.settings import settings
 from met.diagnostic import Place

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from batch.colours import Reach, reach
-from batch.pool import ENDED, Column
+from batch.queries.colours import Reach, reach
+from batch.queries.pool import ENDED, Column
+from batch.queries.signals import pretty_unit
 from batch.report.changes import Comparison
 from batch.report.content import History, Map, Overview, Ruler, Section, Signals, Stability
 from batch.report.markup import Html
-from batch.signals import pretty_unit
 from met.visible import visible
 
 PRECISE = 1e-6

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from batch.failures import ranges
-from batch.margin import stable_at, verdict
-from batch.pool import Column, Pool
+from batch.queries.failures import ranges
+from batch.queries.pool import Column, Pool
 from batch.report.content import Bed, Stability
+from batch.terminal.margin import stable_at, verdict
 from met.distinct import distinct
 from met.margin import Margin, margins
 from met.plan import Experiment

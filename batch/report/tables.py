@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from batch.output import quoted
-from batch.pool import ENDED, Column, Pool, shown
+from batch.campaigns.output import quoted
+from batch.queries.pool import ENDED, Column, Pool, shown
+from batch.queries.summary import median_text
 from batch.report.against import GOOD, Before
 from batch.report.content import Table, Worst
-from batch.summary import median_text
 from met.distinct import distinct
 
 MOST_CASES = 20

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from batch.margin import stable_head
 from batch.report.blocks import Anchors, case_link, scrolling, spot_link
 from batch.report.content import ParameterRow, SourceText, Stability, Table, Worst
 from batch.report.markup import Child, Html, breaking, el, join, lines
+from batch.terminal.margin import stable_head
 
 
 def table(found: Table, label: str, cells: Sequence[Sequence[Child]] = (), more: Sequence[str] = ()) -> Html:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from batch.failures import failures, ranges
-from batch.pool import ENDED, Column, Pool, shown
+from batch.queries.failures import failures, ranges
+from batch.queries.pool import ENDED, Column, Pool, shown
+from batch.queries.summary import spread
 from batch.report.against import Before
 from batch.report.content import Demand, Failing, MetricRow, Part, Verdict
-from batch.summary import spread
 from ic.printing.columns import count as counted
 from met.run import DONE
 

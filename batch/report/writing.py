@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from batch.output import quoted
+from batch.campaigns.output import quoted
 from batch.report.page import GENERATOR
 from met.diagnostic import Problem, error
 from met.files import new_file, open_regular

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import batch
-from batch import performing, tasks
+from batch.campaigns import performing, tasks
 from met.diagnostic import Problem
 from met.plan import Plan
 from met.render import render

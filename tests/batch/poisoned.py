@@ -17,8 +17,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from batch import tasks, worker
-from batch.tasks import Done, Section, Task
+from batch.campaigns import tasks
+from batch.campaigns.tasks import Done, Section, Task
+from batch.executors import worker
 
 
 def command(**poison: Any) -> tuple[str, ...]:

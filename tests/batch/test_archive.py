@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 import batch
-from batch import tasks
 from batch.archive import limits
 from batch.archive.provenance import UNKNOWN, Revision
 from batch.archive.read import ArchiveFile
+from batch.campaigns import tasks
 from met import keys, plan_file
 from met.diagnostic import Problem
 from tests.batch import plans
@@ -397,7 +397,7 @@ def damaged(change: Any, *experiments: Any) -> str:
     """What is said of an archive after this change."""
     import h5py
 
-    from batch.show import as_json, show
+    from batch.terminal.show import as_json, show
 
     batch.run(plans.plan(*experiments), output="a.h5")
     with h5py.File("a.h5", "r+") as file:
@@ -468,7 +468,7 @@ def test_flipped_bits_anywhere_are_a_problem_or_an_archive(here: Path) -> None:
 import random, signal, sys
 from pathlib import Path
 from batch.archive.read import ArchiveFile, is_archive
-from batch.show import as_json, show
+from batch.terminal.show import as_json, show
 from met.diagnostic import Problem
 
 class Stuck(BaseException):

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import batch
-from batch import cases, ordering
 from batch.archive.read import ArchiveFile
-from batch.ordering import By, by_names
-from batch.running import run_and_tell
-from batch.show import as_json, show
+from batch.queries import cases, ordering
+from batch.queries.ordering import By, by_names
+from batch.terminal.running import run_and_tell
+from batch.terminal.show import as_json, show
 from met import keys, plan_file
 from met.cli import main
 from met.diagnostic import Problem
@@ -205,7 +205,7 @@ def test_the_table_is_in_the_decks_units_and_marks_what_is_missed(here: Path) ->
 
 
 def test_smallest_median_and_largest_are_of_the_finite_values_everywhere() -> None:
-    from batch.summary import Spread, median_text, spread
+    from batch.queries.summary import Spread, median_text, spread
 
     values = np.array([3.0, np.inf, 1.0, np.nan, 2.5, np.inf, np.inf])
     assert spread(values) == Spread(minimum=1.0, median=2.5, maximum=3.0, infinite=3, unknown=1)
@@ -216,7 +216,7 @@ def test_smallest_median_and_largest_are_of_the_finite_values_everywhere() -> No
 
 
 def test_a_pure_number_has_no_unit_and_may_be_in_per_cent(here: Path) -> None:
-    from batch.summary import summary_of
+    from batch.queries.summary import summary_of
 
     experiment = plans.nominal()
     over = replace(experiment.structure.metrics[0], name="settle", model="overshoot")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from batch.colours import Reach, reach
+from batch.queries.colours import Reach, reach
 
 RNG = np.random.default_rng(3)
 BULK = np.linspace(0.0, 50.0, 700)

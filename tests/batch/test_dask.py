@@ -17,14 +17,14 @@ import pytest
 from distributed import Client, LocalCluster, Reschedule
 
 import batch
-from batch.campaign import prepare, values_sections
-from batch.child import Crew
+from batch.campaigns.campaign import prepare, values_sections
+from batch.campaigns.folder import Folder, beside
+from batch.campaigns.tasks import Section, Task
 from batch.executors import Outcome, dask_connection, dask_worker
 from batch.executors import dask as executor
+from batch.executors.child import Crew
 from batch.executors.choose import choose
 from batch.executors.dask import Dask
-from batch.folder import Folder, beside
-from batch.tasks import Section, Task
 from met.diagnostic import Problem
 from met.version import VERSION
 from tests.batch import plans, whole
@@ -137,7 +137,7 @@ class TestWhatItIsCalled:
 
     @pytest.mark.slow
     def test_commands_that_need_no_cluster_do_not_load_it(self) -> None:
-        program = "import sys, batch.cli, batch.executors.dask; print('distributed' in sys.modules)"
+        program = "import sys, batch.cli.show, batch.executors.dask; print('distributed' in sys.modules)"
         words = [sys.executable, "-c", program]
         assert subprocess.run(words, capture_output=True, text=True, cwd=whole.ROOT).stdout == "False\n"
 
@@ -226,7 +226,8 @@ class TestWorkersThatCannotServe:
 
 POISONED = """
 import os, signal, sys, time
-from batch import tasks, worker
+from batch.campaigns import tasks
+from batch.executors import worker
 carry_out = tasks.carry_out
 def poisoned(section, task, *words, **more):
     rows = set(section.rows[task.first : task.last])

@@ -16,10 +16,11 @@ import pytest
 
 import batch
 import ic
-from batch import performing, running, tasks
 from batch.archive.read import ArchiveFile
+from batch.campaigns import performing, tasks
 from batch.executors.processes import Processes
-from batch.failures import failures
+from batch.queries.failures import failures
+from batch.terminal import running
 from met import cli
 from met.diagnostic import Problem
 from met.plan import Plan
@@ -365,8 +366,8 @@ class TestWorkers:
         def refuse(*_: Any, **__: Any) -> Any:
             raise OSError(number, os.strerror(number))
 
-        monkeypatch.setattr("batch.child.subprocess.Popen", refuse)
-        monkeypatch.setattr("batch.output.resource.getrlimit", lambda _: (77, 77))
+        monkeypatch.setattr("batch.executors.child.subprocess.Popen", refuse)
+        monkeypatch.setattr("batch.campaigns.output.resource.getrlimit", lambda _: (77, 77))
         assert stopped(plans.plan(plans.gains(4)), here / "a.h5", executor=Processes(2)) == (
             f"error[E354]: the campaign cannot go on: a worker cannot be started: {why}\n"
             " = help: nothing was kept\n"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from batch.grids import MOST_LEVELS, Scale, is_log, levelled, levels, spacing
+from batch.queries.grids import MOST_LEVELS, Scale, is_log, levelled, levels, spacing
 
 DENSE = (2 * np.geomspace(1e-4, 3.0, 300) / 2 * 180 / np.pi).tolist()
 """As numbers come from a deck, through SI and back."""

@@ -18,13 +18,13 @@ import pytest
 
 import batch
 import ic
-from batch import job, merge, resuming, shard, status, submitting, tasks
 from batch.archive.read import ArchiveFile
-from batch.campaign import prepare
-from batch.executors import Outcome
+from batch.campaigns import merge, resuming, shard, status, tasks
+from batch.campaigns.campaign import prepare
+from batch.campaigns.folder import Folder
+from batch.campaigns.replaying import differences
+from batch.executors import Outcome, job, submitting
 from batch.executors.threads import Threads
-from batch.folder import Folder
-from batch.replaying import differences
 from met import cli
 from met.diagnostic import Problem
 from met.plan import Plan

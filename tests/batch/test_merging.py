@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import batch
-from batch import shard
+from batch.campaigns import shard
 from met import run as engine
 from met.diagnostic import Problem
 from tests.batch import plans

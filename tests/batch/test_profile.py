@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import ic
-from batch.profile import told
+from batch.terminal.profile import told
 from ic.find import standard_decks
 from met.cli import main
 from met.profile import Input, Part, Profile

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from batch import rehearsal
+from batch.campaigns import rehearsal
 from met import cli, models
 
 DECK = """\
@@ -122,5 +122,5 @@ def test_a_model_that_does_none_of_it_is_run(offered: Callable[[str], Path]) -> 
 
 
 def test_models_of_met_itself_need_no_rehearsal(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("batch.rehearsal.subprocess.Popen", lambda *_, **__: pytest.fail("started"))
+    monkeypatch.setattr("batch.campaigns.rehearsal.subprocess.Popen", lambda *_, **__: pytest.fail("started"))
     rehearsal.rehearse(1.0, source="two_link.ic")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import batch
-from batch import campaign, tasks
-from batch.performing import perform
+from batch.campaigns import campaign, tasks
+from batch.campaigns.performing import perform
 from met import keys
 from met.diagnostic import Problem
 from tests.batch import plans

@@ -12,8 +12,8 @@ import pytest
 
 import batch
 import ic
-from batch import cutting, performing, tasks
 from batch.archive.read import ArchiveFile, Group
+from batch.campaigns import cutting, performing, tasks
 from met import cli, plan_file
 from met.plan import Experiment, Plan
 from tests.batch import plans, whole
@@ -108,7 +108,7 @@ def test_blocks_that_are_merged_decide_nothing_but_where_text_lies(
     here: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Blocks of cases are cut at fixed places, whatever the tasks were; so a shard may end within one."""
-    from batch import merge
+    from batch.campaigns import merge
 
     found = []
     for cases in (3, 4, 40):

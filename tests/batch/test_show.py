@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import batch
-from batch import braille
 from batch.archive.read import ArchiveFile
-from batch.show import as_json, show
-from batch.signals import number_text, panels, pretty_unit
+from batch.queries.signals import number_text, panels, pretty_unit
+from batch.terminal import braille
+from batch.terminal.show import as_json, show
 from met.diagnostic import Problem
 from tests.batch import plans
 

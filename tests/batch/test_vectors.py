@@ -15,8 +15,8 @@ import ic
 from batch.archive.read import ArchiveFile
 from batch.plotting import draw
 from batch.plotting.sheet import COLOURS
-from batch.show import show
-from batch.signals import Panel, history, panels
+from batch.queries.signals import Panel, history, panels
+from batch.terminal.show import show
 from met import run as engine
 from met.diagnostic import Problem
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from batch.progress import Bar, duration, status
-from batch.running import run_and_tell
+from batch.terminal.progress import Bar, duration, status
+from batch.terminal.running import run_and_tell
 from ic.printing.columns import size as size_text
 from met import plan_file
 from met.diagnostic import Problem

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 import batch
-from batch import campaign, tasks
-from batch.performing import perform
+from batch.campaigns import campaign, tasks
+from batch.campaigns.performing import perform
 from met import plan_file
 from met.diagnostic import Problem
 from tests.batch import plans
@@ -236,8 +236,8 @@ def test_where_no_more_files_can_be_opened_it_is_said(here: Path, monkeypatch: p
     def refuse(*_: Any, **__: Any) -> Any:
         raise OSError(errno.EMFILE, os.strerror(errno.EMFILE), "a.h5.campaign/lock")
 
-    monkeypatch.setattr("batch.folder.os.open", refuse)
-    monkeypatch.setattr("batch.output.resource.getrlimit", lambda _: (77, 77))
+    monkeypatch.setattr("batch.campaigns.folder.os.open", refuse)
+    monkeypatch.setattr("batch.campaigns.output.resource.getrlimit", lambda _: (77, 77))
     with pytest.raises(Problem) as caught:
         batch.run(plans.plan(plans.gains(3)), output="a.h5")
     assert refused(caught) == (

@@ -18,10 +18,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from batch.campaigns.folder import Folder, beside, gaps
+from batch.campaigns.tasks import Section, Task
 from batch.executors import Executor, Outcome
 from batch.executors.threads import Threads
-from batch.folder import Folder, beside, gaps
-from batch.tasks import Section, Task
 from met.plan import Experiment
 from tests.batch import plans
 
@@ -39,9 +39,11 @@ for name, value in json.loads(sys.argv[1]).items():
 from met.cli import main
 sys.exit(main(sys.argv[2:]))
 """
-"""`met` with names of modules set: `{"batch.cutting.WORK_SECONDS": 0.1}`."""
+"""`met` with names of modules set: `{"batch.campaigns.cutting.WORK_SECONDS": 0.1}`."""
 
-SHORT_TASKS: Mapping[str, float] = {"batch.cutting.WORK_SECONDS": 0.1, "batch.cutting.FIRST_SECONDS": 0.01}
+SHORT_TASKS: Mapping[str, float] = {
+    "batch.campaigns.cutting.WORK_SECONDS": 0.1, "batch.campaigns.cutting.FIRST_SECONDS": 0.01
+}  # fmt: skip
 
 
 # Plans
@@ -106,7 +108,7 @@ def workers(process: int) -> list[int]:
     found = []
     for child in children(process):
         with contextlib.suppress(OSError):
-            if b"batch.worker" in Path(f"/proc/{child}/cmdline").read_bytes():
+            if b"batch.executors.worker" in Path(f"/proc/{child}/cmdline").read_bytes():
                 found.append(child)
     return found
 

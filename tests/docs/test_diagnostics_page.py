@@ -152,9 +152,9 @@ def damaged_campaign(folder: Path) -> None:
 def begun(folder: Path) -> None:
     """Three of five cases are done, of another deck of the same name."""
     import ic
-    from batch import resuming, tasks
-    from batch.campaign import prepare, values_sections
-    from batch.folder import Folder
+    from batch.campaigns import resuming, tasks
+    from batch.campaigns.campaign import prepare, values_sections
+    from batch.campaigns.folder import Folder
 
     text = (folder / "deck.ic").read_text(encoding="utf-8")
     (folder / "deck.ic").write_text(text.replace("0.025", "0.02"), encoding="utf-8")
@@ -321,8 +321,8 @@ def test_python_asks_where_nothing_comes_from() -> None:
 
 def test_the_beginning_of_an_id_that_several_cases_have(monkeypatch: pytest.MonkeyPatch) -> None:
     import batch
-    from batch import campaign
     from batch.archive.read import ArchiveFile
+    from batch.campaigns import campaign
     from met import keys
     from tests.batch import plans
 

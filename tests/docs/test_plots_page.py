@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from batch import grids
 from batch.plotting import asked, histories, output, points, sheet, sides
+from batch.queries import grids
 from met import cli
 from tests.batch.plotting import figures
 from tests.batch.plotting.figures import PAGE

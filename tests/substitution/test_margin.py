@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from batch.margin import as_data, in_words, remedy, told, verdict
+from batch.terminal.margin import as_data, in_words, remedy, told, verdict
 from met.cli import main
 from met.margin import HEAVIEST, LIGHTEST, Margin, margins
 from met.plan import Experiment

@@ -17,7 +17,7 @@ import batch
 import ic
 from batch.beds.executor import OnBeds
 from batch.beds.running import check_margins
-from batch.campaign import prepare
+from batch.campaigns.campaign import prepare
 from hw import records
 from met import cli
 

@@ -15,8 +15,8 @@ from batch.beds.executor import Driving, OnBeds, Ports
 from batch.beds.known import Case
 from batch.beds.telling import Telling, kept_time, timings
 from batch.beds.telling import beside as written_beside
-from batch.folder import Folder
-from batch.progress import Bar
+from batch.campaigns.folder import Folder
+from batch.terminal.progress import Bar
 from hw import records
 from hw.bed import Fault, Sample, State
 from hw.records import SIZE

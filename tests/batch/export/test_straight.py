@@ -10,7 +10,7 @@ import pytest
 
 import batch
 import ic
-from batch import running
+from batch.terminal import running
 from met import cli
 from met.diagnostic import Problem, error
 from tests.batch.export.decks import Mcap
@@ -115,7 +115,7 @@ def test_what_cannot_be_exported_does_not_run(
 
 
 def test_an_archive_of_another_format_is_refused(here: Path) -> None:
-    from batch.campaign import prepare
+    from batch.campaigns.campaign import prepare
 
     with pytest.raises(Problem) as problem:
         prepare(ic.compile("deck.ic", select=["brief"]), output="x.mcap")

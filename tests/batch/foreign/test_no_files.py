@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import batch
-from batch.folder import Folder, beside
+from batch.campaigns.folder import Folder, beside
 from hw.transcript import read
 from met import plan_file
 from met.diagnostic import Problem

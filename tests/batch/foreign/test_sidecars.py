@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 
 import batch
-from batch import job, shard
 from batch.beds.executor import OnBeds, Ports
 from batch.beds.made import check_head
-from batch.folder import Folder
+from batch.campaigns import shard
+from batch.campaigns.folder import Folder
+from batch.executors import job
 from hw import records, transcript
 from hw.beds.replay import ReplayBed
 from met import plan_file

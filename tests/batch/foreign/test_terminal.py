@@ -11,9 +11,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from batch import braille, show
 from batch.archive.read import ArchiveFile
-from batch.progress import Bar
+from batch.terminal import braille, show
+from batch.terminal.progress import Bar
 from met.visible import line, say, visible
 from tests.batch.foreign.archives import changed, met, readers
 from tests.batch.foreign.mutations import CONTROL

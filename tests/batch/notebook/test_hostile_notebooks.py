@@ -13,8 +13,8 @@ import xarray
 
 import batch
 import ic
-from batch import running
 from batch.export import export
+from batch.terminal import running
 from met import cli
 from met.diagnostic import Problem, error
 from met.plan import Choice

@@ -13,12 +13,12 @@ import pytest
 import batch
 import ic
 from batch.archive.read import ArchiveFile
-from batch.deck_units import DeckUnits
-from batch.limits import limits_of
 from batch.plotting import draw
 from batch.plotting.held import DOTS
-from batch.show import show
-from batch.signals import history, panels
+from batch.queries.deck_units import DeckUnits
+from batch.queries.limits import limits_of
+from batch.queries.signals import history, panels
+from batch.terminal.show import show
 from tests.batch.plotting.pictures import shown
 
 DECK = """

@@ -292,7 +292,7 @@ class TestMaps:
 
 def test_colours_of_words_are_those_that_eyes_tell_apart() -> None:
     from batch.plotting.points import _sets
-    from batch.pool import Column
+    from batch.queries.pool import Column
 
     by = Column("choice:a", "a", "", "choice", np.array([0.0, 1.0, 0.0, 1.0]), ("one", "two"))
     x = Column("parameter:x", "x", "", "parameter", np.array([0.0, 0.0, 1.0, 1.0]))

@@ -14,7 +14,7 @@ import pytest
 import batch
 from batch.archive.read import ArchiveFile
 from batch.differences.told import told
-from batch.pool import Column
+from batch.queries.pool import Column
 from batch.report import against as sides
 from batch.report import report
 from batch.report.content import Report

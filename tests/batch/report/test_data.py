@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import batch
-from batch import ordering
 from batch.archive.read import ArchiveFile
-from batch.grids import levelled
-from batch.pool import ENDED, Column, Pool, pools
+from batch.queries import ordering
+from batch.queries.grids import levelled
+from batch.queries.pool import ENDED, Column, Pool, pools
 from batch.report import histories, overview, stability
 from batch.report.content import Part, Report
 from batch.report.data import gather

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from batch import grids
+from batch.queries import grids
 from batch.report import histories, overview, stability
 from batch.report.data import MOST_LINES
 from tests.batch.report import figures

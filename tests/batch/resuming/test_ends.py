@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import batch
-from batch import performing, shard, tasks
+from batch.campaigns import performing, shard, tasks
 from met import cli, plan_file
 from tests.batch import plans, whole
 from tests.batch.begun import CASES, OF_TASK, begin, flip, go_on, plan, refused
@@ -79,7 +79,7 @@ def test_the_archive_of_another_plan_stays_until_the_new_one_is_whole(archive: P
 
 DIES = """
 import os, signal
-from batch import folder, merge, output, performing
+from batch.campaigns import folder, merge, output, performing
 def die(*_, **__):
     os.kill(os.getpid(), signal.SIGKILL)
 """
@@ -295,7 +295,7 @@ def test_room_is_asked_for_what_is_missing_alone(
 ) -> None:
     kept = begin(archive)
     there = sum(path.stat().st_size for path in whole.folder_of(archive).shards.iterdir())
-    needed = batch.campaign.prepare(plan(), output=archive).bytes_missing
+    needed = batch.campaigns.campaign.prepare(plan(), output=archive).bytes_missing
     assert there > needed // 10
     monkeypatch.setattr(shutil, "disk_usage", room(needed))
     rest, _ = go_on(archive)

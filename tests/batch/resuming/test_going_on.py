@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import batch
-from batch import shard, tasks
-from batch import status as status_files
-from batch.folder import Folder
+from batch.campaigns import shard, tasks
+from batch.campaigns import status as status_files
+from batch.campaigns.folder import Folder
 from tests.batch import plans, whole
 from tests.batch.begun import CASES, OF_TASK, begin, flip, go_on, plan, refused
 

@@ -1,0 +1,228 @@
+"""A campaign: which cases of a plan are run, what is kept of them, and the running itself.
+
+`prepare` settles everything that can be refused (names, cases, room on the disk, the output) and writes nothing;
+batch/campaigns/performing.py runs what is missing, and puts it together.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from batch.archive import layout as archive_layout
+from batch.campaigns import choosing
+from batch.campaigns.folder import Folder, beside
+from batch.campaigns.keep import Keep, Known, chosen, keep, known, listed
+from batch.campaigns.output import check_output, check_room, default_output
+from batch.campaigns.tasks import Section
+from ic.printing.columns import size as size_text
+from met import run as engine
+from met.diagnostic import Problem, error
+from met.distinct import distinct
+from met.frozen import frozen
+from met.plan import Experiment, Plan
+
+KEPT_BYTES = 1 << 30
+"""Histories are kept by default while the archive stays below this."""
+
+OUTPUTS = 8
+"""Numbers of a case in a shard besides its coordinates and metrics."""
+
+
+@frozen
+class Wires:
+    """Real beds stand at the wires. late: ticks of their delay that pass on the wires."""
+
+    late: int
+
+
+@frozen
+class Part:
+    """The cases of one experiment that are run.
+
+    rows    of its case table, rising
+    kept    places in `rows` of the cases whose histories are kept whatever comes of them
+    later   how many more may be chosen when all are done, at most
+    single  whether histories are kept as numbers of four bytes
+    wires   whether its beds are real ones, and how late these are (met.program.build.build); None: they are emulated
+    """
+
+    experiment: Experiment
+    rows: np.ndarray
+    kept: np.ndarray
+    later: int = 0
+    single: bool = False
+    wires: Wires | None = None
+
+    def prepared(self) -> engine.Prepared:
+        """What runs it."""
+        if self.wires is None:
+            return engine.prepare(self.experiment)
+        return engine.prepare(self.experiment, wire=True, late=self.wires.late)
+
+    @property
+    def recorded(self) -> int:
+        """Of how many cases histories are kept, at most."""
+        return min(len(self.rows), len(self.kept) + self.later)
+
+    @property
+    def all_recorded(self) -> bool:
+        return 0 < len(self.rows) == len(self.kept)
+
+    @property
+    def bytes(self) -> int:
+        """About what is in the archive of it."""
+        described = archive_layout.PARAMETER_TEXT * len(self.experiment.parameters)
+        return archive_layout.layout(self.experiment, len(self.rows), self.recorded, self.single).bytes + described
+
+    @property
+    def shard_bytes(self) -> int:
+        """About what its shards take."""
+        numbers = OUTPUTS + len(self.experiment.cases.coordinates) + len(self.experiment.structure.metrics)
+        histories = self.recorded * self.experiment.structure.history_bytes // (2 if self.single else 1)
+        return 8 * numbers * len(self.rows) + histories
+
+
+@frozen
+class Campaign:
+    """What will be run, all of it checked. words: that say what is kept, as `prepare` takes them."""
+
+    plan: Plan
+    parts: tuple[Part, ...]
+    keep: Keep
+    words: tuple[str | int, ...]
+    output: Path
+    notes: tuple[str, ...] = ()
+
+    @property
+    def cases(self) -> int:
+        return sum(len(part.rows) for part in self.parts)
+
+    @property
+    def bytes(self) -> int:
+        """About the size of the archive."""
+        return sum(part.bytes for part in self.parts)
+
+    def bytes_of(self, histories: Sequence[tuple[Part, int]]) -> int:
+        """About the room for the histories of so many cases of each part, in shards and in the archive."""
+        whole = sum(part.experiment.structure.history_bytes // (2 if part.single else 1) * n for part, n in histories)
+        return self.bytes + 2 * whole
+
+    @property
+    def bytes_missing(self) -> int:
+        """About the room on the disk that is needed until the archive is whole, beside the shards that are there."""
+        shards = sum(part.shard_bytes for part in self.parts)
+        return self.bytes + shards - min(shards, Folder(beside(self.output)).bytes())
+
+
+def prepare(
+    plan: Plan,
+    *,
+    output: str | os.PathLike[str] | None = None,
+    experiments: Sequence[str] | None = None,
+    cases: Sequence[int | str] | None = None,
+    histories: str | int | Sequence[str | int] = "default",
+    float32: bool = False,
+    selected: Sequence[tuple[Experiment, np.ndarray]] | None = None,
+    kept: Mapping[str, np.ndarray] | None = None,
+    wires: Wires | None = None,
+) -> Campaign:
+    """Settle what will be run; raises Problem for anything that would stop it later, and writes nothing.
+
+    output       None: `default_output`, in the current folder
+    experiments  names; None: all of the plan's
+    cases        positions in the case table, `7` or `"#7"`, or the beginning of a case_id; None: all
+    histories    what to keep (batch/campaigns/keep.py), one word or several
+    float32      keep histories as numbers of four bytes
+    selected     experiments with rows of their case tables, in place of `experiments` and `cases`
+    kept         rows whose histories are kept, by the experiment's name, in place of `histories`
+    wires        where it is run on real beds
+    """
+    all_of = None
+    if selected is None:
+        asked = choosing.experiments_named(plan, experiments)
+        all_of = sum(experiment.cases.count for experiment in asked)
+        selected = choosing.selected(asked, cases)
+    selected = [(experiment, rows) for experiment, rows in selected if len(rows)]
+    if not selected:
+        raise Problem(error("E311", "there is no case to run", help="`met cases DECK` lists them"))
+    named = [experiment for experiment, _ in selected]
+    target = Path(output) if output is not None else default_output(plan, experiments, selected, all_of)
+    wanted = keep(histories, named)
+    words = tuple(listed(histories))
+    parts = _parts(selected, wanted, float32)
+    if kept is not None:
+        parts = tuple(replace(part, kept=np.searchsorted(part.rows, kept[part.experiment.name])) for part in parts)
+    notes: list[str] = []
+    whole = sum(part.bytes for part in parts)
+    if wanted.default and whole > KEPT_BYTES:
+        wanted, words = Keep(), ("none",)
+        parts = _parts(selected, wanted, float32)
+        notes.append(
+            f"histories would take {size_text(whole)}, over {size_text(KEPT_BYTES)}: metrics only are kept "
+            f"(`--histories all` keeps them; any case can be run again alone: `--case '#0'`)"
+        )
+    parts = tuple(replace(part, wires=wires) for part in parts)
+    kept_plan = replace(plan, experiments=tuple(part.experiment for part in parts), selected=())
+    words = tuple("all" if word == "default" else word for word in words)
+    campaign = Campaign(kept_plan, parts, wanted, words, target, tuple(notes))
+    check_output(target, kept_plan)
+    if not target.exists():  # one that is there may be whole, and need nothing: then `perform` sees to it
+        check_room(target, campaign.bytes_missing)
+    return campaign
+
+
+def _parts(
+    selected: Sequence[tuple[Experiment, np.ndarray]], wanted: Keep, single: bool
+) -> tuple[Part, ...]:
+    """The experiments with what is kept of them. Raises Problem E311, E312 for cases that are none."""
+    chosen = choosing.selected([experiment for experiment, _ in selected], wanted.cases) if wanted.cases else []
+    named = {experiment.name: rows for experiment, rows in chosen}
+    strays, run = set[int](), set[int]()
+    for experiment, rows in selected:
+        own = named.get(experiment.name, rows[:0])
+        among = np.isin(own, rows)
+        strays.update(experiment.cases.table[row] for row in own[~among])
+        run.update(experiment.cases.table[row] for row in own[among])
+    if strays - run:
+        case = min(strays - run)
+        raise Problem(error("E351", f"the history of case #{case} cannot be kept: it is not among those to run"))
+    parts = []
+    for experiment, rows in selected:
+        if experiment.structure.history_bytes:
+            kept = known(wanted, experiment, rows, named.get(experiment.name, np.empty(0, np.int64)))
+            parts.append(Part(experiment, rows, kept, wanted.at_most(len(rows)), single))
+        else:
+            parts.append(Part(experiment, rows, np.empty(0, np.int64)))
+    return tuple(parts)
+
+
+def values_sections(campaign: Campaign) -> list[Section]:
+    """The first pass: all cases, with their histories where those of all are kept."""
+    return [
+        Section(number, number, part.prepared(), part.rows, part.all_recorded, part.single)
+        for number, part in enumerate(campaign.parts)
+    ]
+
+
+def histories_section(campaign: Campaign, values: Section, results: Callable[[], Known]) -> Section | None:
+    """The second pass over an experiment: the cases whose histories are kept, where that is not all of them.
+
+    results  what became of its cases
+    """
+    part = campaign.parts[values.number]
+    if part.all_recorded or not part.experiment.structure.history_bytes:
+        return None
+    kept = part.kept
+    if campaign.keep.later:
+        kept = distinct(np.concatenate([kept, chosen(campaign.keep, part.experiment, results())]))
+    if not len(kept):
+        return None
+    number = len(campaign.parts) + values.number
+    return Section(number, values.number, values.prepared, part.rows[kept], True, part.single, values.begun)
+
+

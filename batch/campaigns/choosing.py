@@ -1,0 +1,82 @@
+"""Which runs and sweeps of a plan, and which of their cases, a user means."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+
+import numpy as np
+
+from batch.queries.rows import row_of
+from met import keys
+from met.diagnostic import Problem, error
+from met.plan import Experiment, Plan
+
+
+def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experiment, ...]:
+    """The plan's experiments of these names; all of them for None. Raises Problem E310."""
+    if names is None:
+        return plan.experiments
+    by_name: dict[str, list[Experiment]] = {}
+    for experiment in plan.experiments:
+        for name in {experiment.name, experiment.asked}:
+            by_name.setdefault(name, []).append(experiment)
+    problems = []
+    for name in names:
+        if name not in by_name:
+            near = difflib.get_close_matches(name, by_name, n=1)
+            helps = [f"did you mean `{near[0]}`?"] if near else []
+            helps.append(f"runs and sweeps of {plan.deck}: {', '.join(by_name)}")
+            problems.append(error("E310", f"no run or sweep `{name}` in {plan.deck}", help=helps))
+    if problems:
+        raise Problem(problems)
+    found = {experiment.name: experiment for name in names for experiment in by_name[name]}
+    return tuple(found.values())
+
+
+def selected(
+    experiments: Sequence[Experiment], cases: Sequence[int | str] | None
+) -> list[tuple[Experiment, np.ndarray]]:
+    """The rows of each experiment that some cases are, by position (`7`, `"#7"`) or the beginning of a case_id; all for
+    None. An experiment that has none of them is left out. Raises Problem E311, E312."""
+    if cases is None:
+        return [(experiment, np.arange(experiment.cases.count)) for experiment in experiments]
+    found: dict[str, set[int]] = {experiment.name: set() for experiment in experiments}
+    for case in cases:
+        matches = [(e, row) for e in experiments for row in _rows(e, case)]
+        if not matches:
+            last: dict[str, int] = {}
+            for e in experiments:
+                last[e.asked] = max(last.get(e.asked, 0), int(e.cases.table[-1]))
+            counts = ", ".join(f"`{name}` has #0 {f'to #{row}' if row else 'alone'}" for name, row in last.items())
+            meant = [f"a position is written `'#{case}'`"] if isinstance(case, str) and case.isdecimal() else []
+            helps = [*meant, counts, "`met cases DECK` lists them"]
+            raise Problem(error("E311", f"no case `{_case_text(case)}`", help=helps))
+        if len(matches) > 1 and not _is_row(case):
+            some = ", ".join(f"#{e.cases.table[row]} of `{e.asked}`" for e, row in matches[:4])
+            message = f"case `{case}` may be any of {len(matches)}: {some}"
+            position, alike = matches[0][0].cases.table[matches[0][1]], len({_id_of(*match) for match in matches}) == 1
+            remedy = "" if alike else "give more of its id, or "  # cases that differ in structure alone share their ids
+            raise Problem(error("E312", message, help=f"{remedy or 'give '}its position: `--case '#{position}'`"))
+        for experiment, row in matches:
+            found[experiment.name].add(row)
+    return [(e, np.array(sorted(found[e.name]), dtype=np.int64)) for e in experiments if found[e.name]]
+
+
+def _id_of(experiment: Experiment, row: int) -> str:
+    return keys.case_ids(experiment, [row])[0]
+
+
+def _is_row(case: int | str) -> bool:
+    return not isinstance(case, str) or row_of(case) is not None
+
+
+def _case_text(case: int | str) -> str:
+    return case if isinstance(case, str) else f"#{case}"
+
+
+def _rows(experiment: Experiment, case: int | str) -> list[int]:
+    if _is_row(case):
+        position = row_of(case) if isinstance(case, str) else int(case)
+        return np.flatnonzero(experiment.cases.table == position).tolist()
+    return [row for row, case_id in enumerate(keys.case_ids(experiment)) if case and case_id.startswith(str(case))]

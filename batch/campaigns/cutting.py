@@ -1,0 +1,41 @@
+"""How large the next task of a section is: a second or two of work, so that starting it costs nothing and losing it
+little; smaller towards the end, so that nobody waits for the last one. It decides nothing but speed."""
+
+from __future__ import annotations
+
+from batch.campaigns.tasks import GRANULE, Section
+
+WORK_SECONDS = 1.5
+"""Of a task, on what runs it."""
+
+FIRST_SECONDS = 0.2
+"""Of the first tasks, by a guess that is right within a factor of ten or so."""
+
+GUESS_NS = 40.0
+"""Of a joint's step."""
+
+
+class Cutter:
+    """Learns from the tasks that are done how long a case takes."""
+
+    def __init__(self, section: Section) -> None:
+        structure = section.prepared.experiment.structure
+        steps = structure.schedule.ticks // min([structure.schedule.dynamics, *(s.divisor for s in structure.servos)])
+        self._most = section.most
+        self._guess = 1e-9 * GUESS_NS * steps * max(1, len(structure.joints))
+        self._seconds, self._cases = 0.0, 0.0
+
+    def learn(self, cases: int, seconds: float) -> None:
+        """So many cases took a worker so long."""
+        if cases >= GRANULE:  # fewer take as long as a whole block
+            self._seconds, self._cases = 0.5 * self._seconds + seconds, 0.5 * self._cases + cases
+
+    def size(self, left: int, workers: int) -> int:
+        """Cases of the next task, where so many are left for so many workers."""
+        if self._cases:
+            wanted = WORK_SECONDS * self._cases / max(self._seconds, 1e-9)
+        else:
+            wanted = FIRST_SECONDS / self._guess
+        wanted = min(wanted, -(-left // (2 * workers)) if workers > 1 else left)
+        cases = max(GRANULE, int(wanted) // GRANULE * GRANULE)
+        return min(cases, self._most, left)

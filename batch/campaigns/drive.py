@@ -1,0 +1,176 @@
+"""Getting a campaign's cases done: what is missing is cut into tasks, tasks that are lost are tried again in parts.
+
+A case that kills its worker, or never ends, is found by halving: a lost task is cut into pieces, each is tried again,
+and what is lost in the end is one case, `TRIES` times. Its status says so, and all others are done.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from batch.campaigns import shard, tasks
+from batch.campaigns.cutting import Cutter
+from batch.campaigns.folder import Folder, gaps
+from batch.campaigns.tasks import Section, Task
+from batch.executors import Executor, Outcome
+from met.run import LOST, TIMED_OUT
+
+TRIES = 3
+"""How often a case is tried whose worker dies: a machine may fail by itself."""
+
+PIECES = 16
+"""Of a task that is lost."""
+
+AHEAD = 1
+"""Tasks that wait for a worker."""
+
+
+class Progress(Protocol):
+    """Who is told how far a campaign is (batch/terminal/progress.py)."""
+
+    def begin(self, name: str, cases: int, done: int, failed: int, workers: str) -> None: ...
+    def advance(self, done: int, failed: int) -> None: ...
+    def end(self) -> None: ...
+
+
+class Stopped(Exception):
+    """It cannot go on, and why; what is done is kept."""
+
+
+class TooManyFailures(Stopped):
+    """More cases failed than were allowed."""
+
+
+@dataclass
+class Count:
+    """Cases of a section that are done, and how many of them failed; seconds of computing that they took."""
+
+    done: int = 0
+    failed: int = 0
+    seconds: float = 0.0
+
+
+@dataclass
+class Driver:
+    """Drives the sections of a campaign, one after the other. Whoever made the executor closes it.
+
+    counts   what is done, by section
+    told     what is to be told of shards that did not count
+    sections of the first pass, whose failures count: those after them run the same cases again
+    """
+
+    folder: Folder
+    executor: Executor
+    progress: Progress | None = None
+    max_failures: int | None = None
+    sections: int | None = None
+    counts: dict[int, Count] = field(default_factory=dict)
+    told: list[str] = field(default_factory=list)
+    _at: int | None = None
+
+    def find(self, section: Section) -> list[tuple[int, int]]:
+        """Count what is there of a section; the stretches that are missing."""
+        kept, told = self.folder.sound(section)
+        self.told += told
+        missing = gaps(kept, len(section.rows))
+        count = self.counts[section.number] = Count(len(section.rows) - sum(last - first for first, last in missing))
+        for done in kept.values():
+            count.failed += done.failed
+            count.seconds += done.seconds
+        return missing
+
+    def run(self, section: Section, missing: Sequence[tuple[int, int]], cases: int | None = None) -> None:
+        """Run the cases that are missing. cases: of how many it is told how far it is; None: the section's. Raises
+        Stopped."""
+        self.check()
+        if not missing:
+            return
+        work = _Work(self, section, missing)
+        if self.progress is not None:
+            count = self.counts[section.number]
+            self.progress.begin(section.name, cases or len(section.rows), count.done, count.failed, self.executor.about)
+        self._at = section.number
+        work.run()
+        self._at = None
+        if self.progress is not None:
+            self.progress.end()
+
+    def tell(self) -> None:
+        """Pass on how far the section is that is being run."""
+        if self.progress is not None and self._at is not None:
+            count = self.counts[self._at]
+            self.progress.advance(count.done + self.executor.under_way, count.failed)
+
+    def check(self) -> None:
+        """Raises TooManyFailures."""
+        failed = sum(count.failed for number, count in self.counts.items()
+                     if self.sections is None or number < self.sections)  # fmt: skip
+        if self.max_failures is not None and failed > self.max_failures:
+            cases = f"{failed:,} case{'s' if failed != 1 else ''} failed"
+            raise TooManyFailures(f"{cases}, more than the {self.max_failures:,} allowed")
+
+
+class _Work:
+    """One section on its way."""
+
+    def __init__(self, driver: Driver, section: Section, missing: Sequence[tuple[int, int]]) -> None:
+        self._driver, self._section = driver, section
+        self._gaps = deque(missing)
+        self._again: deque[Task] = deque()
+        self._tries: dict[Task, int] = {}
+        self._cutter = Cutter(section)
+        self._open = 0
+
+    def run(self) -> None:
+        executor, driver = self._driver.executor, self._driver
+        while True:
+            while self._open < executor.workers + AHEAD and (task := self._next()) is not None:
+                executor.submit(task)
+                self._open += 1
+            if not self._open:
+                return
+            for outcome in executor.wait():
+                self._open -= 1
+                self._take(outcome)
+            driver.tell()
+            driver.check()
+
+    def _next(self) -> Task | None:
+        if self._again:
+            return self._again.popleft()
+        if not self._gaps:
+            return None
+        first, last = self._gaps.popleft()
+        left = last - first + sum(b - a for a, b in self._gaps)
+        cut = first + min(last - first, self._cutter.size(left, self._driver.executor.workers))
+        if cut < last:
+            self._gaps.appendleft((cut, last))
+        return Task(self._section.number, first, cut)
+
+    def _take(self, outcome: Outcome) -> None:
+        task, count = outcome.task, self._driver.counts[self._section.number]
+        if outcome.kind == "broken":
+            raise Stopped(outcome.why)
+        if outcome.done is not None:
+            self._cutter.learn(task.cases, outcome.done.seconds)
+            count.done += task.cases
+            count.failed += outcome.done.failed
+            count.seconds += outcome.done.seconds
+            return
+        if task.cases > 1:
+            step = -(-task.cases // PIECES)
+            for first in range(task.first, task.last, step):
+                self._again.append(Task(task.section, first, min(first + step, task.last)))
+            return
+        tries = self._tries[task] = self._tries.get(task, 0) + 1
+        if outcome.kind == "lost" and tries < TRIES:
+            self._again.append(task)
+            return
+        status, why = (LOST, f"its worker {outcome.why}, {tries} times") if outcome.kind == "lost" else (
+            TIMED_OUT, f"timed out: {outcome.why}")  # fmt: skip
+        shard.write(self._driver.folder.shards / task.name, tasks.not_run(self._section, task, status, why))
+        count.done += 1
+        count.failed += 1

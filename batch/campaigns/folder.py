@@ -1,0 +1,397 @@
+"""A campaign's folder, beside the archive until that is whole: what was asked for, the shards, who works in it.
+
+    two_link.gains.h5.campaign/
+      campaign.json     what is computed: sections, the keys of their code and cases
+      plan.json         the plan, for workers; large case tables and rows beside it
+      shards/           one file a task, named SECTION-FIRST-LAST
+      status*.json      how far who is, written every second (batch/campaigns/status.py)
+      lock              held while somebody works here: by one driver alone, or by the jobs of a cluster together
+
+The shards are the journal: what is missing is what no sound shard of this very campaign covers. So a run that was
+killed goes on by running what is missing, and it does not matter how its tasks were cut.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import glob
+import io
+import json
+import os
+import re
+import shlex
+import shutil
+import stat
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from batch.archive.sink import is_at
+from batch.campaigns import shard
+from batch.campaigns.tasks import Done, Section, Task
+from met import plan_file
+from met import run as engine
+from met.diagnostic import Problem, error
+from met.files import is_count, new_file, read_json, read_regular
+from met.plan import Plan
+from met.program.step import ASTRAY
+from met.version import VERSION
+
+SCHEMA, FORMAT = "met.campaign", 1
+ENDING = ".campaign"
+OURS = re.compile(
+    r"(lock|shards|logs|plan\.json|plan\..*\.npy|rows\.\d+\.npy|status(\.\d+)?\.json|jobs\.json|\..*\.tmp|\.nfs.*)$"
+)
+SHARD = re.compile(r"(\d+)-(\d+)-(\d+)")
+
+NPY_HEAD_BYTES = 4096
+"""Before the numbers of a `.npy` file; numpy writes 128."""
+
+
+class Busy(Exception):
+    """Somebody else works in the folder."""
+
+
+class Folder:
+    """The folder of one campaign. `lock` it before writing; `close` gives it up."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._lock = -1
+
+    @property
+    def shards(self) -> Path:
+        return self.path / "shards"
+
+    @property
+    def submitted(self) -> bool:
+        """Whether jobs of a queue have it, which may not have begun."""
+        return (self.path / "jobs.json").exists()
+
+    @property
+    def beds(self) -> Path:
+        """Where records of cases on motor beds are."""
+        return self.path / "beds"
+
+    @property
+    def recorded(self) -> bool:
+        """Whether there are some: what was driven is not driven again."""
+        return any(self.beds.glob("*.records"))
+
+    def exists(self) -> bool:
+        return (self.path / "campaign.json").exists()
+
+    # Who works here
+
+    def lock(self, *, together: bool = False) -> None:
+        """Raises Busy where somebody works here, unless both do so `together`; makes the folder where there is none."""
+        while self._lock < 0:
+            self.path.mkdir(exist_ok=True)
+            self._lock = _lock_file(self.path / "lock")
+            try:
+                fcntl.flock(self._lock, (fcntl.LOCK_SH if together else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+            except BlockingIOError:
+                self.close()
+                raise Busy from None
+            except OSError as reason:
+                if reason.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a disk without locks: do without
+                    self.close()
+                    raise
+            if not is_at(self._lock, self.path / "lock"):  # who had it has taken the folder away meanwhile
+                self.close()
+
+    def close(self) -> None:
+        if self._lock >= 0:
+            os.close(self._lock)
+            self._lock = -1
+
+    def foreign(self) -> list[str]:
+        """What is in the folder where it is no campaign's; nothing of it is ours to remove."""
+        if self.exists() or not self.path.is_dir():
+            return []
+        return sorted(path.name for path in self.path.iterdir() if not OURS.match(path.name))
+
+    def empty(self) -> None:
+        """Take all but the lock out of the folder, which is locked by us."""
+        for path in self.path.iterdir():
+            if path.name != "lock":
+                _remove(path)
+
+    def remove(self) -> None:
+        """Take the folder away, which is locked by us, or of nobody's."""
+        leaving = self.path.with_name(f".{self.path.name}.{os.getpid()}.leaving")
+        if self.path.is_symlink():  # the folder that it leads to is its owner's
+            self.empty()
+            (self.path / "lock").unlink(missing_ok=True)
+            self.path.unlink()
+        else:
+            try:
+                self.path.rename(leaving)
+            except FileNotFoundError:
+                pass
+            except OSError:  # a name that would be too long
+                shutil.rmtree(self.path, ignore_errors=True)
+        self.forget()
+        self.close()
+
+    def forget(self) -> None:
+        """Take away what was on its way out, now or in a run that was killed over it."""
+        for leaving in self.path.parent.glob(f".{glob.escape(self.path.name)}.*.leaving"):
+            shutil.rmtree(leaving, ignore_errors=True)
+
+    # What is computed
+
+    def describe(self, plan: Plan, sections: Iterable[Section], **about: Any) -> None:
+        """Write down what is computed, for workers and for who comes back later.
+
+        about   `key` of the campaign, name of its `archive`, words for the `histories` that are kept
+        """
+        self.shards.mkdir(exist_ok=True)
+        # those that are there are ours, and may be damaged: plan_file writes over nothing but plans
+        for path in (self.path / "plan.json", *self.path.glob("plan.*.npy")):
+            path.unlink(missing_ok=True)
+        plan_file.write(plan, self.path / "plan.json")
+        told = []
+        for section in sections:
+            rows = None
+            if len(section.rows) < section.prepared.experiment.cases.count:
+                rows = f"rows.{section.number}.npy"
+                with new_file(self.path / rows) as file:
+                    np.save(file, section.rows)
+            told.append({
+                "number": section.number, "name": section.name, "again": section.number != section.experiment,
+                "experiment": section.experiment, "cases": len(section.rows), "rows": rows,
+                "recorded": section.recorded, "single": section.single, "code": section.code,
+            })  # fmt: skip
+        data = {"schema": SCHEMA, "version": FORMAT, "met": VERSION, "deck": plan.deck, "sections": told, **about}
+        put(self.path / "campaign.json", data)
+
+    def described(self) -> dict[str, Any]:
+        """What was written down. Raises Problem where that is damaged, or of another version of MET."""
+        path = self.path / "campaign.json"
+        try:
+            return _checked(read_json(path))
+        except (OSError, ValueError, LookupError, TypeError) as reason:
+            raise self._damaged(path) from reason
+
+    def plan(self) -> Plan:
+        """The plan that is run here. Raises Problem."""
+        return plan_file.read(self.path / "plan.json")
+
+    def sections(self) -> dict[int, Section]:
+        """The sections by their numbers, for a worker. Raises Problem E353 where the code here is not that of the
+        campaign, as after an update of MET or of models while jobs waited: what it gave would count for nothing."""
+        experiments = [engine.prepare(experiment) for experiment in self.plan().experiments]
+        out = {}
+        described = self.described()
+        for told in described["sections"]:
+            number, of = told["number"], told["experiment"]
+            if of >= len(experiments):
+                raise self._damaged(self.path / "campaign.json")
+            if told["code"] not in (experiments[of].work_key, experiments[of].old_code_key):
+                raise Problem(_other_code(experiments[of].experiment.name, self.path, described))
+            rows = self._rows(told, experiments[of].experiment.cases.count)
+            out[number] = Section(number, of, experiments[of], rows, told["recorded"], told["single"], told["code"])
+        return out
+
+    def _rows(self, told: dict[str, Any], count: int) -> np.ndarray:
+        """The rows of a section of an experiment with so many cases. Raises Problem."""
+        if told["rows"] is None:
+            rows = np.arange(count)
+        else:
+            path = self.path / told["rows"]
+            try:
+                data = io.BytesIO(read_regular(path, count * np.dtype(np.int64).itemsize + NPY_HEAD_BYTES))
+                rows = np.lib.format.read_array(data, allow_pickle=False)
+            except (OSError, ValueError, TypeError, EOFError, OverflowError, MemoryError) as reason:
+                raise self._damaged(path) from reason
+            if rows.dtype != np.int64 or rows.ndim != 1 or not _rise(rows, count):
+                raise self._damaged(path)
+        if len(rows) != told["cases"]:
+            raise self._damaged(self.path / "campaign.json")
+        return rows
+
+    def _damaged(self, path: Path) -> Problem:
+        helps = "`--fresh` starts over, and removes what is in it"
+        return Problem(error("E350", f"{path} is damaged, or of another version of MET", help=helps))
+
+    # What is done
+
+    def named(self, number: int) -> list[Task]:
+        """The tasks of a section that have a file, sound or not, by their first cases."""
+        found = []
+        for name in os.listdir(self.shards) if self.shards.is_dir() else ():
+            parts = SHARD.fullmatch(name)
+            task = Task(*map(int, parts.groups())) if parts else None
+            if task is not None and task.section == number and task.name == name:
+                found.append(task)
+        return sorted(found, key=lambda task: (task.first, -task.last))
+
+    def read(self, section: Section, task: Task) -> shard.Shard:
+        """A task's shard. Raises shard.Unsound where it is none of this section's, OSError."""
+        found = shard.read(self.shards / task.name, task.cases * _bytes_of_case(section))
+        if not 0 <= task.first < task.last <= len(section.rows) or len(found.outputs) != task.cases:
+            raise shard.Unsound("holds other cases than its name says")
+        if found.key != section.key(task.first, task.last):
+            raise shard.Unsound("is of another plan, or of another version of MET's code")
+        if not _fits(section, found):
+            raise shard.Unsound("holds other outputs than the program has")
+        return found
+
+    def sound(self, section: Section) -> tuple[dict[Task, Done], list[str]]:
+        """The tasks of a section whose shards count, and what is told of those that do not, which are removed: their
+        cases are run again."""
+        kept: dict[Task, Done] = {}
+        told = []
+        at = 0
+        for task in self.named(section.number):
+            try:
+                found = self.read(section, task)
+            except (shard.Unsound, OSError) as reason:
+                why = str(reason) if isinstance(reason, shard.Unsound) else f"cannot be read: {reason.strerror}"
+                told.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
+                _remove(self.shards / task.name)
+            else:
+                kept[task] = Done(found.seconds, found.failed_from(at - task.first))  # a case counts once
+                at = max(at, task.last)
+        return kept, told
+
+    def bytes(self) -> int:
+        """Of the shards that are there."""
+        sizes = 0
+        with contextlib.suppress(OSError):
+            for path in self.shards.glob("*-*-*"):
+                sizes += path.stat().st_size
+        return sizes
+
+    def seconds(self, enough: float) -> float:
+        """Of computing that the shards which are there took; when it is enough, no more are looked at."""
+        total = 0.0
+        for path in self.shards.glob("*-*-*"):
+            with contextlib.suppress(shard.Unsound, OSError):
+                total += shard.read(path).seconds
+            if total >= enough:
+                break
+        return total
+
+    def sweep(self) -> None:
+        """Remove what workers that were killed had begun to write; there are none at work."""
+        for path in self.shards.glob(".*.tmp"):
+            path.unlink(missing_ok=True)
+
+
+def _other_code(name: str, path: Path, described: dict[str, Any]) -> Any:
+    message = f"the code of `{name}` here is not that with which {path} was begun: nothing of it is run"
+    helps = [
+        f"MET or a package of models has changed since; it was begun by MET {described['met']}, this is MET {VERSION}",
+        "bring the former code back, and submit or run the same again; `--fresh` starts over with this one",
+    ]
+    return error("E353", message, help=helps)
+
+
+def _remove(path: Path) -> None:
+    """Take away what has this name, whatever it is."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _lock_file(path: Path) -> int:
+    """The file that is locked, open; made where there is none. A link in its place would lock another's file, and
+    never be the file that was opened. Raises Problem E350, OSError."""
+    helps = f"nobody at work in a campaign has such a lock: remove it, `rm -r {shlex.quote(str(path))}`"
+    try:
+        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    except OSError as reason:
+        if reason.errno in (errno.ELOOP, errno.EISDIR, errno.ENXIO):  # a link, a folder, a socket
+            raise Problem(error("E350", f"{path} is not a regular file", help=helps)) from None
+        raise
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        raise Problem(error("E350", f"{path} is not a regular file", help=helps))
+    return file
+
+
+def _checked(data: Any) -> dict[str, Any]:
+    """What campaign.json says, where it is what one says; all of it but the plan's and the rows' own sizes. Raises
+    ValueError, LookupError, TypeError."""
+    sections = data["sections"]
+    good = (
+        data["schema"] == SCHEMA and data["version"] == FORMAT
+        and all(isinstance(data[name], str) for name in ("key", "archive", "deck"))
+        and Path(data["archive"]).name == data["archive"] != ""
+        and all(isinstance(word, str) or is_count(word) for word in data["histories"])
+        and isinstance(data["float32"], bool)
+        and [each["number"] for each in sections] == list(range(len(sections)))
+    )  # fmt: skip
+    for each in sections if good else ():
+        good = good and (
+            is_count(each["experiment"]) and is_count(each["cases"])
+            and isinstance(each["name"], str) and isinstance(each["code"], str)
+            and each["rows"] in (None, f"rows.{each['number']}.npy")
+            and all(isinstance(each[name], bool) for name in ("again", "recorded", "single"))
+        )  # fmt: skip
+    if not good:
+        raise ValueError("it is no description of a campaign")
+    return dict(data)
+
+
+def _rise(rows: np.ndarray, count: int) -> bool:
+    """Whether these are rows of a case table with so many cases, each once and in order."""
+    return len(rows) == 0 or bool(rows[0] >= 0 and rows[-1] < count and (np.diff(rows) > 0).all())
+
+
+def _bytes_of_case(section: Section) -> int:
+    """What a case of a section takes in a shard."""
+    program = section.prepared.program
+    rows = section.prepared.experiment.structure.schedule.rows if section.recorded else 0
+    return np.dtype(float).itemsize * (len(program.outputs) + rows * program.columns)
+
+
+def _fits(section: Section, found: shard.Shard) -> bool:
+    """Whether the arrays of a shard are of the program's size, and its failures such as there are."""
+    program, structure = section.prepared.program, section.prepared.experiment.structure
+    if found.outputs.shape[1] != len(program.outputs):
+        return False
+    shape = (len(found.outputs), structure.schedule.rows, program.columns)
+    wanted = shape if section.recorded and program.columns else None
+    if wanted != (None if found.history is None else found.history.shape):
+        return False
+    failed = found.outputs[found.outputs[:, 0] != 0.0, :3]
+    parts = len(structure.moving) + bool(structure.free) + len(structure.payloads) + len(structure.sensors)
+    most = np.array([ASTRAY, parts, structure.schedule.ticks + 1])
+    return bool(((failed >= 0.0) & (failed <= most)).all())
+
+
+def beside(archive: Path) -> Path:
+    """The folder of the campaign that fills an archive."""
+    return archive.with_name(archive.name + ENDING)
+
+
+def gaps(tasks: Iterable[Task], cases: int) -> list[tuple[int, int]]:
+    """Stretches of cases that no task covers; tasks by their first cases."""
+    out, at = [], 0
+    for task in tasks:
+        if task.first > at:
+            out.append((at, task.first))
+        at = max(at, task.last)
+    return [*out, (at, cases)] if at < cases else out
+
+
+def put(path: Path, data: Any) -> None:
+    """Write JSON whole, or not at all."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with new_file(temporary) as file:
+            file.write(json.dumps(data).encode())
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise

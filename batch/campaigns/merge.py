@@ -1,0 +1,156 @@
+"""The shards of a campaign into its archive: in order, a bounded number of cases at a time, each shard proved again."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from batch.campaigns import shard
+from batch.campaigns.folder import Folder
+from batch.campaigns.keep import Known
+from batch.campaigns.tasks import Section
+from met import run as engine
+from met.diagnostic import Problem, error
+from met.run import Run
+
+if TYPE_CHECKING:
+    from batch.archive.write import Writer
+
+BLOCK = 1 << 16
+"""Cases that are written at a time, however they were run: where HDF5 puts strings depends on it."""
+
+
+class Missing(Exception):
+    """A shard that was there does not count any more, and why. Its cases have to be run again."""
+
+
+def merge(
+    writer: Writer, number: int, folder: Folder, values: Section, histories: Section | None,
+    progress: Callable[[int], None] = lambda _: None,
+) -> None:  # fmt: skip
+    """Write one experiment. Raises Missing.
+
+    values     all of its cases;  histories: those that were run again for them
+    progress   told how many cases are written
+    """
+    kept = histories.rows if histories is not None else np.empty(0, np.int64)
+    places = np.searchsorted(values.rows, kept)
+    before: list[np.ndarray] = []
+    waiting: list[np.ndarray] = []
+    fates: dict[int, tuple[int, str]] = {}
+    ended: dict[int, tuple[int, str]] = {}
+    first = held = 0
+
+    def put(cases: int) -> None:
+        nonlocal waiting, fates, first, held
+        outputs = np.concatenate(waiting)
+        mine = {case: fate for case, fate in fates.items() if case < cases}
+        again = np.flatnonzero((places >= first) & (places < first + cases))
+        here = places[again] - first
+        before.append(outputs[here])
+        ended.update({int(k): mine[int(case)] for k, case in zip(again, here, strict=True) if int(case) in mine})
+        writer.put_cases(number, first, _results(values, first, outputs[:cases], None, mine))
+        fates = {case - cases: fate for case, fate in fates.items() if case >= cases}
+        waiting, first, held = [outputs[cases:]], first + cases, held - cases
+        progress(first)
+
+    for at, found in pieces(folder, values):
+        if found.history is not None:
+            writer.put_signals(number, at, _results(values, at, found.outputs.copy(), found.history, dict(found.fates)))
+        fates |= {at - first + case: fate for case, fate in found.fates.items()}
+        waiting.append(found.outputs.copy() if found.history is not None else found.outputs)  # not the shard with it
+        held += len(found.outputs)
+        while held >= BLOCK:
+            put(BLOCK)
+    if held:
+        put(held)
+    if histories is not None:
+        again = np.concatenate(before)
+        first_kept = 0
+        for at, found in pieces(folder, histories):
+            # a case that gave nothing then has no history either: it is what was found of it first that counts
+            lost = {case - at: fate for case, fate in ended.items() if 0 <= case - at < len(found.outputs)}
+            known = {**found.fates, **lost}
+            _check_bits(histories, at, found.outputs, again[at : at + len(found.outputs)], known)
+            kept = np.array([case in lost or case not in found.fates for case in range(len(found.outputs))])
+            if kept.any():
+                run = _results(histories, at, found.outputs, found.history, known)
+                writer.put_signals(number, first_kept, run, kept)
+            first_kept += int(kept.sum())
+
+
+def without_history(folder: Folder, values: Section, histories: Section) -> dict[int, str]:
+    """Rows whose worker died, or that found no end, when they were run again for their histories, and why: they have
+    none. Those of which that was found the first time keep theirs, which is empty."""
+    first = {row for row, _ in _alone(folder, values)}
+    return {row: why for row, why in _alone(folder, histories) if row not in first}
+
+
+def _alone(folder: Folder, section: Section) -> Iterator[tuple[int, str]]:
+    """Rows that could not be run, and why; each has a shard of its own. One that a shard before it holds as well counts
+    as it is there, as in `pieces`: a worker that was thought dead may have come to its end."""
+    at = 0
+    for task in folder.named(section.number):
+        if task.cases == 1 and task.first >= at:
+            with contextlib.suppress(shard.Unsound, OSError):  # `pieces` comes upon it, too
+                for _, why in folder.read(section, task).fates.values():
+                    yield int(section.rows[task.first]), why
+        at = max(at, task.last)
+
+
+def results(folder: Folder, section: Section) -> Known:
+    """What became of all cases of a section, as far as it decides whose histories are kept."""
+    status, metrics = np.empty(len(section.rows), np.int8), dict[str, np.ndarray]()
+    for at, found in pieces(folder, section):
+        run = _results(section, at, found.outputs, None, dict(found.fates))
+        status[at : at + len(run.status)] = run.status
+        for name, values in run.metrics.items():
+            metrics.setdefault(name, np.empty(len(section.rows)))[at : at + len(values)] = values
+    return Known(status, metrics)
+
+
+def pieces(folder: Folder, section: Section) -> Iterator[tuple[int, shard.Shard]]:
+    """The shards of a section in order, less what was had before, each with the place of its first case."""
+    at = 0
+    for task in folder.named(section.number):
+        if task.last <= at:
+            continue
+        if task.first > at:
+            break
+        try:
+            found = folder.read(section, task)
+        except (shard.Unsound, OSError) as reason:
+            raise Missing(f"shard {task.name} {reason}") from reason
+        yield at, _without(found, at - task.first)
+        at = task.last
+    if at < len(section.rows):
+        raise Missing(f"no shard holds case {at:,} of {section.name}")
+
+
+def _without(found: shard.Shard, first: int) -> shard.Shard:
+    """A shard less its first cases."""
+    if not first:
+        return found
+    history = None if found.history is None else found.history[first:]
+    fates = {case - first: fate for case, fate in found.fates.items() if case >= first}
+    return shard.Shard(found.key, found.outputs[first:], history, found.seconds, fates)
+
+
+def _results(
+    section: Section, first: int, outputs: np.ndarray, history: np.ndarray | None, fates: dict[int, tuple[int, str]]
+) -> Run:
+    rows = section.rows[first : first + len(outputs)]
+    return engine.results(section.prepared, rows, history, outputs, fates)
+
+
+def _check_bits(section: Section, at: int, now: np.ndarray, before: np.ndarray, fates: Iterable[int]) -> None:
+    """A case that was run again for its history gave the numbers that it gave before; those of `fates` gave none."""
+    alike = ((now.view(np.int64) == before.view(np.int64)) | (np.isnan(now) & np.isnan(before))).all(axis=1)
+    alike[list(fates)] = True
+    if not alike.all():
+        case = section.prepared.experiment.cases.table[section.rows[at + int(np.argmin(alike))]]
+        message = f"case #{case} of `{section.name}` gave other numbers when it was run again for its history"
+        raise Problem(error("E352", message, help="a defect of MET, or of this machine's memory: please report it"))

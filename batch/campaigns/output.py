@@ -1,0 +1,157 @@
+"""Where an archive goes: its default name, what is refused as a place for it, and its name once it is whole."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import resource
+import shlex
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from batch.archive.sink import Busy, Sink, temporary_of
+from batch.campaigns.folder import Folder, beside
+from batch.export import FORMATS
+from ic.printing.columns import size as size_text
+from met.diagnostic import Problem, error
+from met.files import new_file
+from met.plan import Experiment, Plan
+
+
+def default_output(
+    plan: Plan, experiments: Sequence[str] | None = None, selected: Sequence[tuple[Experiment, np.ndarray]] = (),
+    whole: int | None = None,
+) -> Path:  # fmt: skip
+    """`two_link.h5`; `two_link.gains.h5` where runs are named; `two_link.gains.case7.h5` for some of the cases.
+
+    They are named here, or were when the plan was made (`two_link.all.h5` where all were asked for).
+    So a case that is run again does not take its sweep's place. A deck of the standard library is called `<name>`.
+    whole: how many cases there are of all that was asked for; None: of what is selected.
+    """
+    names = [Path(plan.deck.strip("<>")).stem, *(experiments or plan.selected)]
+    count = sum(len(rows) for _, rows in selected)
+    if count < (sum(experiment.cases.count for experiment, _ in selected) if whole is None else whole):
+        few = [int(position) for each, rows in selected for position in each.cases.table[rows]] if count <= 4 else []
+        names.append("case" + "-".join(map(str, few)) if few else "cases")
+    return Path(".".join([*names, "h5"]))
+
+
+def publish(output: Path, temporary: Path, sidecar: dict[str, Any]) -> None:
+    """Give a finished archive its name, and its sidecar."""
+    beside = sidecar_path(output)
+    beside_temporary = temporary_of(beside)
+    try:
+        with new_file(beside_temporary) as file:
+            file.write(f"{json.dumps(sidecar, indent=1)}\n".encode())
+        temporary.replace(output)
+        beside_temporary.replace(beside)
+    finally:
+        beside_temporary.unlink(missing_ok=True)
+    folder = os.open(output.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+def sidecar_path(output: Path) -> Path:
+    return output.with_name(output.name + ".run.json")
+
+
+def check_output(output: Path, plan: Plan) -> None:
+    """Refuse an output that could not be written in the end, before anything runs. Raises Problem E305, E307."""
+    try:
+        _check_output(output, plan)
+    except Busy:
+        raise Problem(busy(output)) from None
+    except OSError as reason:
+        raise Problem(cannot_write(output, reason)) from reason
+
+
+def _check_output(output: Path, plan: Plan) -> None:
+    from batch.archive.read import is_archive
+
+    for folder in (output, *output.parents):
+        if (folder / "campaign.json").exists() and folder.name.endswith(".campaign"):
+            archive = quoted(folder.with_name(folder.name.removesuffix(".campaign")))
+            remedy = f"what it fills is called {archive}: `-o {archive}`"
+            raise Problem(error("E305", f"cannot write {output}: {folder} is a campaign's folder", help=remedy))
+    if output.suffix.lower().removeprefix(".") in FORMATS:
+        remedy = f"`-o {quoted(output.with_suffix('.h5'))}`; `met run DECK -o {quoted(output)}` writes both"
+        raise Problem(error("E305", f"cannot write {output}: it is to be an archive, which ends in .h5", help=remedy))
+    for target in (output, sidecar_path(output)) if output.name else (output,):  # the name of . and / is empty
+        if target.is_dir():
+            inside = quoted(target / default_output(plan))
+            helps = f"name a file in it: `-o {inside}`" if target == output else ()
+            raise Problem(error("E305", f"cannot write {target}: it is a folder", help=helps))
+    if beside(output).exists() and not beside(output).is_dir():
+        message = f"cannot write {output}: {beside(output)} is no folder, and a campaign's has to be there"
+        raise Problem(error("E305", message, help="give another name with `-o`, or move the file"))
+    if foreign := Folder(beside(output)).foreign():
+        message = f"cannot write {output}: {beside(output)} is no campaign's folder, and holds {', '.join(foreign[:3])}"
+        raise Problem(error("E305", message, help="give another name with `-o`, or move the folder"))
+    if not output.parent.is_dir():
+        what = "is a file, not a folder" if output.parent.exists() else "does not exist"
+        helps = () if output.parent.exists() else f"make it first: `mkdir -p {quoted(output.parent)}`"
+        raise Problem(error("E305", f"cannot write {output}: {output.parent} {what}", help=helps))
+    for target in (output, sidecar_path(output)):
+        if target.exists() and not target.is_file():
+            raise Problem(error("E305", f"cannot write {target}: it is not a regular file"))
+    if output.exists() and output.stat().st_size > 0 and not is_archive(output):
+        helps = "give another name with `-o`, or remove the file"
+        raise Problem(error("E305", f"{output} exists and is no archive of MET: it is not written over", help=helps))
+    temporary_of(sidecar_path(output)).exists()  # the longest of the names that there will be beside it
+    probe = Sink(temporary_of(output))
+    probe.remove()
+    probe.close()
+
+
+def check_room(output: Path, needed: int) -> None:
+    """Refuse what the disk cannot hold. needed: bytes, about, until it is whole. Raises Problem E306."""
+    free = shutil.disk_usage(output.parent).free
+    if needed > free:
+        needs, has = size_text(needed), size_text(free)
+        message = f"cannot write {output}: it needs about {needs} until it is whole, and the disk has {has} left"
+        helps = (
+            "`--histories none` keeps metrics only; `--float32`, fewer signals in `record`, or a slower "
+            "`rates.record`, take less"
+        )
+        raise Problem(error("E306", message, help=helps))
+
+
+def cannot_write(output: Path, reason: OSError, kept: str = "") -> Any:
+    """kept: what of the work is kept, and where; nothing is without it."""
+    why = (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
+    if reason.errno in (errno.EMFILE, errno.ENFILE):  # whatever it was that could not be opened
+        return error("E305", f"cannot write {output}: {why}", help=f"{kept or 'nothing was kept'}; {more_files()}")
+    where = str(reason.filename) if isinstance(reason.filename, str | os.PathLike) else ""
+    if where and Path(where).is_relative_to(beside(output)):  # the archive itself is in nobody's way
+        why = f"{where}: {why}"
+    helps = kept or "nothing was kept; `-o FILE` names another place"
+    if reason.errno in (errno.EEXIST, errno.EISDIR, errno.ENOTDIR):
+        helps = f"{kept or 'nothing was kept'}; move away what is in the way, or give another name with `-o`"
+    return error("E305", f"cannot write {output}: {why}", help=helps)
+
+
+def more_files() -> str:
+    """The remedy where no more files can be opened."""
+    most = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    return f"`ulimit -n` allows {most:,} open files: allow more in the shell that runs it, or use fewer processes"
+
+
+def busy(output: Path) -> Any:
+    helps = [
+        f"`met status {quoted(output)}` says how far it is", "wait until it is done, or give another name with `-o`",
+    ]  # fmt: skip
+    return error("E307", f"cannot write {output}: another run is writing it now", help=helps)
+
+
+def quoted(path: Any) -> str:
+    """A path as a word of a command line: for a shell, and not to be taken for an option."""
+    text = str(path)
+    return shlex.quote(f"./{text}" if text.startswith("-") else text)

@@ -1,0 +1,295 @@
+"""Performing a campaign: find what is done, run what is missing, merge all into the archive, give it its name.
+
+However it ends, nothing that took a second of work or more is lost: the shards stay in the folder beside the archive,
+and the next run of the same campaign goes on from there.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from batch.archive.sink import Busy as ArchiveBusy
+from batch.archive.sink import temporary_of
+from batch.campaigns import merge, resuming
+from batch.campaigns.campaign import Campaign, histories_section, values_sections
+from batch.campaigns.drive import Driver, Progress, Stopped, TooManyFailures
+from batch.campaigns.folder import Busy, Folder, beside, gaps
+from batch.campaigns.output import busy, cannot_write, check_room, publish, quoted
+from batch.campaigns.status import Reporter, died
+from batch.campaigns.tasks import Section
+from batch.executors import Executor
+from batch.executors.threads import Threads
+from met.diagnostic import Diagnostic, Problem, error
+from met.frozen import frozen
+
+WORTH_SECONDS = 1.0
+"""Work that took less is not kept where a campaign ends early: it is done again as fast as it is found."""
+
+ATTEMPTS = 3
+"""How often shards that are found to be damaged when they are merged are run again."""
+
+
+@frozen
+class Performed:
+    """What came of a campaign.
+
+    seconds  by experiment: of computing, on all workers together
+    whole    whether all was there before, so that nothing was run
+    notes    what happened on the way: what was resumed, which shards did not count
+    """
+
+    seconds: Mapping[str, float]
+    whole: bool = False
+    notes: tuple[str, ...] = ()
+
+
+class TooMany(Problem):
+    """More cases failed than were allowed: an answer, and no mistake of who asked."""
+
+
+def perform(
+    campaign: Campaign,
+    *,
+    executor: Executor | None = None,
+    fresh: bool = False,
+    max_failures: int | None = None,
+    together: bool = False,
+    progress: Progress | None = None,
+    ready: Callable[[], None] | None = None,
+    say: Callable[[str], None] = lambda _: None,
+    more: Callable[[], Mapping[str, Any]] = dict,
+) -> Performed:
+    """Run a campaign into its archive. Raises Problem. An interrupt passes through, with words of what is kept and how
+    to go on; without any where nothing is.
+
+    executor      who runs the tasks; None: the threads of this process
+    fresh         whether to start over where something is there
+    max_failures  stop when more cases have failed
+    together      put together what others have done; it cannot go on where cases are missing
+    ready         called once the first kernel is there, so that something will be written
+    say           told, as it comes, what is found of an earlier run
+    more          what else stands beside the archive, asked when all cases are done
+    """
+    values = resuming.as_begun(Folder(beside(campaign.output)), campaign, values_sections(campaign))
+    key = resuming.campaign_key(values)
+    there = resuming.there(campaign, key)
+    if there == resuming.WHOLE and not fresh:
+        resuming.tidy(Folder(beside(campaign.output)), key)
+        return Performed({}, whole=True)
+    if not there and not fresh and not together and not resuming.goes_on(Folder(beside(campaign.output)), key):
+        resuming.guard(campaign)
+    check_room(campaign.output, campaign.bytes_missing)
+    values[0].prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
+    folder = Folder(beside(campaign.output))
+    try:
+        folder.lock()
+    except Busy:
+        raise Problem(busy(campaign.output)) from None
+    except OSError as reason:
+        raise Problem(cannot_write(campaign.output, reason)) from reason
+    if not fresh and there != resuming.WHOLE and resuming.there(campaign, key) == resuming.WHOLE:
+        folder.remove()  # another run has ended meanwhile
+        return Performed({}, whole=True)
+    if there == resuming.DAMAGED and not fresh:
+        say(f"{campaign.output} is not as it was written: it is made again")
+    work = _Work(campaign, folder, values, key, max_failures, progress, say, more)
+    try:
+        work.begin(fresh)
+        if ready is not None:
+            ready()
+        return work.run(executor or Threads(), together)
+    except KeyboardInterrupt as interrupt:
+        raise type(interrupt)(work.leave("interrupted")) from None
+    except TooManyFailures as reason:
+        work.leave("stopped")
+        raise TooMany(_stopped("E355", str(reason), work, ", with a larger `--max-failures`")) from None
+    except Stopped as reason:
+        work.leave("stopped")
+        raise Problem(_stopped("E354", f"the campaign cannot go on: {reason}", work)) from None
+    except ArchiveBusy:
+        work.leave("stopped")
+        raise Problem(busy(campaign.output)) from None
+    except OSError as reason:
+        kept = work.leave("stopped")
+        raise Problem(cannot_write(campaign.output, reason, kept)) from reason
+    except BaseException:
+        work.leave("stopped")
+        raise
+    finally:
+        folder.close()
+
+
+class _Work:
+    """A campaign on its way, in its folder."""
+
+    def __init__(
+        self, campaign: Campaign, folder: Folder, values: list[Section], key: str, max_failures: int | None,
+        progress: Progress | None, say: Callable[[str], None], more: Callable[[], Mapping[str, Any]],
+    ) -> None:  # fmt: skip
+        self.campaign, self.folder, self.key, self.say, self.more = campaign, folder, key, say, more
+        self.sections = {section.number: section for section in values}
+        self.values = values
+        self.notes: list[str] = []
+        self.began = time.time()
+        self.reporter = Reporter(folder, campaign.cases, progress)
+        self.max_failures = max_failures
+        self.driver: Driver | None = None
+        self.ours = self.resumed = False
+
+    def begin(self, fresh: bool) -> None:
+        """Make the folder, or take up the one that is there. Raises Problem E353 where it is of another campaign."""
+        self.resumed = bool(self.folder.named(0)) and not fresh
+        for note in resuming.take_up(self.folder, self.campaign, self.values, self.key, fresh):
+            self._note(note)
+        for note in died(self.folder) if self.resumed else ():
+            self._note(note)
+        self.ours = True
+        self.folder.forget()
+        resuming.describe(self.folder, self.campaign, self.values, self.key)
+        self.folder.sweep()
+
+    def run(self, executor: Executor, together: bool) -> Performed:
+        driver = self.driver = Driver(self.folder, executor, self.reporter, self.max_failures, len(self.values))
+        executor.open(self.folder, self.sections, driver.tell)
+        try:
+            for attempt in range(ATTEMPTS):
+                missing = [(section, driver.find(section)) for section in self.values]
+                self._tell_found(first=not attempt)
+                left = sum(last - first for _, stretches in missing for first, last in stretches)
+                if together and left:
+                    raise Stopped(f"{left:,} of {self.campaign.cases:,} cases are missing")
+                for section, stretches in missing:
+                    driver.run(section, stretches)
+                try:
+                    histories = self._histories(driver)
+                    self.reporter.state("merging")
+                    self._merge(histories)
+                    break
+                except merge.Missing as reason:
+                    if attempt == ATTEMPTS - 1:
+                        raise Stopped(f"{reason}, again and again") from None
+        finally:
+            executor.close()
+        seconds = {section.name: 0.0 for section in self.values}
+        for number, count in driver.counts.items():
+            seconds[self.sections[number].name] += count.seconds
+        self.folder.remove()
+        return Performed(seconds, notes=tuple(self.notes))
+
+    def leave(self, state: str) -> str:
+        """Give up, for now. What is worth keeping stays; in words how much and where, else "" and nothing stays."""
+        if not self.ours:
+            return ""
+        self.folder.sweep()
+        worth = self.resumed or self.folder.submitted or self.folder.recorded
+        worth = worth or self.folder.seconds(WORTH_SECONDS) >= WORTH_SECONDS
+        if not worth:
+            self.folder.remove()
+            return ""
+        self.reporter.state(state)
+        left = sum(last - first for section in self.values
+                   for first, last in gaps(self.folder.named(section.number), len(section.rows)))  # fmt: skip
+        done = self.campaign.cases - left
+        return f"{done:,} of {self.campaign.cases:,} cases are kept in {self.folder.path}; the same command goes on"
+
+    def _histories(self, driver: Driver) -> dict[int, Section]:
+        """Run the second pass; its sections by experiment."""
+        found = {}
+        for section in self.values:
+            histories = histories_section(self.campaign, section, partial(merge.results, self.folder, section))
+            if histories is not None:
+                self.sections[histories.number] = found[section.number] = histories
+        if found:
+            parts = [(self.campaign.parts[section.experiment], len(section.rows)) for section in found.values()]
+            check_room(self.campaign.output, self.campaign.bytes_of(parts))
+            resuming.describe(self.folder, self.campaign, self.sections.values(), self.key)
+            missing = [(section, driver.find(section)) for section in found.values()]
+            self._tell_found(first=False)
+            for section, stretches in missing:
+                driver.run(section, stretches)
+        return found
+
+    def _merge(self, histories: Mapping[int, Section]) -> None:
+        from batch.archive.provenance import machine
+        from batch.archive.write import Part, Writer
+
+        parts = []
+        for part, values in zip(self.campaign.parts, self.values, strict=True):
+            kept = part.kept
+            if values.number in histories:
+                rows = histories[values.number].rows
+                lost = merge.without_history(self.folder, values, histories[values.number])
+                for row, why in lost.items():
+                    case = part.experiment.cases.table[row]
+                    again = f"`met run {quoted(self.campaign.output)} --case '#{case}'` tries again"
+                    self._note(f"no history of case #{case} of `{values.name}` is kept: {why}; {again}")
+                kept = np.searchsorted(part.rows, rows[~np.isin(rows, list(lost))])
+            program = values.prepared
+            parts.append(
+                Part(part.experiment, part.rows, kept, part.single, program.code_key, program.result_keys)
+            )
+        temporary = temporary_of(self.campaign.output)
+        writer = Writer(temporary, self.campaign.plan, parts)
+        try:
+            for number, section in enumerate(self.values):
+                self.reporter.begin(f"{section.name}, merging", len(section.rows), 0, 0, "")
+                merge.merge(
+                    writer, number, self.folder, section, histories.get(number),
+                    lambda cases: self.reporter.advance(cases, 0),
+                )  # fmt: skip
+                self.reporter.end()
+            writer.finish()
+            sidecar = {
+                "archive": self.campaign.output.name,
+                "began": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self.began)),
+                "seconds": round(time.time() - self.began, 6),
+                "workers": self.driver.executor.about if self.driver else "",
+                "experiments": self._timings(),
+                "notes": self.notes,
+                **self.more(),
+                **resuming.proof(self.campaign, self.key, temporary),
+                **machine(),
+            }
+            publish(self.campaign.output, temporary, sidecar)
+            writer.close()
+        except BaseException as reason:
+            writer.abandon()
+            if writer.failure is not None and isinstance(reason, Exception):
+                raise writer.failure from reason
+            raise
+
+    def _timings(self) -> list[dict[str, Any]]:
+        counts = self.driver.counts if self.driver else {}
+        return [
+            {"experiment": section.name, "cases": len(section.rows),
+             "seconds": round(sum(counts[n].seconds for n, s in self.sections.items()
+                                  if s.experiment == section.experiment and n in counts), 6)}
+            for section in self.values
+        ]  # fmt: skip
+
+    def _tell_found(self, *, first: bool) -> None:
+        driver = self.driver
+        assert driver is not None
+        for text in driver.told:
+            self._note(text)
+        driver.told.clear()
+        done = sum(count.done for count in driver.counts.values())
+        if first and done:
+            self._note(f"goes on: {done:,} of {self.campaign.cases:,} cases are done")
+
+    def _note(self, text: str) -> None:
+        self.notes.append(text)
+        self.say(text)
+
+
+def _stopped(code: str, message: str, work: _Work, how: str = "") -> Diagnostic:
+    kept = work.folder.path.exists()
+    helps = f"what is done is kept in {work.folder.path}: the same command goes on{how}" if kept else "nothing was kept"
+    return error(code, message, help=helps)
+
+

@@ -1,0 +1,138 @@
+"""Cases of an archive run again, from the archive alone: with full histories, and the same bits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from batch.archive.read import ArchiveFile, Group
+from batch.terminal.show import chosen, picked
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.plan import Experiment, Plan
+from met.run import comparable
+
+MOST_TOLD = 8
+"""Differences that are named."""
+
+
+@frozen
+class Replay:
+    """What of an archive is run again: its plan, and of each experiment the rows of the case table; `kept`, by name,
+    those whose histories the archive has, where all of it is run again."""
+
+    archive: Path
+    plan: Plan
+    selected: tuple[tuple[Experiment, np.ndarray], ...]
+    word: str
+    kept: Mapping[str, np.ndarray] | None = None
+
+    @property
+    def output(self) -> Path:
+        """Where it goes unless the user says: `two_link.gains.case7.h5`, in the current folder."""
+        return Path(f"{self.archive.stem}.{self.word}.h5")
+
+
+def replay(
+    archive: str | Path, names: Sequence[str], cases: Sequence[str], failed: bool = False, everything: bool = False
+) -> Replay:
+    """What is asked for. cases: as `met show` takes them; failed: all that did not reach their end; everything: all of
+    the archive, with the histories that it has. Raises Problem."""
+    with ArchiveFile(archive) as file:
+        rows: dict[str, set[int]] = {}
+        for case in cases:
+            for group, position in picked(file, names, case):
+                if position is not None:
+                    rows.setdefault(group.name, set()).add(_row(group, position))
+        if failed:
+            for group in chosen(file, names):
+                for position in np.flatnonzero(group.values("status") != 0).tolist():
+                    rows.setdefault(group.name, set()).add(_row(group, position))
+        positions: dict[str, np.ndarray] = {}
+        for group in chosen(file, names) if everything else ():
+            rows[group.name] = set(group.values("case").tolist())
+            positions[group.name] = group.values("case")[group.recorded_positions]
+        if not cases and not failed and not everything:
+            helps = ("`--case '#7'` runs a case again, `--failed` all that failed, `--all` all",
+                     "`met show` lists the cases")  # fmt: skip
+            raise Problem(error("E357", f"which cases of {file.path} are to be run again?", help=helps))
+        if not rows:
+            raise Problem(error("E357", f"no case of {file.path} failed: there is nothing to run again"))
+        plan = file.plan()
+        picked_rows = []
+        kept: dict[str, np.ndarray] = {}
+        for experiment in plan.experiments:
+            if experiment.name in rows:
+                table = experiment.cases.table
+                wanted = np.searchsorted(table, sorted(rows[experiment.name]))
+                picked_rows.append((experiment, np.asarray(wanted, dtype=np.int64)))
+                if everything:
+                    kept[experiment.name] = np.searchsorted(table, positions[experiment.name])
+    few = sorted({position for positions in rows.values() for position in positions})
+    if everything:
+        word = "again"
+    else:
+        word = "failed" if failed else "case" + "-".join(map(str, few)) if len(few) <= 4 else "cases"
+    return Replay(Path(archive), plan, tuple(picked_rows), word, kept if everything else None)
+
+
+def _row(group: Group, position: int) -> int:
+    """The position in the case table of a case of an archive."""
+    return int(group.at("case", [position])[0])
+
+
+def differences(before: str | Path, after: str | Path) -> list[str]:
+    """Where the cases of the second archive came out otherwise than in the first, a line each; none where all of their
+    bits are the same. How a case ended that was lost or timed out is no part of it."""
+    out = []
+    with ArchiveFile(before) as old_file, ArchiveFile(after) as new_file:
+        groups = {group.name: group for group in old_file.groups}
+        for new in new_file.groups:
+            old = groups[new.name]
+            places = np.searchsorted(old.values("case"), new.values("case"))
+            ran = old.at("status", places) < 2
+            out += _signals(old, new, places, ran)
+            names = ["case_id", "status", "n_valid", *(variable.name for variable in new.role("metric"))]
+            for name in names:
+                a, b = old.at(name, places), new.values(name)
+                for place in np.flatnonzero(~_alike(a, b) & ran).tolist():
+                    case = new.values("case")[place]
+                    out.append(f"#{case} of {new.name}: {name} was {_plain(a[place])}, is {_plain(b[place])}")
+            old_code, new_code = (group.attributes.get("code_key") for group in (old, new))
+            if out and comparable(old_code, new_code) and old_code != new_code:  # older archives have none
+                what = f"the program of `{new.name}` is another"
+                out.insert(0, f"{what}: MET's code, or that of models, has changed since")
+    return out[:MOST_TOLD] + ([f"and {len(out) - MOST_TOLD} more"] if len(out) > MOST_TOLD else [])
+
+
+def _signals(old: Group, new: Group, places: np.ndarray, ran: np.ndarray) -> list[str]:
+    """The same of signals, of the cases whose histories both archives have. places: of new's cases in old."""
+    out = []
+    for variable in new.role("signal"):
+        if variable.name not in old.variables or old.variables[variable.name].role != "signal":
+            continue
+        for place in np.flatnonzero(ran).tolist():
+            if places[place] in old.recorded_positions and place in new.recorded_positions:
+                a, b = old.signal(variable.name, int(places[place])), new.signal(variable.name, place)
+                if a.dtype != b.dtype:  # of four bytes on one side
+                    a, b = a.astype(np.float32), b.astype(np.float32)
+                if a.shape == b.shape and not _alike(a, b).all():
+                    row = int(np.argmin(_alike(a, b).reshape(len(a), -1).all(axis=1)))
+                    case, time = new.values("case")[place], new.values("time")[row]
+                    out.append(f"#{case} of {new.name}: {variable.name} differs from {time:g} s on")
+    return out
+
+
+def _alike(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    if before.dtype.kind == "f":
+        whole = np.dtype(f"i{before.dtype.itemsize}")
+        bits = [np.ascontiguousarray(values, before.dtype).view(whole) for values in (before, after)]
+        same = bits[0] == bits[1]
+        return np.asarray(same | (np.isnan(before) & np.isnan(after)))
+    return np.asarray(before == after)
+
+
+def _plain(value: object) -> str:
+    return repr(value.item()) if isinstance(value, np.generic) else repr(value)

@@ -1,0 +1,220 @@
+"""What is there already of a campaign: its archive, whole, or shards of it in its folder; or of another one."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from batch.archive.read import ArchiveFile
+from batch.campaigns.campaign import Campaign, prepare
+from batch.campaigns.changes import changes
+from batch.campaigns.folder import Busy, Folder, beside
+from batch.campaigns.output import sidecar_path
+from batch.campaigns.tasks import Section
+from batch.terminal.progress import duration
+from met import plan_file
+from met.diagnostic import Problem, error
+from met.files import open_regular, read_json
+
+WHOLE, DAMAGED = "whole", "damaged"
+
+GUARDED_SECONDS = 60.0
+"""Of computing: a finished archive that took as long is not replaced by another campaign's unless it is asked for."""
+
+MOST_SECONDS = 1e12
+"""Of computing: more has no campaign taken, whatever its sidecar says."""
+
+MOST_CHANGES = 8
+"""Changes that a refusal names."""
+
+
+def campaign_key(values: Sequence[Section]) -> str:
+    """Of all that decides the numbers of a campaign: code, and what goes into it. Which cases are run again for
+    their histories may change on the way."""
+    return hashlib.sha256(json.dumps([[section.name, section.key()] for section in values]).encode()).hexdigest()
+
+
+def as_begun(folder: Folder, campaign: Campaign, values: list[Section]) -> list[Section]:
+    """The sections with the keys of programs that an older MET wrote, where what stands in the folder, or beside the
+    archive, is this campaign under those keys; else as they are."""
+    key = campaign_key(values)
+    begun = _begun_key(folder, campaign)
+    if begun in ("", key):
+        return values
+    older = [replace(section, begun=section.prepared.old_code_key) for section in values]
+    return older if campaign_key(older) == begun else values
+
+
+def _begun_key(folder: Folder, campaign: Campaign) -> str:
+    """The key of what was begun in the folder, else of what made the archive; "" where neither can be read."""
+    try:
+        if folder.exists():
+            return str(folder.described()["key"])
+        return str(read_json(sidecar_path(campaign.output))["campaign"])
+    except (Problem, OSError, ValueError, LookupError, TypeError):
+        return ""
+
+
+def proof(campaign: Campaign, key: str, archive: Path) -> dict[str, str]:
+    """What is written beside a finished archive, so that `there` knows it again."""
+    return {"campaign": key, "asked_sha256": _asked_sum(campaign), "archive_sha256": _file_sum(archive)}
+
+
+def there(campaign: Campaign, key: str) -> str:
+    """WHOLE where the archive is there, of this very campaign and plan, and as it was written; DAMAGED where it is not
+    as it was written; else ""."""
+    output = campaign.output
+    try:
+        told = read_json(sidecar_path(output))
+        asked = {"campaign": key, "asked_sha256": _asked_sum(campaign)}
+        if not isinstance(told, dict) or any(told.get(name) != value for name, value in asked.items()):
+            return ""
+        return WHOLE if told.get("archive_sha256") == _file_sum(output) else DAMAGED
+    except (OSError, ValueError):
+        return ""
+
+
+def guard(campaign: Campaign) -> None:
+    """Refuse to replace a finished archive of another campaign that took long, or was measured on motor beds. Raises
+    Problem E353."""
+    try:
+        told = read_json(sidecar_path(campaign.output))
+        seconds = min(MOST_SECONDS, sum(float(each["seconds"]) for each in told["experiments"]))
+        measured = bool(told.get("beds"))
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        return
+    if (seconds < GUARDED_SECONDS and not measured) or not campaign.output.exists():
+        return
+    try:
+        with ArchiveFile(campaign.output) as file:
+            found = changes(file.plan(as_written=True), campaign.plan)
+    except Problem:
+        found = ["it cannot be read any more"]
+    what = "driven on motor beds" if measured else f"{duration(seconds)} of computing"
+    message = f"{campaign.output} holds another campaign, {what}, and is left as it is"
+    raise Problem(error("E353", message, help=_what(found or ["what is asked for (`--case`, `--histories`)"])))
+
+
+def _what(found: Sequence[str]) -> list[str]:
+    """What has changed, and what to do."""
+    most = [*found[:MOST_CHANGES], *([f"and {len(found) - MOST_CHANGES} more"] if len(found) > MOST_CHANGES else [])]
+    return [
+        "changed since: " + most[0], *(f"               {each}" for each in most[1:]),
+        "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it",
+    ]  # fmt: skip
+
+
+def goes_on(folder: Folder, key: str) -> bool:
+    """Whether the folder holds this very campaign, begun."""
+    try:
+        return folder.exists() and folder.described()["key"] == key
+    except Problem:
+        return False
+
+
+def tidy(folder: Folder, key: str) -> None:
+    """Remove what a run left that was killed after its archive had got its name; not what another campaign began."""
+    folder.forget()
+    if not folder.exists():
+        return
+    with contextlib.suppress(Busy, Problem):
+        folder.lock()
+        try:
+            if folder.described()["key"] == key:
+                folder.remove()
+        finally:
+            folder.close()
+
+
+def take_up(folder: Folder, campaign: Campaign, values: Sequence[Section], key: str, fresh: bool) -> Iterator[str]:
+    """See to what is in the folder, which is locked; what is to be told. Raises Problem E350, E353."""
+    if not folder.exists():
+        return
+    held = sum(task.cases for number in range(len(values)) for task in folder.named(number))
+    if fresh:
+        folder.empty()
+        yield f"starts over: {held:,} cases that were done before are removed"
+        return
+    if not held and not folder.submitted and not folder.recorded:  # whoever began it had done nothing
+        folder.empty()
+        return
+    told = folder.described()
+    if told["key"] != key:
+        raise Problem(_of_another(folder, campaign, values, told))
+
+
+def describe(folder: Folder, campaign: Campaign, sections: Iterable[Section], key: str) -> None:
+    """Write down in the folder what is computed there."""
+    folder.describe(
+        campaign.plan, sections, key=key, archive=campaign.output.name, histories=campaign.words,
+        float32=any(part.single for part in campaign.parts),
+    )  # fmt: skip
+
+
+def described(folder: Folder) -> Campaign:
+    """The campaign of a folder, as it was written down. Raises Problem."""
+    told = folder.described()
+    if beside(folder.path.with_name(told["archive"])).name != folder.path.name:
+        message = f"{folder.path} says that it fills {told['archive']}, which has another folder"
+        raise Problem(error("E350", message, help="give the folder the name back that it had"))
+    plan = folder.plan()
+    first = sorted((section for section in folder.sections().values()), key=lambda section: section.number)
+    selected = [(each.prepared.experiment, each.rows) for each in first[: len(plan.experiments)]]
+    return prepare(
+        plan, output=folder.path.with_name(told["archive"]), selected=selected, histories=told["histories"],
+        float32=told["float32"],
+    )  # fmt: skip
+
+
+def _of_another(folder: Folder, campaign: Campaign, values: Sequence[Section], told: dict[str, Any]) -> Any:
+    done = sum(task.cases for number in range(len(told["sections"])) for task in folder.named(number))
+    try:
+        found = changes(folder.plan(), campaign.plan)
+    except Problem:
+        found = ["its plan cannot be read any more"]
+    if not found:
+        found = _other_work(campaign, values, told)
+    message = f"{folder.path} holds {done:,} cases of another campaign, and is left as it is"
+    return error("E353", message, help=_what(found))
+
+
+def _other_work(campaign: Campaign, values: Sequence[Section], told: dict[str, Any]) -> list[str]:
+    """What else may differ where the plan is the same."""
+    before = told["sections"][: len(values)]
+    if [len(section.rows) for section in values] != [each.get("cases") for each in before]:
+        return ["other cases were asked for"]
+    if [section.code for section in values] != [each.get("code") for each in before]:
+        return [f"MET's own models or code (it was begun by version {told.get('met')})"]
+    if [(section.recorded, section.single) for section in values] != [
+        (each.get("recorded"), each.get("single")) for each in before
+    ]:
+        return ["what is kept of histories (`--histories`, `--float32`)"]
+    return ["which cases were asked for, or whose histories are kept (`--case`, `--histories`)"]
+
+
+def _asked_sum(campaign: Campaign) -> str:
+    """Of the plan, the cases, and what is kept of them."""
+    summed = hashlib.sha256(json.dumps([campaign.keep.failed, campaign.keep.worst]).encode())
+
+    def refer(experiment: Any, index: int) -> dict[str, Any]:
+        if not index:
+            summed.update(plan_file.table(experiment).tobytes())
+        return {"index": index}
+
+    text = plan_file.dumps(campaign.plan, refer)
+    summed.update(text.encode())
+    for part in campaign.parts:
+        summed.update(part.rows.tobytes() + b"kept" + part.kept.tobytes())
+    return summed.hexdigest()
+
+
+def _file_sum(path: Path) -> str:
+    with open_regular(path) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+

@@ -1,0 +1,201 @@
+"""How far a campaign is: written into its folder every second by who works there, read by `met status`."""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from batch.archive.read import ArchiveFile
+from batch.campaigns.drive import Progress
+from batch.campaigns.folder import ENDING, Folder, beside, gaps, put
+from batch.campaigns.output import sidecar_path
+from batch.terminal.progress import duration
+from met.files import is_count, read_json
+
+WRITE_SECONDS = 1.0
+
+STALE_SECONDS = 30.0
+"""Who has written nothing for so long is not at work any more."""
+
+
+TYPES: dict[str, type | tuple[type, ...]] = {
+    "state": str, "pid": int, "host": str, "workers": str, "cases": int, "failed": int, "updated": (int, float),
+    "section_done": int, "section_began": (int, float), "at_first": int,
+}  # fmt: skip
+"""What a status file has at least."""
+
+
+class Reporter:
+    """Passes on how far it is, and writes it down. name: of one job among several that work in a folder."""
+
+    def __init__(self, folder: Folder, cases: int, progress: Progress | None = None, name: str = "") -> None:
+        self._path = folder.path / (f"status.{name}.json" if name else "status.json")
+        self._progress = progress
+        self._next = 0.0
+        self._told: dict[str, Any] = {
+            "state": "starting", "pid": os.getpid(), "host": socket.gethostname(), "began": time.time(), "cases": cases,
+            "failed": 0, "at_first": 0, "workers": "", "section_done": 0, "section_began": time.time(),
+        }  # fmt: skip
+        self._before: dict[str, tuple[int, int]] = {}
+        self._name = ""
+
+    def begin(self, name: str, cases: int, done: int, failed: int, workers: str) -> None:
+        """A section starts, or is taken up again."""
+        self._name = name
+        self._told |= {"state": "running", "section": name, "section_cases": cases, "workers": workers,
+                       "section_began": time.time(), "at_first": done}  # fmt: skip
+        self._take(done, failed)
+        self._write()
+        if self._progress is not None:
+            self._progress.begin(name, cases, done, failed, workers)
+
+    def advance(self, done: int, failed: int) -> None:
+        self._take(done, failed)
+        if time.monotonic() > self._next:
+            self._write()
+        if self._progress is not None:
+            self._progress.advance(done, failed)
+
+    def end(self) -> None:
+        if self._progress is not None:
+            self._progress.end()
+
+    def state(self, state: str) -> None:
+        """running, merging, interrupted, stopped, done."""
+        self._told["state"] = state
+        self._write()
+
+    def _take(self, done: int, failed: int) -> None:
+        self._told |= {"section_done": done, "failed": failed}
+
+    def _write(self) -> None:
+        self._next = time.monotonic() + WRITE_SECONDS
+        self._told["updated"] = time.time()
+        try:
+            put(self._path, self._told)
+        except OSError:  # a full disk stops who writes results, and is told by them
+            pass
+
+
+def told(folder: Folder) -> list[dict[str, Any]]:
+    """What those who work or worked in a folder wrote last, the latest first."""
+    found = []
+    for path in folder.path.glob("status*.json"):
+        try:
+            data = read_json(path)
+        except (OSError, ValueError):
+            continue
+        if isinstance(data, dict) and all(isinstance(data.get(name), kind) for name, kind in TYPES.items()):
+            found.append({**data, "name": path.name.removeprefix("status").removesuffix(".json").strip(".")})
+    return sorted(found, key=lambda each: -each["updated"])
+
+
+def found(name: str) -> Folder | None:
+    """The folder that a user means: its own name, or its archive's; None where there is none. Raises
+    Problem for what is no sound archive."""
+    path = Path(name)
+    for each in (path, beside(path) if path.name else path):
+        if Folder(each).exists():
+            return Folder(each)
+    return None
+
+
+def report(folder: Folder, now: float) -> dict[str, Any]:
+    """How far a campaign is, as data: of each section what is done, by the shards that are there, and who works."""
+    sections = []
+    told_here = folder.described()
+    for each in told_here["sections"]:
+        left = sum(last - first for first, last in gaps(folder.named(each["number"]), each["cases"]))
+        sections.append({
+            "name": each["name"], "cases": each["cases"], "done": each["cases"] - left,
+            "again": each["again"],
+        })  # fmt: skip
+    workers = []
+    for each in told(folder):
+        rate = None
+        done = each["section_done"] - each["at_first"]
+        seconds = each["updated"] - each["section_began"]
+        if done > 0 and seconds > 0:
+            rate = done / seconds
+        workers.append({
+            "job": each["name"], "state": each["state"] if alive(each, now) or each["state"] not in AT_WORK else "died",
+            "host": each["host"], "pid": each["pid"], "workers": each["workers"], "cases": each["cases"],
+            "done": each["section_done"], "failed": each["failed"], "cases_per_s": rate,
+            "seconds_ago": max(0.0, now - each["updated"]),
+        })  # fmt: skip
+    return {"folder": str(folder.path), "archive": told_here["archive"], "deck": told_here["deck"],
+            "sections": sections, "workers": workers}  # fmt: skip
+
+
+def lines(data: dict[str, Any]) -> list[str]:
+    """The same for people."""
+    from ic.printing.columns import columns
+
+    first = [each for each in data["sections"] if not each["again"]]
+    cases, done = (sum(each[name] for each in first) for name in ("cases", "done"))
+    out = [f"{data['folder']}: {done:,} of {cases:,} cases are done"]
+    rows = [[each["name"] + (", again for histories" if each["again"] else ""), f"{each['done']:,}",
+             f"of {each['cases']:,}"] for each in data["sections"]]  # fmt: skip
+    out += columns(rows, right=(1, 2)) if len(rows) > 1 else []
+    working = [each for each in data["workers"] if each["state"] in AT_WORK]
+    rates = [each["cases_per_s"] for each in working if each["cases_per_s"]]
+    if rates and cases > done:
+        rate = sum(rates)
+        shown = f"{rate:,.3g}" if rate < 1000 else f"{rate:,.0f}"
+        out.append(f"  {shown} cases/s, {duration((cases - done) / rate)} left")
+    rows = []
+    for each in data["workers"]:
+        failed = f"{each['failed']:,} failed" if each["failed"] else ""
+        job, ago = f"job {each['job']}" if each["job"] else "", f"{duration(each['seconds_ago'])} ago"
+        rows.append([
+            job, each["state"], f"on {each['host']}", f"process {each['pid']}", each["workers"], failed, ago,
+        ])  # fmt: skip
+    out += columns(rows, right=())
+    if not working and done < cases:
+        out.append("  nobody is at work: the command that began it goes on")
+    return out
+
+
+def whole(archive: Path) -> dict[str, Any] | None:
+    """What is beside a finished archive: its cases, and when it was begun; None where there is none. Raises
+    Problem for what is no sound archive."""
+    try:
+        told = read_json(sidecar_path(archive))
+        cases = sum(each["cases"] for each in told["experiments"] if is_count(each["cases"]))
+        return {"archive": str(archive), "cases": cases, "began": str(told["began"])} if archive.is_file() else None
+    except (OSError, ValueError, LookupError, TypeError):
+        pass
+    if not archive.exists():
+        return None
+    with ArchiveFile(archive) as file:
+        return {"archive": str(archive), "cases": sum(group.count for group in file.groups), "began": "unknown"}
+
+
+def here(folder: Path) -> list[str]:
+    """Campaigns in a folder that are not finished."""
+    return sorted(path.name for path in folder.glob(f"*{ENDING}") if Folder(path).exists())
+
+
+AT_WORK = ("starting", "running", "merging")
+
+
+def died(folder: Folder) -> Iterator[str]:
+    """What is to be told of a run before this one that ended without a word."""
+    for each in told(folder):
+        if not each["name"] and each["state"] in AT_WORK and not alive(each, time.time()):
+            alone = "thread" in each["workers"] and not each["workers"].startswith("Dask")
+            remedy = "; if a case did it, `--processes 2` finds out which" if alone else ""
+            yield f"the run before this one was killed (process {each['pid']} on {each['host']}){remedy}"
+
+
+def alive(told: dict[str, Any], now: float) -> bool:
+    """Whether who wrote this is still at work, as far as that can be known."""
+    if told["state"] not in AT_WORK:
+        return False
+    if told["host"] == socket.gethostname():
+        return Path(f"/proc/{told['pid']}").exists()
+    return bool(now - told["updated"] < STALE_SECONDS)

@@ -1,0 +1,140 @@
+"""The one verb underneath every campaign: run some cases of a section, write one shard.
+
+A section is cases of one experiment that are run alike, with their histories or without; a task is a stretch of them.
+How cases are cut into tasks, and who carries them out, decides nothing about what they give.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from batch.campaigns import shard
+from met import run as engine
+from met.frozen import frozen
+from met.run import Prepared
+
+GRANULE = 32
+"""Cases of a task are a multiple of this, the widest block of a kernel, where there are so many."""
+
+MOST_CASES = 1 << 18
+"""Cases of a task without histories."""
+
+MOST_BYTES = 128 << 20
+"""Histories of a task, which lie in memory at a time."""
+
+
+@frozen
+class Section:
+    """Cases of one experiment that are run alike.
+
+    number      in its campaign;  experiment: its number in the plan
+    rows        of the case table, [case]
+    recorded    whether histories are kept;  single: as numbers of four bytes
+    begun       key of the program that the campaign was begun with, where it is of an older kind than ours for the same
+    """
+
+    number: int
+    experiment: int
+    prepared: Prepared
+    rows: np.ndarray
+    recorded: bool
+    single: bool = False
+    begun: str = ""
+
+    @property
+    def code(self) -> str:
+        """Key of the program, as the campaign has it."""
+        return self.begun or self.prepared.work_key
+
+    @property
+    def name(self) -> str:
+        """What a user calls it."""
+        return self.prepared.experiment.name
+
+    @property
+    def most(self) -> int:
+        """Cases of a task at most."""
+        if not self.recorded:
+            return MOST_CASES
+        cases = max(1, min(MOST_CASES, MOST_BYTES // self.prepared.experiment.structure.history_bytes))
+        return cases if cases < GRANULE else cases // GRANULE * GRANULE
+
+    def key(self, first: int = 0, last: int | None = None) -> str:
+        """Of all that decides what these cases give: the code, how long it runs, what goes into it, what is kept."""
+        experiment = self.prepared.experiment
+        inputs = engine.inputs(experiment, self.rows[first:last])
+        kept = ("recorded" if self.recorded else "outputs", "f4" if self.single else "f8")
+        told = (self.code, experiment.structure.schedule.ticks, *kept, inputs.shape)
+        return hashlib.sha256(f"{told}\n".encode() + inputs.tobytes()).hexdigest()
+
+
+@frozen
+class Task:
+    """Cases `first` to `last` (not itself) of a section, by their places in its rows."""
+
+    section: int
+    first: int
+    last: int
+
+    @property
+    def cases(self) -> int:
+        return self.last - self.first
+
+    @property
+    def name(self) -> str:
+        """Of its shard."""
+        return f"{self.section}-{self.first:09}-{self.last:09}"
+
+
+@frozen
+class Done:
+    """A task that was carried out: seconds of computing, and how many of its cases failed."""
+
+    seconds: float
+    failed: int
+
+
+def carry_out(
+    section: Section, task: Task, folder: Path, *, threads: int | None = None,
+    progress: Callable[[int], None] | None = None, computed: Callable[[], None] = lambda: None,
+) -> Done:  # fmt: skip
+    """Run a task's cases and write its shard into the folder. computed: called in between."""
+    found = compute(section, task, threads=threads, progress=progress)
+    computed()
+    shard.write(folder / task.name, found)
+    return Done(found.seconds, found.failed)
+
+
+def compute(
+    section: Section, task: Task, *, threads: int | None = None, progress: Callable[[int], None] | None = None
+) -> shard.Shard:
+    """What a task's cases give."""
+    section.prepared.kernel  # noqa: B018 - compiling is not computing
+    began = time.perf_counter()
+    rows = section.rows[task.first : task.last]
+    history, outputs = engine.compute(
+        section.prepared, rows, threads=threads, record=section.recorded, progress=progress
+    )
+    if history is not None and section.single:
+        with np.errstate(over="ignore"):  # what is too large for four bytes is infinite there
+            history = history.astype(np.float32)
+    return shard.Shard(
+        key=section.key(task.first, task.last), outputs=outputs, history=history, seconds=time.perf_counter() - began
+    )
+
+
+def not_run(section: Section, task: Task, ended: int, why: str) -> shard.Shard:
+    """The shard of cases that could not be run: `met.run.TIMED_OUT` or `LOST`, and why."""
+    width = len(section.prepared.program.outputs)
+    history = None
+    if section.recorded and section.prepared.program.columns:
+        shape = (task.cases, section.prepared.experiment.structure.schedule.rows, section.prepared.program.columns)
+        history = np.full(shape, np.nan, np.float32 if section.single else np.float64)
+    fates = dict.fromkeys(range(task.cases), (ended, why))
+    key = section.key(task.first, task.last)
+    return shard.Shard(key, np.zeros((task.cases, width)), history, 0.0, fates)

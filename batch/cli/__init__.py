@@ -1,0 +1,1 @@
+"""The commands of `met` that batch gives, one file each."""

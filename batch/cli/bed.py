@@ -1,0 +1,201 @@
+"""`met bed`: motor beds, real or emulated; faces of batch.beds and hw."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import click
+
+from batch.cli.run import SECONDS, measured
+from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
+from met.diagnostic import Problem
+
+
+class Hertz(click.ParamType):
+    """A rate with its unit: `1 kHz`, `500 Hz`; a bare number is Hz."""
+
+    name = "rate"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """In Hz."""
+        try:
+            hz = measured(value, "Hz")
+        except ValueError:
+            self.fail(f"`{value}` is no rate: write `1 kHz` or `500 Hz`", param, ctx)
+        if not 1.0 <= hz <= 1e5:
+            self.fail(f"`{value}` is no rate to exchange at: 1 Hz to 100 kHz", param, ctx)
+        return hz
+
+
+class Amount(click.ParamType):
+    """A quantity above zero with its unit: `12 V`; a bare number is SI."""
+
+    name = "amount"
+
+    def __init__(self, unit: str) -> None:
+        self._unit = unit
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """In SI."""
+        try:
+            found = measured(value, self._unit)
+        except (ValueError, Problem):
+            found = 0.0
+        if not 0.0 < found < math.inf:
+            self.fail(f"`{value}` is none: write `12 {self._unit}`", param, ctx)
+        return found
+
+
+PORT = click.option("--port", "word", metavar="[JOINT=]PORT", required=True, help="Where the bed is.")
+BAUD = click.option("--baud", type=click.IntRange(1, 2**31 - 1), default=921600, show_default=True, metavar="BAUD",
+                    help="Of a serial line.")  # fmt: skip
+
+
+@click.group(short_help="Drive a motor bed: probe it, measure its line, run a deck's joint on it.")
+def bed() -> None:
+    """Work with a motor bed, at PORT: a serial line (/dev/ttyUSB0, socket://HOST:PORT), `emulated` (the deck's bed in
+    this process), `firmware` or `qemu` (the bed's firmware over a simulated plant, here or on an emulated Cortex-M3),
+    or the transcript of an earlier run.
+    """
+
+
+@bed.command(short_help="Say who is at a port, and what its sensors read.")
+@click.argument("source", metavar="[DECK|PLAN.json]", required=False)
+@click.argument("names", nargs=-1, metavar="[NAME]")
+@PORT
+@BAUD
+@deck_options
+@format_option
+@loudness_options
+def probe(word: str, source: str | None, names: tuple[str, ...], **options: Any) -> int:
+    """Greet a bed and read its sensors: its name, firmware, limits and scales, faults that are latched, and for which
+    rates the line is fast enough. It is not armed. A simulated bed (`emulated`, `firmware`, `qemu`) is the one of DECK.
+
+    Exit status: 0 it answers; 2 it does not, or the input is wrong.
+    """
+    from batch.beds.probe import probe_and_tell
+
+    _check(source, names, options)
+    probe_and_tell(word, source, names, **options)
+    return YES
+
+
+@bed.command(short_help="Have a bed forget faults that it has latched.")
+@PORT
+@BAUD
+@format_option
+@loudness_options
+def clear(word: str, **options: Any) -> int:
+    """A bed that stopped itself does not arm again until it is told to forget why. This prints what it was, waits until
+    the shaft has come to rest, and clears it. Find the cause first.
+
+    Exit status: 0 nothing is latched any more; 2 the bed does not answer, or its shaft turns on.
+    """
+    from batch.beds.clearing import clear_and_tell
+
+    clear_and_tell(word, **options)
+    return YES
+
+
+@bed.command(short_help="Measure how well exchanges with a bed keep their time.")
+@click.argument("source", metavar="[DECK|PLAN.json]", required=False)
+@click.argument("names", nargs=-1, metavar="[NAME]")
+@PORT
+@BAUD
+@click.option("--rate", type=Hertz(), metavar="RATE", help="Of exchanges [the deck's, else 1 kHz].")
+@click.option("--duration", type=SECONDS, metavar="TIME", default=10.0, show_default="10 s", help="For so long.")
+@click.option("--joints", type=click.IntRange(min=1, max=64), metavar="N", default=1, show_default=True, help="So many "
+              "exchanges each period, one after another, as joints on such beds would need.")  # fmt: skip
+@deck_options
+@format_option
+@loudness_options
+def jitter(word: str, source: str | None, names: tuple[str, ...], **options: Any) -> int:
+    """Read a bed's sensors at a steady rate, as a run exchanges with it, and print how late exchanges began and how
+    long they took. The bed is not armed. Shared computers have hard times that no measurement has seen.
+
+    Exit status: 0 a run would not have been stopped; 1 it would have, by five periods of lateness or silence; 2 the
+    bed does not answer, or the input is wrong.
+    """
+    from batch.beds.jitter import jitter_and_tell
+
+    _check(source, names, options)
+    return YES if jitter_and_tell(word, source, names, **options) else NO
+
+
+def _check(source: str | None, names: tuple[str, ...], options: dict[str, Any]) -> None:
+    """Refuse options that would do nothing, and more than one bed."""
+    if len(names) > 1:
+        raise click.UsageError(f"one bed at a time: `{names[0]}` or `{names[1]}`")
+    if source is not None:
+        check_options(source, names, False, options["defines"], options["include_dirs"], options["settings"])
+
+
+@bed.command(short_help="Find a bed's parameters by guided moves, as a deck to include.")
+@click.argument("source", metavar="DECK|PLAN.json")
+@click.argument("names", nargs=-1, metavar="[NAME]")
+@PORT
+@BAUD
+@click.option("--lock-step", is_flag=True, help="Of simulated firmware: it has no time of its own.")
+@click.option("--kt-load", type=Amount("N*m/A"), metavar="CONSTANT", help="Torque constant of the load motor, by "
+              "which torques are measured [the deck's bed's].")  # fmt: skip
+@click.option("--kt-load-error", type=click.FloatRange(0.0, 50.0), metavar="PERCENT", default=0.0, show_default=True,
+              help="Half of its 95 % interval; it widens what is measured by it.")  # fmt: skip
+@click.option("--voltage", type=Amount("V"), metavar="VOLTAGE", help="Most of the moves [the servo's v_max].")
+@click.option("--current", type=Amount("A"), metavar="CURRENT", help="Most of the moves [what balances the drive].")
+@click.option("--rate", type=Amount("rad/s"), metavar="RATE", help="Above it a move is over [0.8 of the bed's limit].")
+@click.option("-o", "--output", metavar="FILE.ic", help="The deck [JOINT.identified.ic, in this folder].")
+@deck_options
+@format_option
+@loudness_options
+def identify(word: str, source: str, names: tuple[str, ...], **options: Any) -> int:
+    """Lead a bed through a minute of moves, and find its resistance, torque constant, largest torque, friction and
+    inertia, each with its 95 % interval. DECK has what is believed before: the servo's motor is the data sheet.
+
+    Nothing but the load motor may be on the shaft, which turns both ways at up to its full voltage. Exit status: 0
+    found; 2 the bed stopped, is not what the model is, or the input is wrong.
+    """
+    from batch.beds.identifying import identify_and_tell
+
+    _check(source, names, options)
+    identify_and_tell(word, source, names, **options)
+    return YES
+
+
+@bed.command(short_help="Run a deck whose joints' motors are on beds.")
+@click.argument("source", metavar="DECK|PLAN.json")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@click.option("--port", "ports", multiple=True, metavar="[JOINT=]PORT", required=True, help="Where the bed is; of "
+              "several beds each.")  # fmt: skip
+@BAUD
+@click.option("--lock-step", is_flag=True, help="Of simulated firmware: it has no time of its own, so "
+              "that a run has the same bits each time.")  # fmt: skip
+@click.option("--rest", type=SECONDS, metavar="TIME", help="Let the motors cool between cases (`30 s`).")
+@click.option("--transcripts", metavar="DIR", help="Write what goes over the lines into files in this folder.")
+@click.option("--clear", is_flag=True, help="Before each case, clear what its bed has latched: a sweep then goes on "
+              "after a case whose bed stopped itself.")  # fmt: skip
+@click.option("--force", is_flag=True, help="Arm the bed also where a law has no margin of stability.")
+@click.option("-o", "--output", metavar="FILE", help="The archive [as `met run` calls it].")
+@click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'.")
+@click.option("--fresh", is_flag=True, help="Start over, rather than drive what is missing.")
+@click.option("--no-picture", is_flag=True, help="Draw no picture beside the archive.")
+@deck_options
+@loudness_options
+def run(source: str, names: tuple[str, ...], **options: Any) -> int:
+    """Run a deck's only run or sweep, the one marked `default`, or those of these NAMEs: the arm is simulated in real
+    time, and the motor of each substituted joint is on its bed. Cases follow one another.
+
+    The archive is like any other: `met diff` compares it with the simulation's. A case whose bed stops is a failed
+    case, and says why. Exit status: 0 all cases reached their end and met the requirements; 1 not all; 2 the input is
+    wrong.
+    """
+    from batch.beds.running import run_and_tell
+    from batch.executors.termination import TERMINATED, Terminated, terminable
+
+    check_options(source, names, False, options["defines"], options["include_dirs"], options["settings"])
+    try:
+        with terminable():
+            return YES if run_and_tell(source, names, **options) else NO
+    except Terminated:
+        click.echo("\nmet: terminated", err=True)
+        return TERMINATED

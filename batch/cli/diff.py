@@ -1,0 +1,47 @@
+"""`met diff`: a face of batch.differences."""
+
+from __future__ import annotations
+
+import click
+
+from met.cli import NO, YES, format_option
+from met.visible import line, say
+
+
+@click.command(short_help="Say what changed between two archives, case by case.")
+@click.argument("a", metavar="A.h5")
+@click.argument("b", metavar="B.h5")
+@click.option("--tol", "tolerances", multiple=True, metavar="LIST", help="How much may differ: qd=1e-6rad/s,rel=1e-9,"
+              "time=1ms; may be repeated. Nothing may, unless it is given.")  # fmt: skip
+@click.option("--require", type=click.Choice(["identical", "equivalent"]), default="equivalent", show_default=True,
+              help="What is asked for.")  # fmt: skip
+@click.option("--distributions", is_flag=True, help="Compare metrics as distributions too, as where seeds differ.")
+@click.option("--all", "every", is_flag=True, help="Show all that is found, not the first of each kind alone.")
+@format_option
+def diff(
+    a: str, b: str, tolerances: tuple[str, ...], require: str, distributions: bool, every: bool, form: str
+) -> int:  # fmt: skip
+    """Compare two campaigns: one case or a million, of two versions of a deck, of its models, or of MET.
+
+    Cases are matched by what is varied in them. First what made the two: the decks' lines, what they change and what
+    follows from that. Then status, then signals and metrics:
+    identical to the bit, equivalent within a tolerance, different, or incomparable. Exit status: 0 they are as
+    required; 1 they differ, require something else, or cannot be compared; 2 the input is wrong.
+    """
+    import json
+
+    from batch.campaigns.output import quoted
+    from batch.differences.campaigns import diff
+    from batch.differences.compare import EQUIVALENT, VERDICTS
+    from batch.differences.data import as_data
+    from batch.differences.told import Cut, told
+    from batch.differences.tolerance import tolerances as read
+
+    found = diff(a, b, read(tolerances), distributions=distributions)
+    options = [*(f"--tol {quoted(each)}" for each in tolerances), *(["--distributions"] if distributions else [])]
+    cut = Cut(every, f"`{' '.join(['met diff', quoted(a), quoted(b), *options, '--all'])}`")
+    say(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(map(line, told(found, cut))))
+    enough = VERDICTS.index(found.verdict) <= VERDICTS.index(require)
+    if form != "json" and found.verdict == EQUIVALENT and not enough:
+        click.echo("exit 1: `--require identical` asks for the same bits")
+    return YES if enough else NO

@@ -1,0 +1,160 @@
+"""`met run`, `submit`, `status`: faces of batch.terminal.running, .submitting and .status."""
+
+from __future__ import annotations
+
+import glob
+from typing import Any
+
+import click
+
+from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
+from met.visible import line, say
+
+MOST_NAMED = 5
+"""Archives that are named where none was meant."""
+
+
+class Seconds(click.ParamType):
+    """A time with its unit: `90 s`, `5 min`, `1.5 h`; a bare number is seconds."""
+
+    name = "time"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """In seconds."""
+        try:
+            seconds = measured(value, "s")
+        except ValueError:
+            self.fail(f"`{value}` is no time: write `90 s`, `5 min` or `1.5 h`", param, ctx)
+        if not 0.0 < seconds < float("inf"):
+            self.fail(f"`{value}` is no time to wait for", param, ctx)
+        return seconds
+
+
+SECONDS = Seconds()
+
+
+def measured(value: Any, si: str) -> float:
+    """A number with or without a unit, in SI. si: the unit that is meant without one. Raises ValueError."""
+    import re
+
+    from met import units
+
+    split = re.fullmatch(r"([-+.\deE]*\d\.?)\s*(\D*)", str(value).strip())
+    number, unit = split.groups() if split else ("", "")
+    found = float(number) * (units.parse_unit(unit).scale if unit else 1.0)
+    if unit and not units.same(units.parse_unit(unit).dimension, units.parse_unit(si).dimension):
+        raise ValueError
+    return found
+
+
+@click.command(short_help="Run the cases of a deck or a plan into an archive.")
+@click.argument("source", metavar="DECK|PLAN.json|ARCHIVE.h5")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck; all cases of "
+              "an archive.")  # fmt: skip
+@click.option("-o", "--output", metavar="FILE", help="The archive [DECK.h5, or DECK.NAME.h5, in this folder]; "
+              "FILE.mcap, .csv or .parquet: FILE.h5, and an export of it.")  # fmt: skip
+@click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'.")
+@click.option("--failed", is_flag=True, help="Of an archive: run the cases again that did not reach their end.")
+@click.option("--histories", multiple=True, metavar="WHICH",
+              help="Whose signals to keep besides metrics: all, none, every:N, failed, worst:N:METRIC, or a case; "
+              "several together. [all, while the archive stays below 1 GiB]")  # fmt: skip
+@click.option("--float32", is_flag=True, help="Keep signals as numbers of four bytes.")
+@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads, of each process [one a core].")
+@click.option("--processes", type=click.IntRange(min=1), metavar="N", help="Run in N processes: a case that kills its "
+              "process is found out, and the others are done.")  # fmt: skip
+@click.option("--dask", metavar="ADDRESS", help="Run on the workers of this Dask scheduler, or of a `local` one.")
+@click.option("--timeout", type=SECONDS, metavar="TIME", help="Give up a case that makes no progress for so long "
+              "(`90 s`, `5 min`); in processes.")  # fmt: skip
+@click.option("--max-failures", type=click.IntRange(min=0), metavar="N", help="Stop when more cases have failed.")
+@click.option("--fresh", is_flag=True, help="Start over, rather than run what is missing.")
+@click.option("--no-picture", is_flag=True, help="Draw no picture beside the archive.")
+@deck_options
+@format_option
+@loudness_options
+def run(source: str, names: tuple[str, ...], form: str, **options: Any) -> int:
+    """Run a deck's only run or sweep, else the one marked `default`; or those of these NAMEs.
+
+    The archive opens in xarray as it is; a picture of it lies beside it. A run that was interrupted or killed goes on
+    where it was. Of an archive, cases are run again, to the same bits. Exit status: 0 all cases reached their end and
+    met the requirements; 1 not all; 2 the input is wrong, and nothing was written.
+    """
+    from batch.executors.termination import TERMINATED, Terminated, terminable
+    from batch.terminal.running import run_and_tell
+
+    check_options(
+        source, names, options["everything"], options["defines"], options["include_dirs"], options["settings"]
+    )
+    try:
+        with terminable():
+            return YES if run_and_tell(source, names, json=form == "json", **options) else NO
+    except Terminated:
+        click.echo("\nmet: terminated", err=True)
+        return TERMINATED
+
+
+@click.command(short_help="Hand the cases of a deck or a plan to a cluster's queue.")
+@click.argument("source", metavar="DECK|PLAN.json")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@click.option("--slurm", is_flag=True, required=True, help="To SLURM, by sbatch: a job array, and a job that merges.")
+@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Jobs of the array [16].")
+@click.option("--sbatch", "options", multiple=True, metavar="WORD", help="A further word for sbatch, such as "
+              "--partition=long; may be repeated.")  # fmt: skip
+@click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck.")
+@click.option("-o", "--output", metavar="FILE", help="The archive [as `met run` calls it].")
+@click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'.")
+@click.option("--histories", multiple=True, metavar="WHICH", help="Whose signals to keep, as of `met run`.")
+@click.option("--float32", is_flag=True, help="Keep signals as numbers of four bytes.")
+@click.option("--timeout", type=SECONDS, metavar="TIME", help="Give up a case that makes no progress for so long.")
+@click.option("--fresh", is_flag=True, help="Start over, rather than submit what is missing.")
+@deck_options
+@format_option
+@loudness_options
+def submit(source: str, names: tuple[str, ...], slurm: bool, form: str, **options: Any) -> int:
+    """Submit what is missing of a campaign as a job array: on a file system that all nodes see, this folder's.
+
+    The archive is there when the last job has ended; `met status ARCHIVE` says how far it is. What a cancelled job has
+    not done, the same command submits again, or `met run` runs here.
+    """
+    from batch.terminal.running import submit_and_tell
+
+    check_options(
+        source, names, options["everything"], options["defines"], options["include_dirs"], options["settings"]
+    )
+    submit_and_tell(source, names, json=form == "json", **options)
+    return YES
+
+
+@click.command(short_help="Say how far a campaign is that runs, waits or was interrupted.")
+@click.argument("where", metavar="ARCHIVE|FOLDER")
+@format_option
+def status(where: str, form: str) -> int:
+    """Say how far a campaign is, from any shell: ARCHIVE as it will be called, or its folder ARCHIVE.campaign.
+
+    Exit status: 0 all of it is done; 1 not yet; 2 there is no such campaign.
+    """
+    import json
+    import time
+    from pathlib import Path
+
+    from batch.campaigns.output import quoted
+    from batch.campaigns.status import found, here, lines, report, whole
+    from met.diagnostic import Problem, error
+
+    folder = found(where)
+    if folder is None:
+        if (data := whole(Path(where.removesuffix(".campaign")))) is None:
+            others = here(Path(where).parent)
+            helps = ["campaigns here: " + ", ".join(others)] if others else []
+            archives = sorted(path.name for path in Path(where).parent.glob(f"{glob.escape(Path(where).stem)}*.h5"))
+            if archives and not where.endswith(".h5"):
+                helps.append("a status is of an archive; here: " + ", ".join(map(quoted, archives[:MOST_NAMED])))
+            helps.append("`met run DECK -o ARCHIVE` begins one; its folder is beside the archive until that is whole")
+            raise Problem(error("E359", f"no campaign fills {where}", help=helps))
+        since = f", begun at {data['began']}" if data["began"] != "unknown" else ""
+        said = f"{data['archive']} is whole: {data['cases']:,} case{'s' if data['cases'] != 1 else ''}{since}"
+        say(json.dumps(data, indent=1) if form == "json" else line(said))
+        return YES
+    data = report(folder, time.time())
+    say(json.dumps(data, indent=1) if form == "json" else "\n".join(map(line, lines(data))))
+    return NO  # its folder is there, and so its archive is not, whatever is done of it

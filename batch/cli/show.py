@@ -1,0 +1,133 @@
+"""`met show`, `profile`, `margin`: faces of batch.terminal.show, met.profile and met.margin."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from met.cli import NO, YES, check_options, deck_options, format_option
+from met.visible import say
+
+if TYPE_CHECKING:
+    from met.plan import Experiment
+
+
+@click.command(short_help="Show an archive in the terminal: outcome, metrics, signals.")
+@click.argument("archive", metavar="ARCHIVE")
+@click.argument("signals", nargs=-1, metavar="[SIGNAL]...")
+@click.option("--run", "experiments", multiple=True, metavar="NAME", help="Only this run or sweep of the archive.")
+@click.option("--case", metavar="ID", help="All about this case alone: the beginning of its id, or '#0'.")
+@click.option("--all-cases", is_flag=True, help="All rows of the table of cases, not the first 20 alone.")
+@click.option("--sort", multiple=True, metavar="NAME", help="Cases by this metric or varied parameter, smallest first; "
+              "NAME:largest: largest first. Repeated: equal ones by the next.")  # fmt: skip
+@click.option("--reverse", is_flag=True, help="Of --sort: largest first, by each NAME that does not say it itself.")
+@click.option("--no-plots", is_flag=True, help="Numbers only.")
+@format_option
+def show(
+    archive: str, signals: tuple[str, ...], experiments: tuple[str, ...], case: str | None, all_cases: bool,
+    sort: tuple[str, ...], reverse: bool, no_plots: bool, form: str,
+) -> int:  # fmt: skip
+    """Show what an archive holds: what was run, how it went, metrics, requirements, and SIGNALs (`qd`, `elbow.q`).
+
+    Of a sweep, also which cases failed or missed a requirement, worst first, or by what --sort names.
+    """
+    import shutil
+    import sys
+
+    from batch.archive.read import ArchiveFile
+    from batch.queries.ordering import by_names
+    from batch.terminal.show import as_json, show
+    from met.render import wants_colour
+
+    if reverse and not sort:
+        raise click.UsageError("--reverse is of --sort, and nothing is sorted: `--sort NAME`")
+    if case is not None and sort:
+        raise click.UsageError("--sort is of many cases, and --case of one")
+    by = by_names(sort, reverse=reverse)
+    with ArchiveFile(archive) as file:
+        if form == "json":
+            click.echo(as_json(file, experiments, case=case, all_cases=all_cases, by=by))
+            return YES
+        width = min(100, shutil.get_terminal_size((100, 24)).columns)
+        colour = wants_colour(sys.stdout)
+        text = show(
+            file, signals, experiments=experiments, case=case, all_cases=all_cases, by=by, width=width, colour=colour,
+            plots=not no_plots,
+        )  # fmt: skip
+        click.echo(text, nl=False, color=colour)  # made visible where it was made, but for our own colours
+    return YES
+
+
+@click.command(short_help="Show where the time of a run goes, and what its kernel is like.")
+@click.argument("source", metavar="DECK|PLAN.json")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@deck_options
+@format_option
+def profile(
+    source: str, names: tuple[str, ...], defines: tuple[str, ...], include_dirs: tuple[str, ...],
+    settings: tuple[str, ...], form: str,
+) -> int:  # fmt: skip
+    """Measure the kernel of a deck's only run or sweep, of the one marked `default`, or of these NAMEs, on one core.
+
+    Operations, flops and time of each part of a step, the share of what the core can do, what is folded into the code
+    and what is an input, and how the kernel was made. Nothing is written but the cache.
+    """
+    from batch.terminal.profile import told
+    from met.profile import as_data
+    from met.profile import profile as measured
+
+    found = [(measured(each), each) for each in _asked_for(source, names, defines, include_dirs, settings, form)]
+    _say(form, [as_data(each) for each, _ in found], [told(*each) for each in found])
+    return YES
+
+
+@click.command(short_help="Say whether a law keeps a motor on a bed stable, and with what margin.")
+@click.argument("source", metavar="DECK|PLAN.json")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@deck_options
+@format_option
+def margin(
+    source: str, names: tuple[str, ...], defines: tuple[str, ...], include_dirs: tuple[str, ...],
+    settings: tuple[str, ...], form: str,
+) -> int:  # fmt: skip
+    """Predict, for each joint whose motor is on a bed, how heavy the arm may be for its law, rate and delay.
+
+    The loop of bed, servo and law is taken round once by the functions that run it, and its eigenvalues are looked at.
+    Exit status: 0 all joints are stable in all cases; 1 one is not; 2 the input is wrong, or no joint is on a bed.
+    """
+    from batch.terminal.margin import as_data, told
+    from met.diagnostic import Problem, error
+    from met.margin import margins
+
+    named = _asked_for(source, names, defines, include_dirs, settings, form)
+    asked = [each for each in named if each.structure.substitutions]
+    if not asked:
+        helps = ("a run says so: `substitute JOINT { }`", "name the run or sweep that does, if it is another one")
+        raise Problem(error("E333", "no joint is on a bed here", help=helps))
+    found = [(each, margins(each)) for each in asked]
+    _say(form, [as_data(*each) for each in found], [told(*each) for each in found])
+    return YES if all(one.stable for _, cases in found for case in cases for one in case) else NO
+
+
+def _asked_for(
+    source: str, names: tuple[str, ...], defines: tuple[str, ...], include_dirs: tuple[str, ...],
+    settings: tuple[str, ...], form: str,
+) -> Sequence[Experiment]:  # fmt: skip
+    """The runs and sweeps of a deck or plan that a command is asked about; what the compiler says goes to people."""
+    from batch.campaigns.choosing import experiments_named
+    from batch.terminal.running import read_plan
+
+    check_options(source, names, defines=defines, include_dirs=include_dirs, settings=settings)
+    plan = read_plan(
+        source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=form == "json"
+    )
+    return experiments_named(plan, names or None)
+
+
+def _say(form: str, data: Sequence[Any], texts: Sequence[Iterable[str]]) -> None:
+    """Prints data for programs, or texts for people with a line between each two."""
+    import json
+
+    say(json.dumps(data, indent=1) if form == "json" else "\n\n".join("\n".join(lines) for lines in texts))

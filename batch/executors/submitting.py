@@ -1,0 +1,142 @@
+"""`met submit --slurm`: a campaign as a job array, a share of its cases each, and a job that puts it together."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import subprocess
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from batch.campaigns import resuming
+from batch.campaigns.campaign import Campaign, values_sections
+from batch.campaigns.folder import Busy, Folder, beside, gaps, put
+from batch.campaigns.output import busy, cannot_write, check_room
+from batch.campaigns.tasks import GRANULE, Task
+from met import interpreter
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+
+STRIPES = 8
+"""Stretches of a job's share, spread over all cases: neighbours in a sweep often take alike, and all jobs as long."""
+
+JOBS = 16
+"""Jobs, unless so many are asked for."""
+
+
+@frozen
+class Submitted:
+    """array, end: numbers of the job array and of the job that merges; jobs: of the array; cases: that are missing."""
+
+    array: str
+    end: str
+    jobs: int
+    cases: int
+
+
+def submit(
+    campaign: Campaign,
+    *,
+    jobs: int | None = None,
+    options: Sequence[str] = (),
+    timeout: float | None = None,
+    fresh: bool = False,
+    say: Callable[[str], None] = lambda _: None,
+) -> Submitted | None:
+    """Hand what is missing of a campaign to SLURM; None where its archive is whole. Raises Problem.
+
+    jobs     of the array; None: `JOBS`, or fewer where there is less to share
+    options  further words for sbatch, of both jobs: `--partition=long`
+    """
+    program = shutil.which("sbatch")
+    if program is None:
+        helps = ("submit where SLURM's commands are, on a login node", "`met run` runs it on this machine")
+        raise Problem(error("E358", "there is no `sbatch` here", help=helps))
+    values = values_sections(campaign)
+    key = resuming.campaign_key(values)
+    if not fresh and resuming.there(campaign, key) == resuming.WHOLE:
+        return None
+    if not fresh and not resuming.goes_on(Folder(beside(campaign.output)), key):
+        resuming.guard(campaign)
+    check_room(campaign.output, campaign.bytes_missing)
+    folder = Folder(beside(campaign.output))
+    try:
+        folder.lock()
+        for note in resuming.take_up(folder, campaign, values, key, fresh):
+            say(note)
+        resuming.describe(folder, campaign, values, key)
+        folder.sweep()
+        missing = []
+        for section in values:
+            kept, told = folder.sound(section)
+            for note in told:
+                say(note)
+            missing += [Task(section.number, *gap) for gap in gaps(kept, len(section.rows))]
+        cases = sum(task.cases for task in missing)
+        if cases < campaign.cases:
+            say(f"goes on: {campaign.cases - cases:,} of {campaign.cases:,} cases are done")
+        count = min(jobs or JOBS, max(1, -(-cases // GRANULE)))
+        tasks = folder.path / "jobs.json"
+        dealt = [[[t.section, t.first, t.last] for t in each] for each in shares(missing, count)]
+        put(tasks, {"shares": dealt, "timeout": timeout})
+    except Busy:
+        raise Problem(busy(campaign.output)) from None
+    except OSError as reason:
+        raise Problem(cannot_write(campaign.output, reason)) from reason
+    finally:
+        folder.close()
+    try:
+        return _hand_over(campaign, folder, count if cases else 0, cases, options)
+    except Problem:
+        if cases == campaign.cases:  # nothing is done that would be lost
+            folder.remove()
+        raise
+
+
+def _hand_over(campaign: Campaign, folder: Folder, count: int, cases: int, options: Sequence[str]) -> Submitted:
+    """Have sbatch take the array, of so many jobs, and the job that merges."""
+    program, tasks = str(shutil.which("sbatch")), folder.path / "jobs.json"
+    logs = folder.path / "logs"
+    logs.mkdir(exist_ok=True)
+    log = str(logs.resolve()).replace("%", "%%")  # as sbatch reads names
+    name = campaign.output.stem
+    common = [program, "--parsable", f"--job-name=met-{name}", *options]
+    array = ""
+    if cases:
+        script = _script(folder.path, "share", '"$SLURM_ARRAY_TASK_ID"', shlex.quote(str(tasks.resolve())))
+        words = [*common, f"--array=0-{count - 1}", f"--output={log}/%A_%a.log"]
+        array = _sbatch(words, script, bool(options))
+    script = _script(folder.path, "together")
+    after = [f"--dependency=afterany:{array}"] if array else []
+    end = _sbatch([*common, *after, f"--output={log}/%A.log"], script, bool(options))
+    return Submitted(array, end, count, cases)
+
+
+def shares(missing: Sequence[Task], count: int) -> list[list[Task]]:
+    """What is missing, cut into stretches and dealt out, so that each job has about as many cases, from everywhere."""
+    whole = sum(task.cases for task in missing)
+    each = max(GRANULE, -(-whole // (count * STRIPES * GRANULE)) * GRANULE)
+    pieces = [Task(task.section, first, min(first + each, task.last)) for task in missing
+              for first in range(task.first, task.last, each)]  # fmt: skip
+    return [pieces[number::count] for number in range(count)]
+
+
+def _script(folder: Path, *words: str) -> str:
+    """The job's script. words: after the folder, as a shell reads them."""
+    exports = [f"export {name}={shlex.quote(value)}" for name, value in interpreter.packages().items()]
+    job = shlex.join(interpreter.command("batch.executors.job", str(folder.absolute())))
+    return "\n".join(["#!/bin/sh", *exports, f"exec {job} {' '.join(words)}", ""])
+
+
+def _sbatch(command: Sequence[str], script: str, more: bool) -> str:
+    """Number of the job. Raises Problem E358 with SLURM's own words."""
+    done = subprocess.run(command, input=script, capture_output=True, text=True)
+    number = re.match(r"\d+", done.stdout.strip())
+    if done.returncode != 0 or number is None:
+        said = (done.stderr or done.stdout).strip().splitlines()
+        words = said[-1] if said else "it said nothing"
+        given = ["what is given by `--sbatch` goes to sbatch as it is"] if more else []
+        helps = [*given, "`met run` runs it on this machine"]
+        raise Problem(error("E358", f"sbatch refuses the job: {words}", help=helps))
+    return number.group()

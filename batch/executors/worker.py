@@ -1,0 +1,93 @@
+"""A worker process: `python -m batch.executors.worker FOLDER --threads N` runs what its parent sends it.
+
+The parent's side is batch/executors/child.py.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from batch.campaigns import tasks
+from batch.campaigns.folder import Folder
+from batch.campaigns.shard import cannot_keep
+from batch.campaigns.tasks import Section, Task
+from batch.executors.child import NO_MEMORY
+from met.diagnostic import Problem
+
+TELL_SECONDS = 0.2
+
+
+class Parent:
+    """The other end of the two pipes."""
+
+    def __init__(self) -> None:
+        self._out = os.dup(sys.stdout.fileno())
+        os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a model prints is no message
+        self.tasks: queue.SimpleQueue[Task] = queue.SimpleQueue()
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def tell(self, **message: Any) -> None:
+        data = json.dumps(message).encode() + b"\n"
+        try:
+            while data:
+                data = data[os.write(self._out, data) :]
+        except OSError:  # nobody listens any more
+            os._exit(0)
+
+    def _listen(self) -> None:
+        """A parent that is gone, killed or not, has closed its end: then there is nobody to work for."""
+        for line in sys.stdin:
+            self.tasks.put(Task(*json.loads(line)["task"]))
+        os._exit(0)
+
+
+def main(arguments: list[str]) -> None:
+    """Run tasks until the parent is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to all; the parent decides
+    folder, threads = Folder(Path(arguments[0])), int(arguments[2])
+    parent = Parent()
+    sections: dict[int, Section] = {}
+    while True:
+        task = parent.tasks.get()
+        try:
+            if task.section not in sections:
+                sections = folder.sections()
+            section = sections[task.section]
+            section.prepared.kernel  # noqa: B018 - compiled here, so that a case's time does not begin before
+            parent.tell(begun=[])
+            done = tasks.carry_out(
+                section, task, folder.shards, threads=threads, progress=_slowly(parent),
+                computed=lambda: parent.tell(computed=[]),  # a slow disk is no case without an end
+            )  # fmt: skip
+            parent.tell(done=[done.seconds, done.failed])
+        except MemoryError:
+            os._exit(NO_MEMORY)
+        except Problem as problem:
+            parent.tell(broken="; ".join(each.message for each in problem.diagnostics))
+        except OSError as reason:
+            parent.tell(broken=cannot_keep(folder.path, reason))
+
+
+def _slowly(parent: Parent) -> Any:
+    last = 0.0
+
+    def tell(done: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last > TELL_SECONDS:
+            last = now
+            parent.tell(progress=done)
+
+    return tell
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,1 @@
+"""Questions to an archive: its cases, requirements and signals, as what shows them needs them."""

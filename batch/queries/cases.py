@@ -1,0 +1,185 @@
+"""The cases of an archive one by one: which failed, which missed a requirement and by how much."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from batch.archive.read import ArchiveFile, Group, Stored
+from batch.queries import ordering, requirements
+from batch.queries.failures import STATUS
+from batch.queries.ordering import By
+from batch.queries.pool import ENDED, Pool
+from batch.queries.signals import deck_unit, number_text, value_text
+from batch.queries.summary import finite
+from met.diagnostic import Problem
+
+SHOWN_CASES = 20
+"""Rows of the table unless all are asked for."""
+
+MISSES = "\N{BALLOT X}"
+
+
+def table(group: Group, most: int | None = SHOWN_CASES, *, by: By | None = None, hint: bool = True) -> list[str]:
+    """The cases as lines, worst first or `by` what is asked for, in the deck's units; a metric that misses a
+    requirement bears a cross.
+
+    most: how many, None for all; hint: whether to say how many are left out.
+    """
+    from ic.printing.columns import columns
+
+    positions = ordering.positions(group, by)
+    left = 0 if most is None else max(0, len(positions) - most)
+    positions = positions[: len(positions) - left]
+    outcomes = requirements.outcomes(group, positions)
+    cells = [["", *(f"#{row}" for row in group.at("case", positions))]]
+    cells.append(["id", *(case_id[:8] for case_id in group.at("case_id", positions))])
+    marks, units = _marks(group, outcomes), ["", ""]
+    if "repeat" in group.variables and group.values("repeat").any():
+        cells.append(["repeat", *map(str, group.at("repeat", positions))])
+        units.append("")
+    for variable in (*group.role("coordinate"), *group.role("metric")):
+        scale, unit = deck_unit(variable)
+        texts = [number_text(value / scale) for value in group.at(variable.name, positions)]
+        name = variable.path
+        if variable.name in marks:
+            missed = marks[variable.name]
+            texts = [f"{text} {MISSES if miss else ' '}" for text, miss in zip(texts, missed, strict=True)]
+            name, unit = f"{name}  ", f"{unit}  "
+        cells.append([name, *texts])
+        units.append(unit)
+    cells.append(["", *map(_outcome, group.at("status", positions), outcomes)])
+    rows = [list(row) for row in zip(*cells, strict=True)]
+    if any(unit.strip() for unit in units):
+        rows.insert(1, [*units, ""])
+    out = columns(rows, right=(0, *range(2, len(cells) - 1)))
+    return [*out, f"  ... {left:,} more; --all-cases prints them"] if left and hint else out
+
+
+def table_across(pool: Pool, by: By, most: int | None = SHOWN_CASES) -> list[str]:
+    """The cases of all structures of a sweep as lines, `by` what is asked for, with what tells the structures apart."""
+    from ic.printing.columns import columns
+
+    places = ordering.across(pool, by)
+    left = 0 if most is None else max(0, len(places) - most)
+    places = places[: len(places) - left]
+    cells = [["", "", *(f"#{case}" for case in pool.cases[places])]]
+    cells.append(["id", "", *(case_id[:8] for case_id in pool.texts("case_id", places))])
+    words = 0
+    for column in pool.columns:
+        values, name, unit = column.values[places], column.label, column.unit
+        if column.role == "choice":
+            words += 1
+            cells.append([name, "", *("" if np.isnan(value) else column.words[int(value)] for value in values)])
+            continue
+        texts = ["" if np.isnan(value) else number_text(value) for value in values]
+        if column.limits:
+            judged = [pool.requirements.index(limit.text) for limit in column.limits]
+            missed = (pool.outcomes[places][:, judged] == 0).any(axis=1)
+            texts = [f"{text} {MISSES if miss else ' '}" for text, miss in zip(texts, missed, strict=True)]
+            name, unit = f"{name}  ", f"{unit}  "
+        cells.append([name, unit, *texts])
+    ended = [ENDED[number] for number in pool.ended[places]]
+    cells.append(["", "", *("" if word == "done" else word for word in ended)])
+    rows = [list(row) for row in zip(*cells, strict=True)]
+    out = columns(rows, right=(0, *range(2 + words, len(cells) - 1)))
+    return [*out, f"  ... {left:,} more; --all-cases prints them"] if left else out
+
+
+def title(group: Group, most: int | None = None, *, by: By | None = None) -> str:
+    """What the order of the table is, or of its beginning."""
+    if (found := ordering.within(group, by)) is not None:
+        return found.title
+    outcomes = requirements.outcomes(group)
+    number = f"{min(most, group.count)} " if most is not None else ""
+    failed = bool((group.values("status") != 0).any())
+    equal = ordering.ranking(group).equal(SHOWN_CASES if most is None else most) if failed or outcomes.shape[1] else 0
+    if failed or (outcomes != 1).any():
+        many = f" ({equal:,} are equally bad)" if equal else ""
+        return f"the {number}worst cases{many}:" if number else f"cases, worst first{many}:"
+    many = f" ({equal:,} are equally close)" if equal else ""
+    near = f"the {number}cases closest to a limit{many}:" if number else f"cases, closest to a limit first{many}:"
+    return near if outcomes.shape[1] else "cases:"
+
+
+def rows_json(
+    group: Group, most: int | None = SHOWN_CASES, *, by: By | None = None,
+    positions: Sequence[int] | np.ndarray | None = None,
+) -> list[dict[str, Any]]:
+    """The same for programs, in SI, of these cases or of the worst: what a case is, how it ended, its metrics (null
+    where not finite), and whether it meets each requirement (null where that is not known)."""
+    positions = ordering.positions(group, by)[:most] if positions is None else np.asarray(positions)
+    numbers = [variable.name for variable in (*group.role("coordinate"), *group.role("metric"))]
+    repeats = {"repeat": group.at("repeat", positions)} if "repeat" in group.variables else {}
+    values = {name: group.at(name, positions) for name in ("case", "case_id", "status", "cause", *numbers)}
+    texts = requirements.texts(group)
+    outcomes = requirements.outcomes(group, positions)
+    return [
+        {
+            "row": int(values["case"][i]),
+            "case_id": str(values["case_id"][i]),
+            **{each: int(found[i]) for each, found in repeats.items()},
+            "status": STATUS.get(int(values["status"][i]), "unknown"),
+            "cause": str(values["cause"][i]),
+            "coordinates": {v.path: finite(float(values[v.name][i])) for v in group.role("coordinate")},
+            "metrics": {v.name: finite(float(values[v.name][i])) for v in group.role("metric")},
+            "met": {text: {1: True, 0: False}.get(int(value)) for text, value in zip(texts, outcomes[i], strict=True)},
+        }
+        for i in range(len(positions))
+    ]
+
+
+def parameters(archive: ArchiveFile, group: Group, position: int) -> dict[str, dict[str, Any]]:
+    """All parameters of a case by path: SI value, unit, and whether it follows from what is varied."""
+    from met.plan import Formula
+
+    experiment = next(e for e in archive.plan().experiments if e.name == group.name)
+    varied = {v.path: float(group.at(v.name, [position])[0]) for v in group.role("coordinate")}
+    outputs = experiment.formulas.replay(varied)
+    out = {}
+    for path, quantity in experiment.parameters.items():
+        follows = isinstance(quantity.value, Formula)
+        value = float(outputs[quantity.value.output]) if isinstance(quantity.value, Formula) else quantity.value
+        out[path] = {"value": value, "unit": quantity.unit, "varies": follows}
+    return out
+
+
+def varied_lines(archive: ArchiveFile, group: Group, position: int) -> list[str]:
+    """What is varied in a case, and every parameter that follows from it."""
+    from ic.printing.columns import columns
+
+    coordinates = group.role("coordinate")
+    if not coordinates:
+        return []
+    rows = [[v.path, value_text(group.at(v.name, [position])[0], v)] for v in coordinates]
+    try:
+        followers = parameters(archive, group, position)
+    except Problem:  # a model of the plan's is not installed here; what was varied is known all the same
+        followers = {}
+    for path, given in followers.items():
+        if given["varies"] and path not in group.variables:
+            plain = Stored(path, (), "", given["unit"], (), "", {})
+            rows.append([path, value_text(given["value"], plain)])
+    out = ["varied, and what follows from it:", *columns(rows)]
+    return [*out, f"  of {len(followers)} parameters; --format json lists them all"] if followers else out
+
+
+# Outcomes
+
+
+def _outcome(status: int, outcomes: np.ndarray) -> str:
+    if status != 0:
+        return STATUS.get(int(status), "failed")
+    if not len(outcomes):
+        return ""
+    return "missed" if (outcomes == 0).any() else "unknown" if (outcomes < 0).any() else "met"
+
+
+def _marks(group: Group, outcomes: np.ndarray) -> dict[str, np.ndarray]:
+    """By metric that has requirements: which of the cases miss one."""
+    out: dict[str, np.ndarray] = {}
+    for each in requirements.required(group):
+        out[each.metric] = out.get(each.metric, False) | (outcomes[:, each.place] == 0)
+    return out

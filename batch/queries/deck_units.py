@@ -1,0 +1,99 @@
+"""In which units a deck's author thinks of a signal: `deg` where the deck wrote `deg`. Archives hold SI."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+
+from batch.archive.read import ArchiveFile, Group
+from batch.queries.signals import Panel
+from met.diagnostic import Place, Problem
+from met.plan import Experiment, Plan
+from met.units import Measure, parse_unit
+
+MOTION = re.compile(r"initial\.|metrics\.|guides?\.|environment\.|(.*\.)?servo\.command\.")
+"""Parameters in whose units a motion is thought of; lengths of links and torques of friction say nothing of it."""
+
+WRITTEN = re.compile(r"[\d.\])]\s*([A-Za-z%][\w*/^()]*)\s*$")
+"""A value's unit, at its end: `30 deg`, `[0, 0, 90] deg`."""
+
+
+class DeckUnits:
+    """By SI unit that of the deck: of a signal what a requirement of it is in, else what most of its values are in.
+
+    experiment  what was run, as the plan has it; None where the plan cannot be read here: units are SI then
+    """
+
+    def __init__(self, archive: ArchiveFile, group: Group) -> None:
+        self.group = group
+        try:
+            plan: Plan | None = archive.plan(as_written=True)
+        except Problem:
+            plan = None
+        found = [] if plan is None else [each for each in plan.experiments if each.name == group.name]
+        self.experiment: Experiment | None = found[0] if found else None
+        self._votes = _votes(self.experiment, plan) if plan is not None and self.experiment is not None else {}
+        self._required = self._of_metrics()
+
+    def panel(self, panel: Panel) -> Panel:
+        """The panel in the deck's unit."""
+        if panel.unit in ("", "1"):
+            return panel
+        required = [*self._required.get(panel.name, ()), *self._required.get(panel.variable, ())]
+        usual = self._votes.get(panel.unit, ())
+        unit = next((each for each in (*required, *usual) if _scale(each, panel.unit)), "")
+        scale = _scale(unit, panel.unit)
+        return replace(panel, unit=unit, scale=scale, in_si=panel.unit) if scale not in (0.0, 1.0) else panel
+
+    def _of_metrics(self) -> dict[str, list[str]]:
+        """By signal the units of requirements of it; a joint's speaks for all of its signal."""
+        out: dict[str, list[str]] = {}
+        if self.experiment is None:
+            return out
+        named = {metric.name: metric.of for metric in self.experiment.structure.metrics}
+        judged = {each.metric for each in self.experiment.requirements}
+        for variable in self.group.role("metric"):
+            of = named.get(variable.path, "")
+            if of and variable.path in judged:
+                for signal in (of, of.rpartition(".")[2]):
+                    out.setdefault(signal, []).append(str(variable.attributes.get("deck_unit", variable.unit)))
+        return out
+
+
+def _votes(experiment: Experiment, plan: Plan) -> dict[str, tuple[str, ...]]:
+    """By SI unit those that the deck wrote values in, the most frequent first; what is zero says nothing."""
+    texts = {source.name: source.text.split("\n") for source in plan.sources}
+    counts: dict[str, Counter[str]] = {}
+    seen: set[tuple[str, Place | None]] = set()
+    for path, quantity in experiment.parameters.items():
+        place = quantity.origin.place
+        if place is None or not MOTION.match(path) or quantity.value == 0.0 or (quantity.unit, place) in seen:
+            continue
+        seen.add((quantity.unit, place))
+        found = WRITTEN.search(_text(place, texts))
+        if found:
+            counts.setdefault(quantity.unit, Counter())[found[1]] += 1
+    return {unit: tuple(each for each, _ in found.most_common()) for unit, found in counts.items()}
+
+
+def _text(place: Place, texts: Mapping[str, list[str]]) -> str:
+    lines = texts.get(place.file, [])
+    line = lines[place.line - 1] if 0 < place.line <= len(lines) else ""
+    return line[place.column - 1 : place.column - 1 + place.length]
+
+
+def _scale(unit: str, si: str) -> float:
+    """How many of an SI unit one of this unit is; 0 where they are of different kinds."""
+    mine, theirs = _measure(unit), _measure(si)
+    if mine is None or theirs is None or mine.dimension != theirs.dimension:
+        return 0.0
+    return mine.scale / theirs.scale
+
+
+def _measure(unit: str) -> Measure | None:
+    try:
+        return parse_unit(unit)
+    except ValueError:
+        return None

@@ -1,0 +1,178 @@
+"""Two numbers that cases differ in, as a grid: how their values are spaced, its levels, whether cases fill it,
+and which case stands for a cell. Pictures and reports take the same from here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from batch.queries.signals import number_text
+from met.distinct import distinct
+from met.frozen import frozen
+
+MOST_LEVELS = 48
+"""Rows and columns of a map; more values share them, in stretches."""
+
+FULL = 0.5
+"""A grid has cases in more than this share of its cells: two parameters that go in step make none."""
+
+
+Scale = Literal["linear", "log", "place"]
+
+EVEN, EVEN_LOG = 0.05, 0.15
+"""How much steps may differ, against their mean, that values are said to rise evenly: 0.33, 0.67, 1 do; and of their
+logarithms: 1, 3, 10 do, 1, 2, 5, 10 do not."""
+
+SPAN, METRIC_SPAN = 100.0, 1000.0
+"""Largest value against the smallest, from which on an axis of points is logarithmic: of a parameter, of a metric."""
+
+
+ROUND = ((1, 2, 5), (1, 3), (1,))
+"""Steps within a power of ten of a logarithmic axis, the densest first."""
+
+
+@frozen
+class Levels:
+    """Where cases lie along a side of a grid.
+
+    values  the different values, rising; of too many the edges of stretches of them, one more than `texts`
+    texts   each level in words
+    places  of each case which level it has; -1 where its value is no number
+    scale   how the levels are spaced; `place`: neither evenly nor by factors, so that all are as wide
+    """
+
+    values: np.ndarray
+    texts: tuple[str, ...]
+    places: np.ndarray
+    scale: Scale
+
+    @property
+    def stretches(self) -> bool:
+        """Whether a level is a stretch of values."""
+        return len(self.values) > len(self.texts)
+
+
+def levels(values: np.ndarray) -> np.ndarray:
+    """The different values that are numbers, rising."""
+    return distinct(values[np.isfinite(values)])
+
+
+def spacing(found: np.ndarray) -> Scale:
+    """How different, rising values follow one another: by equal steps, by equal factors, or neither."""
+    if len(found) < 2:
+        return "place"
+    if _even(found, EVEN):
+        return "linear"
+    return "log" if found[0] > 0.0 and _even(np.log(found), EVEN_LOG) else "place"
+
+
+def is_log(found: np.ndarray) -> bool:
+    """Whether points at these different, rising values lie on a logarithmic axis: they rise by factors, or span so many
+    that the small ones would be one on another."""
+    if len(found) < 3 or found[0] <= 0.0:
+        return False
+    scale = spacing(found)
+    return scale == "log" or (scale == "place" and spans(found, SPAN))
+
+
+def spans(values: np.ndarray, ratio: float) -> bool:
+    """Whether values are all above zero and the largest is so many times the smallest."""
+    finite = values[np.isfinite(values)]
+    low, high = finite.min(initial=np.inf), finite.max(initial=-np.inf)
+    return bool(0.0 < low < np.inf and high / ratio >= low)
+
+
+def levelled(values: np.ndarray, words: Sequence[str] = (), most: int = MOST_LEVELS) -> Levels:
+    """The levels of a column.
+
+    words  of a choice, what its numbers stand for
+    most   so many levels of values that come again and again, as in a grid; samples share MOST_LEVELS at most
+    """
+    found = levels(values)
+    finite = np.isfinite(values)
+    scale: Scale = "place" if words else spacing(found)
+    again = scale != "place" or 2 * len(found) <= int(finite.sum())
+    if not again:
+        most = min(most, MOST_LEVELS)
+    places = np.full(len(values), -1)
+    if len(found) <= most:
+        places[finite] = np.searchsorted(found, values[finite])
+        texts = [words[int(v)] if words else number_text(float(v)) for v in found]
+        return Levels(found, tuple(texts), places, scale)
+    if again:
+        return _neighbours(found, values, most, scale)
+    scale = "log" if is_log(found) else "linear"
+    edges = (np.geomspace if scale == "log" else np.linspace)(found[0], found[-1], most + 1)
+    places[finite] = np.clip(np.searchsorted(edges, values[finite], side="right") - 1, 0, most - 1)
+    texts = [f"{number_text(float(a))} … {number_text(float(b))}" for a, b in pairwise(edges)]
+    return Levels(edges, tuple(texts), places, scale)
+
+
+def _neighbours(found: np.ndarray, values: np.ndarray, most: int, scale: Scale) -> Levels:
+    """Stretches of neighbouring values, as many in each, so that none is empty; they meet half way between values."""
+    stretch = np.arange(len(found)) * most // len(found)
+    first = np.searchsorted(stretch, np.arange(most))
+    last = np.append(first[1:], len(found)) - 1
+    edges = edges_of(found, scale)[np.append(first, len(found))]
+    texts = [number_text(float(a)) if a == b else f"{number_text(float(a))} … {number_text(float(b))}"
+             for a, b in zip(found[first], found[last], strict=True)]  # fmt: skip
+    finite = np.isfinite(values)
+    places = np.full(len(values), -1)
+    places[finite] = stretch[np.searchsorted(found, values[finite])]
+    return Levels(edges, tuple(texts), places, scale)
+
+
+def edges_of(found: np.ndarray, scale: Scale) -> np.ndarray:
+    """Half way between values, and as far beyond the first and the last; of a logarithmic scale by factors."""
+    if scale == "log":
+        return np.asarray(np.exp(edges_of(np.log(found), "linear")))
+    middles = (found[1:] + found[:-1]) / 2
+    return np.concatenate([[1.5 * found[0] - 0.5 * found[1]], middles, [1.5 * found[-1] - 0.5 * found[-2]]])
+
+
+def round_numbers(low: float, high: float, steps: Sequence[int]) -> list[float]:
+    """The numbers from low to high that are one of these, times a power of ten."""
+    powers = range(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
+    found = (float(f"{step}e{power}") for power in powers for step in steps)
+    return [x for x in found if low <= x <= high]
+
+
+def _even(values: np.ndarray, share: float) -> bool:
+    steps = np.diff(values)
+    return bool(np.ptp(steps) <= share * steps.mean())
+
+
+def is_grid(x: np.ndarray, y: np.ndarray) -> bool:
+    """Whether most of the combinations of two parameters' values are among the cases."""
+    good = np.isfinite(x) & np.isfinite(y)
+    x_levels, y_levels = levels(x), levels(y)
+    if len(x_levels) < 2 or len(y_levels) < 2 or len(x_levels) * len(y_levels) > 2 * good.sum():
+        return False
+    cells = np.searchsorted(x_levels, x[good]) * len(y_levels) + np.searchsorted(y_levels, y[good])
+    return len(distinct(cells)) > FULL * len(x_levels) * len(y_levels)
+
+
+def cells_of(across: Levels, up: Levels) -> np.ndarray:
+    """Of each case its cell, counted row by row from the lowest; -1 where it has none."""
+    there = (across.places >= 0) & (up.places >= 0)
+    return np.where(there, up.places * len(across.texts) + across.places, -1)
+
+
+def standing(values: np.ndarray, cells: np.ndarray, count: int, worse: str) -> np.ndarray:
+    """Of each of `count` cells the case that stands for it; -1 where no case of it has a value.
+
+    worse  `<`: a limit is above, and the largest value is the worst; `>`: the smallest is; "": there is no limit, and
+           the middle one stands for them
+    """
+    there = np.flatnonzero((cells >= 0) & ~np.isnan(values))
+    order = there[np.lexsort((-values[there] if worse == ">" else values[there], cells[there]))]
+    first = np.searchsorted(cells[order], np.arange(count))
+    end = np.searchsorted(cells[order], np.arange(count), side="right")
+    place = end - 1 if worse else (first + end - 1) // 2
+    if not len(order):
+        return np.full(count, -1)
+    return np.where(end > first, order[np.clip(place, 0, len(order) - 1)], -1)

@@ -1,0 +1,83 @@
+"""What a signal is held against: requirements, stops of its joint, limits of its servo, as lines of a picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from batch.queries.signals import Panel, number_text, pretty_unit
+from met.frozen import frozen
+from met.plan import Experiment
+
+POINTWISE = {"max": (1.0,), "min": (1.0,), "final": (1.0,), "peak": (1.0, -1.0)}
+"""Metrics in whose unit a signal is, with the signs at which their limit stands; `peak` is of the size."""
+
+LIMITED = {"voltage": "v_max", "current": "i_max", "current_cmd": "i_max", "motor_torque": "tau_max",
+           "load_current": "i_max"}  # fmt: skip
+"""By the last word of a servo's, or a bed's, channel the parameter that it does not exceed, either way."""
+
+
+@frozen
+class Mark:
+    """A limit: what it is called, and where it stands. time: it is an instant, and no value."""
+
+    text: str
+    value: float
+    time: bool = False
+
+
+def limits_of(experiment: Experiment, panel: Panel, line: int) -> tuple[Mark, ...]:
+    """The limits of one line of a panel, in the panel's unit; those that are finite, and the same in all cases."""
+    joint = panel.joints[line]
+    channel = panel.name if panel.name.startswith(f"{joint}.") or not joint else f"{joint}.{panel.name}"
+    stops, servo = _stops(experiment, joint, panel), _servo(experiment, channel, panel)
+    marks = (*_required(experiment, channel, panel), *stops, *servo)
+    return tuple(dict.fromkeys(mark for mark in marks if math.isfinite(mark.value)))
+
+
+def _required(experiment: Experiment, channel: str, panel: Panel) -> Iterator[Mark]:
+    watched = {metric.name: metric for metric in experiment.structure.metrics}
+    for each in experiment.requirements:
+        metric = watched.get(each.metric)
+        if metric is None or metric.of != channel:
+            continue
+        if metric.model == "settling_time":
+            yield Mark(each.text, each.limit, time=True)
+        for sign in POINTWISE.get(metric.model, ()):
+            yield Mark(each.text, sign * each.limit / panel.scale)
+
+
+def _stops(experiment: Experiment, joint: str, panel: Panel) -> Iterator[Mark]:
+    if not joint or panel.variable.rpartition(".")[2] != "q":
+        return
+    for use in experiment.structure.environment:
+        if use.model == "joint_stop" and _number(experiment, f"environment.{use.name}.joint") == joint:
+            for end in ("lower", "upper"):
+                value = _number(experiment, f"environment.{use.name}.{end}")
+                if isinstance(value, float):
+                    yield _mark(f"{use.name}.{end}", value / panel.scale, panel)
+
+
+def _servo(experiment: Experiment, channel: str, panel: Panel) -> Iterator[Mark]:
+    owner, _, member = channel.rpartition(".")
+    if member in LIMITED and owner.rpartition(".")[2] in ("servo", "bed"):
+        value = _number(experiment, f"{owner}.{LIMITED[member]}")
+        if isinstance(value, float):
+            one = _mark(LIMITED[member], value / panel.scale, panel)
+            yield from (one, replace(one, value=-one.value))
+
+
+def _number(experiment: Experiment, path: str) -> float | str | None:
+    """A parameter that no case varies."""
+    found = experiment.parameters.get(path)
+    if found is None:
+        return None
+    if isinstance(found.value, str):
+        return found.value
+    return float(found.value) if isinstance(found.value, (int, float)) else None
+
+
+def _mark(name: str, value: float, panel: Panel) -> Mark:
+    unit = "" if panel.unit in ("", "1") else pretty_unit(panel.unit)
+    return Mark(f"{name} {number_text(value)} {unit}".rstrip(), value)

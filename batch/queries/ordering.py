@@ -1,0 +1,142 @@
+"""In which order cases are listed: worst first, or by metrics and what is varied, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from batch.archive.read import Group
+from batch.queries import requirements
+from batch.queries.pool import Pool, Role, pools
+from met.diagnostic import Problem, did_you_mean, error
+from met.frozen import frozen
+
+REPEAT = "repeat"
+ROLES: tuple[Role, ...] = ("metric", "parameter", "repeat")
+"""Of columns that cases may be listed by."""
+
+
+WAYS = {"smallest": False, "largest": True}
+"""What may be said of a name, `settle:largest`, and whether the largest comes first then."""
+
+
+@frozen
+class By:
+    """A metric's name, a varied parameter's path, or `repeat`; smallest first, unless `largest`. then: by what those
+    are listed that are equal in this."""
+
+    name: str
+    largest: bool = False
+    then: tuple[By, ...] = ()
+
+    @property
+    def keys(self) -> tuple[By, ...]:
+        return (self, *self.then)
+
+    @property
+    def title(self) -> str:
+        words = [f"{key.name}, {'largest' if key.largest else 'smallest'} first" for key in self.keys]
+        return f"cases by {'; then by '.join(words)}:"
+
+
+def by_names(names: Sequence[str], *, reverse: bool = False) -> By | None:
+    """In the order of these names, each `NAME`, `NAME:largest` or `NAME:smallest`; None where there are none. reverse:
+    largest first of all that do not say it themselves. Raises Problem E329."""
+    keys: list[By] = []
+    for each in names:
+        name, colon, way = (each, "", "") if "," in each else each.partition(":")  # `check` tells of several in one
+        if colon and way not in WAYS:
+            helps = f"`--sort {name}:largest`, or `--sort {name}:smallest`"
+            raise Problem(error("E329", f"`{each}` is no order of cases: `{way}` is neither largest nor smallest",
+                                help=helps))  # fmt: skip
+        if name in [key.name for key in keys]:
+            raise Problem(error("E329", f"cases are to be listed by `{name}` twice", help="leave one out"))
+        keys.append(By(name, WAYS[way] if colon else reverse))
+    return _joined(keys)
+
+
+def _joined(keys: Sequence[By]) -> By | None:
+    return By(keys[0].name, keys[0].largest, tuple(keys[1:])) if keys else None
+
+
+def check(groups: Sequence[Group], by: By | None) -> None:
+    """Raises Problem E329 where none of the groups has what cases are to be listed by, or each is of one case."""
+    if by is None:
+        return
+    known = list(dict.fromkeys(name for group in groups for name in _names(group)))
+    for key in by.keys:
+        if key.name not in known:
+            parts = [part.strip() for part in key.name.split(",")]
+            if len(parts) > 1 and all(part.partition(":")[0] in known for part in parts):
+                helps = [f"one name each: `{' '.join(f'--sort {part}' for part in parts)}`"]
+            else:
+                helps = [*did_you_mean(key.name, known), *([f"here: {', '.join(known)}"] if known else [])]
+            raise Problem(error("E329", f"no metric or varied parameter `{key.name}`", help=helps))
+    if all(len(pool.cases) == 1 for pool in pools(groups)):
+        names = " and ".join(f"`{group.name}`" for group in groups)
+        verb = "is" if len(groups) == 1 else "are each"
+        raise Problem(error("E329", f"{names} {verb} one case: there is nothing to list by `{by.name}`",
+                            help="a sweep has several"))  # fmt: skip
+
+
+def positions(group: Group, by: By | None = None) -> np.ndarray:
+    """Positions of the cases, by what is asked for, equal ones and those that have no value, which are last, in the
+    order of the case table; worst first where nothing is asked for, or the group does not have it."""
+    by = within(group, by)
+    if by is None:
+        return worst_first(group)
+    names = _names(group)
+    return _order(by, [np.asarray(group.values(names[key.name]), np.float64) for key in by.keys])
+
+
+def across(pool: Pool, by: By) -> np.ndarray:
+    """The same of the cases of all structures of a sweep, one of which has it: those of others are last."""
+    columns = {column.label: column for column in pool.columns if column.role in ROLES}
+    return _order(by, [columns[key.name].values for key in by.keys])
+
+
+def _order(by: By, values: Sequence[np.ndarray]) -> np.ndarray:
+    """Places by the first of the values, equal ones by the next; not-a-number last in each."""
+    keys = [-each if key.largest else each for key, each in zip(by.keys, values, strict=True)]
+    return np.lexsort(keys[::-1])
+
+
+def within(group: Group, by: By | None) -> By | None:
+    """Of what is asked for what the group has; None where it has none of it."""
+    names = _names(group) if by is not None else {}
+    return _joined([key for key in by.keys if key.name in names]) if by is not None else None
+
+
+def worst_first(group: Group) -> np.ndarray:
+    """Positions of the cases as `ranking` has them."""
+    return ranking(group).order
+
+
+def ranking(group: Group) -> requirements.Ranking:
+    """The cases: failed ones, then those that miss most requirements, then by how far they miss.
+
+    How far is relative to the limit (to the largest value where the limit is 0); a case that meets all requirements
+    stands by how close it comes to one. Without requirements the order is the case table's. Of equal ones those that
+    are far from one another in what is varied come first.
+    """
+    names = [variable.name for variable in group.role("coordinate")]
+    return requirements.ranking(group.values("status"), requirements.outcomes(group), _far(group),
+                                lambda at: [group.values(name)[at] for name in names])  # fmt: skip
+
+
+def _far(group: Group) -> np.ndarray:
+    """How far each case is beyond the limit that it misses most."""
+    worst = np.full(group.count, -np.inf)
+    for each in requirements.required(group):
+        far = requirements.beyond(group.values(each.metric), each.comparison, each.limit)
+        worst = np.maximum(worst, far)
+    return worst
+
+
+def _names(group: Group) -> dict[str, str]:
+    """What cases may be listed by, as users name it: the variable of each."""
+    found = {variable.path: variable.name for variable in (*group.role("metric"), *group.role("coordinate"))}
+    if REPEAT in group.variables and group.values(REPEAT).any():
+        found.setdefault(REPEAT, REPEAT)
+    return found

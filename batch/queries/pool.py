@@ -1,0 +1,212 @@
+"""The cases of a run or sweep in one table, those of all its structures: what they are, and how they came out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from batch.archive.read import Group, Stored
+from batch.queries import requirements
+from batch.queries.failures import STATUS
+from batch.queries.grids import METRIC_SPAN, is_log, levels, spans
+from batch.queries.requirements import Ranking
+from batch.queries.signals import deck_unit, number_text
+from met.distinct import distinct
+from met.frozen import frozen
+from met.run import DONE
+
+Role = Literal["case", "choice", "parameter", "repeat", "metric", "change"]
+Ended = Literal["met", "missed", "unknown", "done", "failed", "timed out", "lost"]
+
+ENDED: tuple[Ended, ...] = ("met", "missed", "unknown", "done", "failed", "timed out", "lost")
+"""How a case came out; its number stands in an array of them. `done`: it reached its end and nothing was required."""
+
+
+@frozen
+class Limit:
+    """A requirement as a line in a plot: its text, its limit in the metric's unit, `<` or `>`."""
+
+    text: str
+    value: float
+    sense: str
+
+
+@frozen
+class Column:
+    """A number a case: a metric, or what it may be drawn against. words: of a choice, what its numbers stand for.
+
+    before  of a metric, what it is in the other archive, where one is compared with; not a number where it has no such
+            case. A column of role "change" holds values less before; its key is that of the metric after "change:"
+    log     whether an axis of its values is logarithmic
+    """
+
+    key: str
+    label: str
+    unit: str
+    role: Role
+    values: np.ndarray
+    words: tuple[str, ...] = ()
+    limits: tuple[Limit, ...] = ()
+    about: str = ""
+    before: np.ndarray | None = None
+    log: bool = False
+
+
+class Pool:
+    """The cases of the groups of one run or sweep, in the order of the case table."""
+
+    def __init__(self, name: str, groups: Sequence[Group]) -> None:
+        self.name, self.groups = name, tuple(groups)
+        numbers = [group.values("case").astype(np.int64) for group in groups]
+        order = np.argsort(np.concatenate(numbers), kind="stable")
+        self.cases = np.concatenate(numbers)[order]
+        """Numbers of the cases in the case table."""
+        self.group_of = np.repeat(np.arange(len(numbers)), [len(each) for each in numbers])[order]
+        self.position_of = np.concatenate([np.arange(len(each)) for each in numbers])[order]
+
+    @property
+    def count(self) -> int:
+        return len(self.cases)
+
+    def gathered(self, name: str, otherwise: float = np.nan) -> np.ndarray:
+        """A variable along `case`, of all groups; `otherwise` where a group lacks it."""
+        out = np.full(self.count, otherwise, np.float64)
+        for number, group in enumerate(self.groups):
+            if name in group.variables:
+                here = self.group_of == number
+                out[here] = group.values(name)[self.position_of[here]]
+        return out
+
+    def texts(self, name: str, places: Sequence[int] | np.ndarray) -> list[str]:
+        """A variable of words in the cases at these places."""
+        out = [""] * len(places)
+        for number, group in enumerate(self.groups):
+            mine = [i for i, place in enumerate(places) if self.group_of[place] == number]
+            if mine and name in group.variables:
+                found = group.at(name, [int(self.position_of[places[i]]) for i in mine])
+                for i, text in zip(mine, found, strict=True):
+                    out[i] = str(text)
+        return out
+
+    @cached_property
+    def status(self) -> np.ndarray:
+        return self.gathered("status", -1.0).astype(np.int64)
+
+    @cached_property
+    def requirements(self) -> tuple[str, ...]:
+        """Texts of the requirements of all groups."""
+        return tuple(dict.fromkeys(text for group in self.groups for text in requirements.texts(group)))
+
+    @cached_property
+    def outcomes(self) -> np.ndarray:
+        """(case, requirement): 1 met, 0 missed, -1 unknown; 1 where a structure does not have the requirement."""
+        out = np.ones((self.count, len(self.requirements)), np.int8)
+        for number, group in enumerate(self.groups):
+            here = self.group_of == number
+            if "met" in group.variables:
+                found = group.values("met")[self.position_of[here]]
+                for column, text in enumerate(requirements.texts(group)):
+                    out[here, self.requirements.index(text)] = found[:, column]
+        return out
+
+    @cached_property
+    def ended(self) -> np.ndarray:
+        """Of each case its place in `content.ENDED`."""
+        out = np.full(self.count, ENDED.index("met" if self.requirements else "done"))
+        out[(self.outcomes < 0).any(axis=1)] = ENDED.index("unknown")
+        out[(self.outcomes == 0).any(axis=1)] = ENDED.index("missed")
+        for status in distinct(self.status).tolist():
+            if status != DONE:
+                word = STATUS.get(status, "failed")
+                out[self.status == status] = next(n for n, each in enumerate(ENDED) if each in (word, "lost"))
+        return out
+
+    @cached_property
+    def limits(self) -> dict[str, tuple[Limit, ...]]:
+        """By metric's variable: its requirements, limits in SI."""
+        out: dict[str, dict[str, Limit]] = {}
+        for group in self.groups:
+            for each in requirements.required(group):
+                out.setdefault(each.metric, {})[each.text] = Limit(each.text, each.limit, each.comparison[:1])
+        return {metric: tuple(found.values()) for metric, found in out.items()}
+
+    @cached_property
+    def ranking(self) -> Ranking:
+        """The cases: failed ones, then those that miss most requirements, then by how far they miss, relative to the
+        limit; as `batch.queries.ordering.ranking` has it of one group."""
+        varied = [column.values for column in self.columns if column.role in ("choice", "parameter")]
+        return requirements.ranking(self.status, self.outcomes, self._far(), lambda at: [each[at] for each in varied])
+
+    @property
+    def worst_first(self) -> np.ndarray:
+        """Places of the cases in that order."""
+        return self.ranking.order
+
+    def _far(self) -> np.ndarray:
+        worst = np.full(self.count, -np.inf)
+        for metric, limits in self.limits.items():
+            values = self.gathered(metric)
+            has = np.isin(self.group_of, [n for n, group in enumerate(self.groups) if metric in group.variables])
+            for limit in limits:
+                far = requirements.beyond(values, limit.sense, limit.value)
+                worst = np.where(has, np.maximum(worst, far), worst)
+        return worst
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """What may be drawn: choices, varied parameters, repeats, metrics; in the deck's units."""
+        out = [self._choice(variable) for variable in self._variables("choice")]
+        out += [self._numbers(variable, "parameter") for variable in self._variables("coordinate")]
+        repeats = self.gathered("repeat", 0.0)
+        if repeats.any():
+            out.append(Column("repeat", "repeat", "", "repeat", repeats))
+        return (*out, *(self._numbers(variable, "metric") for variable in self._variables("metric")))
+
+    def metrics(self) -> tuple[Column, ...]:
+        return tuple(column for column in self.columns if column.role == "metric")
+
+    def varied(self) -> tuple[Column, ...]:
+        """What tells the cases apart, that with most values first."""
+        return tuple(sorted(
+            (c for c in self.columns if c.role != "metric" and len(levels(c.values)) > 1),
+            key=lambda c: (c.role == "choice", -len(levels(c.values))),
+        ))  # fmt: skip
+
+    def _variables(self, role: str) -> list[Stored]:
+        """Of all groups, by name."""
+        return list({v.name: v for group in reversed(self.groups) for v in group.role(role)}.values())
+
+    def _numbers(self, variable: Stored, role: Role) -> Column:
+        scale, unit = deck_unit(variable)
+        limits = tuple(Limit(each.text, each.value / scale, each.sense) for each in self.limits.get(variable.name, ()))
+        values = self.gathered(variable.name) / scale
+        return Column(
+            f"{role}:{variable.name}", variable.path, unit, role, values, (), limits, variable.long_name,
+            log=is_log(levels(values)) if role == "parameter" else spans(values, METRIC_SPAN),
+        )  # fmt: skip
+
+    def _choice(self, variable: Stored) -> Column:
+        """Its values number the words, in the order in which groups have them."""
+        words: dict[str, int] = {}
+        values = np.full(self.count, np.nan)
+        for number, group in enumerate(self.groups):
+            if variable.name in group.variables and group.count:
+                word = str(group.at(variable.name, [0])[0])
+                values[self.group_of == number] = words.setdefault(word, len(words))
+        return Column(f"choice:{variable.name}", variable.path, "", "choice", values, tuple(words))
+
+
+def shown(value: float) -> str:
+    """A number as a page shows it."""
+    if np.isnan(value):
+        return "–"
+    return number_text(value).replace("inf", "∞")
+
+
+def pools(groups: Sequence[Group]) -> list[Pool]:
+    """A pool for each run or sweep among the groups."""
+    names = list(dict.fromkeys(group.sweep or group.name for group in groups))
+    return [Pool(name, [g for g in groups if (g.sweep or g.name) == name]) for name in names]

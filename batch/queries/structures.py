@@ -1,0 +1,52 @@
+"""A sweep of several structures in one table: what each is, how its cases went, its metrics side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from batch.archive.read import ArchiveFile, Group
+from batch.queries.signals import deck_unit
+from batch.queries.summary import Summary, median_text, summary_of
+
+
+def structures(archive: ArchiveFile) -> Iterator[list[str]]:
+    """The table of each sweep that has several structures, under its name and how all of its cases went."""
+    for sweep in dict.fromkeys(group.sweep for group in archive.groups if group.sweep):
+        groups = [group for group in archive.groups if group.sweep == sweep]
+        if len(groups) > 1:
+            yield [*_all_of(sweep, [summary_of(group) for group in groups]), *_table(groups)]
+
+
+def _all_of(sweep: str, summaries: Sequence[Summary]) -> list[str]:
+    """How the sweep went as a whole: how many cases reached their end, and met each requirement."""
+    cases, failed = (sum(getattr(each, name) for each in summaries) for name in ("cases", "failed"))
+    out = [f"{sweep}: {cases - failed:,} of {cases:,} cases reached their end, of {len(summaries)} structures"]
+    texts = list(dict.fromkeys(r.text for each in summaries for r in each.requirements))
+    wide = max(map(len, texts), default=0)
+    for text in texts:
+        found = [(each.cases, r.met) for each in summaries for r in each.requirements if r.text == text]
+        of, met = map(sum, zip(*found, strict=True))
+        out.append(f"  require {text:<{wide}}  met by {met:,} of {of:,} ({100 * met / of:.3g} %)")
+    return out
+
+
+def _table(groups: Sequence[Group]) -> list[str]:
+    """A row a structure: its name, cases, how many meet all, and the median of each metric, in the deck's unit."""
+    from ic.printing.columns import columns
+
+    metrics = list(dict.fromkeys(variable.name for group in groups for variable in group.role("metric")))
+    judged = any("met" in group.variables for group in groups)
+    units = {v.name: deck_unit(v)[1] for group in reversed(groups) for v in group.role("metric")}
+    head = ["", "cases", *(["meet all"] if judged else []), *metrics]
+    rows = [head]
+    if metrics:
+        rows.append(["median of the cases:", "", *([""] if judged else []), *(units[name] for name in metrics)])
+    for group in groups:
+        met = group.values("met") if "met" in group.variables else np.ones((group.count, 0), np.int8)
+        whole = [str(int((met == 1).all(axis=1).sum()))] if judged else []
+        scales = {variable.name: deck_unit(variable)[0] for variable in group.role("metric")}
+        cells = [median_text(group.values(name) / scales[name]) if name in scales else "" for name in metrics]
+        rows.append([group.name, str(group.count), *whole, *cells])
+    return ["", *columns(rows, right=range(1, len(head)))]

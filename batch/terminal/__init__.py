@@ -1,0 +1,1 @@
+"""What `met run`, `show`, `profile` and `margin` say in a terminal."""

@@ -1,0 +1,291 @@
+"""`met show`: an archive in a terminal. What was run, how it went, and its signals."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+from batch.archive.read import ArchiveFile, Group
+from batch.campaigns.output import quoted
+from batch.queries import cases, ordering
+from batch.queries.deck_units import DeckUnits
+from batch.queries.failures import failure_lines
+from batch.queries.ordering import By
+from batch.queries.pool import pools
+from batch.queries.signals import case_text, history, number_text, panels, pretty_unit
+from batch.queries.structures import structures
+from batch.queries.summary import MetricSummary, Summary, summary_of
+from batch.terminal import braille
+from ic.printing.columns import size as size_text
+from met.diagnostic import Problem, error
+from met.distinct import distinct
+from met.visible import line
+
+MOST_GROUPS = 4
+"""So many structures of a sweep are shown in full unless they are named; of more, their table alone."""
+
+NARROWEST = 40
+"""Characters of a line beside a name, however long that is."""
+
+PLOTS = 4
+"""Signals that are drawn unless some are asked for."""
+
+
+def show(
+    archive: ArchiveFile,
+    signals: Sequence[str] = (),
+    *,
+    experiments: Sequence[str] = (),
+    case: str | None = None,
+    all_cases: bool = False,
+    by: By | None = None,
+    width: int = 100,
+    colour: bool = False,
+    plots: bool = True,
+) -> str:
+    """The whole text: of all cases with their table, worst first or `by` what is asked for, or all about one `case`.
+
+    By something, the cases of all structures of a sweep are in one table.
+
+    A plot is of one case, the first recorded unless `case` names another; under the table of all cases there is none
+    unless `signals` are asked for.
+    """
+    out = _Lines()
+    out += [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
+    shown = picked(archive, experiments, case)
+    ordering.check([group for group, _ in shown], by)
+    if not experiments and case is None and not signals:
+        out += [row for table in structures(archive) for row in ("", *table)]
+        counts = Counter(group.sweep for group, _ in shown if group.sweep)
+        hidden = [group.name for group, _ in shown if counts[group.sweep] > MOST_GROUPS and not all_cases]
+        if hidden and by is None:
+            remedy = f"`met show {quoted(archive.path)} --run {hidden[0]}`"
+            out += ["", f"one structure in full: {remedy}; the cases of all: `--all-cases`"]
+            shown = [each for each in shown if each[0].name not in hidden]
+    if by is not None:
+        for pool in pools([group for group, _ in shown]):
+            if len(pool.groups) > 1:
+                most = None if all_cases else cases.SHOWN_CASES
+                out += ["", f"{pool.name}, {by.title}", *cases.table_across(pool, by, most)]
+                shown = [each for each in shown if signals or each[0] not in pool.groups]
+    for group, position in shown:
+        out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, by, width), ""]
+        if plots and (signals or position is not None or not all_cases):
+            out.drawn(_plots(archive, group, signals, position, width, colour))
+        elif signals:
+            panels(group, signals)  # a name that is none is told, drawn or not
+    return "\n".join(out.lines).rstrip() + "\n"
+
+
+class _Lines:
+    """Lines of text, visible, among them drawings, which are so already and may have colours."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def __iadd__(self, lines: Sequence[str]) -> _Lines:
+        self.lines += map(line, lines)
+        return self
+
+    def drawn(self, lines: Sequence[str]) -> None:
+        self.lines += lines
+
+
+def _about(
+    archive: ArchiveFile, group: Group, position: int | None, all_cases: bool, by: By | None, width: int
+) -> list[str]:
+    """How the cases went, and which of them how; or one case: how it went, and what was varied in it."""
+    if position is not None:
+        varied = cases.varied_lines(archive, group, position)
+        name = [case_text(group, position, varied=False)] if group.count > 1 else []
+        return [*name, *verdict(summary_of(group, position), width), *([""] if varied else []), *varied]
+    out = verdict(summary_of(group), width)
+    if group.count > 1:
+        most = None if all_cases else cases.SHOWN_CASES
+        out += ["", cases.title(group, by=by), *cases.table(group, most, by=by)]
+    return out
+
+
+def as_json(
+    archive: ArchiveFile, experiments: Sequence[str] = (), *, case: str | None = None, all_cases: bool = False,
+    by: By | None = None,
+) -> str:
+    """The same for programs: outcome, cases, variables and attributes, without the signals' values.
+
+    `case_table` holds the cases as `show` lists them, the first of many unless `all_cases`; where one `case` is asked
+    for, the outcome is its own, and `case` holds it with all its parameters.
+    """
+    import json
+
+    from batch.queries import summary as outcomes
+
+    groups = []
+    shown = picked(archive, experiments, case)
+    ordering.check([group for group, _ in shown], by)
+    for group, position in shown:
+        if position is None:
+            said: dict[str, Any] = {
+                "case_table": cases.rows_json(group, None if all_cases else cases.SHOWN_CASES, by=by)
+            }  # fmt: skip
+        else:
+            [about] = cases.rows_json(group, positions=[position])
+            said = {"case": {**about, "parameters": outcomes.finite(cases.parameters(archive, group, position))}}
+        variables = [{"name": v.name, "role": v.role, "dims": v.dims, "unit": v.unit} for v in group.variables.values()]
+        groups.append({
+            **outcomes.as_json(summary_of(group, position)), **said, "attributes": outcomes.finite(group.attributes),
+            "variables": variables,
+        })  # fmt: skip
+    provenance = outcomes.finite(archive.provenance)
+    data = {"archive": str(archive.path), "deck": archive.deck, "provenance": provenance, "experiments": groups}
+    return json.dumps(data, indent=1, allow_nan=False)
+
+
+def chosen(archive: ArchiveFile, names: Sequence[str]) -> tuple[Group, ...]:
+    """The experiments of these names, all where none is given."""
+    known = [*dict.fromkeys(group.sweep or group.name for group in archive.groups)]
+    for name in names:
+        if all(name not in (group.name, group.sweep) for group in archive.groups):
+            helps = f"in it: {', '.join(known)}"
+            raise Problem(error("E325", f"no run or sweep `{name}` in {archive.path}", help=helps))
+    found = [group for name in names for group in archive.groups if name in (group.name, group.sweep)]
+    return tuple(dict.fromkeys(found)) if names else archive.groups
+
+
+def picked(archive: ArchiveFile, names: Sequence[str], case: str | None) -> list[tuple[Group, int | None]]:
+    """The experiments of these names; where a case is asked for, those that have it, and its position in each."""
+    groups = chosen(archive, names)
+    if case is None:
+        return [(group, None) for group in groups]
+    found: list[tuple[Group, int | None]] = []
+    problems = []
+    for group in groups:
+        try:
+            found.append((group, group.find_case(case)))
+        except Problem as problem:
+            problems.append(problem)
+    if not found:
+        raise Problem([d for problem in problems for d in problem.diagnostics])
+    return found
+
+
+def heading(group: Group, width: int) -> list[str]:
+    """What was run."""
+    a = group.attributes
+    count = f"{group.count:,} case{'s' if group.count != 1 else ''}"
+    if group.count < a["cases_in_table"]:
+        count += f" of {a['cases_in_table']:,}"
+    text = (
+        f"{count}, {a['duration_s']:g} s, {a['integrator']} at {a['dynamics_hz']:g} Hz, recorded at "
+        f"{a['record_hz']:g} Hz, arm {a['arm']}, velocity products {a['velocity_products']}"
+    )
+    indent = len(group.name) + 2
+    if width - indent < NARROWEST:  # a name that leaves no room stands on a line of its own
+        lines = ["", *textwrap.wrap(text, max(NARROWEST, width - (indent := 4)))]
+    else:
+        lines = textwrap.wrap(text, width - indent)
+    out = [f"{group.name}  {lines[0]}".rstrip(), *(" " * indent + rest for rest in lines[1:])]
+    for variable in group.role("choice"):
+        out.append(f"  {variable.path} = {group.at(variable.name, [0])[0]}")
+    for variable in group.role("coordinate"):
+        scale = float(variable.attributes.get("deck_scale", 1.0))
+        unit = pretty_unit(str(variable.attributes.get("deck_unit", variable.unit)))
+        values = distinct(group.values(variable.name)) / scale
+        few = ", ".join(number_text(value) for value in values[:6]) if len(values) <= 6 else ""
+        many = f"{len(values)} values from {number_text(values[0])} to {number_text(values[-1])}"
+        out.append(f"  {variable.name} = {few or many} {unit}".removesuffix(" 1"))
+    return out
+
+
+def verdict(summary: Summary, width: int) -> list[str]:
+    """How it went: cases, metrics, requirements."""
+    out = [_counts(summary)]
+    out += failure_lines(summary.failures, width)
+    if summary.limited:
+        of = "" if summary.cases == 1 else f" in {summary.limited:,} of {summary.cases:,} cases"
+        out.append(f"  note: the load motor of a bed was at its limit{of}: the run is not what the joint would do")
+        out.append("  what gives it more: `i_max` and `kt_load` of the bed; what asks less: the arm, or its command")
+    if summary.metrics:
+        out += _metric_table(summary)
+    wide = max((len(r.text) for r in summary.requirements), default=0)
+    for r in summary.requirements:
+        if summary.cases == 1:
+            why = "its metric has no value here" if r.no_value else "the case failed"
+            said = "met" if r.met else "missed" if r.missed else f"not known: {why}"
+        else:
+            said = f"met by {r.met:,} of {summary.cases:,} ({100 * r.met / summary.cases:.3g} %)"
+            said += f", not known of {r.unknown:,}" if r.unknown else ""
+            said += f" (its metric has no value in {r.no_value:,})" if r.no_value else ""
+        out.append(f"  require {r.text:<{wide}}  {said}")
+    return out
+
+
+def _counts(summary: Summary) -> str:
+    if summary.cases == 1:
+        return "the case failed" if summary.failed else "the case reached its end"
+    done = summary.cases - summary.failed
+    return f"{done:,} of {summary.cases:,} cases reached their end" + (
+        f", {summary.failed:,} failed" if summary.failed else ""
+    )
+
+
+def _metric_table(summary: Summary) -> list[str]:
+    single = summary.cases == 1
+    head = ("", "", "") if single else ("min", "median", "max")
+    rows = [("", *(head[:1] if single else head), "", "")]
+    for metric in summary.metrics:
+        unit = "" if metric.deck_unit == "1" else pretty_unit(metric.deck_unit)
+        rows.append((metric.name, *_metric_numbers(metric, single), unit, _metric_words(metric, single)))
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    out = []
+    for row in rows[1:] if single else rows:
+        numbers = "  ".join(f"{text:>{wide}}" for text, wide in zip(row[1:-2], widths[1:-2], strict=True))
+        out.append(f"  {row[0]:<{widths[0]}}  {numbers} {row[-2]:<{widths[-2]}}  {row[-1]}".rstrip())
+    return out
+
+
+def _metric_numbers(metric: MetricSummary, single: bool) -> tuple[str, ...]:
+    """Of the finite values; `_metric_words` says how many others there are."""
+    if single:
+        return ("inf" if metric.infinite else _text(metric.median, metric),)
+    return tuple(_text(value, metric) for value in (metric.minimum, metric.median, metric.maximum))
+
+
+def _text(value: float, metric: MetricSummary) -> str:
+    return "-" if math.isnan(value) else number_text(value / metric.deck_scale)
+
+
+def _metric_words(metric: MetricSummary, single: bool) -> str:
+    words = metric.about
+    if metric.infinite and not single:
+        words += f"; infinite in {metric.infinite:,}"
+    return words
+
+
+def _plots(
+    archive: ArchiveFile, group: Group, signals: Sequence[str], case: int | None, width: int, colour: bool
+) -> list[str]:
+    if not group.recorded:
+        if signals:
+            panels(group, signals)  # says that there are none
+        return ["no histories kept"]
+    position = int(group.recorded_positions[0]) if case is None else case
+    if position not in group.recorded_positions:
+        remedy = f"`met run {quoted(group.path)} --case '#{group.values('case')[position]}'` runs it again"
+        return [line(f"its history was not kept: {remedy}")]
+    units = DeckUnits(archive, group)
+    wanted = [units.panel(each) for each in panels(group, signals)]
+    drawn = wanted if signals else wanted[:PLOTS]
+    out = [line(case_text(group, position))] if group.count > 1 and case is None else []
+    time = group.values("time")
+    for panel in drawn:
+        values = history(group, panel, position)
+        about = f"  {panel.about}" if panel.about else ""
+        plot = braille.draw(time, list(values.T), panel.lines, title=f"{panel.axis}{about}", width=width, colour=colour)
+        out += [*plot, ""]
+    if len(drawn) < len(wanted):
+        rest = dict.fromkeys(panel.name for panel in wanted[len(drawn) :])
+        out.append(line(f"also recorded: {', '.join(rest)}"))
+    return out

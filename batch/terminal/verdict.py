@@ -1,0 +1,185 @@
+"""What `met run` says: what will be run and kept before, what came of it and where it is after."""
+
+from __future__ import annotations
+
+import json as json_module
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from batch.archive.read import ArchiveFile
+from batch.campaigns.campaign import Campaign, Part
+from batch.campaigns.output import quoted
+from batch.queries.failures import failure_lines
+from batch.queries.summary import Summary, as_json
+from batch.terminal.progress import duration
+from batch.terminal.show import verdict
+from ic.printing.columns import size as size_text
+from met.frozen import frozen
+
+if TYPE_CHECKING:
+    from batch import Archive
+    from batch.export import Exported
+
+WORST = 3
+"""Cases of a sweep that the verdict names."""
+
+MOST_GROUPS = 4
+"""Structures of a sweep that are told of in full; of more, the table alone, and what failed."""
+
+
+# What is said before
+
+
+def announcement(campaign: Campaign, verbose: bool = False, *, notes: bool = False) -> list[str]:
+    """What will run, and what will be kept. notes: those of the plan as well, which `met plan` prints."""
+    out = []
+    for part in campaign.parts:
+        out += _part_lines(part, verbose)
+        out += [f"  note: {note}" for note in part.experiment.notes] if notes else []
+    if campaign.keep.failed:
+        each = max(part.experiment.structure.history_bytes // (2 if part.single else 1) for part in campaign.parts)
+        out.append(f"and those of cases that fail: {size_text(each)} a case more")
+    out += [f"note: {note}" for note in campaign.notes]
+    return out
+
+
+def writing(campaign: Campaign) -> str:
+    """Where the archive will be, and how large: said once there is a kernel to fill it."""
+    instead = ", in place of the one that is there" if campaign.output.exists() else ""
+    return f"writing {campaign.output}, about {size_text(campaign.bytes)}{instead}"
+
+
+def _part_lines(part: Part, verbose: bool) -> list[str]:
+    experiment = part.experiment
+    schedule = experiment.structure.schedule
+    count, whole = len(part.rows), experiment.cases.count
+    cases = f"{count:,} case{'s' if count != 1 else ''}" + (f" of {whole:,}" if count < whole else "")
+    if count == 1 and whole > 1:
+        of = f"`{experiment.sweep}`" if experiment.sweep else f"{whole:,}"
+        cases = f"case #{experiment.cases.table[part.rows[0]]} of {of}"
+    steps = schedule.ticks // schedule.dynamics
+    out = [
+        f"{experiment.name}: {cases}, {schedule.duration:g} s in {steps:,} steps of {1e3 * schedule.step:g} ms, "
+        f"{experiment.structure.integrator}"
+    ]
+    recorded = ", ".join(recorded.name for recorded in experiment.structure.record)
+    if part.recorded:
+        each = size_text(experiment.structure.history_bytes // (2 if part.single else 1))
+        of = "" if part.all_recorded else f" of {part.recorded:,} cases" + (" at most" if part.later else "")
+        out.append(f"  histories{of}: {recorded}; {schedule.rows:,} rows, {each} a case")
+    else:
+        out.append("  histories: none" + (f" (would be {recorded})" if recorded else ""))
+    for coordinate in experiment.cases.coordinates if verbose else ():
+        out.append(f"  varied: {coordinate.path} ({', '.join(coordinate.sets)})")
+    return out
+
+
+# What is said after
+
+
+@frozen
+class Worst:
+    """The worst cases of a sweep: as lines, for programs, and the row of the first."""
+
+    lines: tuple[str, ...] = ()
+    rows: tuple[dict[str, Any], ...] = ()
+
+    @property
+    def first(self) -> str:
+        return f"#{self.rows[0]['row']}"
+
+
+def worst_cases(archive: ArchiveFile) -> tuple[Worst, ...]:
+    """Of every experiment; none where there is one case, or nothing by which one would be worse than another."""
+    from batch.queries import cases
+
+    out = []
+    for group in archive.groups:
+        rows = tuple(cases.rows_json(group, WORST))
+        judged = any(row["met"] or row["status"] != "done" for row in rows)
+        lines = (cases.title(group, WORST), *cases.table(group, WORST, hint=False)) if judged else ()
+        out.append(Worst(lines, rows if judged else ()) if group.count > 1 else Worst())
+    return tuple(out)
+
+
+def told(
+    source: str, campaign: Campaign, summaries: tuple[Summary, ...], worst: tuple[Worst, ...], picture: Path | None,
+    excuse: str, exported: Exported | None, seconds: Mapping[str, float], ok: bool, tables: Sequence[Sequence[str]],
+) -> list[str]:  # fmt: skip
+    """The verdict, and where everything is. seconds: by experiment; tables: of sweeps of several structures."""
+    out: list[str] = []
+    many = {s.sweep for s in summaries if sum(s.sweep == other.sweep for other in summaries) > MOST_GROUPS} - {""}
+    for summary, cases in zip(summaries, worst, strict=True):
+        lines = verdict(summary, 100)
+        if summary.sweep in many:
+            if summary.failed:
+                out += ["", f"{summary.name}: {lines[0]}", *failure_lines(summary.failures, 100)]
+            continue
+        name = f"{summary.name}: " if len(summaries) > 1 else ""
+        took = f", {duration(seconds[summary.name])} of computing" if summary.name in seconds else ""
+        out += ["", f"{name}{lines[0]}{took}", *lines[1:]]
+        out += ["", *cases.lines] if cases.lines else []
+    out += [line for table in tables for line in ("", *table)]
+    path = campaign.output
+    out += ["", f"archive  {path}  ({size_text(path.stat().st_size)})"]
+    if picture is not None:
+        names = list(dict.fromkeys(summary.sweep or summary.name for summary in summaries))
+        out.append(f"picture  {picture}")
+        if len(names) > 1:
+            out[-1] += f", of {names[0]} alone: `met plot {quoted(path)} --run {quoted(names[1])}` draws another"
+    elif excuse:
+        out.append(f"picture  none: {excuse}")
+    if exported is not None:
+        out.append(f"export   {exported.path}  ({size_text(exported.path.stat().st_size)})")
+    out.append(f"next     met show {quoted(path)}")
+    for summary, cases in zip(summaries, worst, strict=True):
+        if cases.rows and summary.sweep not in many:
+            only = f" --run {quoted(summary.name)}" if len(summaries) > 1 else ""
+            out.append(f"         met show {quoted(path)}{only} --case '{cases.first}'")
+    if not any(summary.recorded for summary in summaries) and campaign.parts[0].experiment.structure.record:
+        part = campaign.parts[0]
+        first = part.experiment.cases.table[part.rows[0]]
+        out.append(f"         met run {quoted(source)} {part.experiment.asked} --case '#{first}'")
+    if not ok:
+        out.append(f"exit 1: {_why_not(summaries)}")
+    return out
+
+
+def _why_not(summaries: tuple[Summary, ...]) -> str:
+    failed = sum(summary.failed for summary in summaries)
+    missed = [r for summary in summaries for r in summary.requirements if r.met < summary.cases]
+    parts = [f"{failed:,} case{'s' if failed != 1 else ''} failed"] if failed else []
+    if missed:
+        parts.append("not met everywhere: " + ", ".join(dict.fromkeys(r.text for r in missed)))
+    return "; ".join(parts)
+
+
+def brief(archive: Archive) -> list[str]:
+    """The verdict of an archive alone: for the log of a job."""
+    out: list[str] = []
+    for summary in archive.summaries:
+        name = f"{summary.name}: " if len(archive.summaries) > 1 else ""
+        lines = verdict(summary, 100)
+        out += ["", f"{name}{lines[0]}", *lines[1:]]
+    out += ["", f"archive  {archive.path}  ({size_text(archive.path.stat().st_size)})"]
+    return out if archive.ok else [*out, f"exit 1: {_why_not(archive.summaries)}"]
+
+
+def verdict_json(
+    campaign: Campaign, summaries: tuple[Summary, ...], worst: tuple[Worst, ...], picture: Path | None,
+    exported: Exported | None, seconds: Mapping[str, float], notes: Sequence[str], ok: bool,
+) -> str:  # fmt: skip
+    """The verdict for programs."""
+    data = {
+        "ok": ok,
+        "archive": str(campaign.output),
+        "picture": None if picture is None else str(picture),
+        "export": None if exported is None else str(exported.path),
+        "notes": [*campaign.notes, *notes],
+        "experiments": [
+            {**as_json(summary), "worst": list(cases.rows), "seconds": seconds.get(summary.name)}
+            for summary, cases in zip(summaries, worst, strict=True)
+        ],
+    }
+    return json_module.dumps(data, indent=1)
