@@ -128,7 +128,7 @@ def _plan(given: object) -> Plan:
         raise TypeError(f"batch.run takes a plan, as ic.compile gives it, and not {type(given).__name__}")
     if Path(given).suffix != ".json":
         raise TypeError(f"batch.run takes a plan, and {os.fspath(given)!r} is none: batch.run(ic.compile({given!r}))")
-    from met import plan_file
+    from met.plan import file as plan_file
 
     return plan_file.read(given)
 

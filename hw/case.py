@@ -20,17 +20,17 @@ from hw.driven import LANES, Driven, divisor, substituted
 from hw.pace import Pace, pace
 from hw.ports import Port, opened
 from hw.writer import recording
-from met import plan_file
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.keys import case_seeds
 from met.plan import SEED, Experiment, Formula
+from met.plan import file as plan_file
+from met.plan.keys import case_seeds
 from met.run import prepare
 
 
 @frozen
 class Asked:
-    """plan: of one experiment, as text (met.plan_file);  row: of its case table
+    """plan: of one experiment, as text (met.plan.file);  row: of its case table
     ports: by joint;  lock_step: whether the beds have no time of their own;  baud: of serial lines
     records: the file that they go to;  head: what else stands at its beginning;  rest: s of rest before the case
     transcripts: by joint, files that what goes over the line is written to

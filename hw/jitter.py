@@ -21,14 +21,14 @@ from hw.pace import Pace
 from hw.ports import Port, opened
 from hw.records import ANSWERED, LAYOUT
 from hw.timing import Timing, spread, stops, timing
-from met import plan_file
 from met.diagnostic import Problem, error
 from met.frozen import frozen
+from met.plan import file as plan_file
 
 
 @frozen
 class Asked:
-    """port, baud: where the bed is;  plan, joint: of a simulated one: an experiment, as text (met.plan_file)
+    """port, baud: where the bed is;  plan, joint: of a simulated one: an experiment, as text (met.plan.file)
     hz: exchanges a second, 1 a joint each time;  seconds: for so long;  joints: as many as if there were
     """
 

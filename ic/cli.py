@@ -61,7 +61,7 @@ def check(
 def _check_plan(path: str, form: str, quiet: bool) -> int:
     """The same for a plan file. Raises Problem where it cannot be read."""
     from ic.printing.check import verdict
-    from met import plan_file
+    from met.plan import file as plan_file
 
     made = plan_file.read(path)
     if form == "json":
@@ -96,7 +96,7 @@ def plan(
     The arm as a tree, rates and steps, channels, cases, sizes; of the runs and sweeps NAME, or else of the only one or
     the default.
     """
-    from met import plan_file
+    from met.plan import file as plan_file
 
     check_options(deck, names, everything, defines, include_dirs, settings)
     made = _plan(deck, include_dirs, defines, settings, names, everything, quiet)
@@ -312,8 +312,8 @@ def _plan_in_file(path: str, names: tuple[str, ...]) -> Plan:
     from dataclasses import replace
 
     from ic.meaning.complaints import known_words
-    from met import plan_file
     from met.diagnostic import error
+    from met.plan import file as plan_file
 
     made = plan_file.read(path)
     known = {experiment.name: experiment for experiment in made.experiments}

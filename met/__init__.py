@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-_HOMES = {"case_ids": "met.keys", "case_keys": "met.keys", "structure_key": "met.keys", "Problem": "met.diagnostic"}
+_KEYS = dict.fromkeys(("case_ids", "case_keys", "structure_key"), "met.plan.keys")
+_HOMES = {**_KEYS, "Problem": "met.diagnostic"}
 
 
 def __getattr__(name: str) -> Any:

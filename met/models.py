@@ -156,7 +156,7 @@ def available(kind: Kind) -> dict[str, Any]:
 
 def _check_names(kind: Kind, model: Any, found_at: str) -> None:
     """What a model holds and shows is recorded under its name, so names are apart, and from those of the engine."""
-    from met.channel import OF_BED, OF_LAW, OF_OBSERVER
+    from met.plan.channel import OF_BED, OF_LAW, OF_OBSERVER
 
     own = {"bed": OF_BED, "law": OF_LAW + OF_OBSERVER}.get(kind, ())
     taken = [name for name, *_ in own] or ["command"]

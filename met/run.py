@@ -10,10 +10,10 @@ from functools import cached_property
 
 import numpy as np
 
-from met import backends, keys, models
+from met import backends, models
 from met.backends.backend import Kernel
 from met.frozen import frozen
-from met.plan import REPEAT, Experiment
+from met.plan import REPEAT, Experiment, keys
 from met.program.build import COORDINATE, METRIC, OUTPUTS, build
 from met.program.step import ASTRAY, EVENTS, NOT_FINITE, SINGULAR
 from met.program.substituted import LIMITED

@@ -32,10 +32,10 @@ from typing import Any, Literal
 import numpy as np
 
 from batch.archive import limits
-from met.channel import DIMENSIONS, channels
 from met.frozen import frozen
-from met.outputs import metric_units
 from met.plan import Coordinate, Experiment, Plan, Recorded
+from met.plan.channel import DIMENSIONS, channels
+from met.plan.outputs import metric_units
 
 SCHEMA = "met.archive"
 VERSION = 1
@@ -306,7 +306,7 @@ def _signal_unit(recorded: Recorded) -> tuple[str, dict[str, Any]]:
 
 
 def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, Any]:
-    from met import keys
+    from met.plan import keys
 
     structure, schedule = experiment.structure, experiment.structure.schedule
     named = ("coordinate", "choice", "recorded")

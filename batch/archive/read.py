@@ -290,9 +290,9 @@ class ArchiveFile:
             return dict(zip(names.tolist(), texts.tolist(), strict=True))
 
     def plan(self, *, as_written: bool = False) -> Plan:
-        """The plan that was run, whole. as_written: to be looked at, not run (met.plan_file.loads)."""
-        from met import plan_file
-        from met.plan_codec import Damaged
+        """The plan that was run, whole. as_written: to be looked at, not run (met.plan.file.loads)."""
+        from met.plan import file as plan_file
+        from met.plan.codec import Damaged
 
         def fetch(reference: dict[str, Any]) -> np.ndarray:
             table = np.asarray(node[reference["file"]][...], dtype="<f8")

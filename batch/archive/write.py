@@ -20,9 +20,10 @@ from batch.archive.hdf5 import LIBVER, h5py
 from batch.archive.layout import Layout, Variable
 from batch.archive.provenance import Revision, version
 from batch.archive.sink import Sink
-from met import backends, keys, models, plan_file
+from met import backends, models
 from met.frozen import frozen
-from met.plan import Experiment, Plan
+from met.plan import Experiment, Plan, keys
+from met.plan import file as plan_file
 
 if TYPE_CHECKING:
     from met.run import Run

@@ -26,11 +26,11 @@ from hw import records
 from hw.case import Asked, pace_of
 from hw.ports import kind
 from hw.process import talk
-from met import plan_file
 from met.diagnostic import Problem, error
 from met.files import new_file, read_json
 from met.frozen import frozen
 from met.plan import Plan
+from met.plan import file as plan_file
 from met.run import FAILED
 
 ANOTHER, FULL = "E407", "E413"

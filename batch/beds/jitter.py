@@ -14,9 +14,9 @@ from hw.ports import EMULATED
 from hw.process import talk
 from hw.timing import EDGES
 from ic.printing.columns import columns
-from met import plan_file
 from met.diagnostic import Problem, error
 from met.plan import Plan
+from met.plan import file as plan_file
 from met.visible import say
 
 HZ, SECONDS = 1000.0, 10.0

@@ -13,8 +13,8 @@ import numpy as np
 from met.diagnostic import Place
 from met.distinct import distinct
 from met.frozen import frozen
-from met.keys import in_key, inputs, structure_key
 from met.plan import BASE, Base, Cases, Command, Course, Experiment, Formula, Plan, Quantity, Schedule, Structure
+from met.plan.keys import in_key, inputs, structure_key
 
 AXES = ("x", "y", "z")
 

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from batch.queries.rows import row_of
-from met import keys
 from met.diagnostic import Problem, error
-from met.plan import Experiment, Plan
+from met.plan import Experiment, Plan, keys
 
 
 def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experiment, ...]:

@@ -33,11 +33,11 @@ import numpy as np
 from batch.archive.sink import is_at
 from batch.campaigns import shard
 from batch.campaigns.tasks import Done, Section, Task
-from met import plan_file
 from met import run as engine
 from met.diagnostic import Problem, error
 from met.files import is_count, new_file, read_json, read_regular
 from met.plan import Plan
+from met.plan import file as plan_file
 from met.program.step import ASTRAY
 from met.version import VERSION
 

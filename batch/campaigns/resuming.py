@@ -17,9 +17,9 @@ from batch.campaigns.folder import Busy, Folder, beside
 from batch.campaigns.output import sidecar_path
 from batch.campaigns.tasks import Section
 from batch.terminal.progress import duration
-from met import plan_file
 from met.diagnostic import Problem, error
 from met.files import open_regular, read_json
+from met.plan import file as plan_file
 
 WHOLE, DAMAGED = "whole", "damaged"
 

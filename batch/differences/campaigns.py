@@ -32,8 +32,8 @@ from batch.differences.tolerance import Tolerance, Tolerances, check, fits, of_d
 from batch.queries.signals import deck_unit
 from met.diagnostic import Problem
 from met.distinct import distinct
-from met.outputs import joint_parts
 from met.plan import Plan
+from met.plan.outputs import joint_parts
 
 WORST = 20
 """Cases that are ranked."""

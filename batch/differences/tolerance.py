@@ -14,8 +14,8 @@ from batch.archive.read import Group
 from met import units
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.outputs import OF_ALL
 from met.plan import Experiment
+from met.plan.outputs import OF_ALL
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 NONE = "none"

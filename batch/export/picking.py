@@ -10,9 +10,9 @@ import numpy as np
 from batch.archive.read import ArchiveFile, Group, Stored
 from batch.queries.signals import panels
 from batch.terminal.show import chosen, picked
-from met.channel import channel_paths
 from met.diagnostic import Problem
 from met.frozen import frozen
+from met.plan.channel import channel_paths
 
 
 @frozen

@@ -12,8 +12,8 @@ from batch.archive.read import ArchiveFile, Group
 from batch.campaigns.output import quoted
 from batch.differences import matching
 from batch.queries.signals import Panel, pretty_unit
-from met.channel import channel_paths
 from met.diagnostic import Problem, error
+from met.plan.channel import channel_paths
 from met.visible import line
 
 LONGEST = 40

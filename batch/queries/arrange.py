@@ -8,8 +8,8 @@ import numpy as np
 
 from batch.archive.read import Group
 from batch.queries.signals import Panel
-from met.channel import joint_of
 from met.frozen import frozen
+from met.plan.channel import joint_of
 
 SPREAD = 2000
 """So many cases at most are looked at for a fan, spread over all."""

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from batch.archive.read import Group, Stored
-from met.channel import FAMILIES, channel_paths, joint_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen
+from met.plan.channel import FAMILIES, channel_paths, joint_of
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

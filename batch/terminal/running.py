@@ -228,7 +228,7 @@ def read_plan(
 ) -> Plan:
     """The plan of a deck, or in a plan file. Warnings go to stderr; errors are a Problem."""
     if names_plan(source):
-        from met import plan_file
+        from met.plan import file as plan_file
 
         return plan_file.read(source)
     import ic

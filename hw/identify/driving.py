@@ -19,9 +19,9 @@ from hw.case import pace_of
 from hw.identify.moves import Guide, Peaks, guided
 from hw.ports import Port, opened
 from hw.writer import recording
-from met import plan_file
 from met.diagnostic import Problem, error
 from met.frozen import frozen
+from met.plan import file as plan_file
 
 SHARE = 0.8
 """Of a bed's own limit of current and rate, that the moves go to at most."""
@@ -32,7 +32,7 @@ TURNS = 4.0
 
 @frozen
 class Asked:
-    """plan: of one experiment, as text (met.plan_file);  row: of its case table;  joint: whose motor is on the bed
+    """plan: of one experiment, as text (met.plan.file);  row: of its case table;  joint: whose motor is on the bed
     port, baud, lock_step, transcript: as of hw.ports.Port;  records: the file that they go to
     sheet: what is believed of the bed, by the names of hw.identify.model.MOTOR, and `v_max`, V
     voltage, current, rate: the most that the moves may ask for, V, A, rad/s; None: what bed and sheet allow

@@ -23,7 +23,7 @@ from met import models
 from met.diagnostic import Label, Place, did_you_mean
 from met.parameter import WORLD, Parameter
 from met.plan import BASE, COMPONENTS, Base, Course, Link, Payload, Structure, ground
-from met.plan_defaults import INERTIA, OF_FREE_BASE, component
+from met.plan.defaults import INERTIA, OF_FREE_BASE, component
 
 USAGE = "write `base = fixed;`, `base = free;` or `base = prescribed { x = sine(amplitude = 1 cm, frequency = 2 Hz); }`"
 INITIAL_OF_BASE = tuple(f"{BASE}.{name}" for name, _ in OF_FREE_BASE)

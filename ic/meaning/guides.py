@@ -24,11 +24,11 @@ from ic.meaning.scope import Scope
 from ic.meaning.servos import Use, course_named, fixed_rate, use_course
 from ic.meaning.values import place_of
 from met import models, units
-from met.channel import carries
 from met.diagnostic import Label, Place
 from met.frozen import frozen
 from met.plan import COMPONENTS, Course, GuideUse, Structure
-from met.plan_defaults import component
+from met.plan.channel import carries
+from met.plan.defaults import component
 from met.trace import Real, Scalar
 
 KIND: Final = "guide"

@@ -31,7 +31,7 @@ from ic.meaning.unvaried import Unvaried
 from met.diagnostic import Label, Place, did_you_mean
 from met.parameter import WORLD
 from met.plan import BASE, INSTANT, Payload, Structure
-from met.plan_defaults import INERTIA
+from met.plan.defaults import INERTIA
 from met.trace import Real
 
 EVENTS = (GRAPPLE, RELEASE)

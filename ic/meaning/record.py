@@ -16,12 +16,12 @@ from ic.meaning.scope import Scope
 from ic.meaning.unvaried import Unvaried
 from ic.meaning.values import place_of
 from met import models
-from met.channel import FAMILIES, Channel, carries, channels, recordable
 from met.diagnostic import Label, Place, did_you_mean, nearest
 from met.frozen import frozen
-from met.outputs import metric_units
 from met.parameter import Parameter
 from met.plan import MetricUse, Recorded, Requirement, Structure
+from met.plan.channel import FAMILIES, Channel, carries, channels, recordable
+from met.plan.outputs import metric_units
 from met.trace import Scalar
 
 OF_SERVO = frozenset({"servo", "bed", "law"})

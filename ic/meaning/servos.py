@@ -31,11 +31,11 @@ from ic.meaning.trajectories import use_file, with_file_named
 from ic.meaning.values import measure_of, place_of
 from ic.text.files import library_defines
 from met import models, units
-from met.channel import COMMAND_UNIT
 from met.diagnostic import Label, Place, Problem, did_you_mean, error, meant
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Command, SensorUse, ServoUse
+from met.plan.channel import COMMAND_UNIT
 from met.trace import Scalar, where
 
 SLOWEST, FASTEST = 1e-3, 1e9

@@ -9,11 +9,11 @@ from ic.meaning.owner import Owner
 from ic.meaning.record import share_metrics
 from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
-from met.channel import recordable
 from met.diagnostic import did_you_mean
-from met.outputs import OF_ALL, joint_parts, tolerable
 from met.parameter import Parameter
 from met.plan import Structure, Tolerance
+from met.plan.channel import recordable
+from met.plan.outputs import OF_ALL, joint_parts, tolerable
 from met.trace import Scalar
 
 WRITE = "write `NAME = SIZE;`: `qd = 1e-6 rad/s;`, `elbow.q = 0.01 deg;`, `rel = 1e-9;`, `time = 1 ms;`"

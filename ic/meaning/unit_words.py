@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from functools import lru_cache
 
 from met import units
-from met.channel import joint_unit
 from met.plan import Joint, JointKind
+from met.plan.channel import joint_unit
 from met.units import PURE, Dimension
 
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from ic.printing.columns import columns, count, number, size
-from met import keys
-from met.plan import Coordinate, Experiment
+from met.plan import Coordinate, Experiment, keys
 
 HEAD, TAIL = 30, 10
 SHORTEST = 4

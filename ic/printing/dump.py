@@ -39,7 +39,7 @@ class Asked:
         import ic
 
         if self.deck.endswith(".json"):
-            from met import plan_file
+            from met.plan import file as plan_file
 
             return plan_file.read(self.deck)
         return ic.compile(self.deck, include_dirs=self.include_dirs, defines=self.defines, set=self.settings,
@@ -123,7 +123,7 @@ def plan(asked: Asked) -> Iterator[str]:
     import json
     import sys
 
-    from met import plan_file
+    from met.plan import file as plan_file
 
     text = plan_file.dumps(asked.plan()).rstrip("\n")
     yield json.dumps(json.loads(text), indent=1) if sys.stdout.isatty() else text

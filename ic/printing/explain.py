@@ -16,11 +16,11 @@ from ic.printing.codes import is_code
 from ic.printing.columns import columns, number, quantity, vector
 from ic.printing.settings import settings
 from met import models, render
-from met.channel import recordable
 from met.diagnostic import Diagnostic, Label, Place, Problem, error, nearest
 from met.models import parameter as declared
 from met.parameter import Parameter
 from met.plan import Coordinate, Experiment, Formula, Origin, Quantity
+from met.plan.channel import recordable
 
 SAID = {
     "deck": "written here",

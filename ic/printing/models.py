@@ -11,9 +11,9 @@ from typing import Any, get_args
 from ic.language import BLOCKS
 from ic.printing.columns import columns, exactly
 from met import models
-from met.channel import of_bed, of_law, watched_unit
 from met.diagnostic import Problem, did_you_mean, error
 from met.parameter import Parameter
+from met.plan.channel import of_bed, of_law, watched_unit
 
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
 HOW = {

@@ -13,7 +13,7 @@ from met import models
 from met.distinct import distinct
 from met.parameter import Parameter
 from met.plan import BASE, Base, Experiment, Formula, Joint, Plan, Structure
-from met.plan_defaults import OF_FREE_BASE
+from met.plan.defaults import OF_FREE_BASE
 
 CHOSEN = 88  # columns, of parameters that stand in one cell
 FIXED_SPACE = "\u00a0"  # no line ends at one

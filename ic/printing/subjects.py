@@ -16,7 +16,8 @@ from ic.printing.columns import columns, exactly
 from ic.printing.language import block_json, print_block
 from ic.printing.models import FIELDS, OF_LANGUAGE, WORDS, default, rows, summary, unit_in_words
 from ic.printing.sweeps import print_words, words_json
-from met import channel, models, units
+from met import models, units
+from met.plan import channel
 
 OF_ANY = (
     ("JOINT.servo.NAME", "what a servo holds, integrates and shows: `met doc` and the name of its model"),

@@ -24,8 +24,8 @@ from ic.meaning.shapes import SHAPES
 from ic.meaning.values import CONSTANTS, FUNCTIONS
 from ic.text.preprocess import DIRECTIVES
 from met import models, units
-from met.channel import COMMAND_UNIT
 from met.plan import BASE
+from met.plan.channel import COMMAND_UNIT
 
 SCOPE = "source.met"
 FOLDER = Path(__file__).parents[2] / "docs" / "editors"

@@ -21,10 +21,9 @@ from ic.sweeps.effects import Effects
 from ic.sweeps.reach import check_coordinates, coordinates, idle
 from ic.sweeps.settings import Settings
 from ic.sweeps.table import columns, kept, repeats, structures
-from met import keys
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
-from met.plan import Cases, Choice, Experiment
+from met.plan import Cases, Choice, Experiment, keys
 from met.trace import Formulas, Graph, Scalar
 
 Group = tuple[Experiment, Scope]

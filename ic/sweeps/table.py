@@ -16,9 +16,9 @@ from ic.meaning.values import COMPARISONS, PURE, Value, Values, evaluate_number,
 from ic.sweeps.axes import Sweep, named
 from ic.sweeps.choices import OF_JOINT, OF_RUN, Choices
 from met import units
-from met.channel import channels
 from met.diagnostic import Label, Problem, did_you_mean, error
 from met.plan import Structure
+from met.plan.channel import channels
 from met.trace import Formulas, Scalar
 
 MOST_NAMED = 4

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from met.channel import Channel
 from met.plan import Experiment
+from met.plan.channel import Channel
 from met.program import balancing, base, failing, guiding, link_sensors, orientations, payloads, sensing
 from met.program.evaluation import gravity, law
 from met.program.machine import PARAMETER, Actuator, Machine

@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any
 
 from met import models
-from met.channel import Channel, channels
 from met.commands.profile import Profile
 from met.diagnostic import Problem, error
 from met.dynamics.spatial import Six
@@ -23,6 +22,7 @@ from met.integrators.integrator import Integrator
 from met.metrics.metric import Metric
 from met.parameter import Memory, Parameter, State
 from met.plan import BASE, Experiment, Formula, Joint, LinkSensor, Payload, SensorUse, ServoUse, Structure
+from met.plan.channel import Channel, channels
 from met.program import guided
 from met.program.courses import recorded
 from met.program.values import Values, answer, parameters, returned

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 
-from met.channel import XYZ, Channel
 from met.dynamics.effective_inertia import effective_inertia
 from met.dynamics.energy import Energy, energy
 from met.dynamics.kinematics import LinkMotion, jacobian
@@ -17,6 +16,7 @@ from met.dynamics.payload import energy_of
 from met.dynamics.recursion import Wrench, reactions
 from met.dynamics.spatial import Vector, add, choose, dot
 from met.integrators.integrator import Motion
+from met.plan.channel import XYZ, Channel
 from met.program import payloads
 from met.program.base import Base, motions
 from met.program.evaluation import Derivative

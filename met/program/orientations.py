@@ -7,7 +7,7 @@ metric watches changes no row. So the signs are a part of the case, whatever run
 
 from __future__ import annotations
 
-from met.channel import WXYZ, Channel
+from met.plan.channel import WXYZ, Channel
 from met.program.observe import Observed
 from met.trace import Real, where
 from met.trace.program import Tape

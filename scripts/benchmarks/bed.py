@@ -30,8 +30,8 @@ from hw.driven import LANES, Driven
 from hw.ports import FIRMWARE, config_of
 from hw.process import talk
 from hw.timing import Timing, timing
-from met import plan_file
 from met.plan import Experiment, Plan
+from met.plan import file as plan_file
 from met.program.plant import bed_values, plant_c
 from met.run import prepare
 

@@ -17,8 +17,9 @@ from batch.archive import limits
 from batch.archive.provenance import UNKNOWN, Revision
 from batch.archive.read import ArchiveFile
 from batch.campaigns import tasks
-from met import keys, plan_file
 from met.diagnostic import Problem
+from met.plan import file as plan_file
+from met.plan import keys
 from tests.batch import plans
 
 pytestmark = pytest.mark.usefixtures("engine")

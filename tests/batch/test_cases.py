@@ -15,10 +15,10 @@ from batch.queries import cases, ordering
 from batch.queries.ordering import By, by_names
 from batch.terminal.running import run_and_tell
 from batch.terminal.show import as_json, show
-from met import keys, plan_file
 from met.cli import main
 from met.diagnostic import Problem
-from met.plan import Experiment, Requirement
+from met.plan import Experiment, Requirement, keys
+from met.plan import file as plan_file
 from tests.batch import plans
 
 pytestmark = pytest.mark.usefixtures("engine")

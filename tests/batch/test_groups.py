@@ -193,7 +193,7 @@ def test_an_archive_says_which_repeat_a_case_is(tmp_path: Path) -> None:
 
 
 def test_large_tables_of_groups_go_through_a_plan_file(tmp_path: Path) -> None:
-    from met import plan_file
+    from met.plan import file as plan_file
 
     plan = compiled(tmp_path, TIMED, "sweep it of hold { vary drive.kp = linspace(0.1, 0.2, 6000) V*s/rad;"
                     " vary integrator = [rk4, midpoint]; vary links.bar.mass = [1, 2] kg; }")  # fmt: skip

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from met import entry_points, interpreter, plan_file
+from met import entry_points, interpreter
+from met.plan import file as plan_file
 from tests.batch import plans
 
 ROOT = Path(__file__).resolve().parents[2]

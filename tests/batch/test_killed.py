@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import batch
-from met import plan_file
+from met.plan import file as plan_file
 from tests.batch import plans, whole
 
 CASES = 10_000

@@ -37,7 +37,7 @@ def test_a_case_that_gives_other_numbers_when_it_is_run_again_stops_the_merge(
 def test_the_code_of_a_plan_is_that_of_its_file(tmp_path: Path) -> None:
     """Workers read the plan from a file: a shard of theirs must count here."""
     import ic
-    from met import plan_file
+    from met.plan import file as plan_file
 
     for deck in ("two_link.ic", "panda.ic", "puma_560.ic"):
         plan = ic.compile(deck, select="all")

@@ -118,7 +118,7 @@ def test_programs_get_json_of_every_run_asked_for(here: Path, capsys: pytest.Cap
 
 @pytest.mark.slow
 def test_a_plan_file_is_measured_too(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from met import plan_file
+    from met.plan import file as plan_file
 
     plan_file.write(ic.compile("two_link.ic", select="all"), "p.json")
     assert main(["profile", "p.json", "nominal"]) == 0

@@ -9,8 +9,8 @@ import pytest
 import batch
 from batch.campaigns import campaign, tasks
 from batch.campaigns.performing import perform
-from met import keys
 from met.diagnostic import Problem
+from met.plan import keys
 from tests.batch import plans
 from tests.batch.refusals import refused
 

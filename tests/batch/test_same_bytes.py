@@ -14,8 +14,9 @@ import batch
 import ic
 from batch.archive.read import ArchiveFile, Group
 from batch.campaigns import cutting, performing, tasks
-from met import cli, plan_file
+from met import cli
 from met.plan import Experiment, Plan
+from met.plan import file as plan_file
 from tests.batch import plans, whole
 
 # Four sweeps: plain, of two structures, of a motor bed with noise that is common, and with noise of each case.

@@ -11,8 +11,8 @@ import pytest
 from batch.terminal.progress import Bar, duration, status
 from batch.terminal.running import run_and_tell
 from ic.printing.columns import size as size_text
-from met import plan_file
 from met.diagnostic import Problem
+from met.plan import file as plan_file
 from tests.batch import plans
 
 

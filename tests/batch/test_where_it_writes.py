@@ -12,8 +12,8 @@ import pytest
 import batch
 from batch.campaigns import campaign, tasks
 from batch.campaigns.performing import perform
-from met import plan_file
 from met.diagnostic import Problem
+from met.plan import file as plan_file
 from tests.batch import plans
 from tests.batch.refusals import refused
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import batch
-from met import plan_file
+from met.plan import file as plan_file
 from tests.batch import plans
 from tests.cluster.slurm import Slurm
 

@@ -12,9 +12,9 @@ import pytest
 import ic
 from ic.text.files import LIBRARY
 from met import run as engine
-from met.channel import recordable
 from met.dynamics.kinematics import link_motions
 from met.plan import Experiment
+from met.plan.channel import recordable
 from met.program.machine import Machine
 from tests.oracles import published_arms as published
 from tests.oracles.package import Package

@@ -323,7 +323,7 @@ def test_the_beginning_of_an_id_that_several_cases_have(monkeypatch: pytest.Monk
     import batch
     from batch.archive.read import ArchiveFile
     from batch.campaigns import campaign
-    from met import keys
+    from met.plan import keys
     from tests.batch import plans
 
     plans.answering(monkeypatch)

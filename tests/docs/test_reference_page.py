@@ -10,7 +10,8 @@ import pytest
 from ic.meaning.values import CONSTANTS
 from ic.printing.models import default
 from ic.printing.reference import page
-from met import channel, cli, models, units
+from met import cli, models, units
+from met.plan import channel
 
 PAGE = (Path(__file__).parents[2] / "docs" / "reference.md").read_text(encoding="utf-8")
 

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from met.plan import JointKind
-from met.plan_defaults import component
+from met.plan.defaults import component
 
 INBOARD: dict[str, tuple[JointKind, str]] = {
     "shift": ("prismatic", "y"), "lift": ("prismatic", "z"), "swing": ("revolute", "z"), "bank": ("revolute", "x"),

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 import ic
-from met import plan_file
 from met.diagnostic import Problem
-from met.keys import structure_key
 from met.plan import Base, Course, Link, Plan
+from met.plan import file as plan_file
+from met.plan.keys import structure_key
 from tests.ic.small_decks import changed
 from tests.met.program.free_flyers import ARM, RUN
 

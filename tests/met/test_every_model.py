@@ -15,8 +15,8 @@ import pytest
 from met import models
 from met import run as engine
 from met.backends.reference.plain import execute
-from met.channel import COMMAND_UNIT
 from met.parameter import Parameter
+from met.plan.channel import COMMAND_UNIT
 from met.program import build
 from met.units import parse_unit
 from tests.ic.small_decks import experiment

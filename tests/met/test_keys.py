@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from met import keys
 from met.diagnostic import Place
-from met.plan import Cases, Experiment, Quantity, Structure
+from met.plan import Cases, Experiment, Quantity, Structure, keys
 from tests.batch import plans
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import ic
-from met import plan_file
 from met import run as engine
 from met.diagnostic import Problem
-from met.keys import inputs, structure_key
 from met.plan import Payload, Plan
+from met.plan import file as plan_file
+from met.plan.keys import inputs, structure_key
 from tests.ic.small_decks import changed
 from tests.met.program.free_flyers import ARM
 from tests.met.program.payload_decks import BOX, RUN

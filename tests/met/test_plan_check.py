@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from met import plan_file
 from met.diagnostic import Problem
+from met.plan import file as plan_file
 from tests.batch import plans
 
 Change = Callable[[dict[str, Any]], Any]

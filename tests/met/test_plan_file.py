@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from met import plan_file
 from met.diagnostic import Expansion, Place, Problem
 from met.plan import Experiment, Origin, Plan, Quantity
-from met.plan_codec import decode, encode
+from met.plan import file as plan_file
+from met.plan.codec import decode, encode
 from tests.batch import plans
 
 

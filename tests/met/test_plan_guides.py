@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from met import plan_file
 from met.diagnostic import Problem
+from met.plan import file as plan_file
 from tests.ic.small_decks import check, told
 
 DECK = """\

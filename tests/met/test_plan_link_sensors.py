@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 
-from met import models, plan_file
+from met import models
 from met.diagnostic import Problem
+from met.plan import file as plan_file
 from tests.ic.small_decks import check, told
 
 DECK = """\

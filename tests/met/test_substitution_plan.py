@@ -11,10 +11,11 @@ from typing import Any
 
 import pytest
 
-from met import keys, models, plan_file
+from met import models
 from met.diagnostic import Problem
 from met.parameter import Memory
-from met.plan import Experiment, Formula, Plan, Substitution
+from met.plan import Experiment, Formula, Plan, Substitution, keys
+from met.plan import file as plan_file
 from met.substitution import BEDS, LAWS
 from tests.batch import plans
 from tests.ic.small_decks import ARM, RUN, SERVO, experiment

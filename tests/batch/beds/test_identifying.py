@@ -20,9 +20,10 @@ from hw.beds.emulated import EmulatedBed
 from hw.identify import driving
 from hw.identify.driving import Asked
 from hw.identify.fit import Estimate, Found
-from met import cli, plan_file
+from met import cli
 from met.diagnostic import Problem
 from met.plan import Experiment, Plan
+from met.plan import file as plan_file
 from met.program.plant import Plant, bed_values
 from tests.hw.conftest import said
 

@@ -15,8 +15,8 @@ import pytest
 import batch
 from batch.campaigns.folder import Folder, beside
 from hw.transcript import read
-from met import plan_file
 from met.diagnostic import Problem
+from met.plan import file as plan_file
 from met.render import render
 from tests.batch import plans
 from tests.batch.begun import begin, go_on, plan, refused, short_tasks

@@ -22,8 +22,8 @@ from batch.campaigns.folder import Folder
 from batch.executors import job
 from hw import records, transcript
 from hw.beds.replay import ReplayBed
-from met import plan_file
 from met.diagnostic import Problem
+from met.plan import file as plan_file
 from met.render import render
 from tests.batch import plans
 from tests.batch.begun import begin, go_on, refused, short_tasks

@@ -15,7 +15,8 @@ import pytest
 
 import batch
 from batch.campaigns import performing, shard, tasks
-from met import cli, plan_file
+from met import cli
+from met.plan import file as plan_file
 from tests.batch import plans, whole
 from tests.batch.begun import CASES, OF_TASK, begin, flip, go_on, plan, refused
 
@@ -163,7 +164,7 @@ def test_a_disk_that_is_full_when_it_goes_on_keeps_what_there_is(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patch:
-        patch.setattr("met.plan_file.write", full)
+        patch.setattr("met.plan.file.write", full)
         assert "no space left on device" in refused(archive)
     assert whole.shards(archive) == kept
 

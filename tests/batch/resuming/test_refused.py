@@ -9,8 +9,8 @@ import pytest
 
 import batch
 import ic
-from met import plan_file
 from met.plan import Plan
+from met.plan import file as plan_file
 from tests.batch import plans, whole
 from tests.batch.begun import CASES, OF_TASK, begin, go_on, plan, refused
 

@@ -59,7 +59,7 @@ def _all_of_it(path: Path, select: Select) -> Compiled:
     from ic.printing.cases import print_cases
     from ic.printing.check import notes, verdict
     from ic.printing.plan import print_plan
-    from met import plan_file
+    from met.plan import file as plan_file
 
     verdict(compiled.plan, compiled.diagnostics)
     experiments = compiled.plan.experiments

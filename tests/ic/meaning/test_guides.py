@@ -9,9 +9,9 @@ import pytest
 
 from met import models
 from met import run as engine
-from met.keys import structure_key
 from met.plan import Command, Course, GuideUse
-from met.plan_file import dumps, loads
+from met.plan.file import dumps, loads
+from met.plan.keys import structure_key
 from tests.ic.small_decks import changed, check, experiment, told
 
 # ruff: noqa: E501 - messages are as wide as they are

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from met import run as engine
-from met.channel import channels
-from met.keys import structure_key
+from met.plan.channel import channels
+from met.plan.keys import structure_key
 from tests.ic.small_decks import changed, check, experiment, told
 
 DECK = """\

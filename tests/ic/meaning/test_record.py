@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 
-from met import models, plan_file
-from met.channel import recordable
+from met import models
 from met.plan import Plan, Recorded
+from met.plan import file as plan_file
+from met.plan.channel import recordable
 from tests.ic.small_decks import RUN, SERVO, changed, check, experiment, told
 
 ARM = """\

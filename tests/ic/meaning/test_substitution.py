@@ -10,8 +10,8 @@ import pytest
 
 import met.substitution
 from ic.meaning.explain import explained
-from met.channel import channels
 from met.plan import Experiment, Formula, Substitution
+from met.plan.channel import channels
 from met.substitution import BEDS
 from tests.ic.small_decks import changed, check, experiment, told
 

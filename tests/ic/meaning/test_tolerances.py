@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from met import plan_file
 from met.diagnostic import Problem
-from met.keys import case_ids, structure_key
 from met.plan import Experiment, Plan
+from met.plan import file as plan_file
+from met.plan.keys import case_ids, structure_key
 from tests.ic import small_decks
 
 # ruff: noqa: E501 - messages are as wide as they are

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import ic
-from met import models, plan_file
+from met import models
 from met import run as engine
 from met.plan import Experiment
+from met.plan import file as plan_file
 from met.units import parse_unit
 from tests.ic.meaning.trajectories import MOVES, servo
 from tests.ic.small_decks import ARM, RUN, changed, check, experiment, told
@@ -112,7 +113,7 @@ def test_the_values_come_from_the_column(tmp_path: Path) -> None:
 
 
 def test_a_name_of_a_file_changes_no_key(tmp_path: Path) -> None:
-    from met.keys import case_ids
+    from met.plan.keys import case_ids
 
     first = read(tmp_path, MOVES)
     (tmp_path / "other.csv").write_text(MOVES)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from met import plan_file
 from met.diagnostic import Problem
+from met.plan import file as plan_file
 from tests.ic.small_decks import ARM, RUN, changed, check, codes, told
 
 # ruff: noqa: E501 - messages are as wide as they are

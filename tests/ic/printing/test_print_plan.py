@@ -13,8 +13,9 @@ from ic.printing.cases import prefixes
 from ic.printing.columns import columns, number, size
 from ic.printing.dump import ORDER, stage_names
 from ic.printing.plan import print_plan
-from met import cli, plan_file
+from met import cli
 from met.diagnostic import Problem
+from met.plan import file as plan_file
 from tests.met.program import free_flyers
 
 DECK = """\
@@ -539,7 +540,7 @@ hinge.dh.a = 0.4 to 0.6 m, varies with the case
 
 
 def test_doc_lists_every_channel_that_an_arm_has(capsys: pytest.CaptureFixture[str]) -> None:
-    from met.channel import channels
+    from met.plan.channel import channels
 
     out = printed(capsys, "doc", "channels")
     (run,) = ic.compile("puma_560.ic").experiments

@@ -14,8 +14,9 @@ from ic.robots.entries import moments, rotation
 from ic.robots.importing import imported
 from ic.robots.names import deck_names
 from ic.robots.urdf import read
-from met import cli, plan_file, run
+from met import cli, run
 from met.plan import Experiment
+from met.plan import file as plan_file
 from tests.ic.robots.two import DECK, TWO, changed, check, said
 from tests.ic.small_decks import told
 from tests.oracles.random_urdf import random_urdf

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from met import keys
-from met.plan import Experiment
+from met.plan import Experiment, keys
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, told
 
 OTHERS = """\

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from met import plan_file
 from met.plan import Experiment
+from met.plan import file as plan_file
 from tests.ic.small_decks import ARM, RUN, SERVO, check, codes, experiment, told
 
 KP = "drive.kp = uniform(1, 2) V*s/rad;"

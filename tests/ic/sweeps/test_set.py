@@ -10,8 +10,9 @@ import pytest
 
 import ic
 from ic.meaning.lower import Compiled, Select
-from met import cli, keys, plan_file
-from met.plan import Experiment, Formula
+from met import cli
+from met.plan import Experiment, Formula, keys
+from met.plan import file as plan_file
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, told
 
 OTHERS = """\

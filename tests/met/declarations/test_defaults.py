@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from met import keys, models
+from met import models
 from met import run as engine
 from met.parameter import Parameter
-from met.plan import Experiment
+from met.plan import Experiment, keys
 from tests.ic.small_decks import check, experiment, told
 from tests.met.declarations.values import errors, inner, paths, varied
 from tests.met.small_models import EVERY, Use, finite, first_uses, uses

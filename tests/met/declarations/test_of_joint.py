@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from met import keys, models
+from met import models
+from met.plan import keys
 from tests.ic.small_decks import experiment
 from tests.met.small_models import Use, smallest
 

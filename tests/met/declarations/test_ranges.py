@@ -15,12 +15,13 @@ import numpy as np
 import pytest
 
 import met.environments
-from met import models, plan_check
+from met import models
 from met.environments import Environment
 from met.environments.environment import Loads
 from met.parameter import Parameter
 from met.plan import Experiment
-from met.plan_codec import Damaged
+from met.plan import check as plan_check
+from met.plan.codec import Damaged
 from tests.ic.small_decks import check, experiment, told
 from tests.met.declarations.values import NUMBERS, bounds, constant, errors, inner, paths, several, shaped, varied
 from tests.met.small_models import EVERY, SMALLEST, Small, Use, smallest, uses

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from met import run as engine
-from met.channel import channels
+from met.plan.channel import channels
 from tests.ic import small_decks
 from tests.ic.small_decks import ARM, SERVO, changed, check, experiment, told
 from tests.met.tree_deck import GRAVITY, TREE

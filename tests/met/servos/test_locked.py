@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from ic.printing.settings import settings
-from met import plan_check
 from met import run as engine
-from met.plan_codec import Damaged
+from met.plan import check as plan_check
+from met.plan.codec import Damaged
 from tests.ic.small_decks import changed, check, experiment, told
 from tests.met.tree_deck import GRAVITY, TREE
 from tests.oracles.plan_tree import pinocchio

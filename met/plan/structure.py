@@ -7,11 +7,11 @@ import re
 from collections.abc import Collection, Mapping
 
 from met import models
-from met import plan_guides as guides
-from met.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.parameter import WORLD
 from met.plan import BASE, COMPONENTS, ServoUse, Structure
-from met.plan_codec import Damaged
+from met.plan import guides as guides
+from met.plan.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
+from met.plan.codec import Damaged
 
 NAME = re.compile(r"[^\W\d]\w*")
 """What a deck can name: a name is part of paths, of messages, of files' names."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from met.parameter import WORLD, Parameter
 from met.plan import Experiment, Formula, Structure
-from met.plan_codec import Damaged
+from met.plan.codec import Damaged
 
 Holds = Callable[[np.ndarray], np.ndarray]
 """Values [case, k] -> which are good [case]."""

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 from typing import Any
 
 from met import models
-from met.channel import carries
 from met.plan import COMPONENTS, Experiment, GuideUse, Structure
-from met.plan_codec import Damaged
+from met.plan.channel import carries
+from met.plan.codec import Damaged
 
 
 def check(structure: Structure, where: str) -> None:

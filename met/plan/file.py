@@ -29,7 +29,7 @@ import numpy as np
 from met.diagnostic import Problem, error
 from met.files import open_regular, read_regular
 from met.plan import Experiment, Formula, Plan
-from met.plan_codec import Damaged, decode, encode
+from met.plan.codec import Damaged, decode, encode
 
 SCHEMA = "met.plan"
 VERSION = 1
@@ -109,7 +109,7 @@ def loads(text: str, name: str = "plan", fetch: Fetch | None = None, *, as_writt
     """A plan from its JSON. name: for messages. fetch: gives the values of a coordinate that are kept elsewhere.
     as_written: to be looked at, not run: whatever models there are here, and without what they have got since.
     """
-    from met.plan_check import check, check_text
+    from met.plan.check import check, check_text
 
     try:
         document = json.loads(text, parse_constant=_no_constant)
@@ -141,7 +141,7 @@ def loads(text: str, name: str = "plan", fetch: Fetch | None = None, *, as_writt
 
 def completed(plan: Plan, name: str = "plan", version: int = VERSION) -> Plan:
     """The plan with the defaults of parameters that it does not have, each listed in its experiment's notes."""
-    from met.plan_defaults import missing_parameters, unknown_parameters
+    from met.plan.defaults import missing_parameters, unknown_parameters
 
     problems, experiments = [], []
     for experiment in plan.experiments:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from met import models
-from met.channel import channels, joint_unit, watched_unit
 from met.diagnostic import Place, nearest
 from met.parameter import Parameter, under
 from met.plan import COMPONENTS, Course, Experiment, Joint, Origin, Quantity, Structure
+from met.plan.channel import channels, joint_unit, watched_unit
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 

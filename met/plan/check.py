@@ -15,11 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from met import models, plan_structure, units
-from met import plan_guides as guides
-from met import plan_relations as relations
-from met import plan_rest as rest
-from met.outputs import tolerable
+from met import models, units
 from met.parameter import Parameter
 from met.plan import (
     BASE,
@@ -29,8 +25,13 @@ from met.plan import (
     Quantity,
     Requirement,
 )
-from met.plan_codec import Damaged
-from met.plan_defaults import INERTIA, declared, heads_of_models, related
+from met.plan import guides as guides
+from met.plan import relations as relations
+from met.plan import rest as rest
+from met.plan import structure as plan_structure
+from met.plan.codec import Damaged
+from met.plan.defaults import INERTIA, declared, heads_of_models, related
+from met.plan.outputs import tolerable
 from met.trace.graph import TRUTHS, Formulas
 
 GROUP = re.compile(r"[\w+-]+(\.[\w+-]+)*")

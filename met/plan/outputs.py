@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from met import models
-from met.channel import channel_paths, channels, watched_unit
 from met.plan import MetricUse, Recorded, Structure
+from met.plan.channel import channel_paths, channels, watched_unit
 
 OF_ALL = {"rel": "1", "time": "s"}
 """What a tolerance may allow of everything: a share of the value; how much earlier or later. With units."""
