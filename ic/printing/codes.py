@@ -8,7 +8,7 @@ from pathlib import Path
 
 from met.diagnostic import Problem, did_you_mean, error
 
-PAGE = Path(__file__).parents[2] / "docs" / "diagnostics.md"
+PAGE = Path(__file__).parents[1] / "pages" / "diagnostics.md"
 
 _ENTRY = re.compile(r"^### ([A-Z]\d{3}): .*?(?=^##)", re.MULTILINE | re.DOTALL)
 _ROW = re.compile(r"^\| ([A-Z]\d{3}) \| (.*?) \|", re.MULTILINE)  # of codes that no deck brings about
