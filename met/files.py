@@ -12,7 +12,9 @@ import errno
 import json
 import math
 import os
+import socket
 import stat
+from collections.abc import Iterator
 from io import BufferedReader, BufferedWriter
 from typing import Any
 
@@ -66,6 +68,31 @@ def new_file(path: str | os.PathLike[str]) -> BufferedWriter:
     with contextlib.suppress(FileNotFoundError):
         os.unlink(path)
     return open(path, "xb")
+
+
+@contextlib.contextmanager
+def whole_file(path: str | os.PathLike[str], *, mode: int | None = None) -> Iterator[BufferedWriter]:
+    """A new file, open for writing, that gets its name, in the place of what had it, once the block has ended and all
+    is on the disk. What the block raises leaves nothing behind. Raises OSError.
+
+    mode  its permissions; None: as of any new file
+    """
+    name = os.fspath(path)
+    folder, base = os.path.split(name)
+    # hosts that share the folder have processes of one number
+    temporary = os.path.join(folder, f".{base}.{socket.gethostname()}.{os.getpid()}.tmp")
+    try:
+        with new_file(temporary) as file:
+            yield file
+            file.flush()
+            if mode is not None:
+                os.fchmod(file.fileno(), mode)
+            os.fsync(file.fileno())
+        os.replace(temporary, name)
+    except BaseException:
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(temporary)
+        raise
 
 
 def read_json(path: str | os.PathLike[str], most: int = MOST_JSON_BYTES) -> Any:

@@ -35,7 +35,7 @@ from batch.campaigns import shard
 from batch.campaigns.tasks import Done, Section, Task
 from met import run as engine
 from met.diagnostic import Problem, error
-from met.files import is_count, new_file, read_json, read_regular
+from met.files import is_count, new_file, read_json, read_regular, whole_file
 from met.plan import Plan
 from met.plan import file as plan_file
 from met.program.step import ASTRAY
@@ -385,13 +385,5 @@ def gaps(tasks: Iterable[Task], cases: int) -> list[tuple[int, int]]:
 
 def put(path: Path, data: Any) -> None:
     """Write JSON whole, or not at all."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with new_file(temporary) as file:
-            file.write(json.dumps(data).encode())
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    with whole_file(path) as file:
+        file.write(json.dumps(data).encode())

@@ -17,7 +17,6 @@ import hashlib
 import json
 import math
 import os
-import socket
 from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
@@ -25,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from met.files import is_count, memory, new_file, open_regular, parse_json
+from met.files import is_count, memory, open_regular, parse_json, whole_file
 from met.frozen import frozen
 from met.run import FAILED, LOST, TIMED_OUT
 
@@ -82,19 +81,12 @@ def write(path: Path, shard: Shard) -> None:
     text = json.dumps(head).encode()
     parts: list[Any] = [MAGIC, len(text).to_bytes(8, "little"), text]
     parts += [np.ascontiguousarray(a, TYPES[_type(a)]).data.cast("B") for a in arrays.values() if a.size]
-    temporary = path.with_name(f".{path.name}.{socket.gethostname()}.{os.getpid()}.tmp")
     summed = SUM()
-    try:
-        with new_file(temporary) as file:
-            for part in parts:
-                summed.update(part)
-                _put(file.fileno(), part)
-            _put(file.fileno(), summed.digest())
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    with whole_file(path) as file:
+        for part in parts:
+            summed.update(part)
+            _put(file.fileno(), part)
+        _put(file.fileno(), summed.digest())
 
 
 def read(path: Path, most: int | None = None) -> Shard:

@@ -8,7 +8,7 @@ from typing import Any
 
 from batch.campaigns.output import quoted
 from met.diagnostic import Problem, error
-from met.files import new_file, open_regular
+from met.files import open_regular, whole_file
 from met.visible import visible
 
 SOFTWARE = "MET"
@@ -79,17 +79,11 @@ def save(figure: Any, output: Path) -> None:
         ".png": ("agg", "FigureCanvasAgg"), ".svg": ("svg", "FigureCanvasSVG"), ".pdf": ("pdf", "FigureCanvasPdf"),
     }[kind]  # fmt: skip
     drawn = getattr(importlib.import_module(f"matplotlib.backends.backend_{backend}"), canvas)(figure)
-    temporary = output.with_name(f".{output.name}.{os.getpid()}.tmp")
     try:
-        try:
-            with new_file(temporary) as file, warnings.catch_warnings():
-                warnings.filterwarnings("error", message="constrained_layout not applied")
-                warnings.filterwarnings("ignore", message="Glyph .* missing from font")
-                getattr(drawn, f"print_{kind[1:]}")(file, metadata=METADATA[kind])
-            temporary.replace(output)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
+        with whole_file(output) as file, warnings.catch_warnings():
+            warnings.filterwarnings("error", message="constrained_layout not applied")
+            warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+            getattr(drawn, f"print_{kind[1:]}")(file, metadata=METADATA[kind])
     except OSError as reason:
         raise _cannot_write(output, reason) from reason
     except UserWarning as reason:

@@ -8,7 +8,7 @@ from pathlib import Path
 from batch.campaigns.output import quoted
 from batch.report.page import GENERATOR
 from met.diagnostic import Problem, error
-from met.files import new_file, open_regular
+from met.files import open_regular, whole_file
 
 ENDINGS = (".html", ".htm")
 HEAD_BYTES = 400
@@ -56,17 +56,9 @@ def is_report(path: Path) -> bool:
 
 def write(output: Path, text: str) -> None:
     """The page under its name when it is whole. Raises Problem E380 where the system refuses."""
-    temporary = output.with_name(f".{output.name}.{os.getpid()}.tmp")
     try:
-        try:
-            with new_file(temporary) as file:
-                file.write(text.encode("utf-8"))
-                file.flush()
-                os.fsync(file.fileno())
-            temporary.replace(output)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
+        with whole_file(output) as file:
+            file.write(text.encode("utf-8"))
     except OSError as reason:
         raise cannot_write(output, reason) from reason
 

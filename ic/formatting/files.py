@@ -8,7 +8,6 @@ import os
 import shlex
 import stat
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 
 from ic.formatting.formatter import formatted
@@ -16,7 +15,7 @@ from ic.formatting.strings import making_strings
 from ic.text.files import Files, FoundFile, decode
 from ic.text.limits import MOST_BYTES
 from met.diagnostic import Problem, error
-from met.files import open_regular
+from met.files import open_regular, whole_file
 from met.frozen import frozen
 
 STDIN = "-"
@@ -115,21 +114,8 @@ def write(path: str, text: str) -> None:
     try:
         if not os.access(target, os.W_OK):
             raise PermissionError(13, os.strerror(13))
-        _replace(target, text.encode())
+        with whole_file(target, mode=stat.S_IMODE(os.stat(target).st_mode)) as file:
+            file.write(text.encode())
     except OSError as reason:
         help = "it is as it was; what takes its place is written beside it, so its folder must allow that"
         raise Problem(error("E338", f"cannot write `{path}`: {reason.strerror}", help=help)) from None
-
-
-def _replace(target: str, data: bytes) -> None:
-    handle, made = tempfile.mkstemp(dir=os.path.dirname(target), prefix=f".{os.path.basename(target)}.", suffix=".new")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.chmod(made, stat.S_IMODE(os.stat(target).st_mode))
-        os.replace(made, target)
-    except BaseException:
-        os.unlink(made)
-        raise

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from met.diagnostic import Problem, error
-from met.files import open_regular, read_regular
+from met.files import open_regular, read_regular, whole_file
 from met.plan import Experiment, Formula, Plan
 from met.plan.codec import Damaged, decode, encode
 
@@ -245,18 +245,9 @@ def _plan_there(path: Path) -> str:
 
 def _replace_file(target: Path, data: bytes) -> None:
     """Write a file whole or not at all."""
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
-        try:
-            temporary.unlink(missing_ok=True)  # of a process that had this number before, and was killed
-            with temporary.open("xb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            temporary.replace(target)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
+        with whole_file(target) as file:
+            file.write(data)
     except OSError as reason:
         raise Problem(error("E300", f"cannot write {target}: {_why(reason)}")) from reason
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+import stat
 from collections.abc import Callable
 from pathlib import Path
 
@@ -88,3 +89,33 @@ def test_a_new_file_is_written_into_nothing_that_lies_in_wait_there(
         file.write(b"new")
     assert (tmp_path / "other").read_bytes() == b"mine"
     assert not (tmp_path / "a").is_symlink() and (tmp_path / "a").read_bytes() == b"new"
+
+
+def test_a_file_has_its_name_when_it_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text("before")
+    with files.whole_file(path) as file:
+        file.write(b"after")
+        assert path.read_text() == "before"
+    assert path.read_text() == "after"
+    with pytest.raises(KeyboardInterrupt), files.whole_file(path) as file:
+        file.write(b"half")
+        raise KeyboardInterrupt
+    assert path.read_text() == "after"
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_a_file_that_is_replaced_may_keep_its_permissions(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    with files.whole_file(path, mode=0o640) as file:
+        file.write(b"text")
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+
+
+def test_a_link_that_lies_where_a_file_is_made_is_not_written_through(tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.write_text("theirs")
+    (tmp_path / f".a.txt.{socket.gethostname()}.{os.getpid()}.tmp").symlink_to(other)
+    with files.whole_file(tmp_path / "a.txt") as file:
+        file.write(b"ours")
+    assert (other.read_text(), (tmp_path / "a.txt").read_text()) == ("theirs", "ours")

@@ -141,7 +141,7 @@ def test_a_killed_writer_leaves_no_page(sweep: Path, monkeypatch: pytest.MonkeyP
     def killed(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Path, "replace", killed)
+    monkeypatch.setattr(os, "replace", killed)
     with pytest.raises(KeyboardInterrupt):
         batch.report.report(sweep)
     assert sorted(path.name for path in Path().iterdir()) == ["two_link.gains.h5", "two_link.gains.h5.run.json"]

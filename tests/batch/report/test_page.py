@@ -176,7 +176,7 @@ class TestWhatIsVendored:
 
     def test_is_installed_with_the_package(self) -> None:
         text = (Path(inlined.__file__).parents[2] / "setup.cfg").read_text(encoding="utf-8")
-        assert "\nbatch = report/assets/*\n" in text
+        assert "\nbatch = py.typed, report/assets/*\n" in text
 
 
 class TestNumbers:
