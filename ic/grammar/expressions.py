@@ -79,7 +79,8 @@ class Expressions(Quantities):
             left = Binary(operator, left, right, token.place)
             if level == _COMPARISON and _LEVEL.get(self.token.text) == _COMPARISON:
                 first = Label(token.place, "the first is here")
-                helps = ("in a condition write `a < b and b < c`", "requirements are written one by one")
+                helps = ("in `exclude when` write `a < b and b < c`",
+                         "write two requirements: `require a < b; require b < c;`")
                 self.fail("D033", "comparisons do not chain", self.token, also=(first,), help=helps)
 
     def prefix(self, least: int) -> Expression:
@@ -233,7 +234,7 @@ class Expressions(Quantities):
                 if named:
                     self.tell("D034", "an argument without a name stands behind one with a name", start,
                               also=(Label(named[-1][0].place, "this one has a name"),),
-                              help="give it its name, or write it first")  # fmt: skip
+                              help="give it a name, too: `NAME = VALUE`")  # fmt: skip
             if not self.another(")"):
                 break
         closing = self.leave("`,` or ")

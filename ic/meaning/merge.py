@@ -118,7 +118,7 @@ class _Merger:
                         "D052",
                         "`like`, `of` and `from` belong to definitions, not to the blocks inside",
                         entry.place,
-                        help="write the block without it; what is not written is taken from the base",
+                        help="write the whole block, without it; a macro (`#define`) holds what blocks have in common",
                     )
                 )
             words, name = entry.words[:-1][:1], entry.words[min(1, len(entry.words) - 1)].text

@@ -22,7 +22,7 @@ def _uses(place: Place) -> list[Place]:
 
 def _macro(place: Place) -> str:
     """The macro whose body a place is in."""
-    return place.expansions[0].macro if place.expansions else "NAME"
+    return place.expansions[0].macro
 
 
 class Names:
@@ -127,6 +127,8 @@ class Names:
             helps = ["a value names a `let`, or what a servo's definition writes, such as `SERVO.kp`"]
         elif first.lower() in ("nan", "inf", "infinity"):
             helps = ["every number of a deck is finite: leave the entry out where its default is endless, or write one"]
+        elif not helps and name.place.file == COMMAND_LINE and not name.place.expansions:
+            helps = ["`--set` takes a value as the deck would write it: a number with its unit, or a name of the deck"]
         elif not helps and any(use.file == COMMAND_LINE for use in (name.place, *_uses(name.place))):
             helps = [f"it comes from `-D`: write a number there, as in `-D {_macro(name.place)}=2`, or define "
                      f"`let {first} = ...;` in the deck"]

@@ -245,7 +245,7 @@ class _Reader:
         if isinstance(found, Value):
             raise Problem(error("D126", f"`{path}` varies over a list of values, and this is one value", found.place,
                                 help=["write `[a, b, c] UNIT`, `(a .. b by c) UNIT` or `linspace(from, to, count) "
-                                      "UNIT`", "one value that stands still belongs into the run"]))
+                                      "UNIT`", "one value that stands still belongs in the run"]))
         values = [value for value in found.items if isinstance(value, Value)]
         if len(values) != len(found.items):
             raise Problem(error("D126", "a list inside a list", found.place,

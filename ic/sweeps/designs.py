@@ -218,7 +218,7 @@ def _in_unit(expression: Expression, unit: Unit | None) -> Expression:
 def _check_arguments(name: str, arguments: tuple[float, ...], found: list[Any]) -> None:
     if name in ("normal", "truncated") and not arguments[1] > 0.0:
         raise Problem(error("D225", "a standard deviation is above 0", found[1].place,
-                            help="a parameter that does not vary belongs into the run"))
+                            help="a parameter that does not vary belongs in the run"))
     if name != "normal" and not arguments[-2] < arguments[-1]:
         raise Problem(error("D225", f"`{name}` goes from a lower to a higher value", found[-1].place,
                             help="change the two about, or leave the parameter out where they are equal"))

@@ -75,7 +75,8 @@ class Macros(Pcpp):
             self.findings.error(
                 "D010", f"macro `{name.text}` is defined again, differently", name.place,
                 also=(Label(old.name_token.place, "first defined here"),),
-                help=(f"`#undef {name.text}` first, or put the default between `#ifndef {name.text}` and `#endif`",),
+                help=(f"`#undef {name.text}` first; or, if this is a default, write it between "
+                      f"`#ifndef {name.text}` and `#endif`",),
             )  # fmt: skip
         elif old is None and macro.parameters is None:
             definitions.warn_of_quantity(name, macro.body, self.findings)

@@ -34,7 +34,7 @@ from ic.text.limits import (
 )
 from ic.text.macros import Macros
 from ic.text.strays import complain_of_stray, complain_of_unseen
-from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean
+from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, nearest
 from met.frozen import frozen
 
 CONDITIONALS = ("if", "ifdef", "ifndef", "elif", "elifdef", "elifndef", "else", "endif")
@@ -143,14 +143,17 @@ class _Preprocessor(Macros):
             help = f"ask `defined({name})`, or define it before: `#define {name} 1`, `-D {name}=1`"
             if name in lets:
                 label = Label(lets[name].place, "this `let` is a value; a condition sees macros alone")
-                self.findings.warn("D036", told, place, also=(label,), help="write a macro for what is to be asked")
+                self.findings.warn("D036", told, place, also=(label,),
+                                   help="define a macro for it, `#define NAME ...`, and ask that")  # fmt: skip
             else:
                 self.findings.warn("D036", told, place, help=[*did_you_mean(name, self.macros), help])
         for name, token in self.given.items():
             if name not in self.asked:
                 near = did_you_mean(name, [*self.asked, *self._zeros])
+                let = nearest(name, lets)
+                values = [] if let is None else [f"a `let` is set by `--set '{let}=VALUE'`"]
                 self.findings.warn("D037", f"`-D {name}` has no effect: nothing in the deck asks for a macro `{name}`",
-                                   token.place, help=[*near, f"`--set '{name}=VALUE'` sets a `let`"])  # fmt: skip
+                                   token.place, help=[*near, *values])  # fmt: skip
 
     def _read(self, file: FoundFile, source: Text, at: Place) -> None:
         self._including.append((file, source))

@@ -109,6 +109,13 @@ def test_a_word_of_a_macro_of_the_command_line_is_told_of_that(tmp_path: Path) -
     assert check(tmp_path, text, ARM, SERVO, RUN, defines=("SIZE=2",)).diagnostics == ()
 
 
+def test_a_word_that_set_gives_is_told_of_set(tmp_path: Path) -> None:
+    (found,) = check(tmp_path, "let long = 2;\n", ARM, SERVO, RUN, set=("long=VALUE",)).diagnostics
+    assert (found.code, found.help) == (
+        "D065", ("`--set` takes a value as the deck would write it: a number with its unit, or a name of the deck",)
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("word", ["nan", "NaN", "inf", "infinity"])
 def test_a_number_that_is_none_is_not_defined_by_a_let(tmp_path: Path, word: str) -> None:
     (found,) = check(tmp_path, f"let long = {word};\n", ARM, SERVO, RUN).diagnostics

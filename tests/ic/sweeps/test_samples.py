@@ -152,7 +152,7 @@ error[D225]: a standard deviation is above 0
    |
 18 | sweep it of hold { sample lhs(3) { drive.kp = unifrom(1, 2) V*s/rad; drive.ki = normal(1, -1) V/rad; } }
    |                                                                                           ^^
-   = help: a parameter that does not vary belongs into the run
+   = help: a parameter that does not vary belongs in the run
 
 2 errors
 """

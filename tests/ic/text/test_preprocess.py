@@ -306,7 +306,7 @@ warning[D036]: `span` is no macro, so it counts as 0 in this condition
 3 | #if LINK > 1 || span > 1
   |                 ^^^^
  ::: a.ic:2:5  this `let` is a value; a condition sees macros alone
-  = help: write a macro for what is to be asked
+  = help: define a macro for it, `#define NAME ...`, and ask that
 
 2 warnings
 """
@@ -326,9 +326,9 @@ def test_a_macro_on_the_command_line_that_nothing_asks_for_gets_a_warning(desk: 
     made = desk.tokens(asked, defines=["LINKS", "RODS=2", "BARS", "MASS=3", "LINK=2", "mas=1"])
     assert [(d.severity, d.code, d.message, d.help) for d in made.diagnostics] == [
         ("warning", "D037", "`-D LINK` has no effect: nothing in the deck asks for a macro `LINK`",
-         ("did you mean `LINKS`?", "`--set 'LINK=VALUE'` sets a `let`")),
+         ("did you mean `LINKS`?",)),
         ("warning", "D037", "`-D mas` has no effect: nothing in the deck asks for a macro `mas`",
-         ("did you mean `MASS`?", "`--set 'mas=VALUE'` sets a `let`")),
+         ("did you mean `MASS`?", "a `let` is set by `--set 'mass=VALUE'`")),
     ]  # fmt: skip
 
 
@@ -389,7 +389,7 @@ error[D010]: macro `SIZE` is defined again, differently
 3 | #define SIZE 2
   |         ^^^^
  ::: a.ic:1:9  first defined here
-  = help: `#undef SIZE` first, or put the default between `#ifndef SIZE` and `#endif`
+  = help: `#undef SIZE` first; or, if this is a default, write it between `#ifndef SIZE` and `#endif`
 
 1 error
 """
