@@ -124,7 +124,7 @@ error[D077]: `mass` of link `bar` must be at least 0 kg
   |
 3 |     link bar { mass = -2 kg; shape = rod(length = 1 m, along = x); }
   |                       ^^^^^ this is -2 kg
-  = help: write a number at least 0 kg (mass of the link)
+  = help: write a number of at least 0 kg (mass of the link)
 
 1 error
 """,

@@ -44,7 +44,7 @@ def asked(group: Group, pool: Pool, names: Sequence[str], cases: Sequence[str], 
             raise _unknown(group, name, list(metrics))
     if signals and others:
         message = f"`{signals[0]}` is a signal and `{others[0]}` a metric: they have no axis in common"
-        raise Problem(error("E391", message, help="draw two pictures, each with a name of its own: `-o FILE`"))
+        raise Problem(error("E391", message, help="draw two pictures, each with a name of its own: `-o FILE.png`"))
     if signals and over:
         message = f"`{signals[0]}` is a signal, which is drawn over time, and not over `{over[0]}`"
         known = f": {', '.join(dict.fromkeys(v.path for v in metrics.values()))}" if metrics else ""

@@ -81,7 +81,7 @@ def several(found: Sequence[T], asked: bool, what: str) -> tuple[Sequence[T], st
         return found, ""
     if asked:
         message = f"{len(found):,} {what} in one picture: {MOST_PANELS} at most"
-        raise Problem(error("E391", message, help="draw several pictures, each with a name of its own: `-o FILE`"))
+        raise Problem(error("E391", message, help="draw several pictures, each with a name of its own: `-o FILE.png`"))
     return found[:MOST_PANELS], f"{MOST_PANELS} of {len(found):,} {what}, others by name"
 
 

@@ -82,11 +82,14 @@ def check_base(scope: Scope, base: Base | None, structure: Structure, environmen
     paths = [f"links.{name}.mass" for name in structure.ground]
     paths += [path for name in structure.ground for path, _ in loads.get(name, ())]
     masses = [settled.value for path in paths if (settled := scope.parameters.get(path)) is not None]
+    own = scope.parameters.get(f"links.{BASE}.mass")
+    written = own is not None and own.origin.kind != "default"
     scope.checks.hold(
         tuple(masses),  # type: ignore[arg-type]  # masses are numbers
         lambda rows: (~(rows.sum(axis=1) > 0.0), []), code="D254", message="the base moves freely and has no mass",
         place=item.place, needs=tuple(paths),
-        help=("give the arm the base's body: `link base { mass = 400 kg; shape = sphere(radius = 0.5 m); }`",
+        help=(f"write a mass above 0 kg for link `{BASE}`" if written else
+              "give the arm the base's body: `link base { mass = 400 kg; shape = sphere(radius = 0.5 m); }`",
               "or write the mass of a link that is fixed to the base",
               *(word for name in structure.ground for word in passing.get(name, ()))))
 

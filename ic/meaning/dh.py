@@ -89,7 +89,7 @@ def use_dh(scope: Scope, owner: Owner, kind: str, item: Item, body: Block) -> No
     if convention is None:
         scope.checks.fail(owner.join("dh"))
         return
-    inner = Owner(f"the dh of {owner.label}", item.place, owner.join("dh"), homes=owner.homes)
+    inner = Owner(f"the dh of {owner.label}", item.place, owner.join("dh"), homes=owner.homes, call=True)
     numbers = item.body or Block()
     check_keys(scope, numbers, [wanted.name for wanted in NUMBERS], inner)
     scope.unvaried[owner.join("dh")] = unvaried.several(_numbers(owner))

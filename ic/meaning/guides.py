@@ -205,8 +205,10 @@ def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any]
     found = guide.idle(SimpleNamespace(**values), duration)
     if found is not None:
         written = [part for name in found[0] if (part := (item.body or Block()).get(name)) is not None]
+        needed = [each for each in guide.parameters if each.name in found[0] and each.default is None]
         scope.complaints.remark("D301", f"guide `{item.name}` {found[1]}", value_at(written[0] if written else item),
-                                help="change that, or leave it out")
+                                help="change that, or leave it out" if not needed else
+                                f"change {' or '.join(f'`{name}`' for name in found[0])}")
 
 
 def _of_joints(scope: Scope, owner: Owner, guide: Any, body: Block, arm: Arm, joints: Iterable[str]) -> None:

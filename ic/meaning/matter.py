@@ -58,7 +58,7 @@ def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
     if refuse_values(scope, item.value, [p.name for p in kind.parameters]):
         scope.checks.fail(f"{owner.path}.shape")
         return None
-    inner = Owner(f"the {name} of {owner.label}", item.place, f"{owner.path}.shape", homes=owner.homes)
+    inner = Owner(f"the {name} of {owner.label}", item.place, f"{owner.path}.shape", homes=owner.homes, call=True)
     body = item.body or Block()
     check_keys(scope, body, [p.name for p in kind.parameters], inner)
     numbers: dict[str, Real] = {}

@@ -34,6 +34,7 @@ class Owner:
     of: str | None = None
     called: str | None = None  # what to call its one parameter, which has no name in the deck
     others: tuple[Parameter, ...] = ()  # all that its model declares, where it is a model
+    call: bool = False  # whether its parameters stand in parentheses, as in `rod(length = 1 m, along = x)`
     short: str = ""  # the parameter that a path may leave out: `environment.gravity.x` for `environment.gravity.g.x`
 
     def what(self, wanted: Parameter) -> str:

@@ -127,12 +127,14 @@ def _check_unused(scope: Scope, item: Item, body: Block, grappled: bool) -> None
         written = body.get(name)
         if written is None:
             continue
-        told, helps = f"payload `{item.name}` is held from the start", ["`at` and `rpy` say where on its link",
-                                                                        "write `grapple = 3 s;` if it flies first"]
+        told, helps = f"payload `{item.name}` is held from the start", [
+            f"leave `{name}` out: `at` and `rpy` say where on its link it is",
+            "or write `grapple = 3 s;` if it flies first"]
         also = []
         if grappled:
             told, helps = f"payload `{item.name}` is held as it is when it is grappled", [
-                "`attitude` and `rate` say how it flies before", "leave `grapple` out if it is held from the start"]
+                f"leave `{name}` out: `attitude` and `rate` say how it flies before",
+                "or leave `grapple` out if it is held from the start"]
             also = [Label(body.items["grapple"].place, "grappled here")]
         scope.complaints.error("D263", f"{told}, so `{name}` has no effect", written.place, also=also, help=helps)
 

@@ -82,7 +82,7 @@ def divisor(complaints: Complaints, rate: Rate, base: Rate, others: list[Rate], 
         helps.append("nearest that fit: " + ", ".join(_fitting(base.hz, n) for n in fits))
     common = _common([exact(each.hz) for each in (rate, base, *others)])
     if common is not None:
-        helps.append(f"or a base rate that all divide: `base = {common};` in `rates`")
+        helps.append(f"{'or ' if helps else ''}a base rate that all divide: `base = {common};` in `rates`")
     complaints.error("D100", message, label, also=also, help=helps)
     return 1
 

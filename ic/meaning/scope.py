@@ -339,10 +339,11 @@ class Scope:
         unit = self.unit(owner, wanted)[0]
         shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
         shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {unit}"
+        doc = f" ({wanted.doc})" if wanted.doc != wanted.name else ""
         also = [Label(owner.place, f"{owner.label} stands here")] if removed is not None else []
         at = Label(removed, "removed here") if removed is not None else owner.place
         self.complaints.error("D075", f"{owner.label} has no `{wanted.name}`", at, also=also,
-                              help=f"write `{wanted.name} = {shown};` ({wanted.doc})")
+                              help=f"write `{wanted.name} = {shown}{'' if owner.call else ';'}`" + doc)
 
     def _settle(self, owner: Owner, wanted: Parameter, name: str, item: Item | None, written: Value | None,
                 default: float | None, record: bool, part: Expression | None = None) -> Real | None:
@@ -565,7 +566,8 @@ class Scope:
             return bad, [f"this is {x:g}{unit}" for x in values[bad, 0][:1]]
 
         limits = " and ".join(f"{word} {bound:g}" for bound, word, _ in bounds) or "finite"
-        remedy = f"write a number {limits}{unit}" if bounds else "write a finite number"
+        of = "of " if limits.startswith("at ") else ""
+        remedy = f"write a number {of}{limits}{unit}" if bounds else "write a finite number"
         if wanted.whole:
             limits, remedy = f"whole and {limits}", remedy.replace("a number", "a whole number")
         limits += unit if bounds else ""

@@ -395,7 +395,7 @@ def use_course(scope: Scope, spot: Owner, inner: Expression, item: Item, *, doc:
     opened = replace(apart, items=inside | dict(apart.items),
                      statements=(*(named or Block()).statements, *apart.statements),
                      pending=(*(named or Block()).pending, *apart.pending))
-    course = replace(spot, label=f"`{name}`", called=None, place=inner.name.place)
+    course = replace(spot, label=f"`{name}`", called=None, place=inner.name.place, call=True)
     if profile.from_file:
         use_file(scope, course, profile, opened, column, kind)
         return profile.name

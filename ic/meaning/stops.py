@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ic.meaning.complaints import Complaints
-from ic.meaning.schedule import hz
+from ic.meaning.schedule import slowest_that_fits
 from met import models
 from met.diagnostic import Label
 from met.plan import Experiment, Formula, Quantity
@@ -41,13 +41,20 @@ def check_stops(complaints: Complaints, experiment: Experiment) -> None:
             place = stiffness[each.stop].origin.place or uses[each.stop].place
             times = enough / each.steps if each.steps > 0.0 else math.inf
             rate = times * structure.schedule.base_hz / structure.schedule.dynamics
-            fits = f"that is {hz(float(math.ceil(rate)))} Hz or more" if math.isfinite(rate) else "no rate is so high"
+            fits = "no rate is so high: make the stop softer"
+            if math.isfinite(rate):
+                least = slowest_that_fits(structure.schedule, _AT_MOST)(rate)
+                fits = f"quicken the dynamics to {least}, or make the stop softer"
             complaints.remark(
                 "D295", f"`{each.stop}` is stiff for the dynamics' step: joint `{each.joint}` touches it for "
                 f"{each.steps:.2g} steps", Label(place, f"h = {structure.schedule.step:g} s") if place else place,
                 help=[f"with {integrator.name} a contact of fewer than {enough:g} steps gives energy that nobody put "
                       "in",
-                      f"{fits}, or a softer stop: the joint feels {each.inertia:.3g} {unit} at the start"])
+                      f"{fits}: the joint feels {each.inertia:.3g} {unit} at the start"])
+
+
+_AT_MOST = math.nextafter(1.0, 2.0)
+"""The first number that a step times the rate that is needed must stay below: 1 itself is enough."""
 
 
 def _stiffest(experiment: Experiment, stiffness: Quantity) -> int:

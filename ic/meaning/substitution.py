@@ -128,7 +128,7 @@ def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use])
             continue
         part = block.get(each)
         owner = Owner(f"{each} `{model.name}` of joint `{item.name}`", (part or item).place, f"{item.name}.{each}",
-                      homes=(part or item).homes, joint=kind)  # type: ignore[arg-type]
+                      homes=(part or item).homes, joint=kind, call=True)  # type: ignore[arg-type]
         scope.unvaried[f"{owner.path}.model"] = unvaried.chosen(f"vary `{owner.path}` over models")
         body = (part.body if part is not None else None) or Block()
         if each == "bed":

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from ic.grammar.syntax import Name, String
@@ -14,6 +15,7 @@ from ic.meaning.models import check_keys, use_model
 from ic.meaning.owner import Owner, Settled
 from ic.meaning.scope import Scope
 from ic.meaning.values import place_of
+from met import units
 from met.diagnostic import Label, Problem, did_you_mean, error
 from met.environments.environment import FILE, Environment
 from met.parameter import Parameter
@@ -81,6 +83,15 @@ def keep_column(scope: Scope, owner: Owner, wanted: Parameter, table: Table, col
     return numbers
 
 
+def _alike(scope: Scope, owner: Owner, column: Column, by_column: Mapping[str, Parameter]) -> list[str]:
+    """The columns that this one could be by its unit; all of them where it has none, or one that cannot be read."""
+    try:
+        meant = units.parse_unit(column.unit or "").dimension
+    except (ValueError, OverflowError, ZeroDivisionError):
+        return list(by_column)
+    return [name for name, wanted in by_column.items() if units.same(scope.unit(owner, wanted)[1], meant)]
+
+
 def _columns(scope: Scope, owner: Owner, lists: list[Parameter], item: Item) -> dict[str, tuple[float, ...]]:
     """The lists. Raises Problem."""
     named = named_file(owner, item)
@@ -90,7 +101,7 @@ def _columns(scope: Scope, owner: Owner, lists: list[Parameter], item: Item) -> 
     for column in table.columns:
         if column.name not in by_column:
             raise Problem(error("D243", f"{owner.label} has no use for column `{column.name}`", column.place,
-                                also=[label], help=[*did_you_mean(column.name, by_column),
+                                also=[label], help=[*did_you_mean(column.name, _alike(scope, owner, column, by_column)),
                                                     known_words("its columns", by_column), "or take it out"]))
     columns = {}
     for name, wanted in by_column.items():

@@ -316,8 +316,11 @@ def _refuse(entry: object, words: list[str], base: str) -> None:
     if isinstance(entry, Setting) and not words:
         path = ".".join(word.text for word in entry.path)
         vary = [] if entry.path[0].text == "tolerances" else [f"`vary {path} = [...];` to vary it"]
+        where = f"set it in a run `like {base}`, and sweep that"
+        if entry.path[0].text == "links":
+            where = f"write it in an arm `like` the run's, and sweep a run `like {base}` that takes that arm"
         raise Problem(error("D136", f"`{path} = ...` in a sweep", place,
-                            help=[*vary, f"{'or ' if vary else ''}set it in a run `like {base}`, and sweep that"]))
+                            help=[*vary, f"{'or ' if vary else ''}{where}"]))
     if words[:1] == ["sample"]:
         raise Problem(error("D136", "a sample names its design and how many", place,
                             help=f"write `sample lhs(200) {{ ... }}`; {known_words('designs', DESIGNS)}"))

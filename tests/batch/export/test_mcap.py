@@ -346,7 +346,7 @@ def test_a_case_without_a_history_is_run_again_first(here: Path, monkeypatch: py
         export("a.h5", cases=["#2"])
     assert said(caught.value) == (
         "error[E328]: no history of case #2 of `gains` was kept\n"
-        " = help: `met run a.h5 --case '#2'` runs it again, to the same bits\n"
+        " = help: `met run a.h5 --case '#2'` runs it again, to the same bits, into an archive of its own\n"
         "\n1 error\n"
     )
     assert Mcap(export("a.h5").path).metadata[1][1]["case"] == "1"

@@ -209,7 +209,7 @@ def test_a_case_without_a_history(tmp_path: Path) -> None:
         for case in ("#2", [1, 2]):
             assert said(lambda case=case: data.met.frames(case=case)) == (
                 "E328", "no history of case #2 of `reaches` was kept\n"
-                f"  `met run {archive} --case '#2'` runs it again, to the same bits"
+                f"  `met run {archive} --case '#2'` runs it again, to the same bits, into an archive of its own"
             )  # fmt: skip
 
 

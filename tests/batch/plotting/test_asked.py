@@ -57,7 +57,7 @@ def test_names_are_those_of_signals_or_of_metrics(
      " = help: signals here: q, qd, tau, shoulder.servo.voltage\n = help: metrics here: settle, volts\n"),
     ({"names": ["qd", "settle"]},
      "error[E391]: `qd` is a signal and `settle` a metric: they have no axis in common\n"
-     " = help: draw two pictures, each with a name of its own: `-o FILE`\n"),
+     " = help: draw two pictures, each with a name of its own: `-o FILE.png`\n"),
     ({"names": ["qd"], "over": ["gearbox.kp"]},
      "error[E391]: `qd` is a signal, which is drawn over time, and not over `gearbox.kp`\n"
      " = help: `--over` is of metrics: settle, volts\n"),

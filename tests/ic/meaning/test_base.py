@@ -282,6 +282,12 @@ error[D254]: the base moves freely and has no mass
 """
 
 
+def test_a_free_base_whose_body_is_written_without_mass_needs_a_mass_and_no_second_body(tmp_path: Path) -> None:
+    arm = changed(ARM, ("mass = 50 kg; shape = sphere(radius = 1 m)", "mass = 0 kg"))
+    (found,) = check(tmp_path, arm, RUN).diagnostics
+    assert (found.code, found.help[0]) == ("D254", "write a mass above 0 kg for link `base`")
+
+
 def test_a_free_base_that_loses_its_mass_in_a_case_is_told(tmp_path: Path) -> None:
     sweep = "sweep light of it { vary links.base.mass = [1, 0] kg; }"
     arm = changed(ARM, ("shape = sphere(radius = 1 m)", "inertia = [0, 0, 0] kg*m^2"))

@@ -451,7 +451,7 @@ warning[D301]: guide `tip` is never damped: no singular value is below a `thresh
    |
 12 |         link = two; point = [1, 0, 0] m; guides = xy; max_damping = 0.1 m; threshold = 0 m;
    |                                                                     ^^^^^
-   = help: change that, or leave it out
+   = help: change `max_damping` or `threshold`
 
 1 warning
 """

@@ -107,7 +107,7 @@ error[D077]: `mass` of link `bar` must be at least 0 kg
   |
 3 |     BAR(-2 kg)
   |         ^^^^^ this is -2 kg
-  = help: write a number at least 0 kg (mass of the link)
+  = help: write a number of at least 0 kg (mass of the link)
   = note: in expansion of macro BAR, used at deck.ic:3:5
 """
 
@@ -343,7 +343,7 @@ error[D075]: `table` has no `values`
   |
 9 |     command = rate(table(times = [0, 2] s));
   |                    ^^^^^
-  = help: write `values = [...] rad/s;` (values at those times, as many)
+  = help: write `values = [...] rad/s` (values at those times, as many)
 """
 
 
@@ -429,7 +429,7 @@ error[D077]: `mass` of link `bar` must be at least 0 kg; case #1 breaks it, and 
 18 | default sweep it of hold { vary links.bar.mass = [1000, -2, -1] g; }
    |                                 ^^^^^^^^^^^^^^ this is -0.002 kg
    = help: case #1: links.bar.mass = -2 g
-   = help: write a number at least 0 kg (mass of the link)
+   = help: write a number of at least 0 kg (mass of the link)
 """
 
 

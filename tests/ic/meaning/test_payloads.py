@@ -173,8 +173,8 @@ error[D263]: payload `box` is held from the start, so `velocity` has no effect
    |
 12 |         on    = hand; velocity = [1, 0, 0] m/s;
    |                       ^^^^^^^^
-   = help: `at` and `rpy` say where on its link
-   = help: write `grapple = 3 s;` if it flies first
+   = help: leave `velocity` out: `at` and `rpy` say where on its link it is
+   = help: or write `grapple = 3 s;` if it flies first
 
 1 error
 """,
@@ -188,8 +188,8 @@ error[D263]: payload `box` is held as it is when it is grappled, so `rpy` has no
 15 |         rpy = [1, 0, 0] deg; position = [1, 2, 3] m;
    |         ^^^
   ::: deck.ic:13:9  grappled here
-   = help: `attitude` and `rate` say how it flies before
-   = help: leave `grapple` out if it is held from the start
+   = help: leave `rpy` out: `attitude` and `rate` say how it flies before
+   = help: or leave `grapple` out if it is held from the start
 
 1 error
 """,

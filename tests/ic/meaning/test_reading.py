@@ -43,7 +43,7 @@ warning[D290]: sensor `q` changes nothing: the law of servo `drive` (rigid_gearb
 9 |     sensor q = tachometer { delay = 1; }
   |     ^^^^^^^^
   = help: it reads under a rate command: qd
-  = help: leave it out, or record it
+  = help: leave it out, or record it: `record += [hinge.servo.sensor.q];`
 """
 
 

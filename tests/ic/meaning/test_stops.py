@@ -40,7 +40,7 @@ warning[D295]: `end` is stiff for the dynamics' step: joint `hinge` touches it f
 """), text  # fmt: skip
     assert text.endswith("""\
    = help: with modified_euler a contact of fewer than 10 steps gives energy that nobody put in
-   = help: that is 2000 Hz or more, or a softer stop: the joint feels 1.67 kg m^2 at the start
+   = help: quicken the dynamics to 2000 Hz, or make the stop softer: the joint feels 1.67 kg m^2 at the start
 
 1 warning
 """), text  # fmt: skip
@@ -66,7 +66,7 @@ def test_with_numbers_at_their_ends_it_is_no_fault(tmp_path: Path) -> None:
     rotor = changed(SERVO, ("ratio = 100", "ratio = 1"), ("j_m = 1e-4", "j_m = 1e-308"),
                     ("kt = 0.05", "kt = 1e-308"))  # fmt: skip
     text = told(check(tmp_path, nothing, rotor, deck(1e308)))
-    assert "touches it for 0 steps" in text and "no rate is so high, or a softer stop" in text
+    assert "touches it for 0 steps" in text and "no rate is so high: make the stop softer" in text
 
 
 @pytest.mark.parametrize(("steps", "least", "most"), [(2.0, 1.0, 6.0), (10.0, 0.005, 0.04)])

@@ -437,7 +437,7 @@ error[D077]: `delay` of bed `emulated` of joint `one` must be whole and at least
   |
 1 | run it like base_run { substitute one { bed = emulated(delay = 1.5); } }
   |                                                                ^^^ this is 1.5
-  = help: write a whole number at least 0 and at most 3 (ticks)
+  = help: write a whole number of at least 0 and at most 3 (ticks)
 """
 
 

@@ -67,7 +67,7 @@ error[D077]: `mass` of link `bar` must be at least 0 kg
   |
 6 |       <mass value="-2"/>
   |                    ^^ this is -2 kg
-  = help: write a number at least 0 kg (mass of the link)
+  = help: write a number of at least 0 kg (mass of the link)
 """)
 mistake("an inertia without mass", ('value="2"', 'value="0"'), says="""\
 error[D087]: the inertia of link `bar` is no body's

@@ -177,12 +177,12 @@ def probe(monkeypatch: pytest.MonkeyPatch) -> Iterator[Use]:
     ("name", "text", "bad", "must", "this", "remedy"),
     [
         ("over", "0 N", "0 N", "above 0 N", "0 N", "a number above 0 N (a force)"),
-        ("least", "-1 1/s", "-1 1/s", "at least 0 1/s", "-1 1/s", "a number at least 0 1/s (a rate)"),
+        ("least", "-1 1/s", "-1 1/s", "at least 0 1/s", "-1 1/s", "a number of at least 0 1/s (a rate)"),
         ("under", "2 m", "2 m", "below 2 m", "2 m", "a number below 2 m (a length)"),
-        ("most", "150 %", "150 %", "at least 0 and at most 1", "1.5", "a number at least 0 and at most 1 (a share)"),
-        ("count", "1.5", "1.5", "whole and at least 1", "1.5", "a whole number at least 1 (a number of things)"),
+        ("most", "150 %", "150 %", "at least 0 and at most 1", "1.5", "a number of at least 0 and at most 1 (a share)"),
+        ("count", "1.5", "1.5", "whole and at least 1", "1.5", "a whole number of at least 1 (a number of things)"),
         ("list", "[1, 0] s", "0", "above 0 s", "0 s", "a number above 0 s (times)"),
-        ("arrow", "[0, 1, 2] N*m", "2", "at most 1 N*m", "2 N*m", "a number at most 1 N*m (a moment)"),
+        ("arrow", "[0, 1, 2] N*m", "2", "at most 1 N*m", "2 N*m", "a number of at most 1 N*m (a moment)"),
     ],
 )
 def test_what_is_said_of_each_kind_of_bound(

@@ -73,6 +73,13 @@ def test_rows_of_a_file_are_the_lists_of_a_deck(tmp_path: Path) -> None:
     np.testing.assert_array_equal(engine.run(experiment(tmp_path, SLIDER)).signals["q"], one)
 
 
+def test_a_column_of_another_dimension_is_not_proposed(tmp_path: Path) -> None:
+    (tmp_path / "loads.csv").write_text("time [s], torque_z [N*m]\n0, 1\n", encoding="utf-8")
+    (found,) = check(tmp_path, FROM_FILE).diagnostics
+    assert found.code == "D243"
+    assert not any("did you mean" in each for each in found.help)
+
+
 def test_what_is_wrong_with_a_file_is_told_in_it(tmp_path: Path) -> None:
     (tmp_path / "loads.csv").write_text("time [s], force_X [N]\n0, 1\n", encoding="utf-8")
     assert told(check(tmp_path, FROM_FILE)) == """\
