@@ -65,6 +65,10 @@ def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[st
         inside = [name for name in known if name == f"{head}.{path}" or name.startswith(f"{head}.{path}.")]
         if inside:
             return inside
+    heads = dict.fromkeys(name.partition(".")[0] for name in known)
+    if path == experiment.name or _is_run(path, also):
+        raise Problem(error("D170", f"`{path}` is a run or a sweep, and no parameter",
+                            help=[f"`met plan DECK {path}` prints it", f"paths begin with {', '.join(heads)}"]))
     follow = [name for each, names in also.items() if each.startswith(f"{path}.") for name in names if name in known]
     if follow:
         return list(dict.fromkeys(follow))
@@ -97,9 +101,18 @@ def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[st
     if beside:
         helps.append(known_words(f"`{head}` has", [name.removeprefix(f"{head}.") for name in beside]))
     if not helps:
-        heads = dict.fromkeys(name.partition(".")[0] for name in known)
         helps.append(f"paths begin with {', '.join(heads)}")
     raise Problem(error("D170", f"no parameter `{path}` in `{experiment.name}`", help=helps))
+
+
+def _is_run(path: str, also: Mapping[str, Sequence[str]]) -> bool:
+    """Whether a run has this name, as in `nominal.initial.shoulder.q`, which is `initial.shoulder.q`.
+
+    An arm, too, stands before whole paths, but among them are its links; a servo's `gearbox.kp` is `elbow.servo.kp`.
+    """
+    reached = {each.removeprefix(f"{path}."): names for each, names in also.items() if each.startswith(f"{path}.")}
+    whole = any(rest in names for rest, names in reached.items())
+    return whole and not any(rest.startswith("links.") for rest in reached)
 
 
 def _three_nearest(path: str, known: Iterable[str]) -> list[str]:

@@ -83,6 +83,26 @@ def test_a_swept_size_of_a_shape_is_shown_over_its_cases(capsys: pytest.CaptureF
     assert "a sweep varies it, here" in out
 
 
+@pytest.mark.parametrize(("name", "run"), [("hold", "hold"), ("hold", "sizes"), ("sizes", "sizes")])
+def test_the_name_of_a_run_is_no_path(name: str, run: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["explain", "a.ic", name, "--run", run]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"""\
+error[D170]: `{name}` is a run or a sweep, and no parameter
+ = help: `met plan DECK {name}` prints it
+ = help: paths begin with links, hinge, """), said
+    assert cli.main(["explain", "a.ic", "hold.environment.gravity.g.z", "--run", run]) == 0  # which is one
+    assert cli.main(["plan", "a.ic", name]) == 0
+
+
+@pytest.mark.parametrize("name", ["swing", "drive"])
+def test_the_name_of_an_arm_or_a_servo_stands_for_what_it_writes(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["explain", "a.ic", name]) == 0
+    assert len(capsys.readouterr().out.splitlines()) > 10
+
+
 def test_paths_that_a_deck_may_write_otherwise_are_understood(capsys: pytest.CaptureFixture[str]) -> None:
     gravity = {"environment.gravity.g.z": (-9.81, "m/s^2", 11)}
     assert explained(capsys, "a.ic", "environment.gravity.z") == gravity
