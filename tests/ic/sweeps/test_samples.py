@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from ic.sweeps import designs
 from met.plan import Experiment
 from met.plan import file as plan_file
 from tests.ic.small_decks import ARM, RUN, SERVO, check, codes, experiment, told
@@ -53,6 +54,35 @@ def test_samples_are_in_the_unit_that_is_written_with_twelve_digits(tmp_path: Pa
     assert all(float(f"{value / 1e-3:.12g}") * 1e-3 == value for value in found.values)
     (own,) = drawn(tmp_path, "sample lhs(5) { links.bar.mass = uniform(100 g, 0.2 kg); }")
     assert own.tolist() == found.values.tolist()
+
+
+BOUNDED = [("initial.hinge.q", ("deg", "arcmin", "arcsec", "cycle", "rad")), ("links.bar.mass", ("g", "kg", "t")),
+           ("initial.hinge.qd", ("rpm", "deg/s", "cycle/min", "rad/h")), ("drive.v_max", ("mV", "kV"))]  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_samples_stay_within_the_bounds_that_the_deck_writes_to_the_last_bit(
+    tmp_path: Path, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In any unit, with bounds of more digits than values have, and at the outermost points that a design may draw."""
+    random = np.random.default_rng(seed)
+    points = np.array([2.0**-54, 0.25, 0.5, 0.75, 1.0 - 2.0**-53])[:, np.newaxis]
+    monkeypatch.setattr(designs, "_points", lambda *asked: points)
+    path, named = BOUNDED[random.integers(len(BOUNDED))]
+    unit, digits = random.choice(named), random.choice([1, 3, 12, 17])
+    low = float(f"{random.uniform(1e-3, 500):.{digits}g}")
+    high = float(f"{low * (1 + 10 ** random.uniform(-3, 1)):.17g}")
+    wide = high - low
+    mean, deviation = low + wide * random.uniform(-3, 4), wide * 10 ** random.uniform(-0.5, 3)
+    kinds = {"uniform": [low, high], "loguniform": [low, high], "truncated": [mean, deviation, low, high]}
+    for kind, numbers in kinds.items():
+        behind = f"{kind}({', '.join(map(repr, map(float, numbers)))}) {unit}"
+        inside = f"{kind}({', '.join(f'{float(x)!r} {unit}' for x in numbers)})"
+        ends, values, same = (drawn(tmp_path, each)[0] for each in (
+            f"vary {path} = [{low!r}, {high!r}] {unit};", f"sample random(5) {{ {path} = {behind}; }}",
+            f"sample random(5) {{ {path} = {inside}; }}"))  # fmt: skip
+        assert ends[0] <= values.min() < values.max() <= ends[1], behind
+        assert values.tolist() == same.tolist()
 
 
 def test_the_seed_decides_and_stands_in_the_sweep_or_its_run(tmp_path: Path) -> None:
