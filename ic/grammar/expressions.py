@@ -80,7 +80,7 @@ class Expressions(Quantities):
             if level == _COMPARISON and _LEVEL.get(self.token.text) == _COMPARISON:
                 first = Label(token.place, "the first is here")
                 helps = ("in `exclude when` write `a < b and b < c`",
-                         "write two requirements: `require a < b; require b < c;`")
+                         "of requirements write two: `require a < b; require b < c;`")
                 self.fail("D033", "comparisons do not chain", self.token, also=(first,), help=helps)
 
     def prefix(self, least: int) -> Expression:

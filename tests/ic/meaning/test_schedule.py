@@ -51,6 +51,13 @@ def test_a_rate_that_does_not_divide_is_told_with_what_fits(tmp_path: Path) -> N
     )
 
 
+def test_a_base_rate_that_is_the_only_remedy_is_no_alternative(tmp_path: Path) -> None:
+    rates = "dynamics = 1 kHz; servos = 2 kHz; record = 100 Hz; base = 1 kHz;"
+    (found,) = check(tmp_path, *with_rates(rates)).diagnostics
+    assert found.message == "`servos` at 2000 Hz is faster than the base rate, 1000 Hz"
+    assert found.help == ("a base rate that all divide: `base = 2000 Hz;` in `rates`",)
+
+
 def test_what_the_message_proposes_compiles(tmp_path: Path) -> None:
     for servos, base in (("(1000/3) Hz", ""), ("250 Hz", ""), ("300 Hz", "base = 3000 Hz;")):
         assert codes(tmp_path, *with_rates(f"dynamics = 1 kHz; servos = {servos}; record = 100 Hz; {base}")) == []
