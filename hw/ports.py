@@ -1,10 +1,10 @@
 """What a user calls a bed, `--port`: a serial line, or what stands for a bed where there is none.
 
-    /dev/ttyUSB0, socket://HOST:PORT   a line, or any other URL of pyserial's
-    emulated                           the deck's bed in this process, in lock-step
-    firmware                           the bed's firmware with the deck's bed as its plant, a program of its own
-    qemu                               the same as it runs on a Cortex-M3, in an emulator
-    FILE                               a transcript: what was answered then
+/dev/ttyUSB0, socket://HOST:PORT   a line, or any other URL of pyserial's
+emulated                           the deck's bed in this process, in lock-step
+firmware                           the bed's firmware with the deck's bed as its plant, a program of its own
+qemu                               the same as it runs on a Cortex-M3, in an emulator
+FILE                               a transcript: what was answered then
 """
 
 from __future__ import annotations

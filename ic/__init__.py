@@ -18,20 +18,31 @@ if TYPE_CHECKING:
 __all__ = ["check", "compile"]
 
 
-def check(path: str | PathLike[str], *, include_dirs: Iterable[str | PathLike[str]] = (), defines: Iterable[str] = (),
-          set: Mapping[str, object] | Iterable[str] = (),
-          select: Sequence[str] | Literal["all"] | None = "all") -> Compiled:
+def check(
+    path: str | PathLike[str],
+    *,
+    include_dirs: Iterable[str | PathLike[str]] = (),
+    defines: Iterable[str] = (),
+    set: Mapping[str, object] | Iterable[str] = (),
+    select: Sequence[str] | Literal["all"] | None = "all",
+) -> Compiled:
     """The plan of all runs and sweeps or None, all diagnostics, every file's text. A mistake raises nothing."""
     from ic.meaning.lower import check as lowered
 
     settings = [f"{path}={value}" for path, value in set.items()] if isinstance(set, Mapping) else set
-    return lowered(path, include_dirs=tuple(include_dirs), defines=tuple(defines), select=select,
-                   settings=tuple(settings))
+    return lowered(
+        path, include_dirs=tuple(include_dirs), defines=tuple(defines), select=select, settings=tuple(settings)
+    )
 
 
-def compile(path: str | PathLike[str], *, include_dirs: Iterable[str | PathLike[str]] = (),
-            defines: Iterable[str] = (), set: Mapping[str, object] | Iterable[str] = (),
-            select: Sequence[str] | Literal["all"] | None = None) -> Plan:
+def compile(
+    path: str | PathLike[str],
+    *,
+    include_dirs: Iterable[str | PathLike[str]] = (),
+    defines: Iterable[str] = (),
+    set: Mapping[str, object] | Iterable[str] = (),
+    select: Sequence[str] | Literal["all"] | None = None,
+) -> Plan:
     """The run plan of a deck.
 
     set     values in the stead of the deck's, as the deck would write them: `{"gearbox.kp": "0.02 V*s/rad"}`, or

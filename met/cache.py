@@ -129,7 +129,7 @@ def _read(path: Path) -> bytes | None:
     data = read(path)
     if data is None or not data.startswith(_MARK):
         return None
-    digest, code = data[len(_MARK):len(_MARK) + 32], data[len(_MARK) + 32:]
+    digest, code = data[len(_MARK) : len(_MARK) + 32], data[len(_MARK) + 32 :]
     return code if digest_of(path.stem, code) == digest else None
 
 

@@ -92,8 +92,14 @@ class Problem(Exception):
         return "\n" + render(self.diagnostics, self.sources).rstrip("\n")
 
 
-def error(code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
-          help: Iterable[str] | str = ()) -> Diagnostic:
+def error(
+    code: str,
+    message: str,
+    at: Label | Place | None = None,
+    *,
+    also: Iterable[Label] = (),
+    help: Iterable[str] | str = (),
+) -> Diagnostic:
     """A `Diagnostic` of severity error, with a bare place allowed for a label and one string for the helps."""
     label = Label(at) if isinstance(at, Place) else at
     helps = (help,) if isinstance(help, str) else tuple(help)

@@ -29,8 +29,10 @@ if TYPE_CHECKING:
 Kind = Literal["servo", "sensor", "environment", "command", "guide", "metric", "integrator", "bed", "law"]
 
 
-OF_ONES_OWN = ("a model of your own is known once its package is installed, `pip install -e FOLDER`; `met new` writes "
-               "such a package")
+OF_ONES_OWN = (
+    "a model of your own is known once its package is installed, `pip install -e FOLDER`; `met new` writes "
+    "such a package"
+)
 
 HELD = ("memory", "outputs", "integrals", "states", "signals")
 """Where declarations say what a model holds and shows."""

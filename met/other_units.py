@@ -182,7 +182,7 @@ def remedy(name: str, number: str = "", *, alone: bool = True) -> tuple[str, ...
 def _with_prefix(name: str) -> tuple[str, int] | None:
     """A prefix before a unit, as a unit of the table and a power of ten: `MHz` is Hz and 6."""
     prefix = "da" if name[:2] == "da" else name[:1].replace("K", "k")
-    unit = name[len(prefix):]
+    unit = name[len(prefix) :]
     if prefix not in _SIZES or unit not in _PREFIXED:
         return None
     if unit == "Nm" and is_unit(f"{prefix}N"):

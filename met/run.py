@@ -28,6 +28,7 @@ DONE, FAILED, TIMED_OUT, LOST = range(4)
 STOPPED = 3.0
 """Of the output `failure`, beside the engine's own: something else ended the case, and a fate says why."""
 
+
 @frozen
 class Run:
     """What the engine gives back for some cases of one experiment; the first axis of every array is the case.
@@ -130,9 +131,7 @@ def comparable(key: str | None, other: str | None) -> bool:
     return key is not None and other is not None and key.partition(":")[1] == other.partition(":")[1]
 
 
-def prepare(
-    experiment: Experiment, *, lanes: int | None = None, wire: bool = False, late: int = 0
-) -> Prepared:
+def prepare(experiment: Experiment, *, lanes: int | None = None, wire: bool = False, late: int = 0) -> Prepared:
     """Make an experiment ready to run; lanes: cases a block, None for what suits the machine."""
     return Prepared(experiment, lanes, wire, late)
 
@@ -168,8 +167,11 @@ def compute(
     """What the kernel gives of these rows, as `results` takes it: histories [case, row, column], where they are kept
     and there are any, and outputs [case, output], in the order of the program's."""
     history, outputs = prepared.kernel.run(
-        inputs(prepared.experiment, rows), prepared.experiment.structure.schedule.ticks,
-        record=record and prepared.program.columns > 0, threads=threads, progress=progress,
+        inputs(prepared.experiment, rows),
+        prepared.experiment.structure.schedule.ticks,
+        record=record and prepared.program.columns > 0,
+        threads=threads,
+        progress=progress,
     )
     return history, outputs
 

@@ -204,10 +204,12 @@ _ROWS: tuple[tuple[str, str, Dimension, int, int], ...] = (
 
 _OF_PI = frozenset({"deg", "arcmin", "arcsec", "cycle", "rpm"})
 
-UNITS: Mapping[str, NamedUnit] = MappingProxyType({
-    name: NamedUnit(name, word, Measure(dimension, over, under, int(name in _OF_PI), int(name in ("Hz", "kHz"))))
-    for name, word, dimension, over, under in _ROWS
-})
+UNITS: Mapping[str, NamedUnit] = MappingProxyType(
+    {
+        name: NamedUnit(name, word, Measure(dimension, over, under, int(name in _OF_PI), int(name in ("Hz", "kHz"))))
+        for name, word, dimension, over, under in _ROWS
+    }
+)
 
 # how a dimension is said, where base units would be hard to read; the first that matches
 _SPOKEN = (

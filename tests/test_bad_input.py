@@ -180,7 +180,12 @@ error[D154]: `values` of `table` has 2 numbers, and `times` 3
 
 @pytest.mark.parametrize(("right", "wrong", "said"), MISTAKES.values(), ids=MISTAKES)
 def test_a_mistake_is_one_placed_message_and_nothing_is_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], right: str, wrong: str, said: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    right: str,
+    wrong: str,
+    said: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert right in DECK
@@ -199,12 +204,15 @@ def test_an_output_that_cannot_be_written_is_told_before_anything_runs(
     assert cli.main(["run", "deck.ic", "-o", "nowhere/deck.h5"]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
-    assert printed.err == """\
+    assert (
+        printed.err
+        == """\
 error[E305]: cannot write nowhere/deck.h5: nowhere does not exist
  = help: make it first: `mkdir -p nowhere`
 
 1 error
 """
+    )
     assert [path.name for path in tmp_path.iterdir()] == ["deck.ic"]
 
 
@@ -220,13 +228,16 @@ def test_a_misspelt_deck_is_told_with_the_one_that_was_meant(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert cli.main(["run", "two_lnk.ic"]) == 2
-    assert capsys.readouterr().err == """\
+    assert (
+        capsys.readouterr().err
+        == """\
 error[D173]: no deck `two_lnk.ic`
  = help: did you mean `two_link.ic`?
  = help: standard decks: ets_vii.ic, free_flyer.ic, manutec_r3.ic, manutec_r3_one_axis.ic, panda.ic, puma_560.ic, shuttle_arm.ic, stanford_arm.ic, station_arm.ic, two_link.ic
 
 1 error
 """
+    )
     assert not list(tmp_path.iterdir())
 
 

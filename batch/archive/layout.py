@@ -199,7 +199,10 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
     out += [_coordinate(experiment, c, names[c.path]) for c in experiment.cases.coordinates]
     out += [
         variable(
-            "status", "int8", "how the case ended", flag_values=np.array([0, 1, 2, 3], np.int8),
+            "status",
+            "int8",
+            "how the case ended",
+            flag_values=np.array([0, 1, 2, 3], np.int8),
             flag_meanings="done failed timed_out lost",
         ),
         variable("cause", "str", "why the case failed; empty where it did not"),

@@ -150,8 +150,10 @@ class Group:
         position = self.find_case(wanted)
         if position not in self.recorded_positions:
             case = self.values("case")[position]
-            helps = (f"`met run {shlex.quote(str(self.path))} --case '#{case}'` runs it again, to the same bits, into "
-                     "an archive of its own")
+            helps = (
+                f"`met run {shlex.quote(str(self.path))} --case '#{case}'` runs it again, to the same bits, into "
+                "an archive of its own"
+            )
             raise Problem(error("E328", f"no history of case #{case} of `{self.name}` was kept", help=helps))
         return position
 

@@ -67,9 +67,7 @@ def campaign_of(
         raise Problem(error("E414", "some of the beds have a time of their own, and some have none", help=one))
     [stepped] = steps
     late = max(pace_of(each).late(stepped) for each in asked)
-    found = prepare(
-        plan, output=output, experiments=names, cases=cases, histories="all", wires=Wires(late)
-    )
+    found = prepare(plan, output=output, experiments=names, cases=cases, histories="all", wires=Wires(late))
     return found, by_joint, stepped
 
 
@@ -112,9 +110,7 @@ def run_and_tell(
 ) -> bool:
     """Drive a deck's run or sweep; True where every case reached its end and met its requirements."""
     say: Callable[[str], None] = (lambda _: None) if quiet else visible.say
-    plan = read_plan(
-        source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=quiet
-    )
+    plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=quiet)
     campaign, by_joint, stepped = campaign_of(
         plan, names or None, ports, lock_step=lock_step, output=output, cases=cases or None
     )

@@ -176,9 +176,7 @@ def prepare(
     return campaign
 
 
-def _parts(
-    selected: Sequence[tuple[Experiment, np.ndarray]], wanted: Keep, single: bool
-) -> tuple[Part, ...]:
+def _parts(selected: Sequence[tuple[Experiment, np.ndarray]], wanted: Keep, single: bool) -> tuple[Part, ...]:
     """The experiments with what is kept of them. Raises Problem E311, E312 for cases that are none."""
     chosen = choosing.selected([experiment for experiment, _ in selected], wanted.cases) if wanted.cases else []
     named = {experiment.name: rows for experiment, rows in chosen}
@@ -224,5 +222,3 @@ def histories_section(campaign: Campaign, values: Section, results: Callable[[],
         return None
     number = len(campaign.parts) + values.number
     return Section(number, values.number, values.prepared, part.rows[kept], True, part.single, values.begun)
-
-

@@ -230,9 +230,7 @@ class _Work:
                     self._note(f"no history of case #{case} of `{values.name}` is kept: {why}; {again}")
                 kept = np.searchsorted(part.rows, rows[~np.isin(rows, list(lost))])
             program = values.prepared
-            parts.append(
-                Part(part.experiment, part.rows, kept, part.single, program.code_key, program.result_keys)
-            )
+            parts.append(Part(part.experiment, part.rows, kept, part.single, program.code_key, program.result_keys))
         temporary = temporary_of(self.campaign.output)
         writer = Writer(temporary, self.campaign.plan, parts)
         try:
@@ -291,5 +289,3 @@ def _stopped(code: str, message: str, work: _Work, how: str = "") -> Diagnostic:
     kept = work.folder.path.exists()
     helps = f"what is done is kept in {work.folder.path}: the same command goes on{how}" if kept else "nothing was kept"
     return error(code, message, help=helps)
-
-

@@ -216,5 +216,3 @@ def _asked_sum(campaign: Campaign) -> str:
 def _file_sum(path: Path) -> str:
     with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-

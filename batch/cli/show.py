@@ -120,9 +120,7 @@ def _asked_for(
     from batch.terminal.running import read_plan
 
     check_options(source, names, defines=defines, include_dirs=include_dirs, settings=settings)
-    plan = read_plan(
-        source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=form == "json"
-    )
+    plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=form == "json")
     return experiments_named(plan, names or None)
 
 

@@ -385,9 +385,7 @@ def _cases(
             out.equivalent += 1
 
 
-def _recorded(
-    a: Group, b: Group, matched: Cases, about: Experiment
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _recorded(a: Group, b: Group, matched: Cases, about: Experiment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Matched cases whose histories both have: their places in `matched`, and along recorded_case of a and b."""
     has_a, has_b = np.isin(matched.a, a.recorded_positions), np.isin(matched.b, b.recorded_positions)
     for mine, theirs, path in ((has_a, has_b, a.path), (has_b, has_a, b.path)):
@@ -422,5 +420,3 @@ def _incomparable(a: Group, b: Group, name: str, role: str) -> str:
     if role == "signal" and a.components(one) != b.components(two):
         return "of other components"
     return ""
-
-

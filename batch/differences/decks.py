@@ -150,8 +150,8 @@ def _unified(before: Sequence[str], now: Sequence[str]) -> Iterator[str]:
 
 
 def _names(a: Mapping[str, str], b: Mapping[str, str]) -> Iterator[str]:
-    """`let`s and macros of both decks that have another text; one that is written several times is left to its lines.
-    """
+    """`let`s and macros of both decks that have another text; one that is written several times is left to its
+    lines."""
     old, new = (_written({name: text for name, text in mine.items() if other.get(name) != text})
                 for mine, other in ((a, b), (b, a)))  # fmt: skip
     for key in dict.fromkeys([*old, *new]):

@@ -54,9 +54,7 @@ def _unlike(one: requirements.Required | None, other: requirements.Required | No
     return one is not None and other is not None and (one.comparison, one.limit) != (other.comparison, other.limit)
 
 
-def _limits(
-    group: Group, one: requirements.Required | None, other: requirements.Required | None
-) -> tuple[str, str]:
+def _limits(group: Group, one: requirements.Required | None, other: requirements.Required | None) -> tuple[str, str]:
     """The limits of two requirements in the deck's unit, where one text stands for both, as `settle < longest`."""
     if one is None or other is None or one.limit == other.limit:
         return "", ""

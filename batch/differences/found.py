@@ -191,8 +191,8 @@ class Experiment:
 
 @frozen
 class Diff:
-    """The difference of two archives. tolerances: of the command line; only_a, only_b: experiments that one has alone.
-    """
+    """The difference of two archives. tolerances: of the command line; only_a, only_b: experiments that one has
+    alone."""
 
     a: Path
     b: Path

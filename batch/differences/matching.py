@@ -31,9 +31,7 @@ class Cases:
         return len(self.a)
 
 
-def experiments(
-    a: ArchiveFile, b: ArchiveFile
-) -> tuple[list[tuple[Group, Group]], list[Group], list[Group]]:
+def experiments(a: ArchiveFile, b: ArchiveFile) -> tuple[list[tuple[Group, Group]], list[Group], list[Group]]:
     """Matched groups, and those that one archive has alone."""
     if len(a.groups) == len(b.groups) == 1:
         return [(a.groups[0], b.groups[0])], [], []

@@ -28,10 +28,13 @@ def made(found: Diff) -> list[tuple[str, tuple[str, ...]]]:
         ("follows", changed.follows),
         ("new", changed.defaults),
         ("structure", tuple(f"that of `{name}` is another" for name in changed.structure)),
-        ("code", (
-            *(f"the program of `{name}` is another{why}" for name in changed.code),
-            *(f"`{what}` of `{name}` is computed otherwise" for name, what in changed.results),
-        )),
+        (
+            "code",
+            (
+                *(f"the program of `{name}` is another{why}" for name in changed.code),
+                *(f"`{what}` of `{name}` is computed otherwise" for name, what in changed.results),
+            ),
+        ),
     ]
     return [(kind, tuple(map(visible, lines))) for kind, lines in said if lines]
 

@@ -29,7 +29,7 @@ def check(dask: object) -> None:
     from distributed import Client
 
     if not isinstance(dask, Client):
-        raise TypeError(f"dask is the address of a scheduler, \"local\" or a Client, and not {type(dask).__name__}")
+        raise TypeError(f'dask is the address of a scheduler, "local" or a Client, and not {type(dask).__name__}')
     if dask.asynchronous:
         raise Problem(error("E356", "the Dask client is asynchronous, and batch.run is not",
                             help="a Client made without `asynchronous=True` serves it"))  # fmt: skip

@@ -41,9 +41,7 @@ class Threads:
     def wait(self) -> list[Outcome]:
         if self._waiting:
             task = self._waiting.popleft()
-            computed = tasks.compute(
-                self._sections[task.section], task, threads=self._threads, progress=self._progress
-            )
+            computed = tasks.compute(self._sections[task.section], task, threads=self._threads, progress=self._progress)
             assert self._writer is not None
             path = self._folder.shards / task.name
             writing = self._writer.submit(shard.write, path, computed)

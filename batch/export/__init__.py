@@ -1,17 +1,17 @@
 """Archives in other tools' formats: `met export`.
 
-    picking    which cases, and which numbers of them
-    output     what may be written over, and a file that has its name only when it is whole
-    mcap       for Foxglove and Lichtblick: the arm in 3D, signals, what came of it; made of
-      poses      where the links are
-      scene      what they look like
-      said       what is logged of a case, and its result
-      wire       messages of our own
-    layout     what Foxglove shows when it opens one
-    cases      a table of cases: what is varied, metrics, requirements
-    csv        a table as text, of cases or of histories
-    parquet    the same for other programs; needs pyarrow
-    straight   an export that a run is asked for
+picking    which cases, and which numbers of them
+output     what may be written over, and a file that has its name only when it is whole
+mcap       for Foxglove and Lichtblick: the arm in 3D, signals, what came of it; made of
+  poses      where the links are
+  scene      what they look like
+  said       what is logged of a case, and its result
+  wire       messages of our own
+layout     what Foxglove shows when it opens one
+cases      a table of cases: what is varied, metrics, requirements
+csv        a table as text, of cases or of histories
+parquet    the same for other programs; needs pyarrow
+straight   an export that a run is asked for
 """
 
 from __future__ import annotations

@@ -111,8 +111,8 @@ def _head(file: ArchiveFile, runs: Iterable[str], heads: Sequence[tuple[str, str
 
 
 def _column(field: Field, values: Sequence[object]) -> list[str]:
-    """The cells of a column; a case_id that reads as a number, such as 93556390810e0238, gets an apostrophe before it.
-    """
+    """The cells of a column; a case_id that reads as a number, such as 93556390810e0238, gets an apostrophe before
+    it."""
     if field.variable == "case_id":
         return [f"'{value}" if NUMBER.fullmatch(str(value)) else _cell(str(value)) for value in values]
     return _line(values)

@@ -80,9 +80,7 @@ def arms(file: ArchiveFile, cases: Sequence[Case], *, named: bool) -> list[Arm]:
     plan = file.plan(as_written=True)
     one_run = len({case.asked for case in cases}) == 1
     prefixes = [f"case{case.number}/" if one_run else f"{case.asked}/case{case.number}/" for case in cases]
-    return [
-        arm_of(plan, case, prefix if len(cases) > 1 else "") for case, prefix in zip(cases, prefixes, strict=True)
-    ]
+    return [arm_of(plan, case, prefix if len(cases) > 1 else "") for case, prefix in zip(cases, prefixes, strict=True)]
 
 
 def too_many(cases: int, asked: str, helps: Sequence[str]) -> Diagnostic:
@@ -134,8 +132,14 @@ def write(file: ArchiveFile, arms: Sequence[Arm], output: Path) -> int:
 
 def _about(writer: Writer, file: ArchiveFile, arms: Sequence[Arm]) -> None:
     """What made the file, before all else: by it a later export knows that it may write over it."""
-    told = {"archive": file.path.name, "deck": file.deck, "arm": arms[0].experiment.structure.arm,
-            "base_frame": root(arms), "met": VERSION, **{name: str(value) for name, value in file.provenance.items()}}
+    told = {
+        "archive": file.path.name,
+        "deck": file.deck,
+        "arm": arms[0].experiment.structure.arm,
+        "base_frame": root(arms),
+        "met": VERSION,
+        **{name: str(value) for name, value in file.provenance.items()},
+    }
     writer.add_metadata(ABOUT, {plain(name): plain(value) for name, value in told.items()})
     for arm in arms:
         case, group = arm.case, arm.case.group

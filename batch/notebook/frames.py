@@ -33,7 +33,8 @@ OWN = frozenset({"position", "orientation", LINK, "axis", "quaternion"})
 
 POSITION_TOLD = {"units": "m", "long_name": "origin of the link's frame", "frame": "world axes"}
 ORIENTATION_TOLD = {
-    "units": "1", "long_name": "unit quaternion of the link's frame",
+    "units": "1",
+    "long_name": "unit quaternion of the link's frame",
     "frame": "from link axes to world axes, continuous from w >= 0",
 }
 """What an archive says of the same where it is recorded."""

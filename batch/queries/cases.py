@@ -105,7 +105,10 @@ def title(group: Group, most: int | None = None, *, by: By | None = None) -> str
 
 
 def rows_json(
-    group: Group, most: int | None = SHOWN_CASES, *, by: By | None = None,
+    group: Group,
+    most: int | None = SHOWN_CASES,
+    *,
+    by: By | None = None,
     positions: Sequence[int] | np.ndarray | None = None,
 ) -> list[dict[str, Any]]:
     """The same for programs, in SI, of these cases or of the worst: what a case is, how it ended, its metrics (null

@@ -98,8 +98,8 @@ SHARES = {
 
 
 def _comparison(found: Verdict) -> Html:
-    """The share of cases that meet all, before and now; how many cases differ; what each requirement gains and loses.
-    """
+    """The share of cases that meet all, before and now; how many cases differ; what each requirement gains and
+    loses."""
     figure: list[Child] = []
     if found.figure is not None:
         was, now, of = found.figure
@@ -173,7 +173,8 @@ def _demand(each: Demand, single: bool, missed: bool, unknown: bool) -> list[Htm
         el("td", f"{each.met:,} of {each.of:,}", cls="right"),
         el("td", share(each.met, each.of), cls="right strong"),
         el("td", f"{each.missed:,}" if each.missed else "–", cls="right bad" if each.missed else "right")
-        if missed else None,
+        if missed
+        else None,
         el("td", f"{each.unknown:,}" if each.unknown else "–", cls="right") if unknown else None,
         el("td", far, cls="right"),
     ]

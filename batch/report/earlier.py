@@ -21,9 +21,7 @@ class Earlier:
     clocks  the page's times, to which those of the other archive are added
     """
 
-    def __init__(
-        self, before: Before, found: Sequence[SignalPanel], clocks: list[np.ndarray], points: int
-    ) -> None:
+    def __init__(self, before: Before, found: Sequence[SignalPanel], clocks: list[np.ndarray], points: int) -> None:
         self.before, self.found, self.clocks, self.points = before, found, clocks, points
         self._panels: dict[tuple[bool, str], dict[tuple[str, str], Panel]] = {}
 

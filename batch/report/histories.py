@@ -100,9 +100,7 @@ def _kept(pool: Pool, before: Before | None = None) -> list[tuple[int, int]]:
     return list(dict.fromkeys(found))
 
 
-def _said(
-    groups: Sequence[_Group], known: int, here: int, plots: int, points: int, compared: bool
-) -> tuple[str, ...]:
+def _said(groups: Sequence[_Group], known: int, here: int, plots: int, points: int, compared: bool) -> tuple[str, ...]:
     """What is not in the page. known, here: recorded cases, and those of them that are in it."""
     out = []
     if here < known:

@@ -110,7 +110,11 @@ def _about(
 
 
 def as_json(
-    archive: ArchiveFile, experiments: Sequence[str] = (), *, case: str | None = None, all_cases: bool = False,
+    archive: ArchiveFile,
+    experiments: Sequence[str] = (),
+    *,
+    case: str | None = None,
+    all_cases: bool = False,
     by: By | None = None,
 ) -> str:
     """The same for programs: outcome, cases, variables and attributes, without the signals' values.

@@ -1,11 +1,11 @@
 """The moves that a bed is led through: each begins at rest and ends at rest, so that each stands by itself.
 
-    steps      of the voltage, both ways, at several levels, and back to 0 V: inertia, and what brakes the shaft
-    loaded     the same under steps of the load's current: the torque that all others are measured by
-    slow       ramps of voltage, and of current, through rest: dry friction, misalignment
-    limited    the largest voltage and 0 V by turns, as the rate goes up and down: the drive's largest torque, and with
-               it what of the braking is friction and what back-EMF
-    mixed      three sines of the voltage and two of the current
+steps      of the voltage, both ways, at several levels, and back to 0 V: inertia, and what brakes the shaft
+loaded     the same under steps of the load's current: the torque that all others are measured by
+slow       ramps of voltage, and of current, through rest: dry friction, misalignment
+limited    the largest voltage and 0 V by turns, as the rate goes up and down: the drive's largest torque, and with
+           it what of the braking is friction and what back-EMF
+mixed      three sines of the voltage and two of the current
 """
 
 from __future__ import annotations

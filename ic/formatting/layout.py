@@ -169,9 +169,7 @@ def _tails(found: Sequence[Row], columns: Sequence[Sequence[int]]) -> list[int]:
     return tails
 
 
-def _settle(
-    found: Sequence[Row], columns: Sequence[Sequence[int]], paragraph: Sequence[int], tails: list[int]
-) -> None:
+def _settle(found: Sequence[Row], columns: Sequence[Sequence[int]], paragraph: Sequence[int], tails: list[int]) -> None:
     """The same for the rows of a paragraph: comments that were below each other are."""
     places: dict[int, list[int]] = {}
     for at in paragraph:

@@ -125,9 +125,7 @@ def _piece(parser: Expressions, at: int, free: int, before: Piece | None, operan
 def _path(parser: Expressions, at: int, free: int) -> int:
     """How many tokens the path has that begins here."""
     length = 1
-    while (
-        length + 2 <= free and parser.tokens[at + length].text == "." and parser.tokens[at + length + 1].kind == NAME
-    ):
+    while length + 2 <= free and parser.tokens[at + length].text == "." and parser.tokens[at + length + 1].kind == NAME:
         length += 2
     return length
 
@@ -208,4 +206,3 @@ def _stay_apart(before: str, after: str) -> bool:
         return [token.text for line in logical_lines(Text("", text)) for token in line if token.kind != SPACE]
 
     return texts(before + after) == [*texts(before), *texts(after)]
-

@@ -1,6 +1,6 @@
 """Values: numbers with units, names, calls, lists, and the operators between them.
 
-    a .. b by c  <  or  <  and  <  not  <  comparison  <  + -  <  * /  <  unary -  <  ^
+a .. b by c  <  or  <  and  <  not  <  comparison  <  + -  <  * /  <  unary -  <  ^
 """
 
 from __future__ import annotations
@@ -79,8 +79,10 @@ class Expressions(Quantities):
             left = Binary(operator, left, right, token.place)
             if level == _COMPARISON and _LEVEL.get(self.token.text) == _COMPARISON:
                 first = Label(token.place, "the first is here")
-                helps = ("in `exclude when` write `a < b and b < c`",
-                         "of requirements write two: `require a < b; require b < c;`")
+                helps = (
+                    "in `exclude when` write `a < b and b < c`",
+                    "of requirements write two: `require a < b; require b < c;`",
+                )
                 self.fail("D033", "comparisons do not chain", self.token, also=(first,), help=helps)
 
     def prefix(self, least: int) -> Expression:

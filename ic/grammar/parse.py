@@ -186,10 +186,13 @@ class _Parser(Expressions):
         """`arm panda from robots/panda.urdf { }`, with or without `urdf` before the name."""
         first = self.at if len(names) == 3 else self.at - 1
         last = self.at
-        while self.tokens[last + 1].text not in ("{", ";", ")") and self.tokens[last + 1].kind != END \
-                and not self.on_new_line(last + 1):
+        while (
+            self.tokens[last + 1].text not in ("{", ";", ")")
+            and self.tokens[last + 1].kind != END
+            and not self.on_new_line(last + 1)
+        ):
             last += 1
-        file = "".join(token.text for token in self.tokens[first:last + 1])
+        file = "".join(token.text for token in self.tokens[first : last + 1])
         self.fail("D020", "the name of a file stands in quotes", span(self.tokens[first], self.tokens[last]),
                   help=f'write `from urdf("{file[:SHOWN]}")`')  # fmt: skip
 
@@ -229,8 +232,10 @@ class _Parser(Expressions):
         helps: tuple[str, ...] = ("give one of the two another name",)
         if self.token.source.name == COMMAND_LINE:
             told = f"`-D {step.macro}` has put {found(self.token)} in the place of this name"
-            helps = ("-D defines a macro, as #define does; it does not set a `let`",
-                     f"`--set '{step.macro}=VALUE'` does, with its unit")
+            helps = (
+                "-D defines a macro, as #define does; it does not set a `let`",
+                f"`--set '{step.macro}=VALUE'` does, with its unit",
+            )
         self.fail("D035", told, step.use, help=helps)
 
     def let(self, names: list[Token], tail: list[Token]) -> Let:
@@ -364,7 +369,6 @@ class _Parser(Expressions):
         self.unexpected(
             "`;`" if token.kind in (*NUMBERS, STRING, NAME) else "`;` or an operator", help=helps.get(token.text, ())
         )
-
 
     def decimal_comma(self) -> str:
         """What to say of `0,325`; "" where the comma stands otherwise."""

@@ -86,9 +86,7 @@ METRIC = Block(
     within="run",
     head="metrics",
     doc="One number of a case, of a channel that it watches.",
-    entries=(
-        Entry(name="of", written="of = swing.q;", path="", doc="the channel: `met doc channels`"),
-    ),
+    entries=(Entry(name="of", written="of = swing.q;", path="", doc="the channel: `met doc channels`"),),
     free="parameters of the model: `met doc metric` lists the models",
 )
 

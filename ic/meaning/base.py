@@ -73,9 +73,12 @@ def check_base(scope: Scope, base: Base | None, structure: Structure, environmen
     if base is not None and base.turns and not structure.velocity_products and off is not None and item is not None:
         what = "a free base" if base.kind == "free" else "a base that turns"
         scope.complaints.error(
-            "D253", f"{what} moves by velocity products, and they are off",
-            place_of(off.value) if off.value is not None else off.place, also=[Label(item.place, f"{what}")],
-            help="leave `velocity_products = off` out")
+            "D253",
+            f"{what} moves by velocity products, and they are off",
+            place_of(off.value) if off.value is not None else off.place,
+            also=[Label(item.place, f"{what}")],
+            help="leave `velocity_products = off` out",
+        )
     if base is None or base.kind != "free" or item is None:
         return
     loads, passing = carried_loads(scope, structure.payloads)
@@ -86,12 +89,19 @@ def check_base(scope: Scope, base: Base | None, structure: Structure, environmen
     written = own is not None and own.origin.kind != "default"
     scope.checks.hold(
         tuple(masses),  # type: ignore[arg-type]  # masses are numbers
-        lambda rows: (~(rows.sum(axis=1) > 0.0), []), code="D254", message="the base moves freely and has no mass",
-        place=item.place, needs=tuple(paths),
-        help=(f"write a mass above 0 kg for link `{BASE}`" if written else
-              "give the arm the base's body: `link base { mass = 400 kg; shape = sphere(radius = 0.5 m); }`",
-              "or write the mass of a link that is fixed to the base",
-              *(word for name in structure.ground for word in passing.get(name, ()))))
+        lambda rows: (~(rows.sum(axis=1) > 0.0), []),
+        code="D254",
+        message="the base moves freely and has no mass",
+        place=item.place,
+        needs=tuple(paths),
+        help=(
+            f"write a mass above 0 kg for link `{BASE}`"
+            if written
+            else "give the arm the base's body: `link base { mass = 400 kg; shape = sphere(radius = 0.5 m); }`",
+            "or write the mass of a link that is fixed to the base",
+            *(word for name in structure.ground for word in passing.get(name, ())),
+        ),
+    )
 
 
 def initial_base(scope: Scope, body: Block, base: Base | None) -> None:
@@ -125,8 +135,15 @@ def held_by(arm: Arm, payloads: Sequence[Payload]) -> dict[str, str]:
     return found
 
 
-def remark_ground(scope: Scope, item: Item, arm: Arm, base: Base | None, environment: Any, values: Mapping[str, Any],
-                  payloads: Sequence[Payload]) -> None:
+def remark_ground(
+    scope: Scope,
+    item: Item,
+    arm: Arm,
+    base: Base | None,
+    environment: Any,
+    values: Mapping[str, Any],
+    payloads: Sequence[Payload],
+) -> None:
     """Tells of an environment model that acts upon links none of which yields to it."""
     if environment.pushes is None or (base is not None and base.kind == "free"):
         return
@@ -142,8 +159,12 @@ def remark_ground(scope: Scope, item: Item, arm: Arm, base: Base | None, environ
     is_base = f"link `{link}`" + ("" if link == BASE else ", which is fixed to the base,")
     is_base += " with all that it acts upon" if len(set(links) - {link, WORLD}) else ""
     why = "moves as it is told" if base is not None else "is part of the ground"
-    scope.complaints.remark("D256", f"environment `{item.name}` changes nothing: {is_base} {why}", place,
-                            help="write `base = free;` in the run, or name a link that a joint moves")
+    scope.complaints.remark(
+        "D256",
+        f"environment `{item.name}` changes nothing: {is_base} {why}",
+        place,
+        help="write `base = free;` in the run, or name a link that a joint moves",
+    )
 
 
 def _standing(scope: Scope, item: Item, arm: Arm) -> Arm:
@@ -182,21 +203,36 @@ def _courses(scope: Scope, item: Item, body: Block) -> tuple[Course, ...]:
 def _course(scope: Scope, item: Item) -> str | None:
     """The model of one component's course."""
     if item.value is None:
-        scope.complaints.error("D250", f"`{item.name}` of the base is a value or a course in time", item.place,
-                               help=f"write `{item.name} = {_example(item.name)};`")
+        scope.complaints.error(
+            "D250",
+            f"`{item.name}` of the base is a value or a course in time",
+            item.place,
+            help=f"write `{item.name} = {_example(item.name)};`",
+        )
         return None
     other = item.value.name.text if isinstance(item.value, Call) else ""
     if other in OTHERS and other not in models.available("command"):
         scope.complaints.error(
-            "D250", f"`{item.name}` of the base is told its positions, and `{other}` is a kind of command "
-            "of servos", place_of(item.value), help=f"write the course alone: `{item.name} = {_example(item.name)};`")
+            "D250",
+            f"`{item.name}` of the base is told its positions, and `{other}` is a kind of command of servos",
+            place_of(item.value),
+            help=f"write the course alone: `{item.name} = {_example(item.name)};`",
+        )
         return None
     inner: Expression = course_named(scope, item.value)
     told = f"`{item.name}` of the base"
-    spot = Owner(told, item.place, f"{BASE}.{item.name}", homes=item.homes, joint=component(item.name).kind,
-                 command="position", called=told)
-    model = use_course(scope, spot, inner, item, doc=f"{item.name} of the base", column=item.name, kind="component",
-                       body=item.body)
+    spot = Owner(
+        told,
+        item.place,
+        f"{BASE}.{item.name}",
+        homes=item.homes,
+        joint=component(item.name).kind,
+        command="position",
+        called=told,
+    )
+    model = use_course(
+        scope, spot, inner, item, doc=f"{item.name} of the base", column=item.name, kind="component", body=item.body
+    )
     if model is not None:
         scope.setting(f"{BASE}.{item.name}.model", model, item=item)
         path = f"{BASE}.{item.name}"
@@ -214,13 +250,22 @@ def _check_jumps(scope: Scope, item: Item, model: str, place: Place) -> None:
     jump = profile.jump(SimpleNamespace(**words)) if set(wanted) <= set(words) else "none"
     smooth = _smooth()
     if jump == "value":
-        scope.complaints.error("D251", f"`{item.name}` of the base jumps, by `{model}`", place,
-                               help=["a body moves from place to place in time",
-                                     known_words("courses without a jump of the rate", smooth)])
+        scope.complaints.error(
+            "D251",
+            f"`{item.name}` of the base jumps, by `{model}`",
+            place,
+            help=[
+                "a body moves from place to place in time",
+                known_words("courses without a jump of the rate", smooth),
+            ],
+        )
     elif jump == "rate":
         scope.complaints.remark(
-            "D252", f"the rate of `{item.name}` of the base jumps, by `{model}`: the blow that this is to the arm is "
-            "left out", place, help=known_words("courses without a jump of the rate", smooth))
+            "D252",
+            f"the rate of `{item.name}` of the base jumps, by `{model}`: the blow that this is to the arm is left out",
+            place,
+            help=known_words("courses without a jump of the rate", smooth),
+        )
 
 
 def _smooth() -> Iterable[str]:
@@ -232,8 +277,11 @@ def _smooth() -> Iterable[str]:
         if not callable(each.jumps):
             found += [name] * (each.jumps == "none")
         else:
-            found += [f"{name}({key} = {word})" for key, word in words
-                      if each.jump(SimpleNamespace(**{**known, key: word})) == "none"]
+            found += [
+                f"{name}({key} = {word})"
+                for key, word in words
+                if each.jump(SimpleNamespace(**{**known, key: word})) == "none"
+            ]
     return sorted(found)
 
 

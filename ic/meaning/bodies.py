@@ -21,12 +21,15 @@ from met.plan import Joint, Link, Payload
 from met.trace import Real
 
 
-def check_body(scope: Scope, owner: Owner, kind: str, name: str, item: Item | None, inertia: tuple[Real, ...],
-               mass: Real | None) -> None:
+def check_body(
+    scope: Scope, owner: Owner, kind: str, name: str, item: Item | None, inertia: tuple[Real, ...], mass: Real | None
+) -> None:
     """The inertia is a body's, in every case. item: the inertia as written, None where it follows from a shape; kind:
     what it is in words."""
-    helps = [f"inertia is about the centre of mass, in {kind} axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2",
-             "products have the sign of -sum(m x y)"]
+    helps = [
+        f"inertia is about the centre of mass, in {kind} axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2",
+        "products have the sign of -sum(m x y)",
+    ]
     weightless = isinstance(mass, float) and mass == 0.0
     if weightless:
         helps = [f"leave `inertia` out, or write the {kind}'s mass"]
@@ -88,8 +91,11 @@ def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint], pa
 
     The joints make a tree.
     """
-    masses = {link.name: settled.value for link in links
-              if (settled := scope.parameters.get(f"links.{link.name}.mass")) is not None}
+    masses = {
+        link.name: settled.value
+        for link in links
+        if (settled := scope.parameters.get(f"links.{link.name}.mass")) is not None
+    }
     if all(isinstance(mass, float) and mass > 0.0 for mass in masses.values()):
         return
     loads, passing = carried_loads(scope, payloads)
@@ -108,8 +114,12 @@ def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint], pa
     above: dict[str, tuple[str, ...]] = {"base": ()}  # the light joints that move, between the base and a link
     for joint in order:
         before = above[joint.child] = above[joint.parent]
-        if joint.kind == "fixed" or heavy[joint.child] or joint.place is None \
-                or any(scope.checks.failed(path) for path in before):
+        if (
+            joint.kind == "fixed"
+            or heavy[joint.child]
+            or joint.place is None
+            or any(scope.checks.failed(path) for path in before)
+        ):
             continue
         above[joint.child] = (*before, f"{joint.name}.moved")
         names = [joint.child]
@@ -123,12 +133,18 @@ def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint], pa
             lambda rows: (~(rows.sum(axis=1) > 0.0), []),
             code="D217",
             path=f"{joint.name}.moved",
-            needs=(*before, *(f"links.{name}.mass" for name in names),
-                   *(path for name in names for path, _ in loads.get(name, ()))),
+            needs=(
+                *before,
+                *(f"links.{name}.mass" for name in names),
+                *(path for name in names for path, _ in loads.get(name, ())),
+            ),
             message=f"joint `{joint.name}` moves nothing that has mass",
             place=joint.place,
-            help=(f"write the mass of link `{joint.child}`, or of one that it carries", "or make the joint fixed",
-                  *also),
+            help=(
+                f"write the mass of link `{joint.child}`, or of one that it carries",
+                "or make the joint fixed",
+                *also,
+            ),
         )
 
 
@@ -145,7 +161,8 @@ def carried_loads(scope: Scope, payloads: Sequence[Payload]) -> tuple[Loads, dic
         if payload.flies:
             word = "grapple" if payload.grappled else "release"
             passing.setdefault(payload.link, []).append(
-                f"payload `{payload.name}` is not always there: one without `{word}` would count")
+                f"payload `{payload.name}` is not always there: one without `{word}` would count"
+            )
         elif settled is not None:
             loads.setdefault(payload.link, []).append((path, settled.value))  # type: ignore[arg-type]  # a number
     return loads, passing

@@ -81,9 +81,18 @@ class Checks:
         """Whether what failed is this, or inside it, or around it."""
         return self.failed(path) or any(path.startswith(each + ".") for each in self._failed if each)
 
-    def hold(self, values: tuple[Real, ...], test: Test, *,
-                    code: str, message: str, place: Place, help: str | tuple[str, ...] = (), path: str = "",
-                    needs: tuple[str, ...] = ()) -> None:
+    def hold(
+        self,
+        values: tuple[Real, ...],
+        test: Test,
+        *,
+        code: str,
+        message: str,
+        place: Place,
+        help: str | tuple[str, ...] = (),
+        path: str = "",
+        needs: tuple[str, ...] = (),
+    ) -> None:
         """Tests [n, k] values now, or once the cases are known where one of them varies.
 
         path   what the check is about; needs: paths whose own checks must hold for this one to say anything
@@ -114,9 +123,12 @@ class Checks:
             row = int(np.flatnonzero(bad)[0])
             where = ", ".join(f"{path} = {self.shown(path, cases[path][row])}" for path in cases)
             more = f", and {int(bad.sum()) - 1} more" if bad.sum() > 1 else ""
-            self.complaints.error(check.code, f"{check.message}; case #{row} breaks it{more}",
-                                  Label(check.place, causes[0] if causes else ""),
-                                  help=(f"case #{row}: {where}", *(self._narrower(check) or check.help)))
+            self.complaints.error(
+                check.code,
+                f"{check.message}; case #{row} breaks it{more}",
+                Label(check.place, causes[0] if causes else ""),
+                help=(f"case #{row}: {where}", *(self._narrower(check) or check.help)),
+            )
 
     def _narrower(self, check: Check) -> tuple[str, ...]:
         """The remedy where what is checked was drawn from a normal distribution, which has no bounds."""
@@ -139,4 +151,3 @@ class Checks:
             return value
         formulas = Formulas.of(self.graph, [value])
         return float(formulas.replay({path: float(varied.values[0]) for path, varied in self.varied.items()})[0])
-

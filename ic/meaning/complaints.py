@@ -84,16 +84,25 @@ class Complaints:
         """Whether this value's mistake is known: what a base or a `let` writes is found wrong at each of its users."""
         if diagnostic.at is None or diagnostic.code not in ONCE:
             return False
-        return any(each.code == diagnostic.code and each.at is not None and each.at.place == diagnostic.at.place
-                   for each in self._found)
+        return any(
+            each.code == diagnostic.code and each.at is not None and each.at.place == diagnostic.at.place
+            for each in self._found
+        )
 
-    def error(self, code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
-              help: Iterable[str] | str = ()) -> None:
+    def error(
+        self,
+        code: str,
+        message: str,
+        at: Label | Place | None = None,
+        *,
+        also: Iterable[Label] = (),
+        help: Iterable[str] | str = (),
+    ) -> None:
         self.add(error(code, message, at, also=also, help=help))
 
     def taken_for(self, of: Place, word: str, known: Iterable[str]) -> None:
-        """Notes what an unknown entry of what is defined at `of` may have been meant for: that is not missing besides.
-        """
+        """Notes what an unknown entry of what is defined at `of` may have been meant for: that is not missing
+        besides."""
         near = meant(word, known)
         if near is not None:
             self.lacking.add((of, near.rpartition(".")[2]))
@@ -105,19 +114,42 @@ class Complaints:
             return True
         return any((of, name) in self.lacking for name in names)
 
-    def missing(self, of: Place, names: tuple[str, ...], code: str, message: str, at: Place | None = None, *,
-                also: Iterable[Label] = (), help: Iterable[str] | str = ()) -> None:
+    def missing(
+        self,
+        of: Place,
+        names: tuple[str, ...],
+        code: str,
+        message: str,
+        at: Place | None = None,
+        *,
+        also: Iterable[Label] = (),
+        help: Iterable[str] | str = (),
+    ) -> None:
         """An error about what is defined at `of`, which has none of these entries, unless `lacks` says so."""
         if not self.lacks(of, *names):
             self.error(code, message, at or of, also=also, help=help)
 
-    def warn(self, code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
-             help: Iterable[str] | str = ()) -> None:
+    def warn(
+        self,
+        code: str,
+        message: str,
+        at: Label | Place | None = None,
+        *,
+        also: Iterable[Label] = (),
+        help: Iterable[str] | str = (),
+    ) -> None:
         made = error(code, message, at, also=also, help=help)
         self.add(Diagnostic(made.code, made.message, made.at, made.also, made.help, "warning"))
 
-    def remark(self, code: str, message: str, at: Label | Place | None = None, *, also: Iterable[Label] = (),
-               help: Iterable[str] | str = ()) -> None:
+    def remark(
+        self,
+        code: str,
+        message: str,
+        at: Label | Place | None = None,
+        *,
+        also: Iterable[Label] = (),
+        help: Iterable[str] | str = (),
+    ) -> None:
         """A warning about what the deck means, which says something only once the deck has no errors."""
         made = error(code, message, at, also=also, help=help)
         self._remarks.setdefault(Diagnostic(made.code, made.message, made.at, made.also, made.help, "warning"))
@@ -153,11 +185,13 @@ def _spot(place: Place) -> tuple[str, int, int]:
 
 def belongs(word: str) -> list[str]:
     """Where a word of the language stands that stands elsewhere only."""
-    told = {"substitute": "`substitute JOINT { ... }`, in a run, puts a joint's motor on a bed",
-            "payload": "`payload NAME { ... }`, in a run, is a body that a link carries or grapples",
-            "guide": "`guide NAME = MODEL { ... }`, in a run, commands several joints together",
-            "sensor": "`sensor NAME = MODEL { link = LINK; ... }`, in a run, is on a link; `sensor QUANTITY = MODEL "
-                      "{ ... }`, in a servo, is of its joint"}
+    told = {
+        "substitute": "`substitute JOINT { ... }`, in a run, puts a joint's motor on a bed",
+        "payload": "`payload NAME { ... }`, in a run, is a body that a link carries or grapples",
+        "guide": "`guide NAME = MODEL { ... }`, in a run, commands several joints together",
+        "sensor": "`sensor NAME = MODEL { link = LINK; ... }`, in a run, is on a link; `sensor QUANTITY = MODEL "
+        "{ ... }`, in a servo, is of its joint",
+    }
     return [told[word]] if word in told else []
 
 

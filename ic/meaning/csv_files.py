@@ -78,9 +78,15 @@ class Table:
         first = Label(self._cell(*cells[0][1:], column.number), "this column begins with one")
         for cell, line, row in cells:
             if not _WORD.fullmatch(cell):
-                raise Problem(error("D194", f"`{cell[:40]}` is no word" if cell else "there is no word here",
-                                    self._cell(line, row, column.number), also=[first],
-                                    help="a column without a unit holds words, or pure numbers"))
+                raise Problem(
+                    error(
+                        "D194",
+                        f"`{cell[:40]}` is no word" if cell else "there is no word here",
+                        self._cell(line, row, column.number),
+                        also=[first],
+                        help="a column without a unit holds words, or pure numbers",
+                    )
+                )
         return [(cell, self._cell(line, row, column.number)) for cell, line, row in cells]
 
     def _numbers(self, column: Column, measure: Measure) -> tuple[float, ...]:
@@ -95,9 +101,15 @@ class Table:
                     found = "this number is too large: the largest is 1.8e308"
                 if lost:
                     found = "this number is too small: it would become 0"
-                raise Problem(error("D194", found, self._cell(line, row, column.number),
-                                    also=[Label(column.place, f"column `{column.name}`")],
-                                    help="a number is written as 12.5 or -1e-3, with a point and without a unit"))
+                raise Problem(
+                    error(
+                        "D194",
+                        found,
+                        self._cell(line, row, column.number),
+                        also=[Label(column.place, f"column `{column.name}`")],
+                        help="a number is written as 12.5 or -1e-3, with a point and without a unit",
+                    )
+                )
             made.append(number)
         return tuple(made)
 
@@ -106,10 +118,15 @@ class Table:
         for n, (before, after) in enumerate(itertools.pairwise(times)):
             if not before < after:
                 line, row = self.rows[n + 1]
-                raise Problem(error("D195", f"times of a file rise, and {after:g} s follows {before:g} s",
-                                    self._cell(line, row, column.number),
-                                    also=[Label(self._cell(*self.rows[n], column.number), "the row before")],
-                                    help="sort the rows; for a jump, two times close together"))
+                raise Problem(
+                    error(
+                        "D195",
+                        f"times of a file rise, and {after:g} s follows {before:g} s",
+                        self._cell(line, row, column.number),
+                        also=[Label(self._cell(*self.rows[n], column.number), "the row before")],
+                        help="sort the rows; for a jump, two times close together",
+                    )
+                )
 
     def _cell(self, line: int, row: str, number: int) -> Place:
         cells = row.split(",")
@@ -127,29 +144,51 @@ def _table(file: str, text: str) -> Table:
     lines = text.split("\n")
     rows = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
     if not rows:
-        raise Problem(error("D191", f"`{file}` is empty", Place(file, 1, 1),
-                            help="its first line names the columns, as in `time [s], shoulder [deg]`"))
+        raise Problem(
+            error(
+                "D191",
+                f"`{file}` is empty",
+                Place(file, 1, 1),
+                help="its first line names the columns, as in `time [s], shoulder [deg]`",
+            )
+        )
     if len(rows) > MOST_CSV_ROWS + 1:
-        raise Problem(error("D018", f"a CSV file has at most {MOST_CSV_ROWS} rows",
-                            Place(file, rows[MOST_CSV_ROWS + 1][0], 1), help="thin them out, or split the file"))
+        raise Problem(
+            error(
+                "D018",
+                f"a CSV file has at most {MOST_CSV_ROWS} rows",
+                Place(file, rows[MOST_CSV_ROWS + 1][0], 1),
+                help="thin them out, or split the file",
+            )
+        )
     head = rows.pop(0)
     columns = tuple(_columns(file, *head))
     for line, row in rows:
         if row.count(",") + 1 != len(columns):
             count = row.count(",") + 1
-            raise Problem(error(
-                "D197", f"this row has {count} {'cell' if count == 1 else 'cells'}, and the first line names "
-                f"{len(columns)} columns", Place(file, line, 1, max(len(row), 1)),
-                also=[Label(Place(file, head[0], 1, len(head[1])), "the columns")],
-                help="commas part the cells, and a number has a decimal point"))
+            raise Problem(
+                error(
+                    "D197",
+                    f"this row has {count} {'cell' if count == 1 else 'cells'}, and the first line names "
+                    f"{len(columns)} columns",
+                    Place(file, line, 1, max(len(row), 1)),
+                    also=[Label(Place(file, head[0], 1, len(head[1])), "the columns")],
+                    help="commas part the cells, and a number has a decimal point",
+                )
+            )
     return Table(file, columns, tuple(rows))
 
 
 def _columns(file: str, line: int, row: str) -> Iterator[Column]:
     if all(_NUMBER.fullmatch(_stripped(cell)[0]) for cell in row.split(",")):
-        raise Problem(error("D191", "the first line names no columns: it holds numbers",
-                            Place(file, line, 1, max(len(row), 1)),
-                            help="put a line above them, as in `time [s], shoulder [deg]`"))
+        raise Problem(
+            error(
+                "D191",
+                "the first line names no columns: it holds numbers",
+                Place(file, line, 1, max(len(row), 1)),
+                help="put a line above them, as in `time [s], shoulder [deg]`",
+            )
+        )
     seen: dict[str, Place] = {}
     start = 0
     for number, cell in enumerate(row.split(",")):
@@ -162,11 +201,24 @@ def _columns(file: str, line: int, row: str) -> Iterator[Column]:
             helps = ["write the unit in square brackets behind the name, as in `shoulder [deg]`"]
             if number == 0 and "," not in row and re.search(r"[;\t]", row):
                 helps = ["commas part the columns, as in `time [s], shoulder [deg]`"]
-            raise Problem(error("D191", f"`{text[:40]}` does not name a column" if text else "a column without a name",
-                                place, help=helps))
+            raise Problem(
+                error(
+                    "D191",
+                    f"`{text[:40]}` does not name a column" if text else "a column without a name",
+                    place,
+                    help=helps,
+                )
+            )
         if name in seen:
-            raise Problem(error("D198", f"column `{name}` is there twice", place,
-                                also=[Label(seen[name], "first")], help="give one of them another name"))
+            raise Problem(
+                error(
+                    "D198",
+                    f"column `{name}` is there twice",
+                    place,
+                    also=[Label(seen[name], "first")],
+                    help="give one of them another name",
+                )
+            )
         seen[name] = place
         yield Column(number, name, unit or None, place)
 
@@ -187,13 +239,21 @@ def _measure(column: Column, text: str, dimension: Dimension, label: Label) -> M
     if column.unit is None:
         if dimension == PURE:
             return units.ONE
-        raise Problem(error("D193", f"column `{column.name}` has no unit", column.place, also=[label],
-                            help=f"write {shown}"))
+        raise Problem(
+            error("D193", f"column `{column.name}` has no unit", column.place, also=[label], help=f"write {shown}")
+        )
     measure = _meaning(column, f"write {shown}", [label], dimension)
     if not units.same(measure.dimension, dimension):
         found = "a pure number" if measure.dimension == PURE else f"in {units.text(measure.dimension)}"
-        raise Problem(error("D193", f"column `{column.name}` is {found}, and {text} is needed", column.place,
-                            also=[label], help=f"write {shown}, with numbers in that unit"))
+        raise Problem(
+            error(
+                "D193",
+                f"column `{column.name}` is {found}, and {text} is needed",
+                column.place,
+                also=[label],
+                help=f"write {shown}, with numbers in that unit",
+            )
+        )
     return measure
 
 
@@ -221,6 +281,12 @@ def missing_column(table: Table, name: str, place: Place, why: str = "") -> Prob
     near = did_you_mean(name, names)
     if round_brackets is not None:
         near = (f"a unit stands in square brackets: write `{name} [{round_brackets[len(name) + 2 : -1]}]`",)
-    return Problem(error("D192", f"`{table.file}` has no column `{name}`", place,
-                         also=[Label(table.columns[0].place, "its first line")],
-                         help=[*near, known_words("columns", names), *([why] if why else [])]))
+    return Problem(
+        error(
+            "D192",
+            f"`{table.file}` has no column `{name}`",
+            place,
+            also=[Label(table.columns[0].place, "its first line")],
+            help=[*near, known_words("columns", names), *([why] if why else [])],
+        )
+    )

@@ -55,11 +55,14 @@ def _hertz_for_rate(value: Value) -> Doubt:
     """Hz for 1/s."""
     number = _number(value)
     if isinstance(value.number, Scalar):
-        return Doubt("in 1/s, and Hz is taken as 1/s", (
-            "if that is meant, write `1/s`", "if cycles a second are meant, write `1/s`, and 2 pi times each number"))
-    return Doubt(f"in 1/s, and {_written(value)} is taken as {number} 1/s", (
-        f"if that is meant, write `{number} 1/s`",
-        f"if cycles a second are meant, write `(2*pi*{number}) 1/s`"))
+        return Doubt(
+            "in 1/s, and Hz is taken as 1/s",
+            ("if that is meant, write `1/s`", "if cycles a second are meant, write `1/s`, and 2 pi times each number"),
+        )
+    return Doubt(
+        f"in 1/s, and {_written(value)} is taken as {number} 1/s",
+        (f"if that is meant, write `{number} 1/s`", f"if cycles a second are meant, write `(2*pi*{number}) 1/s`"),
+    )
 
 
 def _no_hertz(value: Value) -> Doubt | None:
@@ -68,12 +71,17 @@ def _no_hertz(value: Value) -> Doubt | None:
         return None
     number = _number(value)
     if isinstance(value.number, Scalar):
-        return Doubt("in Hz, and 1/s is taken as Hz, cycles a second", (
-            "if that is meant, write `Hz`",
-            "if radians a second are meant, write `Hz`, and each number divided by 2 pi"))
-    return Doubt(f"in Hz, and {_written(value)} is taken as {number} Hz, cycles a second", (
-        f"if that is meant, write `{number} Hz`",
-        f"if radians a second are meant, write `({number}/(2*pi)) Hz`"))
+        return Doubt(
+            "in Hz, and 1/s is taken as Hz, cycles a second",
+            (
+                "if that is meant, write `Hz`",
+                "if radians a second are meant, write `Hz`, and each number divided by 2 pi",
+            ),
+        )
+    return Doubt(
+        f"in Hz, and {_written(value)} is taken as {number} Hz, cycles a second",
+        (f"if that is meant, write `{number} Hz`", f"if radians a second are meant, write `({number}/(2*pi)) Hz`"),
+    )
 
 
 def _hertz_for_rad(value: Value, text: str) -> Doubt:
@@ -81,11 +89,15 @@ def _hertz_for_rad(value: Value, text: str) -> Doubt:
     unit = _unit(value)
     if unit is not None and "kHz" not in unit.text:
         number = _in(value, unit)
-        helps = (f"if that is meant, write `{number} {unit.text.replace('Hz', '(rad/s)')}`",
-                 f"if cycles a second are meant, write `{number} {unit.text.replace('Hz', '(cycle/s)')}`")
+        helps = (
+            f"if that is meant, write `{number} {unit.text.replace('Hz', '(rad/s)')}`",
+            f"if cycles a second are meant, write `{number} {unit.text.replace('Hz', '(cycle/s)')}`",
+        )
     else:
-        helps = (f"if that is meant, write `{_number(value)} {text}`",
-                 "if cycles a second are meant, write `cycle/s` in the place of the hertz")
+        helps = (
+            f"if that is meant, write `{_number(value)} {text}`",
+            "if cycles a second are meant, write `cycle/s` in the place of the hertz",
+        )
     return Doubt(f"in {text}, and {_written(value)} is taken as {_number(value)} {text}", helps)
 
 
@@ -101,8 +113,10 @@ def _no_angle(value: Value, text: str, power: int) -> Doubt:
             return f"`{number} {plain}/{angle}`"
         return f"`{number} {angle}{plain[1:]}`" if plain.startswith("1/") else f"`{number} {angle}*{plain}`"
 
-    return Doubt(f"in {text}, and {_written(value)} is taken as {_number(value)} {text}", (
-        f"if that is meant, write {angled('rad')}", f"if turns are meant, write {angled('cycle')}"))
+    return Doubt(
+        f"in {text}, and {_written(value)} is taken as {_number(value)} {text}",
+        (f"if that is meant, write {angled('rad')}", f"if turns are meant, write {angled('cycle')}"),
+    )
 
 
 def _angle_for_none(value: Value, text: str) -> Doubt | None:
@@ -111,8 +125,10 @@ def _angle_for_none(value: Value, text: str) -> Doubt | None:
     if unit is None or not measure_of(unit).turns:
         return None
     number = _number(value)
-    return Doubt(f"in {text}, and {_written(value)} is taken as {number} {text}: angles count in radians", (
-        f"write `{number} {text}`",))
+    return Doubt(
+        f"in {text}, and {_written(value)} is taken as {number} {text}: angles count in radians",
+        (f"write `{number} {text}`",),
+    )
 
 
 def _unit(value: Value) -> Unit | None:

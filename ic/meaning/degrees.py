@@ -34,10 +34,15 @@ def remark_degrees(deck: Deck, definitions: Definitions, complaints: Complaints)
             continue
         plain = isinstance(argument, Number)
         written = spell(argument) if plain else f"({spell(argument)})"
-        complaints.warn("D306", f"`{call.name.text}` of {found.number:g}, a bare number: these are radians",
-                          place_of(argument), help=[
-                              f"if degrees are meant, write `{call.name.text}({written} deg)`",
-                              f"if radians are meant, write `{call.name.text}({written} rad)`"])
+        complaints.warn(
+            "D306",
+            f"`{call.name.text}` of {found.number:g}, a bare number: these are radians",
+            place_of(argument),
+            help=[
+                f"if degrees are meant, write `{call.name.text}({written} deg)`",
+                f"if radians are meant, write `{call.name.text}({written} rad)`",
+            ],
+        )
 
 
 def _calls(entries: Iterable[Entry]) -> Iterator[Call]:

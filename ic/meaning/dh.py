@@ -114,9 +114,12 @@ def _refuse_others(scope: Scope, owner: Owner, item: Item, body: Block) -> None:
         other = body.get(name)
         if other is not None:
             scope.complaints.error(
-                "D181", f"{owner.label} has both `dh` and `{name}`", other.place,
+                "D181",
+                f"{owner.label} has both `dh` and `{name}`",
+                other.place,
                 also=[Label(item.place, "the Denavit-Hartenberg numbers")],
-                help=f"`dh` says all of the joint's frame: leave `{name}` out (`remove {name};` where a base has it)")
+                help=f"`dh` says all of the joint's frame: leave `{name}` out (`remove {name};` where a base has it)",
+            )
         for path in (name, *(f"{name}.{axis}" for axis in XYZ)):
             scope.unvaried[owner.join(path)] = unvaried.follows(owner.join("dh"), _numbers(owner))
 
@@ -131,13 +134,15 @@ def _convention(scope: Scope, item: Item) -> str | None:
     name = word_of(item.value)
     if name in CONVENTIONS:
         if isinstance(item.value, Call) and item.value.positional:
-            scope.complaints.error("D180", f"`{name}` takes its numbers by name", place_of(item.value.positional[0]),
-                                   help=USAGE)
+            scope.complaints.error(
+                "D180", f"`{name}` takes its numbers by name", place_of(item.value.positional[0]), help=USAGE
+            )
             return None
         return name
     meant = OTHER_NAMES.get(name or "")
     helps = [f"write `{meant}`"] if meant else list(did_you_mean(name, CONVENTIONS)) if name else []
     told = f"no Denavit-Hartenberg convention `{name}`" if name else "the name of a convention is needed here"
-    scope.complaints.error("D180", told, place_of(item.value) if item.value is not None else item.place,
-                           help=[*helps, USAGE])
+    scope.complaints.error(
+        "D180", told, place_of(item.value) if item.value is not None else item.place, help=[*helps, USAGE]
+    )
     return None

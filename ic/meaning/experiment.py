@@ -16,8 +16,17 @@ def experiment(scope: Scope, name: str, place: Place, resolved: Resolved, cases:
     parameters, outputs = scope.quantities()
     formulas = Formulas.of(scope.graph, outputs) if outputs else Formulas()
     notes = (*scope.notes, *_stability(scope, resolved, cases))
-    return Experiment(name, resolved.structure, parameters, formulas, cases, resolved.requirements, place, notes,
-                      tolerances=resolved.tolerances)
+    return Experiment(
+        name,
+        resolved.structure,
+        parameters,
+        formulas,
+        cases,
+        resolved.requirements,
+        place,
+        notes,
+        tolerances=resolved.tolerances,
+    )
 
 
 def _stability(scope: Scope, resolved: Resolved, cases: Cases) -> list[str]:

@@ -52,8 +52,14 @@ class Explanation:
     doc: str
 
 
-def explain(path: str | PathLike[str], target: str, *, include_dirs: Sequence[str | PathLike[str]] = (),
-            defines: Sequence[str] = (), select: Select = None) -> tuple[Explanation, ...]:
+def explain(
+    path: str | PathLike[str],
+    target: str,
+    *,
+    include_dirs: Sequence[str | PathLike[str]] = (),
+    defines: Sequence[str] = (),
+    select: Select = None,
+) -> tuple[Explanation, ...]:
     """Every parameter that `target` names: by its own path, or by a definition's (`gearbox.kp`: all that follow it).
 
     Raises Problem with the deck's errors, or D163 where the path names nothing.
@@ -63,9 +69,11 @@ def explain(path: str | PathLike[str], target: str, *, include_dirs: Sequence[st
         raise Problem(compiled.diagnostics, compiled.sources)
     found = tuple(explained(compiled, target))
     if not found:
-        known = list(dict.fromkeys(
-            path for scope in compiled.scopes for path in (*scope.parameters, *scope.beside, *scope.known)
-        ))
+        known = list(
+            dict.fromkeys(
+                path for scope in compiled.scopes for path in (*scope.parameters, *scope.beside, *scope.known)
+            )
+        )
         inside = [path for path in known if path.startswith(target + ".")]
         runs = ", ".join(f"`{experiment.name}`" for experiment in compiled.plan.experiments)
         helps = [f"there are: {', '.join(inside[:24])}"] if inside else list(did_you_mean(target, known))
@@ -85,8 +93,9 @@ def in_full(compiled: Compiled, number: int = 0) -> Experiment:
         value = let.value
         if isinstance(value, Scalar):
             outputs.append(value)
-        parameters[name] = Quantity(Formula(len(outputs) - 1) if isinstance(value, Scalar) else value, let.unit,
-                                    let.origin)
+        parameters[name] = Quantity(
+            Formula(len(outputs) - 1) if isinstance(value, Scalar) else value, let.unit, let.origin
+        )
     return replace(experiment, parameters=parameters, formulas=Formulas.of(scope.graph, outputs))
 
 
@@ -138,8 +147,20 @@ def _explanation(experiment: Experiment, scope: Scope, path: str, settled: Settl
     origin = settled.origin
     written = spell(settled.expression) if settled.expression is not None else ""
     names = tuple(_names(scope, settled.expression)) if settled.expression is not None else ()
-    return Explanation(experiment.name, path, value, settled.unit, varies, written, origin.kind, origin.note,
-                       origin.place, origin.overrides, names, settled.doc)
+    return Explanation(
+        experiment.name,
+        path,
+        value,
+        settled.unit,
+        varies,
+        written,
+        origin.kind,
+        origin.note,
+        origin.place,
+        origin.overrides,
+        names,
+        settled.doc,
+    )
 
 
 def _names(scope: Scope, expression: Expression) -> Iterator[Label]:

@@ -67,9 +67,12 @@ def check_friction(scope: Scope, uses: Iterable[Use], environment: Iterable[Envi
         if servo is not None and servo.parameters is not None and accelerates(servo.bare, servo.parameters):
             label = f"servo `{servo.definition}` ({servo.servo.name})"
             scope.complaints.error(
-                "D291", f"`{failure.use.name}` puts friction on joint `{failure.joint}`, which {label} tells its "
-                "acceleration", failure.place, also=[Label(servo.place, "its servo")],
-                help="leave it out for this joint: no friction slows down or holds what is told its acceleration")
+                "D291",
+                f"`{failure.use.name}` puts friction on joint `{failure.joint}`, which {label} tells its acceleration",
+                failure.place,
+                also=[Label(servo.place, "its servo")],
+                help="leave it out for this joint: no friction slows down or holds what is told its acceleration",
+            )
 
 
 def _about(scope: Scope, environment: Iterable[EnvironmentUse], which: str) -> Iterable[Failure]:
@@ -98,8 +101,11 @@ def _wrong(
     if model.gives is not None and servo.servo.full is None:
         known = [name for name, each in models.find_own("servo").items() if each.full is not None]
         own = servo.servo.name in models.find_own("servo")
-        remedy = known_words("servo models that have one", known) if own else (
-            f"declare `full` in the model `{servo.servo.name}`: the law's outputs at full drive")
+        remedy = (
+            known_words("servo models that have one", known)
+            if own
+            else (f"declare `full` in the model `{servo.servo.name}`: the law's outputs at full drive")
+        )
         return f"{label} has no drive that could run away", remedy, None
     if model.sees is None:
         return None
@@ -125,13 +131,19 @@ def _check_full(scope: Scope, failure: Failure, servo: Use) -> None:
         return any(isinstance(x, float) and math.isinf(x) for x in full)
 
     if endless(numbers):
-        lacking = [each for each in servo.servo.parameters
-                   if numbers.get(each.name) == math.inf and not endless({**numbers, each.name: 1.0})]
+        lacking = [
+            each
+            for each in servo.servo.parameters
+            if numbers.get(each.name) == math.inf and not endless({**numbers, each.name: 1.0})
+        ]
         scope.complaints.error(
-            "D292", f"`{failure.use.name}` would drive joint `{failure.joint}` with all that servo "
-            f"`{servo.definition}` ({servo.servo.name}) can give, and that has no limit", failure.place,
+            "D292",
+            f"`{failure.use.name}` would drive joint `{failure.joint}` with all that servo "
+            f"`{servo.definition}` ({servo.servo.name}) can give, and that has no limit",
+            failure.place,
             also=[Label(servo.place, "its servo")],
-            help=[f"write `{each.name} = ... {each.unit};` in the servo: {each.doc}" for each in lacking])
+            help=[f"write `{each.name} = ... {each.unit};` in the servo: {each.doc}" for each in lacking],
+        )
 
 
 def _window(scope: Scope, failure: Failure) -> tuple[float, float] | None:
@@ -155,9 +167,12 @@ def _remark_between_ticks(scope: Scope, failure: Failure, period: float, duratio
     if has_come(tick * period, ends):
         settled = scope.parameters[f"environment.{failure.use.name}.from"]
         scope.complaints.remark(
-            "D168", f"environment `{failure.use.name}` never acts: the law of joint `{failure.joint}` ticks at "
+            "D168",
+            f"environment `{failure.use.name}` never acts: the law of joint `{failure.joint}` ticks at "
             f"{(tick - 1) * period:.9g} s and at {tick * period:.9g} s, and not in between",
-            settled.origin.place or failure.place, help="change that, or leave it out")
+            settled.origin.place or failure.place,
+            help="change that, or leave it out",
+        )
 
 
 def _remark_overlaps(scope: Scope, failures: Iterable[Failure]) -> None:
@@ -176,7 +191,11 @@ def _remark_overlaps(scope: Scope, failures: Iterable[Failure]) -> None:
                 when = f"from {first:g} s" + (f" until {last:g} s" if math.isfinite(last) else " on")
                 also = [Label(earlier.use.place, "this one")] if earlier.use.place is not None else []
                 scope.complaints.remark(
-                    "D293", f"`{earlier.use.name}` does nothing {when}: `{failure.use.name}` acts on the same of joint "
-                    f"`{failure.joint}` then, and stands later", failure.place, also=also,
-                    help="let one end before the other begins")
+                    "D293",
+                    f"`{earlier.use.name}` does nothing {when}: `{failure.use.name}` acts on the same of joint "
+                    f"`{failure.joint}` then, and stands later",
+                    failure.place,
+                    also=also,
+                    help="let one end before the other begins",
+                )
         same.append((failure, window))

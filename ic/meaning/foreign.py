@@ -23,8 +23,12 @@ def refused(scope: Scope, item: Item) -> bool:
         helps = [f"{OTHER_KINDS[kind]} do the same, with links of `mass = 0 kg` between them"]
         if there:
             helps.append(f"{there}`remove {item.name};` makes room for them")
-        scope.complaints.error("D212", f"joint `{item.name}` is {kind}, and joints are revolute, prismatic or fixed",
-                               item.detail[0].place, help=helps)
+        scope.complaints.error(
+            "D212",
+            f"joint `{item.name}` is {kind}, and joints are revolute, prismatic or fixed",
+            item.detail[0].place,
+            help=helps,
+        )
         return True
     mimic = item.body.get("mimic") if item.body is not None else None
     if mimic is not None:
@@ -33,7 +37,8 @@ def refused(scope: Scope, item: Item) -> bool:
         if there:
             free = f"{there}`{item.name} {{ remove mimic; }}` lets it move by itself"
         held = f"`remove {item.name};  joint {item.name} fixed {{ ... }}` holds it where it is at q = 0"
-        scope.complaints.error("D213", f"joint `{item.name}` follows {other}, which is not in this version",
-                               mimic.place, help=[free, held])
+        scope.complaints.error(
+            "D213", f"joint `{item.name}` follows {other}, which is not in this version", mimic.place, help=[free, held]
+        )
         return True
     return False

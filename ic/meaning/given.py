@@ -42,6 +42,7 @@ def evaluated(entry: Setting, path: str, names: Names) -> Given:
     """What is set to one number. Raises Problem where it is none."""
     found = names.evaluate(entry.value)
     if not isinstance(found, Value):
-        raise Problem(error("D071", f"`{path}` is one number, and this is a list", found.place,
-                            help="leave the brackets out"))
+        raise Problem(
+            error("D071", f"`{path}` is one number, and this is a list", found.place, help="leave the brackets out")
+        )
     return Given(path, found, entry.value)

@@ -1,5 +1,5 @@
-"""Guides of a run: their models' parameters, those of each joint that follows, the courses of their paths, their ticks.
-"""
+"""Guides of a run: their models' parameters, those of each joint that follows, the courses of their paths, their
+ticks."""
 
 from __future__ import annotations
 
@@ -82,9 +82,12 @@ def name_guides(scope: Scope, block: Block) -> None:
         let = scope.definitions.lets.get(name)
         if meaning := _meaning(scope, name):
             scope.complaints.error(
-                "D271", f"`{name}` is {meaning}, so no guide can be called so", item.place,
+                "D271",
+                f"`{name}` is {meaning}, so no guide can be called so",
+                item.place,
                 also=[Label(let.name.place, "the value")] if let is not None else [],
-                help="give the guide another name: `rate(NAME)` is to mean one thing")
+                help="give the guide another name: `rate(NAME)` is to mean one thing",
+            )
 
 
 def _meaning(scope: Scope, name: str) -> str:
@@ -94,9 +97,7 @@ def _meaning(scope: Scope, name: str) -> str:
     return "a unit" if units.is_unit(name) else "a course in time" if name in models.available("command") else ""
 
 
-def resolve_guides(
-    scope: Scope, block: Block, arm: Arm, uses: list[Use], duration: float | None
-) -> list[Guiding]:
+def resolve_guides(scope: Scope, block: Block, arm: Arm, uses: list[Use], duration: float | None) -> list[Guiding]:
     """Every guide of the run, in the deck's order; what is wrong is told. duration: of the run, s; None: unknown."""
     found = []
     for item in block.of_kind(KIND):
@@ -112,17 +113,25 @@ def check_guides(scope: Scope, guides: Iterable[Guiding], structure: Structure) 
     for guide in guides:
         idle = [joint for joint in guide.joints if guide.link and not carries(structure, guide.link, joint)]
         if idle:
-            scope.complaints.error("D276", f"joint `{idle[0]}` follows guide `{guide.name}`, and does not carry link "
-                                   f"`{guide.link}`", guide.place,
-                                   help="give it a command of its own, or guide a link that it carries")
+            scope.complaints.error(
+                "D276",
+                f"joint `{idle[0]}` follows guide `{guide.name}`, and does not carry link `{guide.link}`",
+                guide.place,
+                help="give it a command of its own, or guide a link that it carries",
+            )
         elif guide.whole and 0 < len(guide.joints) < len(guide.components):
             words = next((p for p in guide.model.parameters if p.name == "guides"), None)
             others = words.words if words is not None else ()
             scope.complaints.error(
-                "D275", f"guide `{guide.name}` moves {_count(guide.joints, 'joint')} and guides "
-                f"{_count(guide.components, 'component')}: {', '.join(guide.components)}", guide.place,
-                help=["let more joints follow it, or guide less",
-                      *([known_words("`guides` may be", others)] if others else ())])
+                "D275",
+                f"guide `{guide.name}` moves {_count(guide.joints, 'joint')} and guides "
+                f"{_count(guide.components, 'component')}: {', '.join(guide.components)}",
+                guide.place,
+                help=[
+                    "let more joints follow it, or guide less",
+                    *([known_words("`guides` may be", others)] if others else ()),
+                ],
+            )
 
 
 def check_period(scope: Scope, guide: Guiding, rate: Rate) -> None:
@@ -135,10 +144,15 @@ def check_period(scope: Scope, guide: Guiding, rate: Rate) -> None:
         return bad, [f"{x / rate.hz:.3g} times the error is taken off at each tick" for x in values[bad, 0][:1]]
 
     scope.checks.hold(
-        (guide.fastest,), test, code="D279", message=f"guide `{guide.name}` is unstable at {rate.hz:g} Hz",
-        place=guide.place, needs=(f"guides.{guide.name}",),
+        (guide.fastest,),
+        test,
+        code="D279",
+        message=f"guide `{guide.name}` is unstable at {rate.hz:g} Hz",
+        place=guide.place,
+        needs=(f"guides.{guide.name}",),
         help=f"what it takes off in a second, its gain, must stay below twice its rate, {2.0 * rate.hz:g}/s, and well "
-             "below what its servos can follow")
+        "below what its servos can follow",
+    )
 
 
 def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use], duration: float | None) -> Guiding | None:
@@ -146,8 +160,9 @@ def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use], duration: float 
         at = item.detail[0].place if item.detail else item.place
         told = f"guide `{item.name}` has no model"
         told = f"`{item.detail[0].text}` after the name of a guide" if item.detail else told
-        scope.complaints.error("D270", told, at,
-                               help=[USAGE, known_words("guide models", sorted(models.available(KIND)))])
+        scope.complaints.error(
+            "D270", told, at, help=[USAGE, known_words("guide models", sorted(models.available(KIND)))]
+        )
         return None
     guide = find_model(scope, KIND, word_of(item.value), place_of(item.value))
     if guide is None or refuse_values(scope, item.value, [p.name for p in guide.parameters]):
@@ -157,16 +172,23 @@ def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use], duration: float 
     whole = not scope.lost and all(use.command is not None or not use.servo.commands for use in uses)
     if not follow and whole and not _meaning(scope, item.name):
         kind = guide.commands[0]
-        scope.complaints.error("D272", f"no joint follows guide `{item.name}`", item.place,
-                               help=f"write `command = {kind}({item.name});` in the servo of each joint that it moves, "
-                                    "or leave the guide out")
+        scope.complaints.error(
+            "D272",
+            f"no joint follows guide `{item.name}`",
+            item.place,
+            help=f"write `command = {kind}({item.name});` in the servo of each joint that it moves, "
+            "or leave the guide out",
+        )
     for use in follow:
         assert use.command is not None
         if use.command.kind not in guide.commands:
-            scope.complaints.error("D273", f"guide `{item.name}` ({guide.name}) commands no {use.command.kind}",
-                                   use.place, also=[Label(item.place, "the guide")],
-                                   help=f"write `command = {guide.commands[0]}({item.name});`"
-                                        f" for joint `{use.joint}`")
+            scope.complaints.error(
+                "D273",
+                f"guide `{item.name}` ({guide.name}) commands no {use.command.kind}",
+                use.place,
+                also=[Label(item.place, "the guide")],
+                help=f"write `command = {guide.commands[0]}({item.name});` for joint `{use.joint}`",
+            )
     joints = tuple(use.joint for use in follow)
     owner = Owner(f"guide `{item.name}`", item.place, f"guides.{item.name}", homes=item.homes)
     scope.setting(f"{owner.path}.model", guide.name, item=item)
@@ -174,8 +196,12 @@ def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use], duration: float 
     named = check_names(scope, owner, guide.parameters, body, arm=arm.name, known=known, lost=arm.lost)
     paths = list(COMPONENTS) if guide.components is not None else []
     of_joint = [p.name for p in guide.of_joint]
-    extra = [*(["rate"] if guide.steer is not None else []), *paths, *of_joint,
-             *(f"{joint}.{name}" for joint in joints for name in of_joint)]
+    extra = [
+        *(["rate"] if guide.steer is not None else []),
+        *paths,
+        *of_joint,
+        *(f"{joint}.{name}" for joint in joints for name in of_joint),
+    ]
     values = use_model(scope, owner, guide.parameters, body, extra)
     _of_joints(scope, owner, guide, body, arm, joints)
     guided = guide.components(SimpleNamespace(**values)) if values is not None and paths else ()
@@ -206,9 +232,14 @@ def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any]
     if found is not None:
         written = [part for name in found[0] if (part := (item.body or Block()).get(name)) is not None]
         needed = [each for each in guide.parameters if each.name in found[0] and each.default is None]
-        scope.complaints.remark("D301", f"guide `{item.name}` {found[1]}", value_at(written[0] if written else item),
-                                help="change that, or leave it out" if not needed else
-                                f"change {' or '.join(f'`{name}`' for name in found[0])}")
+        scope.complaints.remark(
+            "D301",
+            f"guide `{item.name}` {found[1]}",
+            value_at(written[0] if written else item),
+            help="change that, or leave it out"
+            if not needed
+            else f"change {' or '.join(f'`{name}`' for name in found[0])}",
+        )
 
 
 def _of_joints(scope: Scope, owner: Owner, guide: Any, body: Block, arm: Arm, joints: Iterable[str]) -> None:
@@ -219,10 +250,15 @@ def _of_joints(scope: Scope, owner: Owner, guide: Any, body: Block, arm: Arm, jo
         general = body.get(wanted.name)
         parts = [part for part in components(general, len(joints)) if part is not None]
         if general is not None and len(joints) > 1 and len(parts) == len(joints):
-            each = "  ".join(f"{joint}.{wanted.name} = {spell(part)};"
-                             for joint, part in zip(joints, parts, strict=True))
-            scope.complaints.error("D071", f"`{wanted.name}` of {owner.label} is one number for each joint, and this "
-                                   "is a list", value_at(general), help=f"write `{each}`")
+            each = "  ".join(
+                f"{joint}.{wanted.name} = {spell(part)};" for joint, part in zip(joints, parts, strict=True)
+            )
+            scope.complaints.error(
+                "D071",
+                f"`{wanted.name}` of {owner.label} is one number for each joint, and this is a list",
+                value_at(general),
+                help=f"write `{each}`",
+            )
             scope.checks.fail(owner.join(wanted.name))
             continue
         for joint in joints:
@@ -230,8 +266,14 @@ def _of_joints(scope: Scope, owner: Owner, guide: Any, body: Block, arm: Arm, jo
             all_of_them = () if own is not None else (owner.path,)
             item = own if own is not None else general
             item = replace(item, homes=all_of_them) if item is not None else None
-            whose = Owner(f"joint `{joint}` of {owner.label}", item.place if item is not None else owner.place,
-                          f"{owner.path}.{joint}", homes=all_of_them, local="", joint=kinds[joint])
+            whose = Owner(
+                f"joint `{joint}` of {owner.label}",
+                item.place if item is not None else owner.place,
+                f"{owner.path}.{joint}",
+                homes=all_of_them,
+                local="",
+                joint=kinds[joint],
+            )
             if scope.number(whose, wanted, item) is None and own is None:
                 break  # the same would be told of every joint
 
@@ -246,18 +288,26 @@ def _courses(
         if part is None:
             continue
         if name in joints:
-            scope.complaints.error("D274", f"`{name}` of {owner.label} is a component of its path, and a joint that "
-                                   "follows it", part.place, help="give the joint another name")
+            scope.complaints.error(
+                "D274",
+                f"`{name}` of {owner.label} is a component of its path, and a joint that follows it",
+                part.place,
+                help="give the joint another name",
+            )
             continue
         if name not in guided:
             chosen = body.get("guides")
             later = chosen is not None and len(chosen.homes) < len(part.homes)  # by a run `like` the one of the path
             scope.complaints.error(
-                "D274", f"`{name}` is not guided by {owner.label}",
+                "D274",
+                f"`{name}` is not guided by {owner.label}",
                 value_at(chosen) if chosen is not None and later else part.place,
                 also=[Label(part.place, "written here")] if later else [],
-                help=[f"it guides {', '.join(guided)}",
-                      f"write `remove {name};`, or guide more" if later else "leave it out, or guide more"])
+                help=[
+                    f"it guides {', '.join(guided)}",
+                    f"write `remove {name};`, or guide more" if later else "leave it out, or guide more",
+                ],
+            )
             continue
         with scope.complaints.gather():
             model = _course(scope, owner, part)
@@ -271,8 +321,12 @@ def _course(scope: Scope, owner: Owner, item: Item) -> str | None:
     kind = component(item.name).kind
     if item.value is None:
         unit = "1 m" if kind == "prismatic" else "30 deg"
-        scope.complaints.error("D274", f"`{item.name}` of {owner.label} is a value or a course in time", item.place,
-                               help=f"write `{item.name} = ramp(to = {unit}, over = 10 s);`")
+        scope.complaints.error(
+            "D274",
+            f"`{item.name}` of {owner.label} is a value or a course in time",
+            item.place,
+            help=f"write `{item.name} = ramp(to = {unit}, over = 10 s);`",
+        )
         return None
     told, path = f"`{item.name}` of {owner.label}", f"{owner.path}.{item.name}"
     spot = Owner(told, item.place, path, homes=item.homes, joint=kind, command="position", called=told)

@@ -31,8 +31,12 @@ def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str,
     if found is not None:
         body = item.body or Block()
         written = [part for name in found[0] if (part := body.get(name)) is not None and part.value is not None]
-        scope.complaints.remark("D168", f"environment `{item.name}` never acts: {found[1]}",
-                                value_at(written[0]) if written else item.place, help="change that, or leave it out")
+        scope.complaints.remark(
+            "D168",
+            f"environment `{item.name}` never acts: {found[1]}",
+            value_at(written[0]) if written else item.place,
+            help="change that, or leave it out",
+        )
     return found is not None
 
 
@@ -42,9 +46,13 @@ def remark_kinds(scope: Scope, environment: Any, item: Item, arm: Arm) -> None:
     for parameter in environment.parameters:
         written = (item.body or Block()).get(parameter.name)
         if parameter.joints and parameter.joints not in kinds and written is not None and not arm.lost:
-            scope.complaints.remark("D168", f"`{parameter.name}` of environment `{item.name}` changes nothing: no "
-                                    f"joint of arm `{arm.name}` is {parameter.joints}", value_at(written),
-                                    help="leave it out")
+            scope.complaints.remark(
+                "D168",
+                f"`{parameter.name}` of environment `{item.name}` changes nothing: no "
+                f"joint of arm `{arm.name}` is {parameter.joints}",
+                value_at(written),
+                help="leave it out",
+            )
 
 
 def remark_beginnings(scope: Scope, uses: tuple[EnvironmentUse, ...]) -> None:
@@ -52,8 +60,14 @@ def remark_beginnings(scope: Scope, uses: tuple[EnvironmentUse, ...]) -> None:
     for use in uses:
         model = models.find("environment", use.model)
         found = {name: scope.parameters.get(f"environment.{use.name}.{name}") for name in model.between}
-        joint = next((str(settled.value) for each in model.parameters if each.names == "joint"
-                      and (settled := scope.parameters.get(f"environment.{use.name}.{each.name}"))), None)
+        joint = next(
+            (
+                str(settled.value)
+                for each in model.parameters
+                if each.names == "joint" and (settled := scope.parameters.get(f"environment.{use.name}.{each.name}"))
+            ),
+            None,
+        )
         begins = scope.parameters.get(f"initial.{joint}.q")
         if begins is None or use.place is None or len(found) != 2 or None in found.values():
             continue
@@ -61,18 +75,33 @@ def remark_beginnings(scope: Scope, uses: tuple[EnvironmentUse, ...]) -> None:
         place = begins.origin.place or next((each.origin.place for each in ends if each.origin.place), use.place)
         also, shown = [Label(use.place, "this one")], unit_written([begins, *ends], begins.unit)
 
-        def told(values: np.ndarray, use: EnvironmentUse = use, joint: str | None = joint, place: Any = place,
-                 also: list[Label] = also, shown: tuple[str, float] = shown) -> tuple[np.ndarray, list[str]]:
+        def told(
+            values: np.ndarray,
+            use: EnvironmentUse = use,
+            joint: str | None = joint,
+            place: Any = place,
+            also: list[Label] = also,
+            shown: tuple[str, float] = shown,
+        ) -> tuple[np.ndarray, list[str]]:
             q, lower, upper = values.T
             beyond = np.flatnonzero(((q < lower) & apart(q, lower)) | ((q > upper) & apart(q, upper)))
             if beyond.size:
                 (q, lower, upper), unit = values[beyond[0]] / shown[1], shown[0]
                 which = f"below {lower:g} {unit}" if q < lower else f"above {upper:g} {unit}"
                 scope.complaints.remark(
-                    "D294", f"joint `{joint}` begins at {q:g} {unit}, beyond an end of `{use.name}`: {which}", place,
-                    also=also, help="the run begins with what drives it back: begin within, or move the end")
+                    "D294",
+                    f"joint `{joint}` begins at {q:g} {unit}, beyond an end of `{use.name}`: {which}",
+                    place,
+                    also=also,
+                    help="the run begins with what drives it back: begin within, or move the end",
+                )
             return np.zeros(len(values), bool), []
 
-        scope.checks.hold((begins.value, *(each.value for each in ends)), told,  # type: ignore[arg-type]
-                          code="D294", message="", place=place, needs=(f"initial.{joint}.q",
-                                                                        f"environment.{use.name}"))
+        scope.checks.hold(
+            (begins.value, *(each.value for each in ends)),  # type: ignore[arg-type]
+            told,
+            code="D294",
+            message="",
+            place=place,
+            needs=(f"initial.{joint}.q", f"environment.{use.name}"),
+        )

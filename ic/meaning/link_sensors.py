@@ -53,9 +53,7 @@ class Sensing:
         return LinkSensor(self.name, self.model, divisor, self.words, self.place)
 
 
-def resolve_link_sensors(
-    scope: Scope, block: Block, arm: Arm, payloads: tuple[Payload, ...]
-) -> list[Sensing]:
+def resolve_link_sensors(scope: Scope, block: Block, arm: Arm, payloads: tuple[Payload, ...]) -> list[Sensing]:
     """Every sensor of the run, in the deck's order; what is wrong is told."""
     scope.sensors = frozenset(item.name for item in block.of_kind(KIND))
     found = []
@@ -70,8 +68,11 @@ def resolve_link_sensors(
 def _sensor(scope: Scope, item: Item, arm: Arm, payloads: tuple[Payload, ...]) -> Sensing | None:
     if item.detail or item.value is None:
         at = item.detail[0].place if item.detail else item.place
-        told = f"`{item.detail[0].text}` after the name of a sensor" if item.detail else (
-            f"sensor `{item.name}` has no model")
+        told = (
+            f"`{item.detail[0].text}` after the name of a sensor"
+            if item.detail
+            else (f"sensor `{item.name}` has no model")
+        )
         scope.complaints.error("D280", told, at, help=[USAGE, known_words("sensors of links", _of_links())])
         return None
     sensor = find_model(scope, KIND, word_of(item.value), place_of(item.value))
@@ -79,9 +80,14 @@ def _sensor(scope: Scope, item: Item, arm: Arm, payloads: tuple[Payload, ...]) -
         return None
     if sensor.measures is None:
         scope.complaints.error(
-            "D281", f"`{sensor.name}` is a sensor of a joint, and this is a run", place_of(item.value),
-            help=[f"write `sensor QUANTITY = {sensor.name} {{ ... }}` in a servo, such as of `qd`",
-                  known_words("sensors of links", _of_links())])
+            "D281",
+            f"`{sensor.name}` is a sensor of a joint, and this is a run",
+            place_of(item.value),
+            help=[
+                f"write `sensor QUANTITY = {sensor.name} {{ ... }}` in a servo, such as of `qd`",
+                known_words("sensors of links", _of_links()),
+            ],
+        )
         return None
     body = item.body or Block()
     owner = Owner(f"sensor `{item.name}`", item.place, f"sensors.{item.name}", homes=item.homes, of=sensor.unit)

@@ -40,8 +40,14 @@ class Compiled:
     scopes: tuple[Scope, ...] = field(default=(), repr=False)  # one for each experiment: what `explain` looks into
 
 
-def check(path: str | PathLike[str], *, include_dirs: Sequence[str | PathLike[str]], defines: Sequence[str],
-          select: Select, settings: Sequence[str] = ()) -> Compiled:
+def check(
+    path: str | PathLike[str],
+    *,
+    include_dirs: Sequence[str | PathLike[str]],
+    defines: Sequence[str],
+    select: Select,
+    settings: Sequence[str] = (),
+) -> Compiled:
     """The deck at `path`, compiled."""
     try:
         deck = read(Path(path), [Path(each) for each in include_dirs], defines, despite_errors=True)
@@ -50,8 +56,14 @@ def check(path: str | PathLike[str], *, include_dirs: Sequence[str | PathLike[st
     return compile_deck(deck, select=select, defines=defines, settings=settings)
 
 
-def compile_deck(deck: Deck, *, select: Select = None, defines: Iterable[str] = (), settings: Sequence[str] = (),
-                 complaints: Complaints | None = None) -> Compiled:
+def compile_deck(
+    deck: Deck,
+    *,
+    select: Select = None,
+    defines: Iterable[str] = (),
+    settings: Sequence[str] = (),
+    complaints: Complaints | None = None,
+) -> Compiled:
     """The plan of the deck's runs and sweeps that `select` names, with everything that is wrong on the way.
 
     settings  `PATH=VALUE`, each as if the deck said so
@@ -91,8 +103,7 @@ def compile_deck(deck: Deck, *, select: Select = None, defines: Iterable[str] = 
             with complaints.gather():
                 check_servo_definition(Scope(definitions, complaints), name)
     except RecursionError:
-        complaints.error("D078", "this deck's values are nested too deeply",
-                         help="build them up in steps, with `let`")
+        complaints.error("D078", "this deck's values are nested too deeply", help="build them up in steps, with `let`")
     except Problem as problem:
         complaints.add(*problem.diagnostics)
     sources = (*deck.sources, *definitions.csv_files.sources, *definitions.robot_files.sources)
@@ -103,13 +114,17 @@ def compile_deck(deck: Deck, *, select: Select = None, defines: Iterable[str] = 
         return Compiled(None, in_order(complaints.all, sources), texts)
     files = tuple(File(source.name, source.text, source.sha256) for source in sources)
     selected = (select,) if isinstance(select, str) else tuple(dict.fromkeys(select or ()))
-    return Compiled(Plan(deck.file, tuple(experiments), files, tuple(defines), selected, tuple(settings)),
-                    in_order(complaints.all, sources), texts, tuple(scopes))
+    return Compiled(
+        Plan(deck.file, tuple(experiments), files, tuple(defines), selected, tuple(settings)),
+        in_order(complaints.all, sources),
+        texts,
+        tuple(scopes),
+    )
 
 
 def _with_settings(deck: Deck, settings: Sequence[str], complaints: Complaints) -> tuple[Deck, tuple[Setting, ...]]:
-    """The deck with the text of what is set among its sources, and the entries of that; those that are wrong are told.
-    """
+    """The deck with the text of what is set among its sources, and the entries of that; those that are wrong are
+    told."""
     if not settings:
         return deck, ()
     before = "".join(source.text for source in deck.sources if source.name == COMMAND_LINE)
@@ -132,8 +147,11 @@ def chosen(definitions: Definitions, complaints: Complaints, select: Select) -> 
         names = [select] if isinstance(select, str) else list(dict.fromkeys(select))
         for name in names:
             if name not in known:
-                complaints.error("D164", f"no run or sweep `{name}` in this deck",
-                                 help=[*did_you_mean(name, known), known_words("it has", known)])
+                complaints.error(
+                    "D164",
+                    f"no run or sweep `{name}` in this deck",
+                    help=[*did_you_mean(name, known), known_words("it has", known)],
+                )
         return [known[name] for name in names if name in known]
     own = {name: definition for name, definition in known.items() if definitions.writes(definition)}
     default = definitions.default() if not own or any(d.default for d in own.values()) else None
@@ -144,8 +162,16 @@ def chosen(definitions: Definitions, complaints: Complaints, select: Select) -> 
         return []
     if not known:
         raise Problem(error("D161", "this deck has no run", help="write `run NAME { ... }`"))
-    none = "several included files mark a `default`" if any(d.default for d in known.values()) else \
-        "none is marked `default`"
-    raise Problem(error("D162", f"this deck has {len(known)} runs and sweeps, and {none}",
-                        also=[Label(d.place, d.name) for d in known.values()],
-                        help=[known_words("name one", known), "or write `default run ...` for one of them"]))
+    none = (
+        "several included files mark a `default`"
+        if any(d.default for d in known.values())
+        else "none is marked `default`"
+    )
+    raise Problem(
+        error(
+            "D162",
+            f"this deck has {len(known)} runs and sweeps, and {none}",
+            also=[Label(d.place, d.name) for d in known.values()],
+            help=[known_words("name one", known), "or write `default run ...` for one of them"],
+        )
+    )

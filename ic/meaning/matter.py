@@ -48,10 +48,15 @@ def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
     name = word_of(item.value)
     if name is None or name not in SHAPES:
         helps = did_you_mean(name, SHAPES) if name else ()
-        scope.complaints.error("D088", f"no shape `{name}`" if name else "a shape is needed here",
-                               value_at(item),
-                               help=[*helps, "shapes: rod(length, along), box(size, along), cylinder(radius, length, "
-                                     "along), sphere(radius)"])
+        scope.complaints.error(
+            "D088",
+            f"no shape `{name}`" if name else "a shape is needed here",
+            value_at(item),
+            help=[
+                *helps,
+                "shapes: rod(length, along), box(size, along), cylinder(radius, length, along), sphere(radius)",
+            ],
+        )
         scope.checks.fail(f"{owner.path}.shape")
         return None
     kind = SHAPES[name]
@@ -89,8 +94,9 @@ def _com(scope: Scope, owner: Owner, kind: str, item: Item | None, solid: Solid 
         scope.derived(owner, f"com.{axis}", value, "m", f"middle of the {solid.kind}")
 
 
-def _inertia(scope: Scope, owner: Owner, kind: str, item: Item | None, solid: Solid | None,
-             mass: Real | None) -> tuple[Real, ...] | None:
+def _inertia(
+    scope: Scope, owner: Owner, kind: str, item: Item | None, solid: Solid | None, mass: Real | None
+) -> tuple[Real, ...] | None:
     if item is not None:
         return scope.vector(owner, _of(INERTIA, kind), item, names=MOMENTS, short=3)
     if solid is None:
@@ -98,13 +104,21 @@ def _inertia(scope: Scope, owner: Owner, kind: str, item: Item | None, solid: So
             return tuple(scope.derived(owner, f"inertia.{name}", 0.0, "kg*m^2", "without mass") for name in MOMENTS)
         if not scope.checks.failed(f"{owner.path}.shape"):
             scope.complaints.missing(
-                owner.place, ("shape", "inertia"), "D089", f"{owner.label} has no inertia",
-                help=["write a shape, such as `shape = rod(length = 1 m, along = x);`",
-                      "or `inertia = [xx, yy, zz] kg*m^2;`, about the centre of mass"])
+                owner.place,
+                ("shape", "inertia"),
+                "D089",
+                f"{owner.label} has no inertia",
+                help=[
+                    "write a shape, such as `shape = rod(length = 1 m, along = x);`",
+                    "or `inertia = [xx, yy, zz] kg*m^2;`, about the centre of mass",
+                ],
+            )
         return None
     if mass is None:
         scope.checks.fail(owner.join("inertia"))
         return None
     scope.unvaried[owner.join("inertia")] = unvaried.several([owner.join(f"inertia.{each}") for each in MOMENTS])
-    return tuple(scope.derived(owner, f"inertia.{name}", value, "kg*m^2", f"uniform {solid.kind} of the {kind}'s mass")
-                 for name, value in zip(MOMENTS, solid.inertia(mass), strict=True))
+    return tuple(
+        scope.derived(owner, f"inertia.{name}", value, "kg*m^2", f"uniform {solid.kind} of the {kind}'s mass")
+        for name, value in zip(MOMENTS, solid.inertia(mass), strict=True)
+    )

@@ -69,8 +69,15 @@ class Block:
         return self.items.get(key)
 
 
-def merge(base: Block | None, body: tuple[Entry, ...], *, home: str | None, base_name: str | None,
-          complaints: Complaints, upon_name: bool = False) -> Block:
+def merge(
+    base: Block | None,
+    body: tuple[Entry, ...],
+    *,
+    home: str | None,
+    base_name: str | None,
+    complaints: Complaints,
+    upon_name: bool = False,
+) -> Block:
     """The base's entries with `body` upon them.
 
     home       name of the definition that writes `body`; None for a use, whose entries no definition's path reaches
@@ -86,8 +93,9 @@ def merge(base: Block | None, body: tuple[Entry, ...], *, home: str | None, base
 
 
 class _Merger:
-    def __init__(self, base: Block, home: str | None, base_name: str | None, complaints: Complaints,
-                 upon_name: bool) -> None:
+    def __init__(
+        self, base: Block, home: str | None, base_name: str | None, complaints: Complaints, upon_name: bool
+    ) -> None:
         homes = (home,) if home else ()
         self.home, self.base_name, self.complaints = homes, base_name, complaints
         self.items = {key: _taken_over(item, homes) for key, item in base.items.items()}
@@ -101,8 +109,14 @@ class _Merger:
 
     def enter(self, entry: Entry) -> None:
         if isinstance(entry, Let):
-            raise Problem(error("D051", "`let` stands inside a definition", entry.place,
-                                help="move it out: a `let` belongs to the whole deck"))
+            raise Problem(
+                error(
+                    "D051",
+                    "`let` stands inside a definition",
+                    entry.place,
+                    help="move it out: a `let` belongs to the whole deck",
+                )
+            )
         if isinstance(entry, Statement):
             if entry.words[0].text == "remove":
                 self._remove(entry)
@@ -157,14 +171,34 @@ class _Merger:
             value, body = open_call(entry.value, self.home[0] if self.home else None, self.complaints)
             if earlier is None:
                 return Item(kind, name, detail, value, body, entry.place, homes=self.home)
-            return Item(earlier.kind, name, earlier.detail, value, body, entry.place,
-                        (earlier.place, *earlier.overrides), homes=self.home)
+            return Item(
+                earlier.kind,
+                name,
+                earlier.detail,
+                value,
+                body,
+                entry.place,
+                (earlier.place, *earlier.overrides),
+                homes=self.home,
+            )
         if earlier is not None and earlier.body is None and not isinstance(earlier.value, (Call, Name)):
-            raise Problem(error("D054", f"`{name}` is a value, not a block", entry.place,
-                                also=[Label(earlier.place, "written here")], help=f"write `{name} = ...;`"))
-        body = merge(earlier.body if earlier else None, entry.body, home=self.home[0] if self.home else None,
-                     base_name=f"`{name}`" if earlier else None, complaints=self.complaints,
-                     upon_name=self.upon_name or (earlier is not None and isinstance(earlier.value, (Call, Name))))
+            raise Problem(
+                error(
+                    "D054",
+                    f"`{name}` is a value, not a block",
+                    entry.place,
+                    also=[Label(earlier.place, "written here")],
+                    help=f"write `{name} = ...;`",
+                )
+            )
+        body = merge(
+            earlier.body if earlier else None,
+            entry.body,
+            home=self.home[0] if self.home else None,
+            base_name=f"`{name}`" if earlier else None,
+            complaints=self.complaints,
+            upon_name=self.upon_name or (earlier is not None and isinstance(earlier.value, (Call, Name))),
+        )
         if earlier is None:
             return Item(kind, name, detail, None, body, entry.place, homes=self.home)
         return replace(earlier, body=body, detail=detail or earlier.detail)
@@ -177,24 +211,37 @@ class _Merger:
         keys = self.names.get(name, [])
         if len(keys) > 1:
             both = [self.items[key] for key in keys]
-            raise Problem(error(
-                "D055", f"`{name}` may be " + " or ".join(f"the {item.kind} `{name}`" for item in both), place,
-                also=[Label(item.place, item.kind) for item in both], help="give them different names in the base"))
+            raise Problem(
+                error(
+                    "D055",
+                    f"`{name}` may be " + " or ".join(f"the {item.kind} `{name}`" for item in both),
+                    place,
+                    also=[Label(item.place, item.kind) for item in both],
+                    help="give them different names in the base",
+                )
+            )
         return self.items[keys[0]] if keys else None
 
     def _append(self, entry: Setting, name: str) -> None:
         earlier = self._earlier("", name, entry.place)
         if earlier is None or earlier.value is None:
             lists = [item.name for item in self.items.values() if item.value is not None]
-            raise Problem(error("D056", f"nothing is in `{name}` yet to append to", entry.place,
-                                help=did_you_mean(name, lists) or f"write `{name} = ...;`"))
+            raise Problem(
+                error(
+                    "D056",
+                    f"nothing is in `{name}` yet to append to",
+                    entry.place,
+                    help=did_you_mean(name, lists) or f"write `{name} = ...;`",
+                )
+            )
         self.items[earlier.key] = replace(earlier, appended=(*earlier.appended, entry.value))
 
     def _remove(self, entry: Statement) -> None:
         if not isinstance(entry.value, Name) or len(entry.words) > 1:
             meant = entry.value.text if isinstance(entry.value, Name) else "NAME"
-            raise Problem(error("D057", "`remove` takes a name, and nothing else", entry.place,
-                                help=f"write `remove {meant};`"))
+            raise Problem(
+                error("D057", "`remove` takes a name, and nothing else", entry.place, help=f"write `remove {meant};`")
+            )
         name = entry.value.text
         earlier = self._earlier("", name, entry.value.place)
         if earlier is None:
@@ -219,8 +266,12 @@ def _meant(entry: Statement) -> Name:
 def _nothing(entry: Statement, items: Mapping[str, Item]) -> Diagnostic:
     """Says of a `remove` that there is nothing of its name."""
     name, known = _meant(entry), [item.name for item in items.values()]
-    return error("D058", f"nothing named `{name.text}` to remove", name.place,
-                 help=[*did_you_mean(name.text, known), known_words("there is", known)])
+    return error(
+        "D058",
+        f"nothing named `{name.text}` to remove",
+        name.place,
+        help=[*did_you_mean(name.text, known), known_words("there is", known)],
+    )
 
 
 def overlay(base: Block, over: Block, complaints: Complaints) -> Block:
@@ -307,6 +358,8 @@ def twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnostic:
     if (place.file, place.line, place.column) == (earlier.file, earlier.line, earlier.column):
         helps = ["its file is included twice: begin that file with `#pragma once`"]
         if place.expansions and place.expansions != earlier.expansions:
-            helps = [f"macro `{place.expansions[-1].macro}` is used twice here: give it the name as an argument, "
-                     "another one each time, or use it once"]
+            helps = [
+                f"macro `{place.expansions[-1].macro}` is used twice here: give it the name as an argument, "
+                "another one each time, or use it once"
+            ]
     return error("D040", f"{what} is written twice", Label(place, "again"), also=[Label(earlier, "first")], help=helps)

@@ -62,8 +62,13 @@ def _check_unused(
         return
     also = [Label(place_of(word.value), "chosen here")] if word is not None and word.value is not None else []
     needed = " or ".join(f"`{only[0]} = {each};`" for each in only[1])
-    scope.complaints.error("D141", f"{owner.label} has no `{wanted.name}` with `{only[0]} = {words[only[0]]}`",
-                           item.place, also=also, help=f"it is there with {needed}")
+    scope.complaints.error(
+        "D141",
+        f"{owner.label} has no `{wanted.name}` with `{only[0]} = {words[only[0]]}`",
+        item.place,
+        also=also,
+        help=f"it is there with {needed}",
+    )
 
 
 def refuse_values(scope: Scope, expression: Expression | None, names: Iterable[str]) -> bool:
@@ -72,13 +77,15 @@ def refuse_values(scope: Scope, expression: Expression | None, names: Iterable[s
         return False
     name = word_of(expression)
     usage = f"{name}({', '.join(f'{each} = ...' for each in names)})"
-    scope.complaints.error("D153", f"`{name}` takes its values by name", place_of(expression.positional[0]),
-                           help=f"write `{usage}`")
+    scope.complaints.error(
+        "D153", f"`{name}` takes its values by name", place_of(expression.positional[0]), help=f"write `{usage}`"
+    )
     return True
 
 
-def check_keys(scope: Scope, body: Block, known: Iterable[str], owner: Owner,
-               others: Mapping[str, str] = MappingProxyType({})) -> None:
+def check_keys(
+    scope: Scope, body: Block, known: Iterable[str], owner: Owner, others: Mapping[str, str] = MappingProxyType({})
+) -> None:
     """Tells every entry of the body that is none of the known plain keys, and notes what it was meant for.
 
     others  what to say of keys one expects
@@ -86,17 +93,31 @@ def check_keys(scope: Scope, body: Block, known: Iterable[str], owner: Owner,
     known = list(known)
     for item in body.items.values():
         if item.kind:
-            scope.complaints.error("D141", f"no `{item.kind}` in {owner.label}", item.place,
-                                   help=[*belongs(item.kind), known_words("it has", known)])
+            scope.complaints.error(
+                "D141",
+                f"no `{item.kind}` in {owner.label}",
+                item.place,
+                help=[*belongs(item.kind), known_words("it has", known)],
+            )
         elif item.name not in known:
             if item.name not in others:
                 scope.complaints.taken_for(owner.place, item.name, known)
-            scope.complaints.error("D141", f"{owner.label} has no `{item.name}`", item.place,
-                                   help=[*([others[item.name]] if item.name in others
-                                           else did_you_mean(item.name, known)), known_words("it has", known)])
+            scope.complaints.error(
+                "D141",
+                f"{owner.label} has no `{item.name}`",
+                item.place,
+                help=[
+                    *([others[item.name]] if item.name in others else did_you_mean(item.name, known)),
+                    known_words("it has", known),
+                ],
+            )
     for statement in body.statements:
-        scope.complaints.error("D142", f"`{statement.words[0].text}` inside {owner.label}", statement.place,
-                               help="it belongs to a run or a sweep")
+        scope.complaints.error(
+            "D142",
+            f"`{statement.words[0].text}` inside {owner.label}",
+            statement.place,
+            help="it belongs to a run or a sweep",
+        )
     refuse_pending(body, scope.complaints)
     scope.removed.update((owner.join(each.key), each.place) for each in body.removed if body.get(each.key) is None)
 
@@ -109,8 +130,9 @@ def find_bare_model(scope: Scope, kind: models.Kind, item: Item, remedy: str) ->
     name, place = word_of(item.value), place_of(item.value) if item.value is not None else item.place
     if name is not None and (isinstance(item.value, Call) or item.body is not None):
         place = place if isinstance(item.value, Call) else upon(item) or place
-        scope.complaints.error("D143", f"`{item.name} = {name}` takes neither parentheses nor braces", place,
-                               help=remedy.format(name))
+        scope.complaints.error(
+            "D143", f"`{item.name} = {name}` takes neither parentheses nor braces", place, help=remedy.format(name)
+        )
         return None
     return find_model(scope, kind, name, place)
 
@@ -118,8 +140,12 @@ def find_bare_model(scope: Scope, kind: models.Kind, item: Item, remedy: str) ->
 def find_model(scope: Scope, kind: models.Kind, name: str | None, place: Place) -> Any:
     """The declaration; None where there is none, which was told."""
     if name is None:
-        scope.complaints.error("D143", f"the name of {an(kind)} model is needed here", place,
-                               help=known_words(f"{kind} models", sorted(models.available(kind))))
+        scope.complaints.error(
+            "D143",
+            f"the name of {an(kind)} model is needed here",
+            place,
+            help=known_words(f"{kind} models", sorted(models.available(kind))),
+        )
         return None
     try:
         return models.find(kind, name, place)
@@ -128,8 +154,9 @@ def find_model(scope: Scope, kind: models.Kind, name: str | None, place: Place) 
         return None
 
 
-def use_model(scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: Block,
-              extra: Iterable[str] = ()) -> dict[str, Any] | None:
+def use_model(
+    scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: Block, extra: Iterable[str] = ()
+) -> dict[str, Any] | None:
     """Every parameter of a model used with this body, entered in the scope; None where one is missing or wrong.
 
     Of those that are there only under a word (`Parameter.only`), those under the words of this body. Two of one name

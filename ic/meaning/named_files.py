@@ -21,8 +21,9 @@ class NamedFiles(Generic[T]):
     missing       the code of the message where there is none of a name
     """
 
-    def __init__(self, deck: Deck, load: Callable[[str, str], T], *, kind: str, ending: str, most: int,
-                 missing: str) -> None:
+    def __init__(
+        self, deck: Deck, load: Callable[[str, str], T], *, kind: str, ending: str, most: int, missing: str
+    ) -> None:
         self._deck, self._load, self._kind, self._ending = deck.file, load, kind, ending
         self._most, self._missing = most, missing
         self._files = Files(deck.include_dirs)
@@ -46,8 +47,10 @@ class NamedFiles(Generic[T]):
                 text = self._files.text(found, kind=self._kind, most=self._most)
                 self._read[found.name] = self._load(found.name, text)
             except Problem as problem:
-                placed = (d if d.at else Diagnostic(d.code, d.message, Label(named.place), d.also, d.help)
-                          for d in problem.diagnostics)
+                placed = (
+                    d if d.at else Diagnostic(d.code, d.message, Label(named.place), d.also, d.help)
+                    for d in problem.diagnostics
+                )
                 self._read[found.name] = Problem(placed)
         made = self._read[found.name]
         if isinstance(made, Problem):

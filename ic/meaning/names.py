@@ -61,7 +61,7 @@ class Names:
         if worth is not None:
             return worth
         if text in self._open:
-            loop = [*list(self._open)[list(self._open).index(text):], text]
+            loop = [*list(self._open)[list(self._open).index(text) :], text]
             raise Problem(
                 error(
                     "D073",
@@ -72,8 +72,14 @@ class Names:
                 )
             )
         if len(self._open) >= DEEPEST:
-            raise Problem(error("D073", f"`{text}` is at the end of a chain of {DEEPEST} names", name.place,
-                                help="define values before their uses"))
+            raise Problem(
+                error(
+                    "D073",
+                    f"`{text}` is at the end of a chain of {DEEPEST} names",
+                    name.place,
+                    help="define values before their uses",
+                )
+            )
         self._open[text] = name.place
         try:
             found = self.evaluate(self._expression(name))
@@ -100,8 +106,13 @@ class Names:
         """Where the name that was written for this value is defined, for messages about it."""
         for text, let in self.definitions.lets.items():
             worth = self._worth.get(text)
-            if isinstance(worth, Value) and worth.number is value.number and worth.dimension == value.dimension \
-                    and worth.place != value.place and value.place.length == len(text):
+            if (
+                isinstance(worth, Value)
+                and worth.number is value.number
+                and worth.dimension == value.dimension
+                and worth.place != value.place
+                and value.place.length == len(text)
+            ):
                 return [Label(let.name.place, f"`{text}` is defined here")]
         return []
 
@@ -116,8 +127,14 @@ class Names:
             item = items.get(".".join(rest))
             if item is not None and item.value is not None:
                 return item.value
-            raise Problem(error("D065", f"servo `{first}` writes no `{'.'.join(rest)}`", name.place,
-                                help=[*did_you_mean(".".join(rest), items), known_words("it writes", items)]))
+            raise Problem(
+                error(
+                    "D065",
+                    f"servo `{first}` writes no `{'.'.join(rest)}`",
+                    name.place,
+                    help=[*did_you_mean(".".join(rest), items), known_words("it writes", items)],
+                )
+            )
         helps = list(did_you_mean(name.text, (*self.definitions.lets, *CONSTANTS)))
         if name.text in FUNCTIONS:
             helps = [f"`{name.text}` is a function: write `{name.text}(...)`"]
@@ -130,8 +147,10 @@ class Names:
         elif not helps and name.place.file == COMMAND_LINE and not name.place.expansions:
             helps = ["`--set` takes a value as the deck would write it: a number with its unit, or a name of the deck"]
         elif not helps and any(use.file == COMMAND_LINE for use in (name.place, *_uses(name.place))):
-            helps = [f"it comes from `-D`: write a number there, as in `-D {_macro(name.place)}=2`, or define "
-                     f"`let {first} = ...;` in the deck"]
+            helps = [
+                f"it comes from `-D`: write a number there, as in `-D {_macro(name.place)}=2`, or define "
+                f"`let {first} = ...;` in the deck"
+            ]
         elif not helps:
             unit = other_units.remedy(first) if len(first) > 1 else ()
             helps = [f"define it: `let {first} = ...;`", *(f"if a unit is meant: {each}" for each in unit)]
@@ -154,8 +173,14 @@ class Names:
                         )
                     )
                 if text in CONSTANTS or text in FUNCTIONS:
-                    raise Problem(error("D079", f"`{text}` has a meaning already", let.name.place,
-                                        help="give the value another name"))
+                    raise Problem(
+                        error(
+                            "D079",
+                            f"`{text}` has a meaning already",
+                            let.name.place,
+                            help="give the value another name",
+                        )
+                    )
                 self.find(Name((let.name,), let.name.place))
             except Problem as problem:
                 problems.append(problem)

@@ -56,8 +56,11 @@ def check_payloads(scope: Scope, block: Block, structure: Structure) -> None:
         item = items[payload.name]
         if payload.flies and not structure.velocity_products:
             scope.complaints.error(
-                "D266", f"payload `{payload.name}` flies by velocity products, and they are off", item.place,
-                help="leave `velocity_products = off` out")
+                "D266",
+                f"payload `{payload.name}` flies by velocity products, and they are off",
+                item.place,
+                help="leave `velocity_products = off` out",
+            )
         for wanted in EVENTS:
             written = (item.body or Block()).get(wanted.name)
             settled = scope.parameters.get(f"payloads.{payload.name}.{wanted.name}")
@@ -74,8 +77,12 @@ def _payload(scope: Scope, item: Item, arm: Arm, taken: Collection[str]) -> Payl
         return Payload(item.name, BASE, place=item.place)
     if item.name in taken:
         what = {BASE: "what the arm stands on", WORLD: "the ground"}.get(item.name, f"a link of arm `{arm.name}`")
-        scope.complaints.error("D262", f"`{item.name}` is {what}, so no payload may be called so", item.place,
-                               help="give the payload another name")
+        scope.complaints.error(
+            "D262",
+            f"`{item.name}` is {what}, so no payload may be called so",
+            item.place,
+            help="give the payload another name",
+        )
     body = item.body
     check_keys(scope, body, PAYLOAD.keys, owner)
     shape = use_matter(scope, owner, "payload", item.name, body)
@@ -108,16 +115,21 @@ def _link(scope: Scope, owner: Owner, item: Item | None, arm: Arm) -> str | None
     """The link that carries it, as written; None where it is none of the arm's, which was told."""
     known = [BASE, *(link.name for link in arm.links if link.name != BASE)]
     if item is None:
-        scope.complaints.missing(owner.place, ("on",), "D261", f"{owner.label} is on no link",
-                                 help=["write `on = LINK;`, the link that carries or grapples it",
-                                       known_words("links", known)])
+        scope.complaints.missing(
+            owner.place,
+            ("on",),
+            "D261",
+            f"{owner.label} is on no link",
+            help=["write `on = LINK;`, the link that carries or grapples it", known_words("links", known)],
+        )
         return None
     name = item.value.text if isinstance(item.value, Name) else None
     if name in known or name in arm.lost:
         return name if name in known else None
     told = f"no link `{name}` in arm `{arm.name}`" if name is not None else f"a link's name is needed for {owner.label}"
-    scope.complaints.error("D261", told, value_at(item),
-                           help=[*(did_you_mean(name, known) if name else ()), known_words("links", known)])
+    scope.complaints.error(
+        "D261", told, value_at(item), help=[*(did_you_mean(name, known) if name else ()), known_words("links", known)]
+    )
     return None
 
 
@@ -127,14 +139,22 @@ def _check_unused(scope: Scope, item: Item, body: Block, grappled: bool) -> None
         written = body.get(name)
         if written is None:
             continue
-        told, helps = f"payload `{item.name}` is held from the start", [
-            f"leave `{name}` out: `at` and `rpy` say where on its link it is",
-            "or write `grapple = 3 s;` if it flies first"]
+        told, helps = (
+            f"payload `{item.name}` is held from the start",
+            [
+                f"leave `{name}` out: `at` and `rpy` say where on its link it is",
+                "or write `grapple = 3 s;` if it flies first",
+            ],
+        )
         also = []
         if grappled:
-            told, helps = f"payload `{item.name}` is held as it is when it is grappled", [
-                f"leave `{name}` out: `attitude` and `rate` say how it flies before",
-                "or leave `grapple` out if it is held from the start"]
+            told, helps = (
+                f"payload `{item.name}` is held as it is when it is grappled",
+                [
+                    f"leave `{name}` out: `attitude` and `rate` say how it flies before",
+                    "or leave `grapple` out if it is held from the start",
+                ],
+            )
             also = [Label(body.items["grapple"].place, "grappled here")]
         scope.complaints.error("D263", f"{told}, so `{name}` has no effect", written.place, also=also, help=helps)
 
@@ -144,10 +164,16 @@ def _check_order(scope: Scope, item: Item, times: list[Real | None], place: Plac
     if grapple is None or release is None:
         return
     head = f"payloads.{item.name}"
-    scope.checks.hold((grapple, release), _not_in_order, code="D264", path=f"{head}.release",
-                      message=f"payload `{item.name}` is not released after it is grappled", place=place,
-                      needs=(f"{head}.grapple", f"{head}.release"),
-                      help="write a later `release`, or an earlier `grapple`")
+    scope.checks.hold(
+        (grapple, release),
+        _not_in_order,
+        code="D264",
+        path=f"{head}.release",
+        message=f"payload `{item.name}` is not released after it is grappled",
+        place=place,
+        needs=(f"{head}.grapple", f"{head}.release"),
+        help="write a later `release`, or an earlier `grapple`",
+    )
 
 
 def _check_solid(scope: Scope, owner: Owner, payload: Payload, item: Item) -> None:
@@ -158,12 +184,19 @@ def _check_solid(scope: Scope, owner: Owner, payload: Payload, item: Item) -> No
         return
     body = item.body or Block()
     given = next((part for name in ("inertia", "shape", "mass") if (part := body.get(name)) is not None), item)
-    helps = ("what flies has mass, and resists a turn about every axis: a box, a cylinder or a sphere does",
-             "or leave `grapple` and `release` out: then it is a part of its link")
+    helps = (
+        "what flies has mass, and resists a turn about every axis: a box, a cylinder or a sphere does",
+        "or leave `grapple` and `release` out: then it is a part of its link",
+    )
     scope.checks.hold(
         tuple(each.value for each in settled if each is not None),  # type: ignore[misc]  # numbers, by the test above
-        _not_solid, code="D265", place=value_at(given), help=helps, needs=(*paths, f"{owner.path}.shape"),
-        message=f"payload `{payload.name}` is no body that could fly")
+        _not_solid,
+        code="D265",
+        place=value_at(given),
+        help=helps,
+        needs=(*paths, f"{owner.path}.shape"),
+        message=f"payload `{payload.name}` is no body that could fly",
+    )
 
 
 def _not_in_order(pairs: np.ndarray) -> tuple[np.ndarray, list[str]]:
@@ -186,11 +219,20 @@ def _remark_time(scope: Scope, payload: Payload, event: str, time: float, struct
     schedule = structure.schedule
     does = f"payload `{payload.name}` is {event}d"
     if time > schedule.duration:
-        scope.complaints.remark("D268", f"{does} at {time:g} s, and the run ends at {schedule.duration:g} s", place,
-                                help=f"leave `{event}` out, or let the run last longer" if event == "release" else
-                                "let the run last longer, or leave it: then the payload flies by")
+        scope.complaints.remark(
+            "D268",
+            f"{does} at {time:g} s, and the run ends at {schedule.duration:g} s",
+            place,
+            help=f"leave `{event}` out, or let the run last longer"
+            if event == "release"
+            else "let the run last longer, or leave it: then the payload flies by",
+        )
         return
     there = schedule.step * math.ceil(time / schedule.step - INSTANT)
     if there - time > INSTANT * schedule.step:
-        scope.complaints.remark("D267", f"{does} at {there:.9g} s: {time:.9g} s is no instant of the dynamics", place,
-                                help=f"a step of the dynamics is {schedule.step:g} s; write a multiple of it")
+        scope.complaints.remark(
+            "D267",
+            f"{does} at {there:.9g} s: {time:.9g} s is no instant of the dynamics",
+            place,
+            help=f"a step of the dynamics is {schedule.step:g} s; write a multiple of it",
+        )

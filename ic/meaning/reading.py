@@ -27,13 +27,20 @@ def remark_unread(scope: Scope, uses: Iterable[Use], structure: Structure) -> No
         helps = known_words(f"it reads{under}", known) if known else f"it reads nothing of its joint{under}"
         for sensor in servo.sensors:
             if sensor.of not in read and sensor.place is not None and not _kept(structure, servo, sensor.of):
-                scope.complaints.remark("D290", f"sensor `{sensor.of}` changes nothing: {label} does not read "
-                                        f"`{sensor.of}`", sensor.place, help=[helps, "leave it out, or record it: "
-                                        f"`record += [{servo.joint}.servo.sensor.{sensor.of}];`"])
+                scope.complaints.remark(
+                    "D290",
+                    f"sensor `{sensor.of}` changes nothing: {label} does not read `{sensor.of}`",
+                    sensor.place,
+                    help=[helps, f"leave it out, or record it: `record += [{servo.joint}.servo.sensor.{sensor.of}];`"],
+                )
         for name, of in _dead(scope, structure, use.joint):
             if str(of.value) not in read and of.origin.place is not None:
-                scope.complaints.remark("D168", f"environment `{name}` never acts: {label} does not read "
-                                        f"`{of.value}`", of.origin.place, help=[helps, "change that, or leave it out"])
+                scope.complaints.remark(
+                    "D168",
+                    f"environment `{name}` never acts: {label} does not read `{of.value}`",
+                    of.origin.place,
+                    help=[helps, "change that, or leave it out"],
+                )
 
 
 def _kept(structure: Structure, servo: ServoUse, of: str) -> bool:

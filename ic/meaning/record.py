@@ -37,9 +37,13 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
     """The variables that are recorded, in the deck's order."""
     scope.unvaried["record"] = Unvaried("is one for the whole sweep", "record all that any case needs")
     if item is None:
-        scope.complaints.missing(run.place, ("record",), "D124", f"{run.label} records nothing",
-                                 help="write `record = [q, qd, tau];`, or `record = [];` where metrics are all you "
-                                      "want")
+        scope.complaints.missing(
+            run.place,
+            ("record",),
+            "D124",
+            f"{run.label} records nothing",
+            help="write `record = [q, qd, tau];`, or `record = [];` where metrics are all you want",
+        )
         return ()
     asked = [name for expression in (item.value, *item.appended) for name in _names(scope, item, expression)]
     known = recordable(structure, [name.text for name in asked])
@@ -53,12 +57,18 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
         if made is None and scope.gone and (name.path[0].text in scope.gone or not structure.moving):
             continue
         if made is None:
-            scope.complaints.error("D125", f"no channel `{name.text}`", name.place,
-                                   help=_nearest(name, known, structure))
+            scope.complaints.error(
+                "D125", f"no channel `{name.text}`", name.place, help=_nearest(name, known, structure)
+            )
         for each in made or ():
             if each.name in found:
-                scope.complaints.error("D040", f"`{each.name}` is recorded twice", name.place,
-                                       also=[Label(found[each.name][1], "first")], help="leave one out")
+                scope.complaints.error(
+                    "D040",
+                    f"`{each.name}` is recorded twice",
+                    name.place,
+                    also=[Label(found[each.name][1], "first")],
+                    help="leave one out",
+                )
             else:
                 found[each.name] = (each, name.place)
     return tuple(recorded for recorded, _ in found.values())
@@ -89,8 +99,12 @@ def _names(scope: Scope, item: Item, expression: Expression | None) -> Iterator[
         if isinstance(each, Name):
             yield each
         else:
-            scope.complaints.error("D124", "a record is a list of channels; this is none", place_of(each),
-                                   help="write `record = [q, qd, tau];`")
+            scope.complaints.error(
+                "D124",
+                "a record is a list of channels; this is none",
+                place_of(each),
+                help="write `record = [q, qd, tau];`",
+            )
 
 
 def _nearest(name: Name, known: dict[str, tuple[Recorded, ...]], structure: Structure) -> list[str]:
@@ -129,8 +143,10 @@ def _why_none(words: list[str], structure: Structure) -> str:
     """Why a fixed joint has no channel, a servo not this one, and a joint none of a link that it does not carry; ""
     where that is not it."""
     if words[0] in {joint.name for joint in structure.joints if joint.kind == "fixed"}:
-        return (f"joint `{words[0]}` is fixed: its two links move as one body, and nothing is computed between them; "
-                "what they take shows in the reaction of the moving joint that carries them")
+        return (
+            f"joint `{words[0]}` is fixed: its two links move as one body, and nothing is computed between them; "
+            "what they take shows in the reaction of the moving joint that carries them"
+        )
     if len(words) > 1 and words[-2] == "servo":
         return _under_a_word(words, structure)
     moving, links = ({each.name for each in group} for group in (structure.moving, structure.links))
@@ -166,12 +182,22 @@ def resolve_metrics(scope: Scope, block: Block, structure: Structure) -> tuple[M
 
 def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Channel]) -> MetricUse | None:
     if item.detail:
-        scope.complaints.error("D129", f"`{item.detail[0].text}` after the name of a metric", item.detail[0].place,
-                               help=f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`")
+        scope.complaints.error(
+            "D129",
+            f"`{item.detail[0].text}` after the name of a metric",
+            item.detail[0].place,
+            help=f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`",
+        )
     if item.value is None:
-        scope.complaints.error("D129", f"metric `{item.name}` has no model", item.place,
-                               help=[f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`",
-                                     known_words("metric models", sorted(models.available("metric")))])
+        scope.complaints.error(
+            "D129",
+            f"metric `{item.name}` has no model",
+            item.place,
+            help=[
+                f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`",
+                known_words("metric models", sorted(models.available("metric"))),
+            ],
+        )
         return None
     metric = find_model(scope, "metric", word_of(item.value), place_of(item.value))
     if metric is None or refuse_values(scope, item.value, ["of", *(p.name for p in metric.parameters)]):
@@ -182,13 +208,16 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
     channel = None
     if of is None:
         check_keys(scope, body, ["of", *(p.name for p in metric.parameters)], owner)
-        scope.complaints.missing(item.place, ("of",), "D125", f"metric `{item.name}` watches no channel",
-                                 help="write `of = CHANNEL;`, such as `of = shoulder.qd;`")
+        scope.complaints.missing(
+            item.place,
+            ("of",),
+            "D125",
+            f"metric `{item.name}` watches no channel",
+            help="write `of = CHANNEL;`, such as `of = shoulder.qd;`",
+        )
     elif not isinstance(of.value, Name) or of.value.text not in known:
         name = of.value if isinstance(of.value, Name) else None
-        if name is not None and (
-            name.path[0].text in scope.lost | scope.gone or _of_lost(scope, name, structure)
-        ):
+        if name is not None and (name.path[0].text in scope.lost | scope.gone or _of_lost(scope, name, structure)):
             return None
         message, helps = "a channel is needed here", ["write `of = CHANNEL;`, such as `of = shoulder.qd;`"]
         if name is not None:
@@ -236,11 +265,18 @@ def read_requirements(scope: Scope, block: Block) -> list[Comparison]:
             continue
         comparison = statement.value
         if not isinstance(comparison, Binary) or comparison.operator not in FLIPPED:
-            scope.complaints.error("D131", "a requirement compares a metric with a limit", place_of(comparison),
-                                   help="write `require METRIC < LIMIT;`, or <=, >, >=")
+            scope.complaints.error(
+                "D131",
+                "a requirement compares a metric with a limit",
+                place_of(comparison),
+                help="write `require METRIC < LIMIT;`, or <=, >, >=",
+            )
             continue
-        removed = {each.key.removeprefix("metric ") for each in block.removed
-                   if each.key.startswith("metric ") and position < each.before}
+        removed = {
+            each.key.removeprefix("metric ")
+            for each in block.removed
+            if each.key.startswith("metric ") and position < each.before
+        }
         operator, metric, limit = comparison.operator, comparison.left, comparison.right
         if not _is_metric(metric, written | removed) and _is_metric(limit, written | removed):
             operator, metric, limit = FLIPPED[operator], limit, metric
@@ -294,7 +330,11 @@ def _limit(scope: Scope, owner: Owner, wanted: Parameter, expression: Expression
     item = Item("", "limit", (), expression, None, place_of(expression))
     number = scope.number(owner, wanted, item, record=False)
     if isinstance(number, Scalar):
-        scope.complaints.error("D122", "the limit of a requirement varies with the sweep", place_of(expression),
-                               help="it is the same for all cases: write a number that stands still")
+        scope.complaints.error(
+            "D122",
+            "the limit of a requirement varies with the sweep",
+            place_of(expression),
+            help="it is the same for all cases: write a number that stands still",
+        )
         return None
     return number

@@ -91,17 +91,34 @@ class Definitions:
             return known[name.text]
         for other, definitions in self._by_kind.items():
             if name.text in definitions:
-                raise Problem(error(
-                    "D042", f"`{name.text}` is {an(other)}, and {an(kind)} is needed here", name.place,
-                    also=[Label(definitions[name.text].place, "defined here")],
-                    help=known_words(f"{kind}s of this deck", known)))
+                raise Problem(
+                    error(
+                        "D042",
+                        f"`{name.text}` is {an(other)}, and {an(kind)} is needed here",
+                        name.place,
+                        also=[Label(definitions[name.text].place, "defined here")],
+                        help=known_words(f"{kind}s of this deck", known),
+                    )
+                )
         file = library_defines(kind, name.text)
         include = [f"a standard deck defines it: add `#include <{file}>`"] if file else did_you_mean(name.text, known)
-        raise Problem(error("D041", f"no {kind} `{name.text}`", name.place,
-                            help=[*include, known_words(f"{kind}s of this deck", known)]))
+        raise Problem(
+            error(
+                "D041",
+                f"no {kind} `{name.text}`",
+                name.place,
+                help=[*include, known_words(f"{kind}s of this deck", known)],
+            )
+        )
 
-    def find_or_meant(self, kind: str, name: Word, complaints: Complaints, *, user: Definition | None = None,
-                      ) -> Definition:
+    def find_or_meant(
+        self,
+        kind: str,
+        name: Word,
+        complaints: Complaints,
+        *,
+        user: Definition | None = None,
+    ) -> Definition:
         """The definition of this name, else the one of the nearest name, which is told: then what it is used with is
         looked at, too. Raises D041 where there is no near one.
 
@@ -110,8 +127,11 @@ class Definitions:
         try:
             return self.find(kind, name)
         except Problem as problem:
-            known = [each for each in self._by_kind[kind] if user is None or user.name not in self.homes(
-                self._by_kind[kind][each])]
+            known = [
+                each
+                for each in self._by_kind[kind]
+                if user is None or user.name not in self.homes(self._by_kind[kind][each])
+            ]
             near = meant(name.text, known)
             if near is None or any(each.code != "D041" for each in problem.diagnostics):
                 raise
@@ -129,11 +149,14 @@ class Definitions:
                 return None
             if any(at is seen for seen in chain):
                 self._failed.update((d.kind, d.name) for d in chain)
-                loop = [*chain[next(i for i, d in enumerate(chain) if d is at):], at]
+                loop = [*chain[next(i for i, d in enumerate(chain) if d is at) :], at]
                 self._complaints.error(
-                    "D043", f"{at.kind} `{at.name}` is like itself: " + " like ".join(f"`{d.name}`" for d in loop),
-                    at.place, also=[Label(d.place, f"`{d.name}`") for d in loop[1:-1]],
-                    help="let one of them stand alone, or be like something else")
+                    "D043",
+                    f"{at.kind} `{at.name}` is like itself: " + " like ".join(f"`{d.name}`" for d in loop),
+                    at.place,
+                    also=[Label(d.place, f"`{d.name}`") for d in loop[1:-1]],
+                    help="let one of them stand alone, or be like something else",
+                )
                 return None
             chain.append(at)
             base = None
@@ -198,17 +221,29 @@ class Definitions:
             self._define_sum(entry)
         else:
             name = entry.path[0].text if isinstance(entry, Setting) and entry.path else "..."
-            raise Problem(error(
-                "D044", "a deck holds definitions and `let`s; this is neither", entry.place,
-                help=[f"a value: `let {name} = ...;`", "a definition: `arm`, `servo`, `run` or `sweep`, a name and a "
-                      "block in braces"]))
+            raise Problem(
+                error(
+                    "D044",
+                    "a deck holds definitions and `let`s; this is neither",
+                    entry.place,
+                    help=[
+                        f"a value: `let {name} = ...;`",
+                        "a definition: `arm`, `servo`, `run` or `sweep`, a name and a block in braces",
+                    ],
+                )
+            )
 
     def _define(self, group: Group) -> None:
         words = list(group.words)
-        if len(words) > 2 and words[1].text in DEFINITIONS and meant(words[0].text, ("default",)) is not None \
-                and words[0].text != "default":
-            self._complaints.error("D045", f"no kind of definition `{words[0].text}`", words[0].place,
-                                   help="did you mean `default`?")
+        if (
+            len(words) > 2
+            and words[1].text in DEFINITIONS
+            and meant(words[0].text, ("default",)) is not None
+            and words[0].text != "default"
+        ):
+            self._complaints.error(
+                "D045", f"no kind of definition `{words[0].text}`", words[0].place, help="did you mean `default`?"
+            )
             words[0] = replace(words[0], text="default")
         default = len(words) > 1 and words[0].text == "default"
         if default:
@@ -218,47 +253,99 @@ class Definitions:
         meant_kind = lower[-1] if lower[0] == "default" else lower[0]
         if kind.text not in DEFINITIONS and meant_kind in DEFINITIONS:
             written = f"{lower[0]} {lower[-1]}" if lower[0] == "default" else lower[0]
-            raise Problem(error("D045", f"no kind of definition `{kind.text}`", kind.place,
-                                help=f"write `{written}`: the language's words are in lower case"))
+            raise Problem(
+                error(
+                    "D045",
+                    f"no kind of definition `{kind.text}`",
+                    kind.place,
+                    help=f"write `{written}`: the language's words are in lower case",
+                )
+            )
         if kind.text not in DEFINITIONS:
-            unknown = error("D045", f"no kind of definition `{kind.text}`", kind.place,
-                            help=[*did_you_mean(kind.text, DEFINITIONS), *belongs(kind.text),
-                                  "kinds: arm, servo, run, sweep"])
+            unknown = error(
+                "D045",
+                f"no kind of definition `{kind.text}`",
+                kind.place,
+                help=[*did_you_mean(kind.text, DEFINITIONS), *belongs(kind.text), "kinds: arm, servo, run, sweep"],
+            )
             near = meant(kind.text, DEFINITIONS)
             if near is None or len(words) != 2:
                 raise Problem(unknown)
             self._complaints.add(unknown)  # what is in it is looked at, too
             kind = replace(kind, text=near)
         if len(words) == 1:
-            raise Problem(error("D046", f"this {kind.text} has no name", kind.place,
-                                help=f"write `{kind.text} NAME {{ ... }}`"))
+            raise Problem(
+                error("D046", f"this {kind.text} has no name", kind.place, help=f"write `{kind.text} NAME {{ ... }}`")
+            )
         if len(words) > 2:
             if words[2].text in ("like", "of"):
-                raise Problem(error("D047", f"the block of {kind.text} `{words[1].text}` is missing", words[2].place,
-                                    help="write `{ ... }` behind its base, or `;` where nothing differs"))
-            raise Problem(error("D047", f"`{words[2].text}` after the name of {an(kind.text)}", words[2].place,
-                                help=f"write `{kind.text} {words[1].text} {{ ... }}`, `like BASE` before the brace"))
+                raise Problem(
+                    error(
+                        "D047",
+                        f"the block of {kind.text} `{words[1].text}` is missing",
+                        words[2].place,
+                        help="write `{ ... }` behind its base, or `;` where nothing differs",
+                    )
+                )
+            raise Problem(
+                error(
+                    "D047",
+                    f"`{words[2].text}` after the name of {an(kind.text)}",
+                    words[2].place,
+                    help=f"write `{kind.text} {words[1].text} {{ ... }}`, `like BASE` before the brace",
+                )
+            )
         if default and kind.text not in ("run", "sweep"):
-            raise Problem(error("D048", f"{an(kind.text)} cannot be the default", group.words[0].place,
-                                help="`default` marks the run or sweep that `met run` takes unless told another"))
+            raise Problem(
+                error(
+                    "D048",
+                    f"{an(kind.text)} cannot be the default",
+                    group.words[0].place,
+                    help="`default` marks the run or sweep that `met run` takes unless told another",
+                )
+            )
         if (group.of is not None) != (kind.text == "sweep") or (kind.text == "sweep" and group.like is not None):
             usage = f"sweep {words[1].text} of RUN {{ ... }}" if kind.text == "sweep" else f"{kind.text} NAME like BASE"
-            raise Problem(error("D049", "a sweep is `of` a run, other definitions are `like` another", kind.place,
-                                help=f"write `{usage}`"))
+            raise Problem(
+                error(
+                    "D049",
+                    "a sweep is `of` a run, other definitions are `like` another",
+                    kind.place,
+                    help=f"write `{usage}`",
+                )
+            )
         if group.made_from is not None and kind.text != "arm":
-            raise Problem(error("D214", f"{an(kind.text)} is not made from a file", group.made_from.name.place,
-                                help="`from urdf(...)` makes an arm"))
+            raise Problem(
+                error(
+                    "D214",
+                    f"{an(kind.text)} is not made from a file",
+                    group.made_from.name.place,
+                    help="`from urdf(...)` makes an arm",
+                )
+            )
         name = words[1]
         if name.text in HEADS and kind.text in ("arm", "servo"):  # whose names begin paths of parameters
-            raise Problem(error("D166", f"`{name.text}` begins paths of its own, so no {kind.text} may be called so",
-                                name.place, help=f"give the {kind.text} another name"))
+            raise Problem(
+                error(
+                    "D166",
+                    f"`{name.text}` begins paths of its own, so no {kind.text} may be called so",
+                    name.place,
+                    help=f"give the {kind.text} another name",
+                )
+            )
         self._add(Definition(kind.text, name.text, group, default))
 
     def _define_sum(self, entry: Setting) -> None:
         """`sweep both = gains + spread;`"""
         if len(entry.path) > 1 or entry.operator != "=":
-            raise Problem(error("D120", "a sweep made of others is `sweep NAME = ONE + OTHER;`", entry.place,
-                                help="its name is one word, and `=` follows"))
+            raise Problem(
+                error(
+                    "D120",
+                    "a sweep made of others is `sweep NAME = ONE + OTHER;`",
+                    entry.place,
+                    help="its name is one word, and `=` follows",
+                )
+            )
         parts: list[Name] = []
         at = entry.value
         while isinstance(at, Binary) and at.operator == "+" and isinstance(at.right, Name):
@@ -266,8 +353,14 @@ class Definitions:
             at = at.left
         if not isinstance(at, Name) or any(len(part.path) > 1 for part in (*parts, at)):
             place = at.place if not isinstance(at, Binary) else at.right.place
-            raise Problem(error("D120", "a sweep is made of runs and sweeps, with `+` between them", place,
-                                help=f"write `sweep {entry.path[0].text} = ONE + OTHER;`"))
+            raise Problem(
+                error(
+                    "D120",
+                    "a sweep is made of runs and sweeps, with `+` between them",
+                    place,
+                    help=f"write `sweep {entry.path[0].text} = ONE + OTHER;`",
+                )
+            )
         group = Group((*entry.words, entry.path[0]), None, None, (), entry.place)
         self._add(Definition("sweep", entry.path[0].text, group, len(entry.words) > 1, (at, *reversed(parts))))
 
@@ -284,8 +377,13 @@ class Definitions:
         for each in self._defaults():
             known = first.setdefault(each.place.file, each)
             if known is not each:
-                self._complaints.error("D050", f"`{each.name}` is a second default", each.place,
-                                       also=[Label(known.place, "the first")], help="keep one `default`")
+                self._complaints.error(
+                    "D050",
+                    f"`{each.name}` is a second default",
+                    each.place,
+                    also=[Label(known.place, "the first")],
+                    help="keep one `default`",
+                )
 
     def _defaults(self) -> list[Definition]:
         return [d for kind in ("run", "sweep") for d in self._by_kind[kind].values() if d.default]
@@ -303,6 +401,12 @@ class Definitions:
 
 def _single(name: Name) -> Word:
     if len(name.path) > 1:
-        raise Problem(error("D059", f"`{name.text}` is a path; the name of a definition is needed", name.place,
-                            help=f"write `{name.path[0].text}`"))
+        raise Problem(
+            error(
+                "D059",
+                f"`{name.text}` is a path; the name of a definition is needed",
+                name.place,
+                help=f"write `{name.path[0].text}`",
+            )
+        )
     return name.path[0]

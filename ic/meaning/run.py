@@ -130,20 +130,30 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     on_beds = [each.joint for each in substitutions]
     for use in uses:
         if known and use.parameters is not None and use.joint not in on_beds:  # there the motor is no part of the step
-            x = fastest_rate(scope, use.servo, use.parameters, f"{use.joint}.servo",
-                             continuous=ticks[use.joint].continuous)
+            x = fastest_rate(
+                scope, use.servo, use.parameters, f"{use.joint}.servo", continuous=ticks[use.joint].continuous
+            )
             if x is not None:
                 fastest[use.joint] = (use, x)
     stability: dict[str, Real] = {}
     for use, x in sorted(fastest.values(), key=lambda each: -scope.checks.first(each[1])):  # the worst is told
-        h_lambda = check_stability(scope, f"servo `{use.definition}`", x, schedule, integrator, rates["dynamics"],
-                                   f"{use.joint}.servo")
+        h_lambda = check_stability(
+            scope, f"servo `{use.definition}`", x, schedule, integrator, rates["dynamics"], f"{use.joint}.servo"
+        )
         if h_lambda is not None:
             stability[use.joint] = h_lambda
     for sensor in sensors:
         if known and sensor.values:
-            check_sensor(scope, sensor.label, models.find("sensor", sensor.model), sensor.values, schedule, integrator,
-                         rates["dynamics"], sensor.path)
+            check_sensor(
+                scope,
+                sensor.label,
+                models.find("sensor", sensor.model),
+                sensor.values,
+                schedule,
+                integrator,
+                rates["dynamics"],
+                sensor.path,
+            )
     for use in uses if known else ():
         check_circuits(scope, use, schedule, integrator, rates["dynamics"], on_bed=use.joint in on_beds)
     servos = tuple(ServoUse(use.joint, use.definition, use.servo.name, use.command, ticks[use.joint].divisor, use.place,
@@ -169,8 +179,9 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     return Resolved(structure, requirements, tolerances, seed, in_order, definition.place)
 
 
-def _keep_settings(scope: Scope, block: Block, arm: Arm, integrator: Any, rates: Mapping[str, Rate],
-                   schedule: Schedule) -> None:
+def _keep_settings(
+    scope: Scope, block: Block, arm: Arm, integrator: Any, rates: Mapping[str, Rate], schedule: Schedule
+) -> None:
     """What the run says besides parameters, for who asks; `Scope.constant` and `Scope.word` have kept some."""
     scope.setting("arm", arm.name, item=block.get("arm"))
     scope.setting("integrator", integrator.name, item=block.get("integrator"))
@@ -192,13 +203,20 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
         if item.kind in RUN.named or (not item.kind and item.name in RUN.keys):
             continue
         if item.kind in RUN.keys:
-            scope.complaints.error("D108", f"`{item.name}` after `{item.kind}`, which takes no name", item.place,
-                                   help=f"write `{item.kind} {'= ...;' if item.body is None else '{ ... }'}`")
+            scope.complaints.error(
+                "D108",
+                f"`{item.name}` after `{item.kind}`, which takes no name",
+                item.place,
+                help=f"write `{item.kind} {'= ...;' if item.body is None else '{ ... }'}`",
+            )
         elif item.kind:
             has = (*RUN.keys, *(" ".join(RUN[word].written.split()[:2]) for word in RUN.named), *RUN.statements)
-            scope.complaints.error("D108", f"no `{item.kind}` in a run", item.place,
-                                   help=[*did_you_mean(item.kind, (*RUN.named, *RUN.keys)),
-                                         known_words("a run has", has)])
+            scope.complaints.error(
+                "D108",
+                f"no `{item.kind}` in a run",
+                item.place,
+                help=[*did_you_mean(item.kind, (*RUN.named, *RUN.keys)), known_words("a run has", has)],
+            )
         elif item.body is not None:
             adds = f"`metric {item.name} = ...` would add a metric"
             holder = next((key for key in BLOCKS if item.name in _inside(block, key)), None)
@@ -210,8 +228,11 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
                 adds = f"`payload {item.name} {{ ... }}` would add a payload"
             scope.complaints.taken_for(definition.place, item.name, (*metrics, *RUN.keys))
             scope.complaints.error(
-                "D109", f"nothing named `{item.name}` in run `{definition.name}` to change", item.place,
-                help=belongs(item.name) or [*did_you_mean(item.name, (*metrics, *RUN.keys)), adds])
+                "D109",
+                f"nothing named `{item.name}` in run `{definition.name}` to change",
+                item.place,
+                help=belongs(item.name) or [*did_you_mean(item.name, (*metrics, *RUN.keys)), adds],
+            )
         else:
             near = did_you_mean(item.name, (*RUN.keys, *metrics)) if "." not in item.name else ()
             helps = in_run(scope.definitions, block, item, RATES.keys) or [*near, known_words("a run has", RUN.keys)]
@@ -244,8 +265,9 @@ def _body(scope: Scope, item: Item | None) -> Block:
     if item is None:
         return Block()
     if item.body is None or item.value is not None:
-        scope.complaints.error("D111", f"`{item.name}` is a block, not a value", item.place,
-                               help=f"write `{item.name} {{ ... }}`")
+        scope.complaints.error(
+            "D111", f"`{item.name}` is a block, not a value", item.place, help=f"write `{item.name} {{ ... }}`"
+        )
         return Block()
     return item.body
 
@@ -253,8 +275,9 @@ def _body(scope: Scope, item: Item | None) -> Block:
 def _arm(scope: Scope, run: Owner, item: Item | None) -> Arm | None:
     if item is None:
         known = known_words("arms of this deck", scope.definitions.of_kind("arm"))
-        scope.complaints.missing(run.place, ("arm",), "D112", f"{run.label} has no arm",
-                                 help=["write `arm = ARM;`", known])
+        scope.complaints.missing(
+            run.place, ("arm",), "D112", f"{run.label} has no arm", help=["write `arm = ARM;`", known]
+        )
         return None
     name = word_of(item.value)
     if name is None or not isinstance(item.value, Name):
@@ -262,8 +285,12 @@ def _arm(scope: Scope, run: Owner, item: Item | None) -> Arm | None:
         scope.complaints.error("D112", "the name of an arm is needed here", at, help="write `arm = ARM;`")
         return None
     if item.body is not None:
-        scope.complaints.error("D112", f"a run does not change its arm `{name}`", upon(item) or item.place,
-                               help=f"define `arm NAME like {name} {{ ... }}`, and write `arm = NAME;`")
+        scope.complaints.error(
+            "D112",
+            f"a run does not change its arm `{name}`",
+            upon(item) or item.place,
+            help=f"define `arm NAME like {name} {{ ... }}`, and write `arm = NAME;`",
+        )
         return None
     with scope.complaints.gather():
         definition = scope.definitions.find_or_meant("arm", Word(name, item.value.place), scope.complaints)
@@ -283,8 +310,9 @@ def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
     if item is None:
         return 0
     if number is not None and not number.is_integer():
-        scope.complaints.error("D113", "a seed is a whole number from 0 to 2^53",
-                               place_of(item.value) if item.value else item.place)
+        scope.complaints.error(
+            "D113", "a seed is a whole number from 0 to 2^53", place_of(item.value) if item.value else item.place
+        )
         return 0
     return int(number or 0)
 
@@ -300,8 +328,9 @@ def _environment(
     for item in body.items.values():
         if item.kind:
             meant = f"{item.name} = {item.kind}" if item.kind in models.available("environment") else "NAME = MODEL"
-            scope.complaints.error("D157", f"no `{item.kind}` in an environment", item.place,
-                                   help=f"write `{meant} {{ ... }}`")
+            scope.complaints.error(
+                "D157", f"no `{item.kind}` in an environment", item.place, help=f"write `{meant} {{ ... }}`"
+            )
         elif item.name == "velocity_products":
             owner = Owner("the environment", item.place, "environment")
             products = scope.word(owner, VELOCITY_PRODUCTS, item) != "off"
@@ -310,8 +339,12 @@ def _environment(
             if use is not None:
                 uses.append(use)
     for statement in body.statements:
-        scope.complaints.error("D142", f"`{statement.words[0].text}` inside the environment", statement.place,
-                               help="it belongs to a run or a sweep")
+        scope.complaints.error(
+            "D142",
+            f"`{statement.words[0].text}` inside the environment",
+            statement.place,
+            help="it belongs to a run or a sweep",
+        )
     return tuple(uses), products
 
 
@@ -329,15 +362,25 @@ def _environment_use(
             found = scope.written(item)
             if isinstance(found, Value):
                 size = "9.81" if isinstance(found.number, Scalar) else f"{abs(found.number):g}"
-                scope.complaints.error("D071", "`gravity` is a list of 3 numbers", found.place,
-                                       help=f"write `gravity = [0, 0, -{size}] m/s^2;`")
+                scope.complaints.error(
+                    "D071",
+                    "`gravity` is a list of 3 numbers",
+                    found.place,
+                    help=f"write `gravity = [0, 0, -{size}] m/s^2;`",
+                )
                 return None
         scope.vector(replace(owner, label="gravity", called="`gravity`"), gravity.parameters[0], item)
         return EnvironmentUse(item.name, gravity.name, None, item.place)
     if item.value is None:
-        scope.complaints.error("D158", f"no environment model `{item.name}` to change", item.place,
-                               help=[f"`{item.name} = MODEL {{ ... }}` would add one",
-                                     known_words("models", sorted(models.available("environment")))])
+        scope.complaints.error(
+            "D158",
+            f"no environment model `{item.name}` to change",
+            item.place,
+            help=[
+                f"`{item.name} = MODEL {{ ... }}` would add one",
+                known_words("models", sorted(models.available("environment"))),
+            ],
+        )
         return None
     environment = find_model(scope, "environment", name, place_of(item.value))
     if environment is None or refuse_values(scope, item.value, [p.name for p in environment.written]):
@@ -363,8 +406,13 @@ def _environment_use(
     if environment.from_file and body.get("file") is not None:
         values = use_table(scope, owner, environment, body)
     else:
-        values = use_model(scope, owner, environment.parameters, body,
-                           extra=[each.name for each in environment.written[len(environment.parameters):]])
+        values = use_model(
+            scope,
+            owner,
+            environment.parameters,
+            body,
+            extra=[each.name for each in environment.written[len(environment.parameters) :]],
+        )
     if values is not None:
         held = held_by(arm, payloads)
         words = {p.name: held.get(values[p.name], values[p.name]) for p in environment.parameters if p.names == "link"}
@@ -385,8 +433,12 @@ def _initial(scope: Scope, body: Block, arm: Arm, uses: Sequence[Use]) -> bool:
             continue
         if item.kind or item.name not in (*known, *INITIAL_OF_BASE):
             there = (*known, *of_base)
-            scope.complaints.error("D114", f"no initial `{item.name}`", item.place,
-                                   help=[*did_you_mean(item.name, there), known_words("there is", there)])
+            scope.complaints.error(
+                "D114",
+                f"no initial `{item.name}`",
+                item.place,
+                help=[*did_you_mean(item.name, there), known_words("there is", there)],
+            )
     for name, unit in (("q", "joint"), ("qd", "joint/s")):
         wanted = Parameter(name=name, unit=unit, default=0.0, doc=f"initial {name}")
         general = body.get(name)
@@ -406,8 +458,12 @@ def _initial(scope: Scope, body: Block, arm: Arm, uses: Sequence[Use]) -> bool:
                 continue
         for n, joint in enumerate(arm.moving):
             own = body.get(f"{joint.name}.{name}")
-            owner = Owner(f"joint `{joint.name}`", (own or general).place if own or general else joint.place,  # type: ignore
-                          f"initial.{joint.name}", joint=joint.kind)
+            owner = Owner(
+                f"joint `{joint.name}`",
+                (own or general).place if own or general else joint.place,  # type: ignore
+                f"initial.{joint.name}",
+                joint=joint.kind,
+            )
             value = listed.items[n] if listed is not None and own is None else None
             if isinstance(value, Values):
                 scope.complaints.error("D071", "a list inside a list", value.place)
@@ -425,8 +481,12 @@ def _balanced(scope: Scope, item: Item | None, uses: Sequence[Use]) -> bool:
     balanced = scope.word(Owner("the initial state", item.place, "initial"), BALANCED, item) == "balanced"
     if balanced and not any(use.servo.balance for use in uses):
         able = [name for name, model in models.available("servo").items() if model.balance]
-        scope.complaints.remark("D248", "no servo of this run can begin balanced: this changes nothing", item.place,
-                                help=known_words("models that can", able))
+        scope.complaints.remark(
+            "D248",
+            "no servo of this run can begin balanced: this changes nothing",
+            item.place,
+            help=known_words("models that can", able),
+        )
     return balanced
 
 
@@ -439,10 +499,15 @@ def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: Ar
         unit, dimension = scope.unit(owner, wanted)
         if isinstance(found, Value) and found.dimension != PURE and not units.same(found.dimension, dimension):
             scope.complaints.error(
-                "D061", f"`{wanted.name}` of {owner.label}, which is {owner.joint}, is in {unit}, and this is in "
-                f"{units.text(found.dimension)}", found.place,
-                help=[f"write it joint by joint: `{owner.path.removeprefix('initial.')}.{wanted.name} = 0 {unit};`",
-                      "or leave it out: without it all joints begin at 0"])
+                "D061",
+                f"`{wanted.name}` of {owner.label}, which is {owner.joint}, is in {unit}, and this is in "
+                f"{units.text(found.dimension)}",
+                found.place,
+                help=[
+                    f"write it joint by joint: `{owner.path.removeprefix('initial.')}.{wanted.name} = 0 {unit};`",
+                    "or leave it out: without it all joints begin at 0",
+                ],
+            )
             return True
     return False
 
@@ -453,29 +518,45 @@ def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: Ar
 def _rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate]:
     rates: dict[str, Rate] = {}
     if item is None:
-        scope.complaints.missing(run.place, ("rates",), "D115", f"{run.label} has no rates",
-                                 help="write `rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }`")
+        scope.complaints.missing(
+            run.place,
+            ("rates",),
+            "D115",
+            f"{run.label} has no rates",
+            help="write `rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }`",
+        )
         return rates
     body = _body(scope, item)
     owner = Owner("`rates`", item.place, "rates")
     for part in body.items.values():
         if part.kind or part.name not in RATES.keys:
             scope.complaints.taken_for(item.place, part.name, RATES.keys)
-            scope.complaints.error("D116", f"no rate `{part.name}`", part.place,
-                                   help=[*did_you_mean(part.name, RATES.keys), known_words("rates", RATES.keys)])
+            scope.complaints.error(
+                "D116",
+                f"no rate `{part.name}`",
+                part.place,
+                help=[*did_you_mean(part.name, RATES.keys), known_words("rates", RATES.keys)],
+            )
             continue
         rate = fixed_rate(scope, owner, part, f"`{part.name}`", part.name, continuous=part.name == "servos")
         if rate is not None:
             rates[part.name] = rate
     if "dynamics" not in body.items and item.body is not None:
-        scope.complaints.missing(item.place, ("dynamics",), "D117", "no rate of the dynamics",
-                                 help="write `dynamics = 1 kHz;`")
+        scope.complaints.missing(
+            item.place, ("dynamics",), "D117", "no rate of the dynamics", help="write `dynamics = 1 kHz;`"
+        )
     return rates
 
 
-def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], uses: list[Use],
-              ticking: Sequence[Ticking], duration: float | None,
-              ) -> tuple[Schedule, dict[str, Ticks], dict[str, int]]:
+def _schedule(
+    scope: Scope,
+    run: Owner,
+    block: Block,
+    rates: dict[str, Rate],
+    uses: list[Use],
+    ticking: Sequence[Ticking],
+    duration: float | None,
+) -> tuple[Schedule, dict[str, Ticks], dict[str, int]]:
     """The schedule, when each servo's law acts, and base ticks a tick of guides and of links' sensors, by path."""
     dynamics = rates.get("dynamics")
     rates_item = block.get("rates")
@@ -483,8 +564,13 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
     for use in uses:
         if use.rate is None and use.has_law and body is not None and "servos" not in body.items:
             assert rates_item is not None
-            scope.complaints.missing(rates_item.place, ("servos",), "D118", "no rate of the servos",
-                                     help="write `servos = 1 kHz;`, or a `rate` in each servo's definition")
+            scope.complaints.missing(
+                rates_item.place,
+                ("servos",),
+                "D118",
+                "no rate of the servos",
+                help="write `servos = 1 kHz;`, or a `rate` in each servo's definition",
+            )
     if dynamics is None:  # which was told: nothing is said of rates, and what does not depend on them is looked at
         ticks = {use.joint: Ticks(1, continuous=False) for use in uses}
         return Schedule(ANY_RATE, 1, 1, ANY_RATE), ticks, dict.fromkeys((each.path for each in ticking), 1)
@@ -495,23 +581,39 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
     base = base_rate([dynamics, record, *others], rates.get("base"))
     item = block.get("duration")
     written = "base" in rates
-    schedule = make_schedule(scope.complaints, dynamics, record, base, others, duration,
-                             place_of(item.value or Name((), item.place)) if item is not None else run.place,
-                             base_written=written)
+    schedule = make_schedule(
+        scope.complaints,
+        dynamics,
+        record,
+        base,
+        others,
+        duration,
+        place_of(item.value or Name((), item.place)) if item is not None else run.place,
+        base_written=written,
+    )
     ticks = {}
     everyone = [dynamics, record, *others]
     for use in uses:
         rate = use.rate or (shared if use.has_law else None) or dynamics
         continuous = rate.hz == CONTINUOUS
         if continuous and use.servo.clocked:
-            scope.complaints.error("D106", f"the law of `{use.servo.name}` needs a clock: it cannot be continuous",
-                                   rate.place, also=[Label(use.place, "used here")], help="write a rate in Hz")
+            scope.complaints.error(
+                "D106",
+                f"the law of `{use.servo.name}` needs a clock: it cannot be continuous",
+                rate.place,
+                also=[Label(use.place, "used here")],
+                help="write a rate in Hz",
+            )
         for sensor in use.sensors if continuous else ():
             if models.find("sensor", sensor.model).clocked and sensor.place is not None:
                 reads = f"{an(sensor.model, quoted=True)} reads at ticks"
-                scope.complaints.error("D106", f"{reads}, and the law of joint `{use.joint}` is continuous",
-                                       sensor.place, also=[Label(rate.place, "continuous")],
-                                       help="write a rate in Hz, or `low_pass` for a sensor that is analog")
+                scope.complaints.error(
+                    "D106",
+                    f"{reads}, and the law of joint `{use.joint}` is continuous",
+                    sensor.place,
+                    also=[Label(rate.place, "continuous")],
+                    help="write a rate in Hz, or `low_pass` for a sensor that is analog",
+                )
         if continuous:
             rate = dynamics
         ticks[use.joint] = Ticks(divisor(scope.complaints, rate, base, everyone, written=written), continuous)
@@ -525,9 +627,12 @@ def _schedule(scope: Scope, run: Owner, block: Block, rates: dict[str, Rate], us
                 check_period(scope, each, rate_of_own)
     if record.hz > dynamics.hz:
         scope.complaints.remark(
-            "D167", f"`record` is faster than the dynamics: rows repeat, {record.hz / dynamics.hz:g} for each step",
-            record.place, also=[Label(dynamics.place, "a step of the dynamics")],
-            help="record at the rate of the dynamics, or slower")
+            "D167",
+            f"`record` is faster than the dynamics: rows repeat, {record.hz / dynamics.hz:g} for each step",
+            record.place,
+            also=[Label(dynamics.place, "a step of the dynamics")],
+            help="record at the rate of the dynamics, or slower",
+        )
     if shared is not None and shared.hz != CONTINUOUS and not uses:
         divisor(scope.complaints, shared, base, everyone, written=written)
     return schedule, ticks, own_ticks

@@ -104,8 +104,17 @@ def _common(rates: list[Fraction]) -> str | None:
     return f"{hz(float(common))} Hz"
 
 
-def make_schedule(complaints: Complaints, dynamics: Rate, record: Rate, base: Rate, others: list[Rate],
-                  duration: float | None, duration_place: Place, *, base_written: bool) -> Schedule:
+def make_schedule(
+    complaints: Complaints,
+    dynamics: Rate,
+    record: Rate,
+    base: Rate,
+    others: list[Rate],
+    duration: float | None,
+    duration_place: Place,
+    *,
+    base_written: bool,
+) -> Schedule:
     """The schedule. Tells what does not fit. duration: of the run, s; None: unknown, which was told."""
     all_rates, before = [dynamics, record, *others], complaints.faults
     step = divisor(complaints, dynamics, base, all_rates, written=base_written)
@@ -114,8 +123,13 @@ def make_schedule(complaints: Complaints, dynamics: Rate, record: Rate, base: Ra
         return Schedule(base.hz, step, row, step * row)
     if duration * base.hz > MOST_TICKS:
         ticks_in_words = f"{min(duration * base.hz, 1e308):.3g}"
-        complaints.error("D103", f"a run of {ticks_in_words} ticks of the base rate", duration_place,
-                         also=[Label(base.place, "the base rate")], help="at most 1e12 are possible: shorten the run")
+        complaints.error(
+            "D103",
+            f"a run of {ticks_in_words} ticks of the base rate",
+            duration_place,
+            also=[Label(base.place, "the base rate")],
+            help="at most 1e12 are possible: shorten the run",
+        )
         return Schedule(base.hz, step, row, 1)
     in_whole = duration.is_integer() and base.hz.is_integer()
     refused = complaints.faults > before  # and so are the steps that a duration would be made of
@@ -168,8 +182,16 @@ def fastest_rate(
     return None
 
 
-def check_stability(scope: Scope, label: str, fastest: Real, schedule: Schedule, integrator: Any, dynamics: Rate,
-                    path: str, of: str = "the servo's fastest rate constant, on any arm") -> Real | None:
+def check_stability(
+    scope: Scope,
+    label: str,
+    fastest: Real,
+    schedule: Schedule,
+    integrator: Any,
+    dynamics: Rate,
+    path: str,
+    of: str = "the servo's fastest rate constant, on any arm",
+) -> Real | None:
     """h lambda of a joint under its servo, or of a sensor: given back, and warned of or told as an error.
 
     label  the servo in words; joints with the same servo and the same figure are told of once, and of several servos
@@ -195,10 +217,12 @@ def check_stability(scope: Scope, label: str, fastest: Real, schedule: Schedule,
             if above < float(np.max(x)) < limit:
                 better = slowest_that_fits(schedule, above)(float(np.max(values[:, 0])))
                 scope.complaints.remark(
-                    "D105", f"{label} is fast for the dynamics' step: h * lambda = "
-                    f"{float(np.max(x)):.3g}", Label(dynamics.place, f"h = {h:g} s"),
+                    "D105",
+                    f"{label} is fast for the dynamics' step: h * lambda = {float(np.max(x)):.3g}",
+                    Label(dynamics.place, f"h = {h:g} s"),
                     help=f"stable below {limit:g} with {integrator.name}, true to the motion below {WARN_ABOVE:g}: the "
-                         f"slowest rate that fits is {better}")
+                    f"slowest rate that fits is {better}",
+                )
             return np.zeros(len(values), bool), []
 
         scope.checks.hold(
@@ -217,6 +241,7 @@ def check_stability(scope: Scope, label: str, fastest: Real, schedule: Schedule,
 
 def slowest_that_fits(schedule: Schedule, limit: float) -> Callable[[float], str]:
     """Of a rate constant (1/s), the slowest rate of the dynamics with which h times it stays below the limit."""
+
     def name(fastest: float) -> str:
         if not math.isfinite(fastest):
             return "none"

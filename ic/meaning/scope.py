@@ -80,8 +80,16 @@ class Scope:
 
     # Numbers
 
-    def number(self, owner: Owner, wanted: Parameter, item: Item | None, *, expression: Expression | None = None,
-               value: Value | None = None, record: bool = True) -> Real | None:
+    def number(
+        self,
+        owner: Owner,
+        wanted: Parameter,
+        item: Item | None,
+        *,
+        expression: Expression | None = None,
+        value: Value | None = None,
+        record: bool = True,
+    ) -> Real | None:
         """The parameter's number; None where it could not be had, which was told.
 
         expression, value  what to take in the stead of the item's expression
@@ -91,14 +99,29 @@ class Scope:
             with self.complaints.gather():
                 found = self.written(item, expression)
                 if isinstance(found, Values):
-                    raise Problem(error("D071", f"`{wanted.name}` of {owner.label} is one number, and this is a list",
-                                        found.place, help="leave the brackets out"))
+                    raise Problem(
+                        error(
+                            "D071",
+                            f"`{wanted.name}` of {owner.label} is one number, and this is a list",
+                            found.place,
+                            help="leave the brackets out",
+                        )
+                    )
                 written = found
         default = wanted.default if isinstance(wanted.default, (int, float)) else None
         return self._settle(owner, wanted, wanted.name, item, written, default, record, expression)
 
-    def vector(self, owner: Owner, wanted: Parameter, item: Item | None, *, names: Sequence[str] = XYZ, short: int = 0,
-               given: Sequence[Real] | None = None, record: bool = True) -> tuple[Real, ...] | None:
+    def vector(
+        self,
+        owner: Owner,
+        wanted: Parameter,
+        item: Item | None,
+        *,
+        names: Sequence[str] = XYZ,
+        short: int = 0,
+        given: Sequence[Real] | None = None,
+        record: bool = True,
+    ) -> tuple[Real, ...] | None:
         """The parameter's numbers, `names` of them, or the first `short`, the rest zero.
 
         given  numbers made of what the item says, in its stead
@@ -121,33 +144,54 @@ class Scope:
             return None
         defaults = wanted.default if isinstance(wanted.default, tuple) else (None,) * len(names)
         parts = components(item, len(names)) if given is None else (None,) * len(names)
-        numbers = [self._settle(owner, wanted, f"{wanted.name}.{name}", item, value, default, record, part)
-                   for name, value, default, part in zip(names, values, defaults, parts, strict=True)]
+        numbers = [
+            self._settle(owner, wanted, f"{wanted.name}.{name}", item, value, default, record, part)
+            for name, value, default, part in zip(names, values, defaults, parts, strict=True)
+        ]
         return None if any(number is None for number in numbers) else tuple(numbers)  # type: ignore[arg-type]
 
-    def _components(self, owner: Owner, wanted: Parameter, item: Item, names: Sequence[str],
-                    short: int) -> Iterable[Value]:
+    def _components(
+        self, owner: Owner, wanted: Parameter, item: Item, names: Sequence[str], short: int
+    ) -> Iterable[Value]:
         count = len(names)
         found = self.written(item)
         text, dimension = self.unit(owner, wanted)
         expected = f"{short} or {count}" if short else f"{count}"
         if isinstance(found, Value):
             unit = "" if text == "1" else f" {text}"
-            raise Problem(error("D071", f"{owner.what(wanted)} is a list of {expected} numbers", found.place,
-                                help=f"write `{item.name} = [...]{unit};`"))
+            raise Problem(
+                error(
+                    "D071",
+                    f"{owner.what(wanted)} is a list of {expected} numbers",
+                    found.place,
+                    help=f"write `{item.name} = [...]{unit};`",
+                )
+            )
         if len(found.items) not in (short, count):
             shown = ", ".join(names)
-            raise Problem(error("D071", f"{owner.what(wanted)} has {expected} numbers, not {len(found.items)}",
-                                found.place, help=f"they are [{shown}]"))
+            raise Problem(
+                error(
+                    "D071",
+                    f"{owner.what(wanted)} has {expected} numbers, not {len(found.items)}",
+                    found.place,
+                    help=f"they are [{shown}]",
+                )
+            )
         numbers = []
         for value in found.items:
             if isinstance(value, Values):
                 raise Problem(error("D071", "a list inside a list", value.place))
             numbers.append(value)
         if dimension != PURE and len(numbers) > 1 and all(value.bare for value in numbers):
-            raise Problem(error("D060", f"{owner.what(wanted)} is in {text}, and these are bare numbers", found.place,
-                                help=f"write {either(f'[...] {each}' for each in in_degrees(text))}: "
-                                     "a unit after the bracket is for all of them"))
+            raise Problem(
+                error(
+                    "D060",
+                    f"{owner.what(wanted)} is in {text}, and these are bare numbers",
+                    found.place,
+                    help=f"write {either(f'[...] {each}' for each in in_degrees(text))}: "
+                    "a unit after the bracket is for all of them",
+                )
+            )
         dimensions = {value.dimension for value in numbers}
         if found.unit is not None and len(dimensions) == 1:  # one unit for all: where it is wrong, it is so once
             self.check_dimension(owner, wanted, replace(numbers[0], place=found.place))
@@ -163,18 +207,31 @@ class Scope:
         with self.complaints.gather():
             found = self.written(item)
             if isinstance(found, Values):
-                raise Problem(error("D071", f"`{wanted.name}` of {owner.label} is one number, and this is a list",
-                                    found.place, help="leave the brackets out"))
+                raise Problem(
+                    error(
+                        "D071",
+                        f"`{wanted.name}` of {owner.label} is one number, and this is a list",
+                        found.place,
+                        help="leave the brackets out",
+                    )
+                )
             self.check_dimension(owner, wanted, found)
             if isinstance(found.number, Scalar):
-                raise Problem(error("D122", f"`{wanted.name}` of {owner.label} varies with the sweep", found.place,
-                                    help=f"it decides the program: vary `{path}` itself"))
+                raise Problem(
+                    error(
+                        "D122",
+                        f"`{wanted.name}` of {owner.label} varies with the sweep",
+                        found.place,
+                        help=f"it decides the program: vary `{path}` itself",
+                    )
+                )
             before = self.complaints.faults
             self._check_range(owner, wanted, found.number, found.place)
             number = float(found.number) if self.complaints.faults == before else None
             if number is not None:
-                self.beside[path] = Settled(number, self.unit(owner, wanted)[0], _origin(item, found.place),
-                                            wanted.doc, item.value)
+                self.beside[path] = Settled(
+                    number, self.unit(owner, wanted)[0], _origin(item, found.place), wanted.doc, item.value
+                )
         if number is None:
             self.checks.fail(path)
         return number
@@ -209,8 +266,14 @@ class Scope:
         with self.complaints.gather():
             found = self.written(item)
             if isinstance(found, Value):
-                raise Problem(error("D071", f"`{wanted.name}` of {owner.label} is a list", found.place,
-                                    help=f"write `{wanted.name} = [...] {self.unit(owner, wanted)[0]};`"))
+                raise Problem(
+                    error(
+                        "D071",
+                        f"`{wanted.name}` of {owner.label} is a list",
+                        found.place,
+                        help=f"write `{wanted.name} = [...] {self.unit(owner, wanted)[0]};`",
+                    )
+                )
             made = []
             for value in found.items:
                 if isinstance(value, Values):
@@ -218,13 +281,17 @@ class Scope:
                 self.check_dimension(owner, wanted, value)
                 if isinstance(value.number, Scalar):
                     remedy = "a list does not vary: write a run for each, and `sweep NAME = ONE + OTHER;`"
-                    raise Problem(error("D122", f"`{wanted.name}` of {owner.label} varies with the sweep", value.place,
-                                        help=remedy))
+                    raise Problem(
+                        error(
+                            "D122", f"`{wanted.name}` of {owner.label} varies with the sweep", value.place, help=remedy
+                        )
+                    )
                 self._check_range(owner, wanted, value.number, value.place)
                 made.append(float(value.number))
             numbers = tuple(made)
-            self.parameters[path] = Settled(numbers, self.unit(owner, wanted)[0], _origin(item, found.place),
-                                            wanted.doc, item.value)
+            self.parameters[path] = Settled(
+                numbers, self.unit(owner, wanted)[0], _origin(item, found.place), wanted.doc, item.value
+            )
         if numbers is None:
             self.checks.fail(path)
         return numbers
@@ -242,8 +309,10 @@ class Scope:
             named = item.value.text if isinstance(item.value, Name) else None
             if named is None or (wanted.words and not wanted.names and named not in wanted.words):
                 place = place_of(item.value) if item.value is not None else item.place
-                helps = [*(did_you_mean(named, wanted.words) if named else ()),
-                         "one of: " + ", ".join(wanted.words) if wanted.words else "write a name, without quotes"]
+                helps = [
+                    *(did_you_mean(named, wanted.words) if named else ()),
+                    "one of: " + ", ".join(wanted.words) if wanted.words else "write a name, without quotes",
+                ]
                 message = f"`{wanted.name}` of {owner.label} is a word"
                 if isinstance(item.value, String):
                     message += ", without quotes"
@@ -268,8 +337,8 @@ class Scope:
         self.beside[path] = Settled(value, unit, origin, "", item.value if item is not None else None)
 
     def remake(self, values: Mapping[str, Real], item: Item) -> None:
-        """Puts values in the stead of settled ones, each made of all that the item writes: what varies one, varies all.
-        """
+        """Puts values in the stead of settled ones, each made of all that the item writes: what varies one, varies
+        all."""
         for path, value in values.items():
             settled = self.parameters[path]
             settled.value = self._plain(value)
@@ -297,8 +366,18 @@ class Scope:
         own = self._coordinate(owner, wanted.name, owner.homes) is not None
         own = own or bool(self._given(owner, wanted.name, owner.homes))
         origin = replace(other.origin, note="" if own else f"that of `{of}`")
-        value = self._finish(owner, wanted, wanted.name, owner.homes, other.value, origin, origin.place or owner.place,
-                             True, other.expression, needs=(of,))
+        value = self._finish(
+            owner,
+            wanted,
+            wanted.name,
+            owner.homes,
+            other.value,
+            origin,
+            origin.place or owner.place,
+            True,
+            other.expression,
+            needs=(of,),
+        )
         for paths in self.sets.values():
             if not own and of in paths:
                 paths.append(owner.join(wanted.name))
@@ -313,14 +392,21 @@ class Scope:
         """What the item's expression is worth, lists with what `+=` appended. Raises Problem."""
         expression = item.value if expression is None else expression
         if expression is None or (item.body is not None and not isinstance(expression, Call)):
-            raise Problem(error("D054", f"`{item.name}` is a value, not a block", item.place,
-                                help=f"write `{item.name} = ...;`"))
+            raise Problem(
+                error("D054", f"`{item.name}` is a value, not a block", item.place, help=f"write `{item.name} = ...;`")
+            )
         found = self.names.evaluate(expression)
         if not item.appended:
             return found
         if isinstance(found, Value):
-            raise Problem(error("D056", f"`{item.name}` is one number, and `+=` appends to a list",
-                                place_of(item.appended[0]), help=f"write `{item.name} = ...;`"))
+            raise Problem(
+                error(
+                    "D056",
+                    f"`{item.name}` is one number, and `+=` appends to a list",
+                    place_of(item.appended[0]),
+                    help=f"write `{item.name} = ...;`",
+                )
+            )
         items = list(found.items)
         for more in item.appended:
             value = self.names.evaluate(more)
@@ -342,11 +428,25 @@ class Scope:
         doc = f" ({wanted.doc})" if wanted.doc != wanted.name else ""
         also = [Label(owner.place, f"{owner.label} stands here")] if removed is not None else []
         at = Label(removed, "removed here") if removed is not None else owner.place
-        self.complaints.error("D075", f"{owner.label} has no `{wanted.name}`", at, also=also,
-                              help=f"write `{wanted.name} = {shown}{'' if owner.call else ';'}`" + doc)
+        self.complaints.error(
+            "D075",
+            f"{owner.label} has no `{wanted.name}`",
+            at,
+            also=also,
+            help=f"write `{wanted.name} = {shown}{'' if owner.call else ';'}`" + doc,
+        )
 
-    def _settle(self, owner: Owner, wanted: Parameter, name: str, item: Item | None, written: Value | None,
-                default: float | None, record: bool, part: Expression | None = None) -> Real | None:
+    def _settle(
+        self,
+        owner: Owner,
+        wanted: Parameter,
+        name: str,
+        item: Item | None,
+        written: Value | None,
+        default: float | None,
+        record: bool,
+        part: Expression | None = None,
+    ) -> Real | None:
         """part: of the item's expression, what this number was written as; None where that is the whole of it."""
         homes = owner.homes if item is None else item.homes
         place = owner.place if item is None else item.place
@@ -370,17 +470,31 @@ class Scope:
         expression = part if part is not None else item.value if item is not None else None
         return self._finish(owner, wanted, name, homes, value, origin, place, record, expression)
 
-    def _finish(self, owner: Owner, wanted: Parameter, name: str, homes: tuple[str, ...], value: Real | None,
-                origin: Origin, place: Place, record: bool, expression: Expression | None = None,
-                needs: tuple[str, ...] = ()) -> Real:
+    def _finish(
+        self,
+        owner: Owner,
+        wanted: Parameter,
+        name: str,
+        homes: tuple[str, ...],
+        value: Real | None,
+        origin: Origin,
+        place: Place,
+        record: bool,
+        expression: Expression | None = None,
+        needs: tuple[str, ...] = (),
+    ) -> Real:
         path = owner.join(name)
         for known in owner.paths(name, homes):
             self.known.setdefault(known, []).append(path)
         for given in self._given(owner, name, homes):
             if origin.note == GIVEN:
-                self.complaints.error("D232", f"this sets `{path}`, which is set already", given.value.place,
-                                      also=[Label(origin.place, "here")] if origin.place is not None else [],
-                                      help="leave one of the two out")
+                self.complaints.error(
+                    "D232",
+                    f"this sets `{path}`, which is set already",
+                    given.value.place,
+                    also=[Label(origin.place, "here")] if origin.place is not None else [],
+                    help="leave one of the two out",
+                )
             self.sets.setdefault(given.path, []).append(path)
             value, expression, place = self._plain(given.value.number), given.expression, given.value.place
             self._check_instead(owner, wanted, given.value, path)
@@ -388,9 +502,13 @@ class Scope:
         coordinate = self._coordinate(owner, name, homes)
         if coordinate is not None:
             if origin.note == GIVEN and not is_given(coordinate.place):
-                self.complaints.error("D233", f"this sets `{path}`, which the sweep varies", origin.place,
-                                      also=[Label(coordinate.place, f"`{coordinate.path}` varies here")],
-                                      help=VARIES)
+                self.complaints.error(
+                    "D233",
+                    f"this sets `{path}`, which the sweep varies",
+                    origin.place,
+                    also=[Label(coordinate.place, f"`{coordinate.path}` varies here")],
+                    help=VARIES,
+                )
             places = (origin.place,) if origin.place is not None else ()
             origin = Origin("case", coordinate.place, (*places, *origin.overrides), origin.note)
             place = coordinate.place
@@ -407,8 +525,7 @@ class Scope:
         return value
 
     def _check_instead(self, owner: Owner, wanted: Parameter, value: Value, path: str) -> None:
-        """Tells of a value of the wrong dimension that stands in the stead of the deck's; path: what has failed then.
-        """
+        """Tells of a value of the wrong dimension in place of the deck's; path: what has failed then."""
         try:
             self.check_dimension(owner, wanted, value)
         except Problem as problem:
@@ -433,9 +550,12 @@ class Scope:
         for other in found[1:]:
             self.sets.setdefault(other.path, [])
             self.complaints.error(
-                "D123", f"`{found[0].path}` and `{other.path}` both set `{owner.join(name)}`", other.place,
+                "D123",
+                f"`{found[0].path}` and `{other.path}` both set `{owner.join(name)}`",
+                other.place,
                 also=[Label(found[0].place, "the first")],
-                help=["vary one of them, or different joints", *self._own(owner, name, homes, (found[0], other))])
+                help=["vary one of them, or different joints", *self._own(owner, name, homes, (found[0], other))],
+            )
         return found[0] if found else None
 
     def _own(self, owner: Owner, name: str, homes: tuple[str, ...], both: tuple[Varied, ...]) -> list[str]:
@@ -473,29 +593,42 @@ class Scope:
                 shown = either(f"{value.number:.12g} {each}" for each in in_degrees(text))
             if value.bare and any(source.name == value.place.file for source in self.definitions.csv_files.sources):
                 shown = f"the unit in square brackets behind the column's name: `[{text}]`"
-            raise Problem(error(
-                "D060", f"{what} is in {text}, and this is a {'bare' if value.bare else 'pure'} number", value.place,
-                also=also,
-                help=apart or (f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}")))
+            raise Problem(
+                error(
+                    "D060",
+                    f"{what} is in {text}, and this is a {'bare' if value.bare else 'pure'} number",
+                    value.place,
+                    also=also,
+                    help=apart or (f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}"),
+                )
+            )
         found = units.text(value.dimension)
         apart = apart or self._of_another_command(owner, wanted, value, text)
         message = f"{what} is " + ("a pure number" if dimension == PURE else f"in {text}") + f", and this is in {found}"
         other = self._other(owner, wanted, value) if dimension == PURE else []
-        raise Problem(error("D061", message, value.place, also=also,
-                            help=apart or [*other, mended(value, text, dimension)]))
+        raise Problem(
+            error("D061", message, value.place, also=also, help=apart or [*other, mended(value, text, dimension)])
+        )
 
     def _of_another_command(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> list[str]:
         """The remedy where a course's parameter has the unit that it has under another kind of command."""
         if owner.command is None:
             return []
-        fits = [kind for kind in ("position", "rate", "acceleration") if kind != owner.command and units.same(
-            value.dimension, unit_here(wanted.unit, owner.joint, kind, owner.of)[1])]
+        fits = [
+            kind
+            for kind in ("position", "rate", "acceleration")
+            if kind != owner.command
+            and units.same(value.dimension, unit_here(wanted.unit, owner.joint, kind, owner.of)[1])
+        ]
         found = units.text(value.dimension)
         if not owner.label.startswith("`"):  # no course: the command is this number
             return [f"`{owner.command}(...)` takes {text}; `{kind}(...)` takes {found}" for kind in fits]
         course = owner.label.strip("`")
-        return [f"of a `{owner.command}` command it is in {text}; with `{kind}({course}(...))` it would be in "
-                f"{found}, like all of that course" for kind in fits]
+        return [
+            f"of a `{owner.command}` command it is in {text}; with `{kind}({course}(...))` it would be in "
+            f"{found}, like all of that course"
+            for kind in fits
+        ]
 
     def _remark_cycles(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> None:
         """Tells of a unit that may mean cycles where radians count, or the reverse."""
@@ -503,8 +636,13 @@ class Scope:
             return
         found = doubt(value, text, measure_here(wanted.unit, owner.joint, owner.command, owner.of))
         if found is not None:
-            self.complaints.warn("D305", f"{owner.what(wanted)} is {found.taken}", value.place,
-                                   also=self.names.label(value), help=found.helps)
+            self.complaints.warn(
+                "D305",
+                f"{owner.what(wanted)} is {found.taken}",
+                value.place,
+                also=self.names.label(value),
+                help=found.helps,
+            )
 
     def _remark_share(self, owner: Owner, wanted: Parameter, value: Value) -> None:
         """Tells of a bare number above 1 where a share is meant, which may have been meant in per cent."""
@@ -519,15 +657,24 @@ class Scope:
         shown, per_cent = f"{number:.12g}", f"{100.0 * number:.12g} %"
         helps = [f"if per cent are meant, write `{shown} %`", f"if that is meant, write `{per_cent}`"]
         if isinstance(value.number, Scalar):
-            helps = ["if per cent are meant, write `%` behind the values",
-                     f"if that is meant, write the values in per cent, such as `{per_cent}`"]
-        self.complaints.warn("D307", f"{owner.what(wanted)} is a share, and {shown} is {per_cent}", value.place,
-                             help=helps)
+            helps = [
+                "if per cent are meant, write `%` behind the values",
+                f"if that is meant, write the values in per cent, such as `{per_cent}`",
+            ]
+        self.complaints.warn(
+            "D307", f"{owner.what(wanted)} is a share, and {shown} is {per_cent}", value.place, help=helps
+        )
 
     def _other(self, owner: Owner, wanted: Parameter, value: Value) -> list[str]:
         """The one optional parameter of the model that a number with this unit may be meant for."""
-        found = [each for each in owner.others if each.shape == "number" and each.default is not None
-                 and each.name != wanted.name and units.same(value.dimension, self.unit(owner, each)[1])]
+        found = [
+            each
+            for each in owner.others
+            if each.shape == "number"
+            and each.default is not None
+            and each.name != wanted.name
+            and units.same(value.dimension, self.unit(owner, each)[1])
+        ]
         if len(found) != 1:
             return []
         return [f"`{found[0].name}` is what is in {self.unit(owner, found[0])[0]}: {found[0].doc}"]
@@ -549,11 +696,19 @@ class Scope:
             return f"{why}: write `{written}` in servo `{owner.homes[-1]}`"
         return f"{why}: give its servo a {key} of its own, `{joint} = {both[-1]} {{ {written} }}`"
 
-    def _check_range(self, owner: Owner, wanted: Parameter, value: Real, place: Place, path: str = "",
-                     needs: tuple[str, ...] = ()) -> None:
-        bounds = [(bound, word, sign) for bound, word, sign in (
-            (wanted.above, "above", np.greater), (wanted.at_least, "at least", np.greater_equal),
-            (wanted.below, "below", np.less), (wanted.at_most, "at most", np.less_equal)) if bound is not None]
+    def _check_range(
+        self, owner: Owner, wanted: Parameter, value: Real, place: Place, path: str = "", needs: tuple[str, ...] = ()
+    ) -> None:
+        bounds = [
+            (bound, word, sign)
+            for bound, word, sign in (
+                (wanted.above, "above", np.greater),
+                (wanted.at_least, "at least", np.greater_equal),
+                (wanted.below, "below", np.less),
+                (wanted.at_most, "at most", np.less_equal),
+            )
+            if bound is not None
+        ]
         text = self.unit(owner, wanted)[0]
         unit = "" if text == "1" else f" {text}"
 
@@ -571,8 +726,16 @@ class Scope:
         if wanted.whole:
             limits, remedy = f"whole and {limits}", remedy.replace("a number", "a whole number")
         limits += unit if bounds else ""
-        self.checks.hold((value,), test, code="D077", message=f"{owner.what(wanted)} must be {limits}",
-                         place=place, path=path, needs=needs, help=remedy + (f" ({wanted.doc})" if wanted.doc else ""))
+        self.checks.hold(
+            (value,),
+            test,
+            code="D077",
+            message=f"{owner.what(wanted)} must be {limits}",
+            place=place,
+            path=path,
+            needs=needs,
+            help=remedy + (f" ({wanted.doc})" if wanted.doc else ""),
+        )
 
     def quantities(self, *, beside: bool = False) -> tuple[dict[str, Any], list[Scalar]]:
         """The parameters as a plan holds them, and the scalars of its formulas, in order. beside: the others too."""

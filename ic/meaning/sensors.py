@@ -29,31 +29,51 @@ def use_sensor(scope: Scope, servo: Owner, use: ServoUse, item: Item) -> SensorU
     servo  owner of the servo's parameters;  use: what there is of it
     """
     if item.detail:
-        scope.complaints.error("D245", f"`{item.detail[0].text}` after the name of a sensor's quantity",
-                               item.detail[0].place, help=USAGE)
+        scope.complaints.error(
+            "D245", f"`{item.detail[0].text}` after the name of a sensor's quantity", item.detail[0].place, help=USAGE
+        )
         return None
     if models.find("servo", use.model).control is None:
-        scope.complaints.error("D246", f"{servo.label} ({use.model}) has no law that would see through a sensor",
-                               item.place, help="leave the sensor out")
+        scope.complaints.error(
+            "D246",
+            f"{servo.label} ({use.model}) has no law that would see through a sensor",
+            item.place,
+            help="leave the sensor out",
+        )
         return None
     known = models.quantities(use)
     if item.name not in known:
-        scope.complaints.error("D245", f"{servo.label} has no `{item.name}` to be sensed", item.place,
-                               help=[*did_you_mean(item.name, known), known_words("a sensor may be of", known)])
+        scope.complaints.error(
+            "D245",
+            f"{servo.label} has no `{item.name}` to be sensed",
+            item.place,
+            help=[*did_you_mean(item.name, known), known_words("a sensor may be of", known)],
+        )
         return None
-    sensor = find_model(scope, "sensor", word_of(item.value), item.place if item.value is None else
-                        place_of(item.value))
+    sensor = find_model(
+        scope, "sensor", word_of(item.value), item.place if item.value is None else place_of(item.value)
+    )
     if sensor is None or refuse_values(scope, item.value, [p.name for p in sensor.parameters]):
         return None
     if sensor.measures is not None:
-        scope.complaints.error("D281", f"`{sensor.name}` is a sensor of a link, and this is a servo",
-                               place_of(item.value) if item.value is not None else item.place,
-                               help=f"write `sensor NAME = {sensor.name} {{ link = LINK; ... }}` in a run")
+        scope.complaints.error(
+            "D281",
+            f"`{sensor.name}` is a sensor of a link, and this is a servo",
+            place_of(item.value) if item.value is not None else item.place,
+            help=f"write `sensor NAME = {sensor.name} {{ link = LINK; ... }}` in a run",
+        )
         return None
     unit = unit_here(known[item.name], servo.joint, None, None)[0]
     path = f"sensor.{item.name}"
-    owner = replace(servo, label=f"sensor `{item.name}` of {servo.label}", place=item.place, of=unit,
-                    path=f"{servo.path}.{path}", local=path, homes=item.homes)
+    owner = replace(
+        servo,
+        label=f"sensor `{item.name}` of {servo.label}",
+        place=item.place,
+        of=unit,
+        path=f"{servo.path}.{path}",
+        local=path,
+        homes=item.homes,
+    )
     body = item.body or Block()
     use_model(scope, owner, sensor.parameters, body)
     scope.setting(f"{owner.path}.model", sensor.name, item=item)

@@ -43,13 +43,16 @@ APART, DIGITS = 1e-9, 1e-5
 """Positions are the same place within APART (rad or m: far above rounding of a deck's numbers, far below what anyone
 sees) and a unit of the sixth digit: so many are printed, and a position that was copied from there is the one meant."""
 
-RATE = Parameter(name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, ticks=True,
-                 doc="how often the servo's computer ticks")
+RATE = Parameter(
+    name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, ticks=True, doc="how often the servo's computer ticks"
+)
 NOT_PARAMETERS = ("model", "command", "rate")
-ASKED: Mapping[str, Mapping[str, str]] = MappingProxyType({
-    "revolute": {"rate": "0.03 rad/s", "position": "30 deg", "torque": "2 N*m", "acceleration": "0.1 rad/s^2"},
-    "prismatic": {"rate": "0.03 m/s", "position": "0.1 m", "torque": "2 N", "acceleration": "0.1 m/s^2"},
-})
+ASKED: Mapping[str, Mapping[str, str]] = MappingProxyType(
+    {
+        "revolute": {"rate": "0.03 rad/s", "position": "30 deg", "torque": "2 N*m", "acceleration": "0.1 rad/s^2"},
+        "prismatic": {"rate": "0.03 m/s", "position": "0.1 m", "torque": "2 N", "acceleration": "0.1 m/s^2"},
+    }
+)
 """What a command may ask of a joint, to show how one is written."""
 
 BESIDE = "write `model = {};`, and its parameters beside it"
@@ -117,17 +120,24 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
         return None
     name = word_of(item.value)
     if name is None or (isinstance(item.value, Call) and item.value.positional):
-        scope.complaints.error("D146", f"the servo of joint `{item.name}` is the name of a servo definition",
-                               place_of(item.value) if item.value else item.place,
-                               help=f"write `{item.name} = SERVO;` or `{item.name} = SERVO {{ kp = ...; }}`")
+        scope.complaints.error(
+            "D146",
+            f"the servo of joint `{item.name}` is the name of a servo definition",
+            place_of(item.value) if item.value else item.place,
+            help=f"write `{item.name} = SERVO;` or `{item.name} = SERVO {{ kp = ...; }}`",
+        )
         return None
     assert item.value is not None
     place = item.value.name.place if isinstance(item.value, Call) else item.value.place
     if name not in scope.definitions.of_kind("servo") and name in models.find_own("servo"):
         file = library_defines("servo", name)
         include = [f"a standard deck defines a servo of this name: add `#include <{file}>`"] if file else []
-        scope.complaints.error("D147", f"`{name}` is a servo model; a servo definition is needed here", place,
-                               help=[*include, f"`servo NAME {{ model = {name}; ... }}`, and `{item.name} = NAME;`"])
+        scope.complaints.error(
+            "D147",
+            f"`{name}` is a servo model; a servo definition is needed here",
+            place,
+            help=[*include, f"`servo NAME {{ model = {name}; ... }}`, and `{item.name} = NAME;`"],
+        )
         return None
     definition = scope.definitions.find_or_meant("servo", Word(name, place), scope.complaints)
     block = scope.definitions.block(definition)
@@ -137,8 +147,14 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
     if item.body is not None:
         block = overlay(block, item.body, scope.complaints)
     label = f"servo `{name}` on joint `{item.name}`" if overridden else f"servo `{name}`"
-    owner = Owner(label, definition.place, f"{item.name}.servo", homes=scope.definitions.homes(definition), local="",
-                  joint=kind)  # type: ignore[arg-type]
+    owner = Owner(
+        label,
+        definition.place,
+        f"{item.name}.servo",
+        homes=scope.definitions.homes(definition),
+        local="",
+        joint=kind,  # type: ignore[arg-type]
+    )
     model = block.get("model")
     if model is None:
         _tell_no_model(scope, block, owner, place)
@@ -153,11 +169,16 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
         _check_needed(scope, owner, servo, command, block, place)
     rate = None
     if servo.control is None and block.get("rate") is not None:
-        scope.complaints.error("D150", f"the model `{servo.name}` has no computer that ticks, so no rate",
-                               block.items["rate"].place, help="leave `rate` out")
+        scope.complaints.error(
+            "D150",
+            f"the model `{servo.name}` has no computer that ticks, so no rate",
+            block.items["rate"].place,
+            help="leave `rate` out",
+        )
     elif block.get("rate") is not None:
-        rate = fixed_rate(scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`",
-                          continuous=True)
+        rate = fixed_rate(
+            scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`", continuous=True
+        )
     scope.setting(f"{item.name}.servo.model", servo.name, item=model)
     scope.unvaried[f"{item.name}.servo.model"] = unvaried.chosen(f"vary `{item.name}.servo` over definitions")
     words = words_chosen([each for each in servo.parameters if each.name in servo.deciding], block)
@@ -173,8 +194,13 @@ def _tell_no_model(scope: Scope, block: Block, owner: Owner, used: Place) -> Non
         if not item.kind and (helps := did_you_mean(item.name, ("model",))):
             scope.complaints.error("D141", f"{owner.label} has no `{item.name}`", item.place, help=[*helps, known])
             return
-    scope.complaints.error("D148", f"{owner.label} has no model", owner.place, also=[Label(used, "used here")],
-                           help=["write `model = MODEL;`", known])
+    scope.complaints.error(
+        "D148",
+        f"{owner.label} has no model",
+        owner.place,
+        also=[Label(used, "used here")],
+        help=["write `model = MODEL;`", known],
+    )
 
 
 def moving_kind(scope: Scope, item: Item, arm: Arm, so: str) -> str | None:
@@ -185,13 +211,20 @@ def moving_kind(scope: Scope, item: Item, arm: Arm, so: str) -> str | None:
         return None  # an entry of the arm could not be read, which may have been this joint
     if kind is None:
         moving = [joint.name for joint in arm.moving]
-        scope.complaints.error("D144", f"no joint `{item.name}` in arm `{arm.name}`", item.place,
-                               help=[*did_you_mean(item.name, moving), known_words("joints", moving)])
+        scope.complaints.error(
+            "D144",
+            f"no joint `{item.name}` in arm `{arm.name}`",
+            item.place,
+            help=[*did_you_mean(item.name, moving), known_words("joints", moving)],
+        )
     if kind == "fixed":
-        scope.complaints.error("D145", f"joint `{item.name}` is fixed, {so}", item.place,
-                               also=[Label(place, "fixed here") for j in arm.joints if j.name == item.name
-                                     and (place := j.place)],
-                               help="leave it out, or make the joint revolute or prismatic")
+        scope.complaints.error(
+            "D145",
+            f"joint `{item.name}` is fixed, {so}",
+            item.place,
+            also=[Label(place, "fixed here") for j in arm.joints if j.name == item.name and (place := j.place)],
+            help="leave it out, or make the joint revolute or prismatic",
+        )
         return None
     return kind
 
@@ -231,7 +264,12 @@ def _check_above(scope: Scope, owner: Owner, parameter: Parameter, command: Comm
         return bad, [f"this is {x:g}{unit}" for x in values[bad, 0][:1]]
 
     scope.checks.hold(
-        (settled.value,), test, code="D077", place=settled.origin.place, path=f"{path}.needed", needs=(path,),
+        (settled.value,),
+        test,
+        code="D077",
+        place=settled.origin.place,
+        path=f"{path}.needed",
+        needs=(path,),
         message=f"{owner.what(parameter)} must be {limit} under a {command.kind} command",
         help=f"write a number {limit} ({parameter.doc})",
     )
@@ -250,7 +288,7 @@ def check_rest(scope: Scope, use: Use) -> None:
             lambda values: (values[:, 0] != 0.0, [f"this is {x:g} {begins.unit}" for x in values[:, 0] if x][:1]),
             code="D119",
             message=f"joint `{use.joint}` begins with a rate, and servo `{use.definition}` ({use.servo.name}) needs it "
-                    "at rest",
+            "at rest",
             place=begins.origin.place,
             help=(f"leave `{use.joint}.qd` out of `initial`", "or give the joint another servo"),
             path=f"{path}.rest",
@@ -278,9 +316,13 @@ def check_start(scope: Scope, use: Use) -> None:
         places = [each.origin.place for each in asked.values() if each.origin.place is not None]
         also = [] if begins.origin.place is None else [Label(begins.origin.place, "the joint begins here")]
         scope.complaints.remark(
-            "D169", f"the command of joint `{use.joint}` begins at {value / scale:g} {unit}, and the joint at "
-            f"{begins.value / scale:g} {unit}: it jumps", places[0] if places else use.place, also=also,
-            help=f"write `{use.joint}.q = {value / scale:.12g} {unit};` in `initial`, or begin the command elsewhere")
+            "D169",
+            f"the command of joint `{use.joint}` begins at {value / scale:g} {unit}, and the joint at "
+            f"{begins.value / scale:g} {unit}: it jumps",
+            places[0] if places else use.place,
+            also=also,
+            help=f"write `{use.joint}.q = {value / scale:.12g} {unit};` in `initial`, or begin the command elsewhere",
+        )
 
 
 def apart(a: Any, b: Any) -> Any:
@@ -306,8 +348,9 @@ def fixed_rate(
         place = place_of(item.value or Name((), item.place))
         if continuous:
             return Rate(label, CONTINUOUS, place)
-        scope.complaints.error("D106", f"`{name}` cannot be continuous: only the law of a servo can", place,
-                               help="write a rate in Hz")
+        scope.complaints.error(
+            "D106", f"`{name}` cannot be continuous: only the law of a servo can", place, help="write a rate in Hz"
+        )
         return None
     wanted = replace(RATE, name=name)
     hz = scope.constant(owner, wanted, item)
@@ -339,19 +382,30 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     word = word_of(call)
     if word is not None and word not in COMMAND_UNIT and word in models.available("command"):
         kind = "position" if "position" in servo.commands else servo.commands[0]
-        scope.complaints.error("D152", f"`{word}` is a course in time, and a command is of a kind", place,
-                               help=[f"write `{kind}({word}(...))`", f"{servo.name} takes {known}"])
+        scope.complaints.error(
+            "D152",
+            f"`{word}` is a course in time, and a command is of a kind",
+            place,
+            help=[f"write `{kind}({word}(...))`", f"{servo.name} takes {known}"],
+        )
         return None
     if not isinstance(call, Call) or item.body is not None or len(call.positional) != 1:
         first = servo.commands[0]
-        scope.complaints.error("D151", "a command is its kind and one value or course in time", place,
-                               help=f"{servo.name} takes {known}: `{first}({ASKED[owner.joint][first]})` or "
-                                    f"`{first}(step(to = ...))`")
+        scope.complaints.error(
+            "D151",
+            "a command is its kind and one value or course in time",
+            place,
+            help=f"{servo.name} takes {known}: `{first}({ASKED[owner.joint][first]})` or `{first}(step(to = ...))`",
+        )
         return None
     kind = call.name.text
     if kind not in servo.commands:
-        scope.complaints.error("D152", f"the model `{servo.name}` takes no command `{kind}`", call.name.place,
-                               help=[*did_you_mean(kind, servo.commands), f"it takes {known}"])
+        scope.complaints.error(
+            "D152",
+            f"the model `{servo.name}` takes no command `{kind}`",
+            call.name.place,
+            help=[*did_you_mean(kind, servo.commands), f"it takes {known}"],
+        )
         return None
     if isinstance(call.positional[0], Name) and scope.guides:
         guide = call.positional[0].text
@@ -360,16 +414,33 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
         _check_known(scope, call.positional[0])
     inner = _asked(scope, call)
     told = f"the command of {owner.label}"
-    spot = replace(owner, label=told, called=told, place=place, path=f"{owner.path}.command", local="command",
-                   homes=item.homes, command=kind)
+    spot = replace(
+        owner,
+        label=told,
+        called=told,
+        place=place,
+        path=f"{owner.path}.command",
+        local="command",
+        homes=item.homes,
+        command=kind,
+    )
     assert kind in COMMAND_UNIT
     value = replace(item, name="command")
     model = use_course(scope, spot, inner, value, doc=f"{kind} asked", column=owner.path.removesuffix(".servo"))
     return None if model is None else Command(kind, model)
 
 
-def use_course(scope: Scope, spot: Owner, inner: Expression, item: Item, *, doc: str, column: str,
-               kind: str = "joint", body: Block | None = None) -> str | None:
+def use_course(
+    scope: Scope,
+    spot: Owner,
+    inner: Expression,
+    item: Item,
+    *,
+    doc: str,
+    column: str,
+    kind: str = "joint",
+    body: Block | None = None,
+) -> str | None:
     """A value, or a course in time, entered in the scope under the path of `spot`: its model; None where there is none.
 
     item    the entry that says it, whose expression is, or holds, `inner`;  body: what of the course is written apart
@@ -389,12 +460,16 @@ def use_course(scope: Scope, spot: Owner, inner: Expression, item: Item, *, doc:
     if refuse_values(scope, inner, [p.name for p in profile.written]):
         return None
     _, named = open_call(inner, None, scope.complaints)
-    inside = {key: replace(part, homes=item.homes, overrides=item.overrides)
-              for key, part in (named or Block()).items.items()}
+    inside = {
+        key: replace(part, homes=item.homes, overrides=item.overrides) for key, part in (named or Block()).items.items()
+    }
     apart = body or Block()
-    opened = replace(apart, items=inside | dict(apart.items),
-                     statements=(*(named or Block()).statements, *apart.statements),
-                     pending=(*(named or Block()).pending, *apart.pending))
+    opened = replace(
+        apart,
+        items=inside | dict(apart.items),
+        statements=(*(named or Block()).statements, *apart.statements),
+        pending=(*(named or Block()).pending, *apart.pending),
+    )
     course = replace(spot, label=f"`{name}`", called=None, place=inner.name.place, call=True)
     if profile.from_file:
         use_file(scope, course, profile, opened, column, kind)
@@ -407,8 +482,14 @@ def _asked(scope: Scope, command: Call) -> Expression:
     """What the command is about: the name of a course alone is that course with nothing written. Raises Problem."""
     inner = command.positional[0]
     if isinstance(inner, String):
-        raise Problem(error("D151", "a command is about a value or a course in time, and this is text", inner.place,
-                            help=f"write `{command.name.text}(trajectory(...))` for a column of a CSV file"))
+        raise Problem(
+            error(
+                "D151",
+                "a command is about a value or a course in time, and this is text",
+                inner.place,
+                help=f"write `{command.name.text}(trajectory(...))` for a column of a CSV file",
+            )
+        )
     return course_named(scope, inner)
 
 
@@ -423,9 +504,17 @@ def _check_known(scope: Scope, inner: Name) -> None:
     """Raises Problem D278 for the name of nothing, where guides are what a command may follow too."""
     if len(inner.path) > 1 or scope.names.knows(inner.text) or inner.text in models.available("command"):
         return
-    raise Problem(error("D278", f"no guide, value or course in time `{inner.text}`", inner.place,
-                        help=[*did_you_mean(inner.text, [*scope.guides, *scope.definitions.lets]),
-                              known_words("guides of this run", scope.guides)]))
+    raise Problem(
+        error(
+            "D278",
+            f"no guide, value or course in time `{inner.text}`",
+            inner.place,
+            help=[
+                *did_you_mean(inner.text, [*scope.guides, *scope.definitions.lets]),
+                known_words("guides of this run", scope.guides),
+            ],
+        )
+    )
 
 
 def _is_guide(scope: Scope, inner: Expression) -> bool:
@@ -454,8 +543,12 @@ def check_servo_definition(scope: Scope, name: str) -> None:
             known = [*(p.name for p in servo.parameters), *NOT_PARAMETERS]
             check_keys(scope, block, known, owner)
             command = block.get("command")
-            if (command is not None and isinstance(command.value, Call) and len(command.value.positional) == 1
-                    and command.value.name.text in COMMAND_UNIT):
+            if (
+                command is not None
+                and isinstance(command.value, Call)
+                and len(command.value.positional) == 1
+                and command.value.name.text in COMMAND_UNIT
+            ):
                 inner = _asked(scope, command.value)
                 if not isinstance(inner, Call) and not _is_guide(scope, inner):
                     scope.names.evaluate(inner)

@@ -71,8 +71,9 @@ def box(p: Mapping[str, Real], along: int) -> Solid:
 def cylinder(p: Mapping[str, Real], along: int) -> Solid:
     radius = p["radius"] * p["radius"]
     across = radius / 4.0 + p["length"] * p["length"] / 12.0
-    return Solid("cylinder", _numbers(p, along), _turned(along, p["length"] / 2.0, 0.0),
-                 _turned(along, radius / 2.0, across))
+    return Solid(
+        "cylinder", _numbers(p, along), _turned(along, p["length"] / 2.0, 0.0), _turned(along, radius / 2.0, across)
+    )
 
 
 def sphere(p: Mapping[str, Real], along: int) -> Solid:
@@ -83,8 +84,12 @@ def sphere(p: Mapping[str, Real], along: int) -> Solid:
 SHAPES: Mapping[str, Shape] = {
     "rod": Shape((_size("length", "length of the rod"), ALONG), rod),
     "box": Shape(
-        (Parameter(name="size", unit="m", above=0.0, shape="vector", doc="edges along x, y and z"),
-         Parameter(name="along", shape="word", words=("x", "y", "z"), default="x", doc=ALONG.doc)), box),
+        (
+            Parameter(name="size", unit="m", above=0.0, shape="vector", doc="edges along x, y and z"),
+            Parameter(name="along", shape="word", words=("x", "y", "z"), default="x", doc=ALONG.doc),
+        ),
+        box,
+    ),
     "cylinder": Shape((_size("radius", "radius"), _size("length", "length"), ALONG), cylinder),
     "sphere": Shape((_size("radius", "radius"),), sphere),
 }

@@ -38,16 +38,26 @@ def check_spins(scope: Scope, block: Block, structure: Structure) -> None:
             if schedule.step * fastest > limit:
                 fits = slowest_that_fits(schedule, limit)(fastest)
                 scope.complaints.remark(
-                    "D300", f"{label} turns by {schedule.step * fastest:.3g} rad in a step of the dynamics",
-                    Label(place, f"h = {schedule.step:g} s"), help=[
+                    "D300",
+                    f"{label} turns by {schedule.step * fastest:.3g} rad in a step of the dynamics",
+                    Label(place, f"h = {schedule.step:g} s"),
+                    help=[
                         f"below {limit:.2g} rad a step a body that tumbles keeps its energy to {LOST_A_TURN:.0%} a "
                         f"turn with {integrator.name}: the slowest rate that fits is {fits}",
-                        "a steady spin about a principal axis through the frame's origin needs less"])
+                        "a steady spin about a principal axis through the frame's origin needs less",
+                    ],
+                )
             return np.zeros(len(rows), bool), []
 
         if len(settled) == len(paths):
-            scope.checks.hold(tuple(settled), warn, code="D300", place=place, message="",  # type: ignore[arg-type]
-                              needs=paths)
+            scope.checks.hold(
+                tuple(settled),  # type: ignore[arg-type]
+                warn,
+                code="D300",
+                place=place,
+                message="",
+                needs=paths,
+            )
 
 
 def _spinning(block: Block, structure: Structure) -> Iterator[tuple[str, str, Place]]:

@@ -46,11 +46,15 @@ def check_stops(complaints: Complaints, experiment: Experiment) -> None:
                 least = slowest_that_fits(structure.schedule, _AT_MOST)(rate)
                 fits = f"quicken the dynamics to {least}, or make the stop softer"
             complaints.remark(
-                "D295", f"`{each.stop}` is stiff for the dynamics' step: joint `{each.joint}` touches it for "
-                f"{each.steps:.2g} steps", Label(place, f"h = {structure.schedule.step:g} s") if place else place,
-                help=[f"with {integrator.name} a contact of fewer than {enough:g} steps gives energy that nobody put "
-                      "in",
-                      f"{fits}: the joint feels {each.inertia:.3g} {unit} at the start"])
+                "D295",
+                f"`{each.stop}` is stiff for the dynamics' step: joint `{each.joint}` touches it for "
+                f"{each.steps:.2g} steps",
+                Label(place, f"h = {structure.schedule.step:g} s") if place else place,
+                help=[
+                    f"with {integrator.name} a contact of fewer than {enough:g} steps gives energy that nobody put in",
+                    f"{fits}: the joint feels {each.inertia:.3g} {unit} at the start",
+                ],
+            )
 
 
 _AT_MOST = math.nextafter(1.0, 2.0)

@@ -45,10 +45,15 @@ def resolve_substitutions(scope: Scope, block: Block, arm: Arm, uses: list[Use])
         first, also = in_order[0]
         if use.law != first.law:
             scope.complaints.error(
-                "D177", f"joint `{use.joint}` has the law `{use.law}`, and joint `{first.joint}` has `{first.law}`",
-                place, also=[Label(also, f"`{first.law}`")],
-                help=["all substituted joints of a run are solved together, by one law: write the same for each",
-                      "or substitute them in two runs"])
+                "D177",
+                f"joint `{use.joint}` has the law `{use.law}`, and joint `{first.joint}` has `{first.law}`",
+                place,
+                also=[Label(also, f"`{first.law}`")],
+                help=[
+                    "all substituted joints of a run are solved together, by one law: write the same for each",
+                    "or substitute them in two runs",
+                ],
+            )
     return tuple(use for use, _ in in_order)
 
 
@@ -56,17 +61,26 @@ def check_ticks(scope: Scope, found: tuple[Substitution, ...], ticks: Mapping[st
     """The servos of substituted joints tick, and together."""
     for use in found:
         if ticks[use.joint].continuous and use.place is not None:
-            scope.complaints.error("D106", f"the servo of joint `{use.joint}` is continuous, and its motor is on a bed",
-                                   use.place, help="a bed's servo ticks: write a rate in Hz")
+            scope.complaints.error(
+                "D106",
+                f"the servo of joint `{use.joint}` is continuous, and its motor is on a bed",
+                use.place,
+                help="a bed's servo ticks: write a rate in Hz",
+            )
     for use in found[1:]:
         rates = [schedule.base_hz / ticks[each.joint].divisor for each in (use, found[0])]
         if rates[0] != rates[1] and use.place is not None and found[0].place is not None:
             scope.complaints.error(
-                "D178", f"the servo of joint `{use.joint}` ticks at {rates[0]:g} Hz, and that of joint "
-                f"`{found[0].joint}`, whose motor is on a bed too, at {rates[1]:g} Hz", use.place,
+                "D178",
+                f"the servo of joint `{use.joint}` ticks at {rates[0]:g} Hz, and that of joint "
+                f"`{found[0].joint}`, whose motor is on a bed too, at {rates[1]:g} Hz",
+                use.place,
                 also=[Label(found[0].place, f"{rates[1]:g} Hz")],
-                help=["all substituted joints of a run are solved together: give their servos the same `rate`",
-                      "or substitute them in two runs"])
+                help=[
+                    "all substituted joints of a run are solved together: give their servos the same `rate`",
+                    "or substitute them in two runs",
+                ],
+            )
 
 
 def check_brakes(scope: Scope, found: tuple[Substitution, ...], environment: Iterable[EnvironmentUse]) -> None:
@@ -77,8 +91,13 @@ def check_brakes(scope: Scope, found: tuple[Substitution, ...], environment: Ite
         for each in found:
             if joint is not None and joint.value == each.joint and use.place is not None and each.place is not None:
                 message = f"`{use.name}` puts friction on joint `{each.joint}`, whose motor is on a bed"
-                scope.complaints.error("D244", message, use.place, also=[Label(each.place, "on a bed")],
-                                       help="leave it out: on a bed, friction is the bed's")
+                scope.complaints.error(
+                    "D244",
+                    message,
+                    use.place,
+                    also=[Label(each.place, "on a bed")],
+                    help="leave it out: on a bed, friction is the bed's",
+                )
 
 
 def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use]) -> tuple[Substitution, Place] | None:
@@ -95,30 +114,48 @@ def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use])
     use = servos.get(item.name)
     if use is None:
         scope.complaints.error(
-            "D175", f"joint `{item.name}` has no servo, so it has no motor that a bed could take the place of",
-            item.place, help=[f"give it one: `servos {{ {item.name} = SERVO; }}`",
-                              known_words("joints whose servos have a motor",
-                                          [use.joint for use in servos.values() if models.has_motor(use.servo)])])
+            "D175",
+            f"joint `{item.name}` has no servo, so it has no motor that a bed could take the place of",
+            item.place,
+            help=[
+                f"give it one: `servos {{ {item.name} = SERVO; }}`",
+                known_words(
+                    "joints whose servos have a motor",
+                    [use.joint for use in servos.values() if models.has_motor(use.servo)],
+                ),
+            ],
+        )
         return None
     if not models.has_motor(use.servo):
         known = [name for name, servo in models.available("servo").items() if models.has_motor(servo)]
         scope.complaints.error(
-            "D176", f"servo `{use.definition}` ({use.servo.name}) of joint `{item.name}` has no motor that a bed could "
-            "take the place of", item.place, also=[Label(use.place, "its servo")],
-            help=known_words("servo models that have a motor", sorted(known)))
+            "D176",
+            f"servo `{use.definition}` ({use.servo.name}) of joint `{item.name}` has no motor that a bed could "
+            "take the place of",
+            item.place,
+            also=[Label(use.place, "its servo")],
+            help=known_words("servo models that have a motor", sorted(known)),
+        )
         return None
     only = use.servo.motor_only
     if only is not None and (word := dict(use.words).get(only[0], only[1][0])) not in only[1]:
         scope.complaints.error(
-            "D176", f"the servo of joint `{item.name}` has `{only[0]} = {word}`, and a motor on a bed has "
-            f"{' or '.join(f'`{each}`' for each in only[1])} alone", item.place, also=[Label(use.place, "its servo")],
-            help=f"write `{only[0]} = {only[1][0]};`, or leave the joint to its servo")
+            "D176",
+            f"the servo of joint `{item.name}` has `{only[0]} = {word}`, and a motor on a bed has "
+            f"{' or '.join(f'`{each}`' for each in only[1])} alone",
+            item.place,
+            also=[Label(use.place, "its servo")],
+            help=f"write `{only[0]} = {only[1][0]};`, or leave the joint to its servo",
+        )
         return None
     if use.sensors:
         scope.complaints.error(
-            "D246", f"the servo of joint `{item.name}` has a sensor, and its motor is on a bed, which has its own",
-            item.place, also=[Label(each.place, "the sensor") for each in use.sensors if each.place],
-            help="leave the sensor out in this run: `remove QUANTITY;`, or a servo `like` it without")
+            "D246",
+            f"the servo of joint `{item.name}` has a sensor, and its motor is on a bed, which has its own",
+            item.place,
+            also=[Label(each.place, "the sensor") for each in use.sensors if each.place],
+            help="leave the sensor out in this run: `remove QUANTITY;`, or a servo `like` it without",
+        )
         return None
     block = item.body or Block()
     check_keys(scope, block, DEFAULTS, Owner(f"`substitute {item.name}`", item.place, ""))
@@ -127,8 +164,14 @@ def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use])
         if model is None:
             continue
         part = block.get(each)
-        owner = Owner(f"{each} `{model.name}` of joint `{item.name}`", (part or item).place, f"{item.name}.{each}",
-                      homes=(part or item).homes, joint=kind, call=True)  # type: ignore[arg-type]
+        owner = Owner(
+            f"{each} `{model.name}` of joint `{item.name}`",
+            (part or item).place,
+            f"{item.name}.{each}",
+            homes=(part or item).homes,
+            joint=kind,  # type: ignore[arg-type]
+            call=True,
+        )
         scope.unvaried[f"{owner.path}.model"] = unvaried.chosen(f"vary `{owner.path}` over models")
         body = (part.body if part is not None else None) or Block()
         if each == "bed":

@@ -47,8 +47,17 @@ def growth(integrator: Any, h: float, a: Any, b: Any) -> Any:
         return np.log(size)
 
 
-def check_swing(scope: Scope, label: str, swing: tuple[Real, Real], schedule: Schedule, integrator: Any,
-                dynamics: Rate, path: str, *, held: bool) -> None:
+def check_swing(
+    scope: Scope,
+    label: str,
+    swing: tuple[Real, Real],
+    schedule: Schedule,
+    integrator: Any,
+    dynamics: Rate,
+    path: str,
+    *,
+    held: bool,
+) -> None:
     """A remark where a swing grows over the run at this step.
 
     label  what swings, in words;  path: of what it belongs to
@@ -65,8 +74,11 @@ def check_swing(scope: Scope, label: str, swing: tuple[Real, Real], schedule: Sc
         if (grown > GROWS).any():
             a, b = map(float, values[int(np.argmax(grown))])
             every = h / (float(np.max(grown)) / steps)
-            still = [f"integrator = {name};" for name, each in known.items()
-                     if name != integrator.name and steps * growth(each, h, a, b) <= GROWS]
+            still = [
+                f"integrator = {name};"
+                for name, each in known.items()
+                if name != integrator.name and steps * growth(each, h, a, b) <= GROWS
+            ]
             enough = _enough(integrator, h, steps, a, b)
             helps = [f"the slowest rate at which it does not: {_slowest(schedule, integrator, a, b)}"]
             if still:
@@ -74,9 +86,11 @@ def check_swing(scope: Scope, label: str, swing: tuple[Real, Real], schedule: Sc
             if enough is not None:
                 helps.append(f"or damp it: of x'' = -a x - b x', b is {b:.3g} 1/s, and {enough:.3g} 1/s would do")
             scope.complaints.remark(
-                "D249", f"{label} swings, and this step of {integrator.name} makes that grow: by e in every "
-                f"{every:.3g} s", Label(dynamics.place, f"h = {h:g} s"),
-                help=[*helps, *(["reckoned with the joint held: a gear swings faster against a light one"] * held)])
+                "D249",
+                f"{label} swings, and this step of {integrator.name} makes that grow: by e in every {every:.3g} s",
+                Label(dynamics.place, f"h = {h:g} s"),
+                help=[*helps, *(["reckoned with the joint held: a gear swings faster against a light one"] * held)],
+            )
         return np.zeros(len(values), bool), []
 
     scope.checks.hold(swing, told, code="D249", place=dynamics.place, message="", needs=(path,))
@@ -110,8 +124,9 @@ def _finer(schedule: Schedule) -> Iterator[tuple[float, int]]:
         yield schedule.base_hz * times, schedule.ticks * times
 
 
-def check_circuits(scope: Scope, use: Use, schedule: Schedule, integrator: Any, dynamics: Rate, *,
-                   on_bed: bool) -> None:
+def check_circuits(
+    scope: Scope, use: Use, schedule: Schedule, integrator: Any, dynamics: Rate, *, on_bed: bool
+) -> None:
     """What of a servo and its sensors swings, and the filters of these, at the dynamics' step.
 
     on_bed  whether the motor is on a bed, and so no part of the step
@@ -125,25 +140,45 @@ def check_circuits(scope: Scope, use: Use, schedule: Schedule, integrator: Any, 
             check_swing(scope, label, swing, schedule, integrator, dynamics, path, held=True)
     for sensor in use.sensors:
         own, label = f"{path}.sensor.{sensor.of}", f"sensor `{sensor.of}` of servo `{use.definition}`"
-        values = {p.name: scope.parameters[f"{own}.{p.name}"].value
-                  for p in models.sensor_parts(sensor, "parameters") if f"{own}.{p.name}" in scope.parameters}
+        values = {
+            p.name: scope.parameters[f"{own}.{p.name}"].value
+            for p in models.sensor_parts(sensor, "parameters")
+            if f"{own}.{p.name}" in scope.parameters
+        }
         check_sensor(scope, label, models.find("sensor", sensor.model), values, schedule, integrator, dynamics, own)
 
 
-def check_sensor(scope: Scope, label: str, sensor: Any, values: Mapping[str, Any], schedule: Schedule,
-                 integrator: Any, dynamics: Rate, path: str) -> None:
+def check_sensor(
+    scope: Scope,
+    label: str,
+    sensor: Any,
+    values: Mapping[str, Any],
+    schedule: Schedule,
+    integrator: Any,
+    dynamics: Rate,
+    path: str,
+) -> None:
     """The filter of a sensor at the dynamics' step. label: the sensor in words; path: of its parameters."""
     rate = asked(scope, sensor.fastest, values, path)
     if rate is not None:
-        check_stability(scope, label, rate, schedule, integrator, dynamics, path,
-                        of="the rate constant of the sensor's filter, 2 pi cutoff")
+        check_stability(
+            scope,
+            label,
+            rate,
+            schedule,
+            integrator,
+            dynamics,
+            path,
+            of="the rate constant of the sensor's filter, 2 pi cutoff",
+        )
     swing = asked(scope, sensor.swing, values, path)
     if swing is not None:
         check_swing(scope, f"the filter of {label}", swing, schedule, integrator, dynamics, path, held=False)
 
 
-def asked(scope: Scope, function: Callable[..., T] | None, values: Mapping[str, Any], path: str,
-          *more: Any) -> T | None:
+def asked(
+    scope: Scope, function: Callable[..., T] | None, values: Mapping[str, Any], path: str, *more: Any
+) -> T | None:
     """What a declaration's function says of these parameters; None of no function, or if one of them is out of range.
 
     path  of the parameters

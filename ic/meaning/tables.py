@@ -1,5 +1,5 @@
-"""Environment models whose lists are columns of a CSV file: its rows become lists of the plan, as if the deck had them.
-"""
+"""Environment models whose lists are columns of a CSV file: its rows become lists of the plan, as if the deck had
+them."""
 
 from __future__ import annotations
 
@@ -31,12 +31,20 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Block)
     for each in lists:
         item = body.get(each.name)
         if item is not None:
-            scope.complaints.error("D242", f"`{each.name}` of {owner.label} stands in the file", item.place,
-                                   also=[Label(body.items[FILE.name].place, "which is named here")],
-                                   help="leave one of the two out")
+            scope.complaints.error(
+                "D242",
+                f"`{each.name}` of {owner.label} stands in the file",
+                item.place,
+                also=[Label(body.items[FILE.name].place, "which is named here")],
+                help="leave one of the two out",
+            )
     own = [each.name for each in environment.parameters if each.shape != "list"]
-    values = use_model(scope, owner, [each for each in environment.parameters if each.shape != "list"],
-                       Block({key: item for key, item in body.items.items() if key in own}))
+    values = use_model(
+        scope,
+        owner,
+        [each for each in environment.parameters if each.shape != "list"],
+        Block({key: item for key, item in body.items.items() if key in own}),
+    )
     for name in (FILE.name, *(each.name for each in lists)):
         scope.unvaried[owner.join(name)] = unvaried.FILE
     columns: dict[str, tuple[float, ...]] | None = None
@@ -55,31 +63,42 @@ def tell_named_lists(scope: Scope, owner: Owner, lists: list[Parameter], body: B
         item = body.get(each.name)
         if item is not None and isinstance(item.value, String):
             found = True
-            scope.complaints.error("D064", f"`{each.name}` of {owner.label} is a list of numbers, not text",
-                                   item.value.place, help=f'write `file = "{item.value.value}";` for a CSV file that '
-                                   f"has it in a column `{TIME if each.rises else each.name}`")
+            scope.complaints.error(
+                "D064",
+                f"`{each.name}` of {owner.label} is a list of numbers, not text",
+                item.value.place,
+                help=f'write `file = "{item.value.value}";` for a CSV file that '
+                f"has it in a column `{TIME if each.rises else each.name}`",
+            )
     return found
 
 
 def named_file(owner: Owner, item: Item) -> String:
     """The name of the file that `file` is. Raises Problem D076."""
     if not isinstance(item.value, String):
-        raise Problem(error("D076", f"`file` of {owner.label} is the name of a file, in quotes",
-                            place_of(item.value) if item.value is not None else item.place,
-                            help=f'write `file = "{item.value.text if isinstance(item.value, Name) else "NAME.csv"}"`'))
+        raise Problem(
+            error(
+                "D076",
+                f"`file` of {owner.label} is the name of a file, in quotes",
+                place_of(item.value) if item.value is not None else item.place,
+                help=f'write `file = "{item.value.text if isinstance(item.value, Name) else "NAME.csv"}"`',
+            )
+        )
     return item.value
 
 
-def keep_column(scope: Scope, owner: Owner, wanted: Parameter, table: Table, column: Column, label: Label
-                ) -> tuple[float, ...]:
+def keep_column(
+    scope: Scope, owner: Owner, wanted: Parameter, table: Table, column: Column, label: Label
+) -> tuple[float, ...]:
     """A column as the model's list, entered in the scope. Raises Problem D193, D194, D195. label: who wants it."""
     text, dimension = scope.unit(owner, wanted)
     numbers = table.numbers(column, text, dimension, label)
     if column.name == TIME:
         table.rising(column, numbers)
     note = f"column `{column.name}` of {table.file}"
-    scope.parameters[owner.join(wanted.name)] = Settled(numbers, text, Origin("deck", column.place, (), note),
-                                                        wanted.doc)
+    scope.parameters[owner.join(wanted.name)] = Settled(
+        numbers, text, Origin("deck", column.place, (), note), wanted.doc
+    )
     return numbers
 
 
@@ -100,9 +119,19 @@ def _columns(scope: Scope, owner: Owner, lists: list[Parameter], item: Item) -> 
     label = Label(named.place, "read here")
     for column in table.columns:
         if column.name not in by_column:
-            raise Problem(error("D243", f"{owner.label} has no use for column `{column.name}`", column.place,
-                                also=[label], help=[*did_you_mean(column.name, _alike(scope, owner, column, by_column)),
-                                                    known_words("its columns", by_column), "or take it out"]))
+            raise Problem(
+                error(
+                    "D243",
+                    f"{owner.label} has no use for column `{column.name}`",
+                    column.place,
+                    also=[label],
+                    help=[
+                        *did_you_mean(column.name, _alike(scope, owner, column, by_column)),
+                        known_words("its columns", by_column),
+                        "or take it out",
+                    ],
+                )
+            )
     columns = {}
     for name, wanted in by_column.items():
         found = table.column(name)
@@ -116,7 +145,10 @@ def _columns(scope: Scope, owner: Owner, lists: list[Parameter], item: Item) -> 
             why = f"the times of the rows stand in a column `{TIME} [s]`" if name == TIME else ""
             raise missing_column(table, name, named.place, why)
     if not table.rows:
-        raise Problem(error("D196", f"`{table.file}` has no rows", table.columns[0].place, also=[label],
-                            help="it has one at least"))
+        raise Problem(
+            error(
+                "D196", f"`{table.file}` has no rows", table.columns[0].place, also=[label], help="it has one at least"
+            )
+        )
     scope.setting(owner.join(FILE.name), table.file, item=item)
     return columns

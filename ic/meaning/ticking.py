@@ -42,8 +42,12 @@ def rate_of(scope: Scope, each: Ticking, shared: Rate | None) -> Rate | None:
     found = each.rate or shared
     if found is None or found.hz == CONTINUOUS:
         told = "the servos are continuous" if found is not None else "the run has no rate of the servos"
-        scope.complaints.error(each.code, f"{each.label} has no rate, and {told}", each.place,
-                               help=f"write `rate = 100 Hz;` in the {each.kind}")
+        scope.complaints.error(
+            each.code,
+            f"{each.label} has no rate, and {told}",
+            each.place,
+            help=f"write `rate = 100 Hz;` in the {each.kind}",
+        )
         return None
     return found
 
@@ -52,6 +56,9 @@ def check_instants(scope: Scope, each: Ticking, divisor: int, dynamics: int, rat
     """It ticks at instants of the dynamics: it sees the arm as it is there."""
     if divisor % dynamics:
         scope.complaints.error(
-            each.code, f"{each.label} {each.does} at {rate.hz:g} Hz, between the steps of the dynamics", rate.place,
+            each.code,
+            f"{each.label} {each.does} at {rate.hz:g} Hz, between the steps of the dynamics",
+            rate.place,
             also=[Label(step.place, f"{step.hz:g} Hz")],
-            help=f"give the {each.kind} a `rate` that divides {step.hz:g} Hz, or quicken the dynamics")
+            help=f"give the {each.kind} a `rate` that divides {step.hz:g} Hz, or quicken the dynamics",
+        )

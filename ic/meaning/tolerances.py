@@ -22,39 +22,58 @@ WRITE = "write `NAME = SIZE;`: `qd = 1e-6 rad/s;`, `elbow.q = 0.01 deg;`, `rel =
 def resolve_tolerances(scope: Scope, body: Block, structure: Structure) -> tuple[Tolerance, ...]:
     """In SI, in the order in which they are written. structure: with its metrics and record."""
     for statement in body.statements:
-        scope.complaints.error("D239", f"`{statement.words[0].text}` inside the tolerances", statement.place,
-                               help="it belongs to a run or a sweep")
+        scope.complaints.error(
+            "D239",
+            f"`{statement.words[0].text}` inside the tolerances",
+            statement.place,
+            help="it belongs to a run or a sweep",
+        )
     known = tolerable(structure)
     found = (_tolerance(scope, item, structure, known) for item in body.items.values())
     return tuple(each for each in found if each is not None)
 
 
-def _tolerance(
-    scope: Scope, item: Item, structure: Structure, known: dict[str, tuple[str, ...]]
-) -> Tolerance | None:
+def _tolerance(scope: Scope, item: Item, structure: Structure, known: dict[str, tuple[str, ...]]) -> Tolerance | None:
     name = item.name
     if item.kind or item.value is None:
         scope.complaints.error("D239", f"`{item.kind or name}` is no tolerance", item.place, help=WRITE)
         return None
     if name not in known:
         if not scope.hangs(name):
-            scope.complaints.error("D237", f"no signal or metric `{name}` here that could differ", item.place,
-                                   help=_nearest(item, structure, known))
+            scope.complaints.error(
+                "D237",
+                f"no signal or metric `{name}` here that could differ",
+                item.place,
+                help=_nearest(item, structure, known),
+            )
         return None
     if len(known[name]) > 1:
         parts = [path for each in structure.record if each.name == name for path in joint_parts(name, each.joints)]
-        scope.complaints.error("D238", f"`{name}` is in {' and in '.join(known[name])}", item.place,
-                               help=known_words("give each joint its own", parts))
+        scope.complaints.error(
+            "D238",
+            f"`{name}` is in {' and in '.join(known[name])}",
+            item.place,
+            help=known_words("give each joint its own", parts),
+        )
         return None
     path = f"tolerances.{name}"
     owner = Owner("the tolerances", item.place, "tolerances", called=f"the tolerance of `{name}`")
-    wanted = Parameter(name=name, unit=known[name][0], at_least=0.0, doc="what a diff allows",
-                       share=name == "rel" or name in share_metrics(structure))
+    wanted = Parameter(
+        name=name,
+        unit=known[name][0],
+        at_least=0.0,
+        doc="what a diff allows",
+        share=name == "rel" or name in share_metrics(structure),
+    )
     size = scope.number(owner, wanted, item, record=False)
     if isinstance(size, Scalar):
         at = scope.varied[path].place if path in scope.varied else place_of(item.value)
-        scope.complaints.error("D122", f"the tolerance of `{name}` varies with the sweep", at,
-                               help="it is the same for all cases: write a number that stands still")
+        scope.complaints.error(
+            "D122",
+            f"the tolerance of `{name}` varies with the sweep",
+            at,
+            help="it is the same for all cases: write a number that stands still",
+        )
         return None
     if size is None:
         return None

@@ -1,5 +1,5 @@
-"""Commands whose course is a column of a CSV file: its rows become lists of the plan, as if the deck had written them.
-"""
+"""Commands whose course is a column of a CSV file: its rows become lists of the plan, as if the deck had written
+them."""
 
 from __future__ import annotations
 
@@ -40,15 +40,20 @@ def use_file(
     """
     others = [each for each in profile.parameters if each.name not in LISTS]
     check_keys(scope, body, [each.name for each in profile.written], owner)
-    values = use_model(scope, owner, others, Block({key: item for key, item in body.items.items()
-                                                    if key in [each.name for each in others]}))
+    values = use_model(
+        scope,
+        owner,
+        others,
+        Block({key: item for key, item in body.items.items() if key in [each.name for each in others]}),
+    )
     for each in (FILE.name, COLUMN.name, *LISTS):
         scope.unvaried[owner.join(each)] = unvaried.FILE
     columns: dict[str, tuple[float, ...]] | None = None
     file = body.get(FILE.name)
     if file is None:
-        scope.complaints.missing(owner.place, (FILE.name,), "D075", f"{owner.label} has no `{FILE.name}`",
-                                 help='write `file = "NAME.csv"`')
+        scope.complaints.missing(
+            owner.place, (FILE.name,), "D075", f"{owner.label} has no `{FILE.name}`", help='write `file = "NAME.csv"`'
+        )
     else:
         with scope.complaints.gather():
             columns = _columns(scope, owner, profile, body, file, name, kind)
@@ -76,14 +81,20 @@ def _columns(
         if column is None:
             why = "the times of the rows stand in a column `time [s]`" if column_name == TIME else ""
             if at is named.place and not why:
-                why = f"that of the {kind}'s name is taken, unless `column = \"NAME\"` names another"
+                why = f'that of the {kind}\'s name is taken, unless `column = "NAME"` names another'
             raise missing_column(table, column_name, at, why)
         label = here if column_name == TIME else Label(named.place, f"read here for {kind} `{own}`")
         columns[name] = keep_column(scope, owner, declared, table, column, label)
     if len(table.rows) < FEWEST:
-        raise Problem(error("D196", f"`{table.file}` has {len(table.rows) or 'no'} row"
-                            f"{'s' if not table.rows else ''}", table.columns[0].place, also=[here],
-                            help=f"a trajectory has {FEWEST} at least; `table` takes a single point"))
+        raise Problem(
+            error(
+                "D196",
+                f"`{table.file}` has {len(table.rows) or 'no'} row{'s' if not table.rows else ''}",
+                table.columns[0].place,
+                also=[here],
+                help=f"a trajectory has {FEWEST} at least; `table` takes a single point",
+            )
+        )
     scope.setting(owner.join(FILE.name), table.file, item=file)
     scope.setting(owner.join(COLUMN.name), wanted, item=body.get(COLUMN.name), note=f"the {kind}'s name")
     return columns
@@ -96,6 +107,11 @@ def _column_name(owner: Owner, item: Item | None, joint: str) -> str:
         return item.value.value
     if isinstance(item.value, Name) and len(item.value.path) == 1:
         return item.value.text
-    raise Problem(error("D076", f"`column` of {owner.label} is the name of a column, in quotes",
-                        place_of(item.value) if item.value is not None else item.place,
-                        help='write `column = "NAME"`'))
+    raise Problem(
+        error(
+            "D076",
+            f"`column` of {owner.label} is the name of a column, in quotes",
+            place_of(item.value) if item.value is not None else item.place,
+            help='write `column = "NAME"`',
+        )
+    )

@@ -129,13 +129,15 @@ def _of_pi(decimal: str) -> bool:
     places = decimal.partition(".")[2]
     if len(places) < 2 or not places.isdigit():
         return False
-    return any(decimal in (f"{exact:.{len(places)}f}", f"{exact:.{len(places) + 5}f}"[:-5])
-               for exact in (math.pi, 2.0 * math.pi))
+    return any(
+        decimal in (f"{exact:.{len(places)}f}", f"{exact:.{len(places) + 5}f}"[:-5])
+        for exact in (math.pi, 2.0 * math.pi)
+    )
 
 
 def _in_unit(value: Value, unit: Unit) -> Value:
-    """A pure number in a unit, rounded once. Raises D067 where it is too large in SI, or so small that it would be 0.
-    """
+    """A pure number in a unit, rounded once. Raises D067 where it is too large in SI, or so small that it would be
+    0."""
     measure = measure_of(unit)
     made = measure.to_si(cast(float, value.number), value.decimal)  # a scalar divides and multiplies too
     sound = _sound(made, value.place, value.number)
@@ -146,8 +148,7 @@ def measure_of(unit: Unit) -> units.Measure:
     """What a unit means. Raises D074 where a factor is no unit."""
     for word, _ in unit.factors:
         if not units.is_unit(word.text):
-            raise Problem(error("D074", f"`{word.text}` is not a unit", word.place,
-                                help=other_units.remedy(word.text)))
+            raise Problem(error("D074", f"`{word.text}` is not a unit", word.place, help=other_units.remedy(word.text)))
     try:
         measure = units.measure((word.text, exponent) for word, exponent in unit.factors)
         if measure.scale == 0.0:
@@ -160,20 +161,30 @@ def measure_of(unit: Unit) -> units.Measure:
 def _with_unit(expression: WithUnit, lookup: Lookup) -> Value | Values:
     inner = _written_unit(expression.inner)
     if inner is not None:
-        raise Problem(error(
-            "D062", f"a unit inside brackets that have one after them, `{expression.unit.text}`", inner,
-            also=[Label(expression.unit.place, "this one is for all the bare numbers inside")],
-            help="give each number its own unit, or none of them"))
+        raise Problem(
+            error(
+                "D062",
+                f"a unit inside brackets that have one after them, `{expression.unit.text}`",
+                inner,
+                also=[Label(expression.unit.place, "this one is for all the bare numbers inside")],
+                help="give each number its own unit, or none of them",
+            )
+        )
     measure_of(expression.unit)
 
     def apply(value: Value | Values) -> Value | Values:
         if isinstance(value, Values):
             return Values(tuple(apply(item) for item in value.items), value.place, expression.unit)
         if value.dimension != PURE:
-            raise Problem(error(
-                "D062", f"a value in {units.text(value.dimension)} inside brackets that have a unit after them",
-                value.place, also=[Label(expression.unit.place, "this unit is for pure numbers")],
-                help="leave the unit after the brackets out, and give each bare number its own"))
+            raise Problem(
+                error(
+                    "D062",
+                    f"a value in {units.text(value.dimension)} inside brackets that have a unit after them",
+                    value.place,
+                    also=[Label(expression.unit.place, "this unit is for pure numbers")],
+                    help="leave the unit after the brackets out, and give each bare number its own",
+                )
+            )
         return _in_unit(value, expression.unit)
 
     return apply(evaluate(expression.inner, lookup))
@@ -201,8 +212,14 @@ def _unary(expression: Unary, lookup: Lookup) -> Value:
 def _binary(node: Binary, left: Value | Values, lookup: Lookup) -> Value:
     operator = node.operator
     if operator in COMPARISONS or operator in ("and", "or"):
-        raise Problem(error("D064", f"`{operator}` is not arithmetic: a number is needed here", node.place,
-                            help="comparisons stand in `exclude when` and `require`"))
+        raise Problem(
+            error(
+                "D064",
+                f"`{operator}` is not arithmetic: a number is needed here",
+                node.place,
+                help="comparisons stand in `exclude when` and `require`",
+            )
+        )
     if isinstance(left, Values):
         raise Problem(error("D071", f"`{operator}` needs one number on its left, and this is a list", left.place))
     right = evaluate_number(node.right, lookup)
@@ -210,10 +227,15 @@ def _binary(node: Binary, left: Value | Values, lookup: Lookup) -> Value:
     bare = left.bare and right.bare
     if operator in ("+", "-"):
         if not units.same(left.dimension, right.dimension):
-            raise Problem(error(
-                "D063", f"`{operator}` of {_named(left)} and {_named(right)}", node.place,
-                also=[Label(left.place, _named(left)), Label(right.place, _named(right))],
-                help=_made_alike(node, left, right)))
+            raise Problem(
+                error(
+                    "D063",
+                    f"`{operator}` of {_named(left)} and {_named(right)}",
+                    node.place,
+                    also=[Label(left.place, _named(left)), Label(right.place, _named(right))],
+                    help=_made_alike(node, left, right),
+                )
+            )
         number = left.number + right.number if operator == "+" else left.number - right.number
         return Value(_sound(number, place), left.dimension, place, bare, left.unit, hertz=left.hertz)
     sign = 1 if operator == "*" else -1
@@ -248,8 +270,14 @@ def _made_alike(node: Binary, left: Value, right: Value) -> str:
 def _power(node: Binary, base: Value, exponent: Value) -> Value:
     power = exponent.number
     if exponent.dimension != PURE:
-        raise Problem(error("D068", f"an exponent in {units.text(exponent.dimension)}", exponent.place,
-                            help="an exponent is a pure number"))
+        raise Problem(
+            error(
+                "D068",
+                f"an exponent in {units.text(exponent.dimension)}",
+                exponent.place,
+                help="an exponent is a pure number",
+            )
+        )
     if isinstance(power, Scalar):
         raise Problem(error("D068", "a varied exponent is not in this version", exponent.place))
     whole = float(power).is_integer() and abs(power) <= BIGGEST_EXPONENT
@@ -258,12 +286,24 @@ def _power(node: Binary, base: Value, exponent: Value) -> Value:
     elif whole:
         dimension = base.dimension ** int(power)
     else:
-        raise Problem(error("D068", f"a quantity in {units.text(base.dimension)} to the power {power:g}", node.place,
-                            help=f"whole exponents up to {BIGGEST_EXPONENT}; sqrt(...) for roots"))
+        raise Problem(
+            error(
+                "D068",
+                f"a quantity in {units.text(base.dimension)} to the power {power:g}",
+                node.place,
+                help=f"whole exponents up to {BIGGEST_EXPONENT}; sqrt(...) for roots",
+            )
+        )
     if isinstance(base.number, Scalar):
         if not whole:
-            raise Problem(error("D068", f"a varied value to the power {power:g}", node.place,
-                                help=f"whole exponents up to {BIGGEST_EXPONENT}; sqrt(...) for roots"))
+            raise Problem(
+                error(
+                    "D068",
+                    f"a varied value to the power {power:g}",
+                    node.place,
+                    help=f"whole exponents up to {BIGGEST_EXPONENT}; sqrt(...) for roots",
+                )
+            )
         return Value(base.number ** int(power), dimension, base.place)
     try:
         result = float(base.number) ** (int(power) if whole else power)
@@ -289,8 +329,7 @@ def _items(written: List, lookup: Lookup) -> Iterable[Value | Values]:
 
 def _range(expression: Range, lookup: Lookup) -> Values:
     """`first .. last by step`: steps from the first, as far as the last."""
-    first, last, step = (evaluate_number(each, lookup) for each in
-                         (expression.first, expression.last, expression.step))
+    first, last, step = (evaluate_number(each, lookup) for each in (expression.first, expression.last, expression.step))
     place = place_of(expression)
     for other in (last, step):
         if not units.same(first.dimension, other.dimension):
@@ -298,13 +337,24 @@ def _range(expression: Range, lookup: Lookup) -> Values:
             if first.bare and last.bare and isinstance(expression.step, Number) and expression.step.unit is not None:
                 inside = f"{spell(expression.first)} .. {spell(expression.last)} by {expression.step.text}"
                 remedy = f"a unit behind the brackets is for all: `({inside}) {expression.step.unit.text}`"
-            raise Problem(error(
-                "D063", f"a range from {_named(first)} to {_named(last)} by {_named(step)}", expression.place,
-                also=[Label(each.place, _named(each)) for each in (first, last, step)],
-                help=remedy))
+            raise Problem(
+                error(
+                    "D063",
+                    f"a range from {_named(first)} to {_named(last)} by {_named(step)}",
+                    expression.place,
+                    also=[Label(each.place, _named(each)) for each in (first, last, step)],
+                    help=remedy,
+                )
+            )
     if any(isinstance(value.number, Scalar) for value in (first, last, step)):
-        raise Problem(error("D121", "the values of a sweep depend on what the sweep varies", place,
-                            help="write numbers that stand still"))
+        raise Problem(
+            error(
+                "D121",
+                "the values of a sweep depend on what the sweep varies",
+                place,
+                help="write numbers that stand still",
+            )
+        )
     a, b, by = (float(value.number) for value in (first, last, step))
     turning = measure_of(step.unit) if step.unit is not None else units.ONE
     if turning.turns and turning.dimension == step.dimension:  # a multiple of pi is no decimal: steps are of the unit
@@ -319,10 +369,9 @@ def _range(expression: Range, lookup: Lookup) -> Values:
     return Values(tuple(made), place, first.unit)
 
 
-def _steps(
-    a: float, b: float, step: float, expression: Range, first: Value, scale: float = 1.0
-) -> Iterable[float]:
+def _steps(a: float, b: float, step: float, expression: Range, first: Value, scale: float = 1.0) -> Iterable[float]:
     """The points of a range. scale: SI units in one of what the numbers are in."""
+
     def shown(number: float) -> str:
         """In the unit of the first value, where it has one of its own."""
         number *= scale
@@ -333,17 +382,34 @@ def _steps(
     if step == 0.0:
         raise Problem(error("D072", "a range by steps of zero has no end", place_of(expression.step)))
     if (b - a) * step < 0.0:
-        raise Problem(error("D072", f"steps of {shown(step)} do not lead from {shown(a)} to {shown(b)}",
-                            place_of(expression.step),
-                            help="give the step the other sign, or change the ends about"))
+        raise Problem(
+            error(
+                "D072",
+                f"steps of {shown(step)} do not lead from {shown(a)} to {shown(b)}",
+                place_of(expression.step),
+                help="give the step the other sign, or change the ends about",
+            )
+        )
     found = series.Steps.between(a, b, step)
     if found.count > MOST_POINTS:
-        raise Problem(error("D072", f"a range of {min(found.count, 10**300):.3g} values", place_of(expression),
-                            help=f"up to {MOST_POINTS} are possible"))
+        raise Problem(
+            error(
+                "D072",
+                f"a range of {min(found.count, 10**300):.3g} values",
+                place_of(expression),
+                help=f"up to {MOST_POINTS} are possible",
+            )
+        )
     if not found.meet:
-        raise Problem(error("D220", f"the steps do not meet the end: they reach {shown(found.last)}, and {shown(b)} "
-                            "is not a whole number of steps from the first", place_of(expression.last),
-                            help="end where the steps do, or `linspace(from, to, count)`, whose ends are met"))
+        raise Problem(
+            error(
+                "D220",
+                f"the steps do not meet the end: they reach {shown(found.last)}, and {shown(b)} "
+                "is not a whole number of steps from the first",
+                place_of(expression.last),
+                help="end where the steps do, or `linspace(from, to, count)`, whose ends are met",
+            )
+        )
     return found.points
 
 
@@ -353,15 +419,33 @@ def _steps(
 def _call(call: Call, lookup: Lookup) -> Value | Values:
     name = call.name.text
     if name not in FUNCTIONS:
-        raise Problem(error("D069", f"no function `{name}`", call.name.place,
-                            help=[*did_you_mean(name, FUNCTIONS), known_words("functions", FUNCTIONS)]))
+        raise Problem(
+            error(
+                "D069",
+                f"no function `{name}`",
+                call.name.place,
+                help=[*did_you_mean(name, FUNCTIONS), known_words("functions", FUNCTIONS)],
+            )
+        )
     if call.named or call.body is not None:
-        raise Problem(error("D070", f"`{name}` takes its arguments in order, without names", call.name.place,
-                            help=f"write `{name}({', '.join(USAGE[name])})`"))
+        raise Problem(
+            error(
+                "D070",
+                f"`{name}` takes its arguments in order, without names",
+                call.name.place,
+                help=f"write `{name}({', '.join(USAGE[name])})`",
+            )
+        )
     if len(call.positional) != len(USAGE[name]) and not (name in ("min", "max") and call.positional):
         count = f"{len(USAGE[name])} argument{'s' * (len(USAGE[name]) != 1)}"
-        raise Problem(error("D070", f"`{name}` takes {count}, not {len(call.positional)}",
-                            call.name.place, help=f"write `{name}({', '.join(USAGE[name])})`"))
+        raise Problem(
+            error(
+                "D070",
+                f"`{name}` takes {count}, not {len(call.positional)}",
+                call.name.place,
+                help=f"write `{name}({', '.join(USAGE[name])})`",
+            )
+        )
     arguments = [evaluate_number(argument, lookup) for argument in call.positional]
     if name in ("linspace", "logspace"):
         return _spaced(call, arguments)
@@ -372,8 +456,14 @@ def _call(call: Call, lookup: Lookup) -> Value | Values:
         result = first
         for other in arguments[1:]:
             if not units.same(first.dimension, other.dimension):
-                raise Problem(error("D063", f"`{name}` of {_named(first)} and {_named(other)}", other.place,
-                                    help="both must be of one dimension"))
+                raise Problem(
+                    error(
+                        "D063",
+                        f"`{name}` of {_named(first)} and {_named(other)}",
+                        other.place,
+                        help="both must be of one dimension",
+                    )
+                )
             number = minimum(result.number, other.number) if name == "min" else maximum(result.number, other.number)
             bare = result.bare and other.bare
             result = Value(_plain(number), first.dimension, call.place, bare, first.unit, hertz=first.hertz)
@@ -383,8 +473,15 @@ def _call(call: Call, lookup: Lookup) -> Value | Values:
     return Value(_plain(sin(first.number) if name == "sin" else cos(first.number)), PURE, call.place)
 
 
-USAGE = {"sqrt": ("x",), "sin": ("x",), "cos": ("x",), "min": ("a", "b"), "max": ("a", "b"),
-          "linspace": ("from", "to", "count"), "logspace": ("from", "to", "count")}
+USAGE = {
+    "sqrt": ("x",),
+    "sin": ("x",),
+    "cos": ("x",),
+    "min": ("a", "b"),
+    "max": ("a", "b"),
+    "linspace": ("from", "to", "count"),
+    "logspace": ("from", "to", "count"),
+}
 
 
 def _sqrt(call: Call, value: Value) -> Value:
@@ -405,21 +502,45 @@ def _spaced(call: Call, arguments: list[Value]) -> Values:
     name = call.name.text
     start, end, count = arguments
     if count.dimension != PURE or isinstance(count.number, Scalar) or not float(count.number).is_integer():
-        raise Problem(error("D072", f"the count of a {name} is a whole number", count.place,
-                            help=f"write `{name}(from, to, count) unit`"))
+        raise Problem(
+            error(
+                "D072",
+                f"the count of a {name} is a whole number",
+                count.place,
+                help=f"write `{name}(from, to, count) unit`",
+            )
+        )
     n = int(count.number)
     if not 2 <= n <= MOST_POINTS:
         raise Problem(error("D072", f"a {name} of {n} points", count.place, help=f"2 to {MOST_POINTS} are possible"))
     if not units.same(start.dimension, end.dimension):
-        raise Problem(error("D063", f"a {name} from {_named(start)} to {_named(end)}", end.place,
-                            help="both must be of one dimension"))
+        raise Problem(
+            error(
+                "D063",
+                f"a {name} from {_named(start)} to {_named(end)}",
+                end.place,
+                help="both must be of one dimension",
+            )
+        )
     if isinstance(start.number, Scalar) or isinstance(end.number, Scalar):
-        raise Problem(error("D121", "the values of a sweep depend on what the sweep varies", call.place,
-                            help="write numbers that stand still"))
+        raise Problem(
+            error(
+                "D121",
+                "the values of a sweep depend on what the sweep varies",
+                call.place,
+                help="write numbers that stand still",
+            )
+        )
     a, b = float(start.number), float(end.number)
     if name == "logspace" and not a * b > 0.0:
-        raise Problem(error("D072", "the ends of a logspace are both above or both below zero", call.place,
-                            help=[*_not_exponents(start, end, n), "linspace(...) has no such limit"]))
+        raise Problem(
+            error(
+                "D072",
+                "the ends of a logspace are both above or both below zero",
+                call.place,
+                help=[*_not_exponents(start, end, n), "linspace(...) has no such limit"],
+            )
+        )
     points = series.even(a, b, n) if name == "linspace" else series.by_ratio(a, b, n)
     bare = start.bare and end.bare
     made = (Value(x, start.dimension, call.place, bare, start.unit, hertz=start.hertz) for x in points)
@@ -480,8 +601,14 @@ def _sound(number: Real, place: Place, *factors: Real) -> Real:
     if not math.isfinite(number):
         raise _too_large(place)
     if factors and number == 0.0 and all(not isinstance(each, Scalar) and each != 0.0 for each in factors):
-        raise Problem(error("D067", "this number is too small: it would become 0", place,
-                            help="the smallest is 4.9e-324, in SI units; for nothing at all write 0"))
+        raise Problem(
+            error(
+                "D067",
+                "this number is too small: it would become 0",
+                place,
+                help="the smallest is 4.9e-324, in SI units; for nothing at all write 0",
+            )
+        )
     return number
 
 

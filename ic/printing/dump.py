@@ -42,8 +42,9 @@ class Asked:
             from met.plan import file as plan_file
 
             return plan_file.read(self.deck)
-        return ic.compile(self.deck, include_dirs=self.include_dirs, defines=self.defines, set=self.settings,
-                          select=self.select)
+        return ic.compile(
+            self.deck, include_dirs=self.include_dirs, defines=self.defines, set=self.settings, select=self.select
+        )
 
 
 Stage = Callable[[Asked], Iterator[str]]

@@ -37,9 +37,13 @@ MOST_IN_FULL = 3  # parameters; of more a line each
 
 def with_settings(experiment: Experiment) -> Experiment:
     """The experiment with the settings of its run as if they were parameters, so that they can be asked for."""
-    return replace(experiment, parameters={**experiment.parameters, **{
-        path: quantity for path, quantity in settings(experiment).items() if path not in experiment.parameters
-    }})
+    return replace(
+        experiment,
+        parameters={
+            **experiment.parameters,
+            **{path: quantity for path, quantity in settings(experiment).items() if path not in experiment.parameters},
+        },
+    )
 
 
 def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[str]] = NO_MORE) -> list[str]:
@@ -67,8 +71,13 @@ def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[st
             return inside
     heads = dict.fromkeys(name.partition(".")[0] for name in known)
     if path == experiment.name or _is_run(path, also):
-        raise Problem(error("D170", f"`{path}` is a run or a sweep, and no parameter",
-                            help=[f"`met plan DECK {path}` prints it", f"paths begin with {', '.join(heads)}"]))
+        raise Problem(
+            error(
+                "D170",
+                f"`{path}` is a run or a sweep, and no parameter",
+                help=[f"`met plan DECK {path}` prints it", f"paths begin with {', '.join(heads)}"],
+            )
+        )
     follow = [name for each, names in also.items() if each.startswith(f"{path}.") for name in names if name in known]
     if follow:
         return list(dict.fromkeys(follow))
@@ -80,15 +89,30 @@ def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[st
     if found:
         return found
     if path in recordable(experiment.structure, [path]):
-        raise Problem(error("D170", f"no parameter `{path}` in `{experiment.name}`",
-                            help=f"it is a channel, which only a run computes: `record = [{path}];` keeps it"))
+        raise Problem(
+            error(
+                "D170",
+                f"no parameter `{path}` in `{experiment.name}`",
+                help=f"it is a channel, which only a run computes: `record = [{path}];` keeps it",
+            )
+        )
     driven = {use.joint for use in experiment.structure.servos}
     if rest.partition(".")[0] == "servo" and definition in {each.name for each in experiment.structure.moving} - driven:
-        raise Problem(error("D170", f"no parameter `{path}` in `{experiment.name}`",
-                            help=f"joint `{definition}` has no servo here: it is free"))
+        raise Problem(
+            error(
+                "D170",
+                f"no parameter `{path}` in `{experiment.name}`",
+                help=f"joint `{definition}` has no servo here: it is free",
+            )
+        )
     if is_code(path):
-        raise Problem(error("D170", f"no parameter `{path}` in `{experiment.name}`",
-                            help=f"`met doc {path}` says what this message means"))
+        raise Problem(
+            error(
+                "D170",
+                f"no parameter `{path}` in `{experiment.name}`",
+                help=f"`met doc {path}` says what this message means",
+            )
+        )
     near = _three_nearest(path, known)
     helps = [f"did you mean `{'`, `'.join(near)}`?"] if near else []
     last = path.rpartition(".")[2]

@@ -23,8 +23,10 @@ OF_ANY = (
     ("JOINT.servo.NAME", "what a servo holds, integrates and shows: `met doc` and the name of its model"),
     ("JOINT.servo.command", "what the servo was asked at its last tick, in the command's unit"),
     ("JOINT.bed.NAME, JOINT.law.NAME", "of a joint whose motor is on a bed: `met doc bed`, `met doc law`"),
-    ("sensors.NAME, sensors.NAME.NAME", "what a sensor of a link reads, and its states; `sensors`: what all of "
-                                      "them read"),
+    (
+        "sensors.NAME, sensors.NAME.NAME",
+        "what a sensor of a link reads, and its states; `sensors`: what all of them read",
+    ),
 )
 
 
@@ -47,8 +49,10 @@ def channels() -> list[dict[str, str]]:
 
 
 JOINT, LINK, PAYLOAD = "JOINT.", "links.LINK.", "payloads.PAYLOAD."
-MORE_WORDS = {word: f"{channel.TURNING[word]}, or {channel.SLIDING[word]} of a prismatic joint"
-              for word in ("inertia", "angular", "linear")}
+MORE_WORDS = {
+    word: f"{channel.TURNING[word]}, or {channel.SLIDING[word]} of a prismatic joint"
+    for word in ("inertia", "angular", "linear")
+}
 
 
 def print_channels() -> Iterator[str]:
@@ -56,8 +60,13 @@ def print_channels() -> Iterator[str]:
     yield ""
     found = channels()
     rows = [("channel", "unit", "components", "meaning", "axes")]
-    yield from columns(rows + [(each["path"], unit_in_words(each["unit"]), each["components"], each["meaning"],
-                                each["frame"]) for each in found])
+    yield from columns(
+        rows
+        + [
+            (each["path"], unit_in_words(each["unit"]), each["components"], each["meaning"], each["frame"])
+            for each in found
+        ]
+    )
     yield ""
     yield from columns(list(OF_ANY))
     yield ""
@@ -78,8 +87,12 @@ def print_dh() -> Iterator[str]:
     yield "In a deck: joint NAME revolute { parent = ...; child = ...; dh = classic(a = 0.4 m, alpha = 90 deg); }"
     yield ""
     yield "Numbers"
-    yield from columns([("name", "unit", "default", "meaning"),
-                        *((each.name, each.unit, default(each), each.doc) for each in dh.NUMBERS)])
+    yield from columns(
+        [
+            ("name", "unit", "default", "meaning"),
+            *((each.name, each.unit, default(each), each.doc) for each in dh.NUMBERS),
+        ]
+    )
 
 
 def dh_json() -> list[dict[str, Any]]:
@@ -115,8 +128,14 @@ def print_substitute() -> Iterator[str]:
         yield from columns([(name, summary(model)) for name, model in models.available(kind).items()])
     yield ""
     yield "Parameters of a bed that are the servo's unless they are written"
-    yield from columns([(name, p.name, f"the servo's {p.of_servo}", p.doc)
-                        for name, model in models.available("bed").items() for p in model.parameters if p.of_servo])
+    yield from columns(
+        [
+            (name, p.name, f"the servo's {p.of_servo}", p.doc)
+            for name, model in models.available("bed").items()
+            for p in model.parameters
+            if p.of_servo
+        ]
+    )
     yield ""
     yield "`met doc emulated`, and so for every bed and law, says what it takes and what of it can be recorded."
 
@@ -142,15 +161,17 @@ def in_si(unit: Mapping[str, Any]) -> str:
 
 Subject = tuple[Callable[[], Iterator[str]], Callable[[], list[Any]]]
 
-SUBJECTS: Mapping[str, Subject] = MappingProxyType({
-    "channels": (print_channels, channels),
-    "designs": (partial(print_words, "designs"), partial(words_json, "designs")),
-    "dh": (print_dh, dh_json),
-    "distributions": (partial(print_words, "distributions"), partial(words_json, "distributions")),
-    "functions": (partial(print_words, "functions"), partial(words_json, "functions")),
-    "shapes": (print_shapes, shapes_json),
-    "units": (print_units, unit_table),
-    **{name: (partial(print_block, BLOCKS[name]), partial(block_json, BLOCKS[name])) for name in OF_LANGUAGE},
-    "substitute": (print_substitute, partial(block_json, BLOCKS["substitute"])),
-})
+SUBJECTS: Mapping[str, Subject] = MappingProxyType(
+    {
+        "channels": (print_channels, channels),
+        "designs": (partial(print_words, "designs"), partial(words_json, "designs")),
+        "dh": (print_dh, dh_json),
+        "distributions": (partial(print_words, "distributions"), partial(words_json, "distributions")),
+        "functions": (partial(print_words, "functions"), partial(words_json, "functions")),
+        "shapes": (print_shapes, shapes_json),
+        "units": (print_units, unit_table),
+        **{name: (partial(print_block, BLOCKS[name]), partial(block_json, BLOCKS[name])) for name in OF_LANGUAGE},
+        "substitute": (print_substitute, partial(block_json, BLOCKS["substitute"])),
+    }
+)
 """By the word that `met doc` takes: what it prints, and the same for programs."""

@@ -23,11 +23,13 @@ OF_FUNCTIONS: Mapping[str, str] = MappingProxyType({
     "logspace": "values in one ratio, both ends included (ends, not exponents)",
 })  # fmt: skip
 
-OF_DESIGNS: Mapping[str, str] = MappingProxyType({
-    "lhs": "a Latin hypercube: each range in n equal parts, one value from each; more samples are other ones",
-    "sobol": "a scrambled Sobol sequence, evenly spread; n a power of 2; more samples change no old case",
-    "random": "independent draws; neither more samples nor more parameters change an old case",
-})
+OF_DESIGNS: Mapping[str, str] = MappingProxyType(
+    {
+        "lhs": "a Latin hypercube: each range in n equal parts, one value from each; more samples are other ones",
+        "sobol": "a scrambled Sobol sequence, evenly spread; n a power of 2; more samples change no old case",
+        "random": "independent draws; neither more samples nor more parameters change an old case",
+    }
+)
 
 OF_DISTRIBUTIONS: Mapping[str, str] = MappingProxyType({
     "uniform": "evenly between two values", "loguniform": "evenly in the logarithm", "normal": "normal, without bounds",
@@ -58,18 +60,28 @@ class Subject:
     more: str
 
 
-SUBJECTS: Mapping[str, Subject] = MappingProxyType({
-    "functions": Subject(
-        "What values may call, and the constants", "let step = max(1 mm, sqrt(2) * 3 mm);", _functions,
-        "The arguments bear units, or the whole has one behind its bracket: `linspace(1, 2, 5) kg`."),
-    "designs": Subject(
-        "How the points of a sweep's sample lie", "sample lhs(200) { PATH = normal(20, 1) kg; }", _designs,
-        "What values the points become, `met doc distributions` says."),
-    "distributions": Subject(
-        "What a parameter of a sample is drawn from", "sample lhs(200) { PATH = uniform(0.09, 0.11) N*m/A; }",
-        _distributions,
-        f"The unit behind the brackets is for all numbers inside. Values are rounded to {DIGITS} digits in it."),
-})
+SUBJECTS: Mapping[str, Subject] = MappingProxyType(
+    {
+        "functions": Subject(
+            "What values may call, and the constants",
+            "let step = max(1 mm, sqrt(2) * 3 mm);",
+            _functions,
+            "The arguments bear units, or the whole has one behind its bracket: `linspace(1, 2, 5) kg`.",
+        ),
+        "designs": Subject(
+            "How the points of a sweep's sample lie",
+            "sample lhs(200) { PATH = normal(20, 1) kg; }",
+            _designs,
+            "What values the points become, `met doc distributions` says.",
+        ),
+        "distributions": Subject(
+            "What a parameter of a sample is drawn from",
+            "sample lhs(200) { PATH = uniform(0.09, 0.11) N*m/A; }",
+            _distributions,
+            f"The unit behind the brackets is for all numbers inside. Values are rounded to {DIGITS} digits in it.",
+        ),
+    }
+)
 
 
 def print_words(name: str) -> Iterator[str]:

@@ -24,9 +24,15 @@ def one(element: Element, tag: str) -> Element | None:
     """The element of this tag inside, None where there is none. Raises Problem D204 where there are two."""
     found = list(element.all(tag))
     if len(found) > 1:
-        raise Problem(error("D204", f"`<{tag}>` is there twice in this `<{element.tag}>`",
-                            Label(found[1].place, "again"), also=[Label(found[0].place, "first")],
-                            help="remove one of the two"))
+        raise Problem(
+            error(
+                "D204",
+                f"`<{tag}>` is there twice in this `<{element.tag}>`",
+                Label(found[1].place, "again"),
+                also=[Label(found[0].place, "first")],
+                help="remove one of the two",
+            )
+        )
     return found[0] if found else None
 
 
@@ -42,8 +48,9 @@ def word(element: Element, attribute: str, usage: str) -> Written:
     """The text of an attribute that must be there. Raises Problem D205; D203 where xacro would have made it."""
     text = element.attributes.get(attribute, "").strip()
     if not text:
-        raise Problem(error("D205", f"this `<{element.tag}>` has no `{attribute}`", element.place,
-                            help=f"write `{usage}`"))
+        raise Problem(
+            error("D205", f"this `<{element.tag}>` has no `{attribute}`", element.place, help=f"write `{usage}`")
+        )
     place = element.place_of(attribute)
     if "${" in text or "$(" in text:
         raise Problem(error("D203", f"`{shown(text)}` is to be filled in", place, help=XACRO))
@@ -62,12 +69,24 @@ def numbers(element: Element, attribute: str, count: int) -> Numbers | None:
         if not _NUMBER.fullmatch(each) or not math.isfinite(float(each)):
             commas = "," in each and all(_NUMBER.fullmatch(part) for part in each.split(",") if part)
             remedy = "a number is finite, and written as 12.5 or -1e-3, without a unit"
-            raise Problem(error("D206", f"`{shown(each)}` is not a number", place,
-                                help="spaces part the numbers, not commas" if commas else remedy))
+            raise Problem(
+                error(
+                    "D206",
+                    f"`{shown(each)}` is not a number",
+                    place,
+                    help="spaces part the numbers, not commas" if commas else remedy,
+                )
+            )
     if len(words) != count:
         wanted = "one number is" if count == 1 else f"{count} numbers are"
-        raise Problem(error("D206", f"{wanted} needed in `{attribute}` of `<{element.tag}>`, not {len(words)}", place,
-                            help="spaces part the numbers" if count > 1 else "write one, without a unit"))
+        raise Problem(
+            error(
+                "D206",
+                f"{wanted} needed in `{attribute}` of `<{element.tag}>`, not {len(words)}",
+                place,
+                help="spaces part the numbers" if count > 1 else "write one, without a unit",
+            )
+        )
     return Numbers(tuple(float(each) + 0.0 for each in words), place)  # -0 is 0
 
 
@@ -75,8 +94,14 @@ def number(element: Element, attribute: str) -> Numbers:
     """One number, which must be there. Raises Problem D205, D206."""
     found = numbers(element, attribute, 1)
     if found is None:
-        raise Problem(error("D205", f"this `<{element.tag}>` has no `{attribute}`", element.place,
-                            help=f"write `<{element.tag} {attribute}=\"...\"/>`"))
+        raise Problem(
+            error(
+                "D205",
+                f"this `<{element.tag}>` has no `{attribute}`",
+                element.place,
+                help=f'write `<{element.tag} {attribute}="..."/>`',
+            )
+        )
     return found
 
 
@@ -94,5 +119,11 @@ def known(element: Element, attributes: Iterable[str]) -> None:
     for each, text in element.attributes.items():
         if each not in names and not _NOTHING.fullmatch(text):
             listed = ", ".join(f"`{name}`" for name in names)
-            raise Problem(error("D208", f"`<{element.tag}>` has no attribute `{shown(each)}`", element.name_place(each),
-                                help=[*did_you_mean(each, names), f"it has {listed}"]))
+            raise Problem(
+                error(
+                    "D208",
+                    f"`<{element.tag}>` has no attribute `{shown(each)}`",
+                    element.name_place(each),
+                    help=[*did_you_mean(each, names), f"it has {listed}"],
+                )
+            )

@@ -61,7 +61,7 @@ def _block(part: Part, notes: list[str]) -> Iterator[str]:
     settings = [(entry.path[0].text, f"{spell(entry.value)};") for entry in entries]
     note = f"// {'; '.join(map(_safe, notes))}" if notes else ""
     ends = [each for each in settings if each[0] in ("parent", "child")]
-    others = settings[len(ends):]
+    others = settings[len(ends) :]
     head = "  ".join(f"{key} = {value}" for key, value in ends)
     line = f"    {words} {{ {'  '.join(f'{key} = {value}' for key, value in settings)} }}"
     first = line if len(line) <= WIDE else f"    {words} {{"
@@ -156,8 +156,9 @@ def _runs(body: Body, arm: str) -> Iterator[str]:
         yield from _fall(joints, rubbing, slides, lambda name: _free(name, taken))
 
 
-def _fall(joints: Mapping[str, Joint], rubbing: Mapping[str, Joint], slides: Collection[str],
-          free: Callable[[str], str]) -> Iterator[str]:
+def _fall(
+    joints: Mapping[str, Joint], rubbing: Mapping[str, Joint], slides: Collection[str], free: Callable[[str], str]
+) -> Iterator[str]:
     yield ""
     yield "// The joints let go, with the damping and friction of the file."
     for name in joints:

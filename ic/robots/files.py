@@ -53,8 +53,14 @@ def _file_named(made_from: Call) -> String:
     """Raises Problem D214 for what is not `urdf("FILE")`."""
     name = made_from.name.text
     if name not in MODELS:
-        raise Problem(error("D214", f"no arm is made from `{name}`", made_from.name.place,
-                            help=[*did_you_mean(name, MODELS), known_words("an arm is made from", MODELS)]))
+        raise Problem(
+            error(
+                "D214",
+                f"no arm is made from `{name}`",
+                made_from.name.place,
+                help=[*did_you_mean(name, MODELS), known_words("an arm is made from", MODELS)],
+            )
+        )
     given = made_from.positional[0] if len(made_from.positional) == 1 and not made_from.named else None
     if not isinstance(given, String):
         raise Problem(error("D214", "`urdf` takes the name of one file, in quotes", made_from.place, help=USAGE))

@@ -45,6 +45,7 @@ def imported(path: str, mimic: Mimic | None = None) -> str:
 
 def without_mimics(robot: Robot, mimic: Mimic) -> Robot:
     """The robot with joints that follow others let go, or fixed where they are at 0; `print_deck` says which."""
+
     def changed(joint: Joint) -> Joint:
         if joint.mimic is None:
             return joint
@@ -71,6 +72,6 @@ def _mended(found: tuple[Diagnostic, ...]) -> list[Diagnostic]:
     follow = "`--mimic free` lets such joints move by themselves, `--mimic fixed` holds them at 0"
     made = [replace(each, help=(follow,)) if each.code == "D213" else each for each in found]
     if made[-1].code != "D213":
-        other = "write a deck with `arm NAME from urdf(\"FILE\") { ... }`: its block can change what the file says"
+        other = 'write a deck with `arm NAME from urdf("FILE") { ... }`: its block can change what the file says'
         made[-1] = replace(made[-1], help=(*made[-1].help, other))
     return made

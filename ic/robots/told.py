@@ -68,4 +68,3 @@ def _joints(body: Body, joints: Sequence[Joint]) -> str:
 
 def _count(n: int, what: str) -> str:
     return f"{n} {what}{'s' * (n != 1)}"
-

@@ -38,12 +38,24 @@ def read(name: str, text: str) -> Robot:
     if root.tag != "robot":
         kind = _FORMATS.get(root.tag)
         what = f": this is {kind}" if kind else ""
-        raise Problem(error("D203", f"`<{shown(root.tag)}>` is not URDF{what}", root.place,
-                            help="a URDF file is `<robot name=\"...\"> ... </robot>`"))
+        raise Problem(
+            error(
+                "D203",
+                f"`<{shown(root.tag)}>` is not URDF{what}",
+                root.place,
+                help='a URDF file is `<robot name="..."> ... </robot>`',
+            )
+        )
     for n, element in enumerate(root.all("link")):
         if n == MOST_LINKS:
-            raise Problem(error("D202", f"a robot has at most {MOST_LINKS} links", element.place,
-                                help="a robot has some ten: is this the right file?"))
+            raise Problem(
+                error(
+                    "D202",
+                    f"a robot has at most {MOST_LINKS} links",
+                    element.place,
+                    help="a robot has some ten: is this the right file?",
+                )
+            )
     complaints = Complaints()
     dropped: dict[str, list[Place]] = {}
     links, joints = [], []
@@ -61,8 +73,14 @@ def read(name: str, text: str) -> Robot:
     if complaints.errors:
         raise Problem(complaints.errors)
     robot = root.attributes.get("name", "").strip()
-    return Robot(name, robot, tuple(links), tuple(joints), _root(root, links, joints),
-                 {tag: tuple(places) for tag, places in dropped.items()})
+    return Robot(
+        name,
+        robot,
+        tuple(links),
+        tuple(joints),
+        _root(root, links, joints),
+        {tag: tuple(places) for tag, places in dropped.items()},
+    )
 
 
 def _within(root: Element) -> Iterator[Element]:
@@ -151,9 +169,13 @@ def _check_names(named: Sequence[Link] | Sequence[Joint], kind: str, complaints:
     first: dict[str, Place] = {}
     for each in named:
         if each.name.text in first:
-            complaints.error("D204", f"{kind} `{shown(each.name.text)}` is there twice",
-                             Label(each.name.place, "again"), also=[Label(first[each.name.text], "first")],
-                             help="give one of the two another name")
+            complaints.error(
+                "D204",
+                f"{kind} `{shown(each.name.text)}` is there twice",
+                Label(each.name.place, "again"),
+                also=[Label(first[each.name.text], "first")],
+                help="give one of the two another name",
+            )
         first.setdefault(each.name.text, each.name.place)
 
 
@@ -163,15 +185,18 @@ def _check_ends(links: Sequence[Link], joints: Sequence[Joint], complaints: Comp
     for joint in joints:
         for end in (joint.parent, joint.child):
             if end.text not in names:
-                complaints.error("D207", f"no link `{shown(end.text)}` in this file", end.place,
-                                 also=[Label(joint.name.place, f"joint `{shown(joint.name.text)}`")],
-                                 help=[*did_you_mean(end.text, names),
-                                       known_words("links", map(shown, sorted(names)))])
+                complaints.error(
+                    "D207",
+                    f"no link `{shown(end.text)}` in this file",
+                    end.place,
+                    also=[Label(joint.name.place, f"joint `{shown(joint.name.text)}`")],
+                    help=[*did_you_mean(end.text, names), known_words("links", map(shown, sorted(names)))],
+                )
 
 
 def _root(element: Element, links: Sequence[Link], joints: Sequence[Joint]) -> Link:
-    """The link that no joint carries. Raises Problem D209 where there is none or more than one, or it carries nothing.
-    """
+    """The link that no joint carries. Raises Problem D209 where there is none or more than one, or it carries
+    nothing."""
     carried = {joint.child.text for joint in joints}
     roots = [link for link in links if link.name.text not in carried]
     if not joints:
@@ -179,13 +204,23 @@ def _root(element: Element, links: Sequence[Link], joints: Sequence[Joint]) -> L
         raise Problem(error("D209", f"this robot {what}", element.place, help="an arm has a joint at least"))
     if not roots:
         also = [Label(joint.name.place, f"joint `{shown(joint.name.text)}`") for joint in joints[1:MOST_NAMED]]
-        raise Problem(error("D209", "every link of this robot hangs on another: none is its base", joints[0].name.place,
-                            also=also,
-                            help="one of the joints closes a loop; a closed chain is not in this version"))
+        raise Problem(
+            error(
+                "D209",
+                "every link of this robot hangs on another: none is its base",
+                joints[0].name.place,
+                also=also,
+                help="one of the joints closes a loop; a closed chain is not in this version",
+            )
+        )
     if len(roots) > 1:
-        raise Problem(error("D209", f"{len(roots)} links of this robot hang on no other, and an arm has one base",
-                            Label(roots[0].name.place, shown(roots[0].name.text)),
-                            also=[Label(each.name.place, shown(each.name.text)) for each in roots[1:MOST_NAMED]],
-                            help="join them by a `<joint type=\"fixed\">`, or take one of the robots out of the file"))
+        raise Problem(
+            error(
+                "D209",
+                f"{len(roots)} links of this robot hang on no other, and an arm has one base",
+                Label(roots[0].name.place, shown(roots[0].name.text)),
+                also=[Label(each.name.place, shown(each.name.text)) for each in roots[1:MOST_NAMED]],
+                help='join them by a `<joint type="fixed">`, or take one of the robots out of the file',
+            )
+        )
     return roots[0]
-

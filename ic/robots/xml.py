@@ -96,11 +96,18 @@ def parse(name: str, text: str) -> Element:
         nonlocal count
         count += 1
         if count > MOST_ELEMENTS:
-            raise Problem(error("D202", f"a URDF file has at most {MOST_ELEMENTS} elements", here(),
-                                help="a robot has some hundred: is this the right file?"))
+            raise Problem(
+                error(
+                    "D202",
+                    f"a URDF file has at most {MOST_ELEMENTS} elements",
+                    here(),
+                    help="a robot has some hundred: is this the right file?",
+                )
+            )
         if len(open_) >= XML_DEPTH:
-            raise Problem(error("D202", f"elements go deeper than {XML_DEPTH}", here(),
-                                help="those of URDF go some six deep"))
+            raise Problem(
+                error("D202", f"elements go deeper than {XML_DEPTH}", here(), help="those of URDF go some six deep")
+            )
         element = Element(tag, attributes, source, parser.CurrentByteIndex)
         (open_[-1].children if open_ else root).append(element)
         open_.append(element)
@@ -111,8 +118,9 @@ def parse(name: str, text: str) -> Element:
     def document_type(*_: object) -> None:
         begin = b"<!DOCTYPE"
         at = max(0, source.data.rfind(begin, 0, parser.CurrentByteIndex + len(begin)))
-        raise Problem(error("D201", "a document type and entities are not read", source.place(at, at + len(begin)),
-                            help=_REMEDY))
+        raise Problem(
+            error("D201", "a document type and entities are not read", source.place(at, at + len(begin)), help=_REMEDY)
+        )
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.StartDoctypeDeclHandler = document_type
@@ -143,8 +151,13 @@ def _not_xml(source: Source, at: int, code: int, open_: list[Element]) -> Diagno
         "unbound prefix": "declare it in `<robot xmlns:PREFIX=\"...\">`",
     }  # fmt: skip
     left_open = bool(open_) and why in ("mismatched tag", "no element found")
-    return error("D200", f"`{source.name}` is no XML: {why}", place,
-                 also=[Label(open_[-1].place, "opened here")] if left_open else [], help=helps.get(why, _NO_URDF))
+    return error(
+        "D200",
+        f"`{source.name}` is no XML: {why}",
+        place,
+        also=[Label(open_[-1].place, "opened here")] if left_open else [],
+        help=helps.get(why, _NO_URDF),
+    )
 
 
 def _of_token(data: bytes, at: int) -> str:
@@ -154,7 +167,7 @@ def _of_token(data: bytes, at: int) -> str:
     if re.search(rb"&\w*\Z", data[max(0, at - SHOWN) : at]):
         return "`&` is written `&amp;`"
     if data[at : at + 1] == b"<":
-        return "in a value `<` is written `&lt;`; else a `\"` or a `>` is missing before it"
+        return 'in a value `<` is written `&lt;`; else a `"` or a `>` is missing before it'
     if data.rfind(b"<", 0, at) > data.rfind(b">", 0, at):
-        return "within a tag stands `NAME=\"...\"`, in quotes, with a blank before it"
+        return 'within a tag stands `NAME="..."`, in quotes, with a blank before it'
     return _NO_URDF

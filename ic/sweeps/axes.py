@@ -78,8 +78,9 @@ class Sweep:
         return (*(axis.size for axis in self.axes), self.repeat)
 
 
-def read_sweep(definitions: Definitions, complaints: Complaints, definition: Definition, graph: Graph, *,
-               seed: int = 0) -> Sweep:
+def read_sweep(
+    definitions: Definitions, complaints: Complaints, definition: Definition, graph: Graph, *, seed: int = 0
+) -> Sweep:
     """The sweep's axes with their values; tells what is wrong with them. seed: the run's, for what is drawn."""
     reader = _Reader(definitions, complaints, definition, graph, seed)
     for entry in definition.group.body:
@@ -87,16 +88,32 @@ def read_sweep(definitions: Definitions, complaints: Complaints, definition: Def
             reader.enter(entry)
         if len(reader.axes) >= MOST_COUNTED and _product(reader) > MOST_CASES:
             break
-    sweep = Sweep(definition.name, tuple(reader.axes), tuple(reader.excludes), reader.seed, reader.independent,
-                  reader.repeat, reader.repeated, definition.place)
+    sweep = Sweep(
+        definition.name,
+        tuple(reader.axes),
+        tuple(reader.excludes),
+        reader.seed,
+        reader.independent,
+        reader.repeat,
+        reader.repeated,
+        definition.place,
+    )
     if not sweep.axes and sweep.repeated is None and not complaints.errors:
-        complaints.error("D126", f"sweep `{definition.name}` varies nothing", definition.place,
-                         help="write `vary PATH = [...] UNIT;`")
+        complaints.error(
+            "D126",
+            f"sweep `{definition.name}` varies nothing",
+            definition.place,
+            help="write `vary PATH = [...] UNIT;`",
+        )
     if math.prod(sweep.sizes) > MOST_CASES:
         sizes = [str(size) for size in sweep.sizes[: None if sweep.repeated else -1]]
         more = "more than " if len(sweep.axes) >= MOST_COUNTED else ""
-        complaints.error("D134", f"sweep `{definition.name}` has {more}{math.prod(sweep.sizes)} cases",
-                         definition.place, help=f"{MOST_CASES} are possible: {' x '.join(sizes)} is more")
+        complaints.error(
+            "D134",
+            f"sweep `{definition.name}` has {more}{math.prod(sweep.sizes)} cases",
+            definition.place,
+            help=f"{MOST_CASES} are possible: {' x '.join(sizes)} is more",
+        )
     return sweep
 
 
@@ -108,8 +125,9 @@ def _product(reader: _Reader) -> int:
 class _Reader:
     """Entry after entry of a sweep's block."""
 
-    def __init__(self, definitions: Definitions, complaints: Complaints, definition: Definition, graph: Graph,
-                 seed: int) -> None:
+    def __init__(
+        self, definitions: Definitions, complaints: Complaints, definition: Definition, graph: Graph, seed: int
+    ) -> None:
         self.definitions, self.complaints, self.graph, self.drawn = definitions, complaints, graph, 0
         self.axes: list[Axis] = []
         self.excludes: list[Statement] = []
@@ -149,9 +167,17 @@ class _Reader:
             case Setting() if _is(entry, "seeds"):
                 word = entry.value.text if isinstance(entry.value, Name) else ""
                 if word not in ("common", "independent"):
-                    raise Problem(error("D221", "`seeds` is `common` or `independent`", place_of(entry.value),
-                                        help=["common: cases that differ in what is varied feel the same noise",
-                                              "independent: each case has noise of its own"]))
+                    raise Problem(
+                        error(
+                            "D221",
+                            "`seeds` is `common` or `independent`",
+                            place_of(entry.value),
+                            help=[
+                                "common: cases that differ in what is varied feel the same noise",
+                                "independent: each case has noise of its own",
+                            ],
+                        )
+                    )
                 self.independent = entry.place if word == "independent" else None
             case _:
                 _refuse(entry, words, self.base)
@@ -165,18 +191,29 @@ class _Reader:
             with self.complaints.gather():
                 words = [word.text for word in entry.words] if isinstance(entry, Setting) else None
                 if words is None or words not in ([], ["vary"], ["macro"], ["vary", "macro"]):
-                    raise Problem(error("D136", "a zip holds `PATH = [...];` and nothing else", entry.place,
-                                        help="all else stands in the sweep, beside the zip"))
+                    raise Problem(
+                        error(
+                            "D136",
+                            "a zip holds `PATH = [...];` and nothing else",
+                            entry.place,
+                            help="all else stands in the sweep, beside the zip",
+                        )
+                    )
                 assert isinstance(entry, Setting)
                 columns.append(self.column(entry, entry.words[-1:] if "macro" in words else ()))
         if not group.body:
             raise Problem(error("D126", "this zip is empty", group.place, help="write `PATH = [...];` in it"))
         for other in columns[1:]:
             if len(other) != len(columns[0]):
-                raise Problem(error(
-                    "D135", f"`{columns[0].path}` has {len(columns[0])} values and `{other.path}` has {len(other)}",
-                    other.place, also=[Label(columns[0].place, f"{len(columns[0])} values")],
-                    help="what is zipped goes in step: as many values each"))
+                raise Problem(
+                    error(
+                        "D135",
+                        f"`{columns[0].path}` has {len(columns[0])} values and `{other.path}` has {len(other)}",
+                        other.place,
+                        also=[Label(columns[0].place, f"{len(columns[0])} values")],
+                        help="what is zipped goes in step: as many values each",
+                    )
+                )
         if columns and self.complaints.faults == before:
             check_equal(columns, self.places.get(columns[0].path, ()))
             self.axes.append(Axis(tuple(columns)))
@@ -184,8 +221,14 @@ class _Reader:
     def file(self, statement: Statement) -> None:
         """`from "cases.csv";`: a row of the file a case, or a value of the axis; its columns are paths."""
         if not isinstance(statement.value, String):
-            raise Problem(error("D222", "`from` takes the name of a CSV file", place_of(statement.value),
-                                help='write `from "cases.csv";`: its first line names paths, with units'))
+            raise Problem(
+                error(
+                    "D222",
+                    "`from` takes the name of a CSV file",
+                    place_of(statement.value),
+                    help='write `from "cases.csv";`: its first line names paths, with units',
+                )
+            )
         from ic.sweeps.files import columns_of
 
         columns, rows = columns_of(self.definitions, statement.value, self.graph)
@@ -195,8 +238,9 @@ class _Reader:
         self.axes.append(Axis(tuple(columns)))
 
     def sample(self, statement: Statement) -> None:
-        sample = read_sample(self.definitions, self.complaints, statement, self.paths,
-                             self.run_seed if self.seed is None else self.seed)
+        sample = read_sample(
+            self.definitions, self.complaints, statement, self.paths, self.run_seed if self.seed is None else self.seed
+        )
         for part in sample.parts:
             self.note(part.path, part.place)
         self.drawn += 1
@@ -211,8 +255,15 @@ class _Reader:
 
     def repeats(self, statement: Statement) -> None:
         if self.repeated is not None:
-            raise Problem(error("D040", "`repeat` is written twice", statement.place,
-                                also=[Label(self.repeated, "first")], help="leave one out"))
+            raise Problem(
+                error(
+                    "D040",
+                    "`repeat` is written twice",
+                    statement.place,
+                    also=[Label(self.repeated, "first")],
+                    help="leave one out",
+                )
+            )
         self.repeat = whole(self.definitions, statement.value, "a number of repeats", least=2)
         self.repeated = statement.place
 
@@ -220,8 +271,15 @@ class _Reader:
 
     def note(self, path: str, place: Place) -> None:
         if path in self.written:
-            raise Problem(error("D040", f"`{path}` is varied twice", place, also=[Label(self.written[path], "first")],
-                                help="leave one out"))
+            raise Problem(
+                error(
+                    "D040",
+                    f"`{path}` is varied twice",
+                    place,
+                    also=[Label(self.written[path], "first")],
+                    help="leave one out",
+                )
+            )
         self.written[path] = place
 
     def column(self, entry: Setting, detail: Sequence[Word] = ()) -> Column:
@@ -243,25 +301,51 @@ class _Reader:
         found = names.evaluate(entry.value)
         check_still(path, entry, names, self.paths)
         if isinstance(found, Value):
-            raise Problem(error("D126", f"`{path}` varies over a list of values, and this is one value", found.place,
-                                help=["write `[a, b, c] UNIT`, `(a .. b by c) UNIT` or `linspace(from, to, count) "
-                                      "UNIT`", "one value that stands still belongs in the run"]))
+            raise Problem(
+                error(
+                    "D126",
+                    f"`{path}` varies over a list of values, and this is one value",
+                    found.place,
+                    help=[
+                        "write `[a, b, c] UNIT`, `(a .. b by c) UNIT` or `linspace(from, to, count) UNIT`",
+                        "one value that stands still belongs in the run",
+                    ],
+                )
+            )
         values = [value for value in found.items if isinstance(value, Value)]
         if len(values) != len(found.items):
-            raise Problem(error("D126", "a list inside a list", found.place,
-                                help=f"a vector varies by its parts: `vary {path}.x = [...];`"))
+            raise Problem(
+                error(
+                    "D126",
+                    "a list inside a list",
+                    found.place,
+                    help=f"a vector varies by its parts: `vary {path}.x = [...];`",
+                )
+            )
         if not values:
             raise Problem(error("D126", f"`{path}` has no values", found.place, help="one at least"))
         first = values[0]
         for value in values[1:]:
             if not units.same(value.dimension, first.dimension):
-                raise Problem(error("D063", f"{named(value)} in a list that begins with {named(first)}", value.place,
-                                    also=[Label(first.place, named(first))], help="all must be of one dimension"))
+                raise Problem(
+                    error(
+                        "D063",
+                        f"{named(value)} in a list that begins with {named(first)}",
+                        value.place,
+                        also=[Label(first.place, named(first))],
+                        help="all must be of one dimension",
+                    )
+                )
         unit = found.unit or first.unit
         bare = all(value.bare for value in values)
         self.places[path] = [value.place for value in values]
-        return self.varied(path, path_place(entry), np.array([value.number for value in values], dtype=float),
-                           Value(0.0, first.dimension, first.place, bare, unit, hertz=first.hertz), unit)
+        return self.varied(
+            path,
+            path_place(entry),
+            np.array([value.number for value in values], dtype=float),
+            Value(0.0, first.dimension, first.place, bare, unit, hertz=first.hertz),
+            unit,
+        )
 
     def varied(self, path: str, place: Place, numbers: np.ndarray, like: Value, unit) -> Varied:  # type: ignore[no-untyped-def]
         """A column of numbers in SI. like: a value of its dimension; unit: the one that the deck wrote."""
@@ -280,8 +364,12 @@ def whole(definitions: Definitions, expression: Expression, what: str, *, least:
     """A whole number that no sweep varies. Raises Problem D113."""
     found = evaluate_number(expression, Names(definitions, {}).find)
     number = found.number
-    if isinstance(number, Scalar) or found.dimension != PURE or not float(number).is_integer() \
-            or not least <= number <= 2**53:
+    if (
+        isinstance(number, Scalar)
+        or found.dimension != PURE
+        or not float(number).is_integer()
+        or not least <= number <= 2**53
+    ):
         most = "2^53" if least == 0 else f"{MOST_CASES}"
         raise Problem(error("D113", f"{what} is a whole number from {least} to {most}", found.place))
     return int(number)
@@ -311,31 +399,68 @@ def _refuse(entry: object, words: list[str], base: str) -> None:
     place = entry.place  # type: ignore[attr-defined]  # every entry has one
     if isinstance(entry, Setting) and not words and len(entry.path) == 1 and entry.path[0].text in ("repeat", "sample"):
         usage = {"repeat": "repeat 5;", "sample": "sample lhs(200) { PATH = uniform(a, b) UNIT; }"}
-        raise Problem(error("D136", f"`{entry.path[0].text} = ...` in a sweep", place,
-                            help=f"write `{usage[entry.path[0].text]}`"))
+        raise Problem(
+            error(
+                "D136", f"`{entry.path[0].text} = ...` in a sweep", place, help=f"write `{usage[entry.path[0].text]}`"
+            )
+        )
     if isinstance(entry, Setting) and not words:
         path = ".".join(word.text for word in entry.path)
         vary = [] if entry.path[0].text == "tolerances" else [f"`vary {path} = [...];` to vary it"]
         where = f"set it in a run `like {base}`, and sweep that"
         if entry.path[0].text == "links":
             where = f"write it in an arm `like` the run's, and sweep a run `like {base}` that takes that arm"
-        raise Problem(error("D136", f"`{path} = ...` in a sweep", place,
-                            help=[*vary, f"{'or ' if vary else ''}{where}"]))
+        raise Problem(
+            error("D136", f"`{path} = ...` in a sweep", place, help=[*vary, f"{'or ' if vary else ''}{where}"])
+        )
     if words[:1] == ["sample"]:
-        raise Problem(error("D136", "a sample names its design and how many", place,
-                            help=f"write `sample lhs(200) {{ ... }}`; {known_words('designs', DESIGNS)}"))
+        raise Problem(
+            error(
+                "D136",
+                "a sample names its design and how many",
+                place,
+                help=f"write `sample lhs(200) {{ ... }}`; {known_words('designs', DESIGNS)}",
+            )
+        )
     if words[:3] == ["exclude", "when", "macro"]:
-        raise Problem(error("D136", "a condition names a macro by its name alone", place,
-                            help="leave out the word `macro`: the macro's value is put in as text"))
+        raise Problem(
+            error(
+                "D136",
+                "a condition names a macro by its name alone",
+                place,
+                help="leave out the word `macro`: the macro's value is put in as text",
+            )
+        )
     if words[:1] == ["require"]:
-        raise Problem(error("D136", "`require` in a sweep", place,
-                            help=f"it belongs to the run: write a run `like {base}` with it, and sweep that"))
+        raise Problem(
+            error(
+                "D136",
+                "`require` in a sweep",
+                place,
+                help=f"it belongs to the run: write a run `like {base}` with it, and sweep that",
+            )
+        )
     if words[:1] == ["tolerances"]:
-        raise Problem(error("D136", "`tolerances` in a sweep", place,
-                            help=f"they belong to the run: write a run `like {base}` with them, and sweep that"))
-    raise Problem(error("D136", f"no `{' '.join(words)}` in a sweep", place,
-                        help=[*did_you_mean(" ".join(words), KNOWN), *belongs(words[0] if words else ""),
-                              known_words("a sweep has", KNOWN)]))
+        raise Problem(
+            error(
+                "D136",
+                "`tolerances` in a sweep",
+                place,
+                help=f"they belong to the run: write a run `like {base}` with them, and sweep that",
+            )
+        )
+    raise Problem(
+        error(
+            "D136",
+            f"no `{' '.join(words)}` in a sweep",
+            place,
+            help=[
+                *did_you_mean(" ".join(words), KNOWN),
+                *belongs(words[0] if words else ""),
+                known_words("a sweep has", KNOWN),
+            ],
+        )
+    )
 
 
 def named(value: Value) -> str:
@@ -345,14 +470,21 @@ def named(value: Value) -> str:
 def check_equal(columns: Sequence[Column], places: Sequence[Place]) -> None:
     """The same values twice are the same case twice. places: of the rows, or of the first column's numbers."""
     seen: dict[tuple[float | str, ...], int] = {}
-    keys = [column.values.tolist() if isinstance(column, Varied) else [o.text for o in column.options]
-            for column in columns]
+    keys = [
+        column.values.tolist() if isinstance(column, Varied) else [o.text for o in column.options] for column in columns
+    ]
     for n, row in enumerate(zip(*keys, strict=True)):
         if row in seen:
             if isinstance(columns[0], Chosen) and not places:
                 places = [option.place for option in columns[0].options]
             first, again = places[seen[row]], places[n]
-            raise Problem(error("D133", f"values number {seen[row] + 1} and {n + 1} are the same", again,
-                                also=[Label(first, "first")] if first != again else [],
-                                help="leave one out: each case stands in the table once"))
+            raise Problem(
+                error(
+                    "D133",
+                    f"values number {seen[row] + 1} and {n + 1} are the same",
+                    again,
+                    also=[Label(first, "first")] if first != again else [],
+                    help="leave one out: each case stands in the table once",
+                )
+            )
         seen[row] = n

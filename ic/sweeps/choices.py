@@ -110,8 +110,14 @@ def refuse_words(path: str, place: Place, values: Expression, names: Names) -> N
     items = values.items if isinstance(values, List) else ()
     model = next((item for item in items if isinstance(item, Call) and item.name.text not in FUNCTIONS), None)
     if model is not None:
-        raise Problem(error("D122", f"`{path}` cannot vary over `{model.name.text}` and the like", place_of(model),
-                            help=[f"vary a parameter of it: `vary {path}.PARAMETER = [...];`", A_RUN_FOR_EACH]))
+        raise Problem(
+            error(
+                "D122",
+                f"`{path}` cannot vary over `{model.name.text}` and the like",
+                place_of(model),
+                help=[f"vary a parameter of it: `vary {path}.PARAMETER = [...];`", A_RUN_FOR_EACH],
+            )
+        )
     word = word_in(values, names)
     if word is not None:
         helps = [A_RUN_FOR_EACH]
@@ -140,12 +146,26 @@ def check_still(path: str, entry: Setting, names: Names, varied: Mapping[str, Pl
     """Raises Problem D121 where the values were computed from what varies. varied: all paths of the sweep."""
     for other in names.followed:
         if other == path:
-            raise Problem(error("D121", f"the values of `{path}` depend on `{path}` itself, which varies",
-                                place_of(entry.value), help="write numbers that stand still"))
-        raise Problem(error("D121", f"the values of `{path}` depend on `{other}`, which varies too",
-                            place_of(entry.value), also=[Label(varied[other], "varies here")],
-                            help=["write numbers that stand still",
-                                  f"or compute it from `{other}` where it is defined, and vary `{other}` alone"]))
+            raise Problem(
+                error(
+                    "D121",
+                    f"the values of `{path}` depend on `{path}` itself, which varies",
+                    place_of(entry.value),
+                    help="write numbers that stand still",
+                )
+            )
+        raise Problem(
+            error(
+                "D121",
+                f"the values of `{path}` depend on `{other}`, which varies too",
+                place_of(entry.value),
+                also=[Label(varied[other], "varies here")],
+                help=[
+                    "write numbers that stand still",
+                    f"or compute it from `{other}` where it is defined, and vary `{other}` alone",
+                ],
+            )
+        )
 
 
 def chosen(path: str, entry: Setting, names: Names) -> Chosen:
@@ -154,13 +174,20 @@ def chosen(path: str, entry: Setting, names: Names) -> Chosen:
     if isinstance(values, List):
         options = [_option(item, names, None) for item in values.items]
     elif isinstance(values, WithUnit) and isinstance(values.inner, List):
-        options = [_option(WithUnit(item, values.unit, place_of(item)), names, values.unit)
-                   for item in values.inner.items]
+        options = [
+            _option(WithUnit(item, values.unit, place_of(item)), names, values.unit) for item in values.inner.items
+        ]
     else:
         found = evaluate(values, names.find) if not isinstance(values, (Name, String)) else None
         if not isinstance(found, Values):
-            raise Problem(error("D126", f"`{path}` varies over a list, and this is one value", place_of(values),
-                                help=f"write `vary {path} = [{spell(values)}, ...];`"))
+            raise Problem(
+                error(
+                    "D126",
+                    f"`{path}` varies over a list, and this is one value",
+                    place_of(values),
+                    help=f"write `vary {path} = [{spell(values)}, ...];`",
+                )
+            )
         options = [_number(item, found.unit) for item in found.items if isinstance(item, Value)]
     if not options:
         raise Problem(error("D126", f"`{path}` has no values", place_of(values), help="one at least"))
@@ -182,16 +209,23 @@ def _option(item: Expression, names: Names, unit: Unit | None) -> Option:
 
 def _number(value: Value, unit: Unit | None) -> Option:
     if isinstance(value.number, Scalar):
-        raise Problem(error("D121", "this value depends on what the sweep varies", value.place,
-                            help="write numbers that stand still"))
+        raise Problem(
+            error(
+                "D121",
+                "this value depends on what the sweep varies",
+                value.place,
+                help="write numbers that stand still",
+            )
+        )
     measure = measure_of(unit) if unit is not None else units.ONE
     number = float(value.number) / measure.scale
     text = f"{number:.12g}"
     shown = f"{text} {unit.text}" if unit is not None else text
     if measure.to_si(float(text), text) == value.number:
         number = float(text)
-    return Option(shown, Number(number, unit, value.place, text if number == float(text) else repr(number)),
-                  value.place)
+    return Option(
+        shown, Number(number, unit, value.place, text if number == float(text) else repr(number)), value.place
+    )
 
 
 # A run with its choices put in
@@ -210,8 +244,14 @@ def put_in(definitions: Definitions, run: Definition, choices: Choices) -> tuple
         servo = definitions.of_kind("servo").get(first)
         if servo is not None and rest:
             if len(rest) > 1 and rest[0] != SENSOR:
-                raise Problem(error("D122", f"`{column.path}` cannot vary by itself", column.place,
-                                    help=f"vary all of it: `vary {first}.{rest[0]} = [...];`"))
+                raise Problem(
+                    error(
+                        "D122",
+                        f"`{column.path}` cannot vary by itself",
+                        column.place,
+                        help=f"vary all of it: `vary {first}.{rest[0]} = [...];`",
+                    )
+                )
             earlier = next((each for each in servos if each.name == first), servo)
             entry = inside(in_servo(rest, definitions.block(earlier)), option.expression, column.place)
             servos = [*(each for each in servos if each is not earlier), replace(earlier, upon=(*earlier.upon, entry))]
@@ -272,9 +312,15 @@ def _place(tree: dict[str, Any], keys: Sequence[str], column: Chosen, option: Op
 
 
 def _both(earlier: Chosen, later: Chosen) -> Problem:
-    return Problem(error("D123", f"`{earlier.path}` and `{later.path}` set the same", later.place,
-                         also=[Label(earlier.place, "the first")], help="vary one of them, or go two ways: "
-                         "two sweeps, and `sweep NAME = ONE + OTHER;`"))
+    return Problem(
+        error(
+            "D123",
+            f"`{earlier.path}` and `{later.path}` set the same",
+            later.place,
+            also=[Label(earlier.place, "the first")],
+            help="vary one of them, or go two ways: two sweeps, and `sweep NAME = ONE + OTHER;`",
+        )
+    )
 
 
 def _entries(tree: dict[str, Any]) -> list[Entry]:

@@ -85,18 +85,25 @@ class Sample:
         for part, values in zip(self.parts, found, strict=True):
             different = len(distinct(values))
             if 2 * different < self.count:
-                raise Problem(error("D225", f"`{part.path}` hardly varies: {self.count} samples have {different} "
-                                    f"value{'s' * (different != 1)}", part.place,
-                                    help=[f"values have {DIGITS} digits: draw it from a wider distribution",
-                                          "or leave it out"]))
+                raise Problem(
+                    error(
+                        "D225",
+                        f"`{part.path}` hardly varies: {self.count} samples have {different} "
+                        f"value{'s' * (different != 1)}",
+                        part.place,
+                        help=[f"values have {DIGITS} digits: draw it from a wider distribution", "or leave it out"],
+                    )
+                )
         return found
 
 
 def _points(design: str, count: int, paths: list[str], seed: int, number: int) -> np.ndarray:
     """Points of the open unit cube, [count, len(paths)]."""
     if design == "random":  # a stream for each path, so that more samples or parameters change no old value
-        streams = [np.random.Generator(np.random.Philox(key=[seed, zlib.crc32(path.encode()) << 32 | number]))
-                   for path in paths]
+        streams = [
+            np.random.Generator(np.random.Philox(key=[seed, zlib.crc32(path.encode()) << 32 | number]))
+            for path in paths
+        ]
         points = np.stack([stream.random(count) for stream in streams], axis=1)
     else:
         from scipy.stats import qmc  # takes most of a second to import
@@ -133,23 +140,42 @@ QUANTILES: Mapping[str, Callable[..., np.ndarray]] = {
 # Reading
 
 
-def read_sample(definitions: Definitions, complaints: Complaints, statement: Statement, paths: Mapping[str, Place],
-                seed: int) -> Sample:
+def read_sample(
+    definitions: Definitions, complaints: Complaints, statement: Statement, paths: Mapping[str, Place], seed: int
+) -> Sample:
     """`sample lhs(200) { PATH = uniform(a, b) UNIT; ... }`. paths: what the sweep varies, and where.
 
     Raises Problem, placed.
     """
     call = statement.value
     if not isinstance(call, Call) or call.body is None:
-        raise Problem(error("D224", "a sample is a design and a block", place_of(call),
-                            help="write `sample lhs(200) { PATH = uniform(a, b) UNIT; }`"))
+        raise Problem(
+            error(
+                "D224",
+                "a sample is a design and a block",
+                place_of(call),
+                help="write `sample lhs(200) { PATH = uniform(a, b) UNIT; }`",
+            )
+        )
     design = call.name.text
     if design not in DESIGNS:
-        raise Problem(error("D224", f"no design `{design}`", call.name.place,
-                            help=[*did_you_mean(design, DESIGNS), known_words("designs", DESIGNS)]))
+        raise Problem(
+            error(
+                "D224",
+                f"no design `{design}`",
+                call.name.place,
+                help=[*did_you_mean(design, DESIGNS), known_words("designs", DESIGNS)],
+            )
+        )
     if len(call.positional) != 1 or call.named:
-        raise Problem(error("D224", f"`{design}` takes the number of samples", call.name.place,
-                            help=f"write `sample {design}(200) {{ ... }}`"))
+        raise Problem(
+            error(
+                "D224",
+                f"`{design}` takes the number of samples",
+                call.name.place,
+                help=f"write `sample {design}(200) {{ ... }}`",
+            )
+        )
     names = Names(definitions, {}, watched=set(paths))
     count = _count(evaluate_number(call.positional[0], names.find))
     parts = []
@@ -158,26 +184,39 @@ def read_sample(definitions: Definitions, complaints: Complaints, statement: Sta
         with complaints.gather():
             if not isinstance(entry, Setting) or entry.words or entry.operator != "=":
                 other = [f"leave out `{entry.words[0].text}`"] if isinstance(entry, Setting) and entry.words else []
-                raise Problem(error("D224", "a sample holds `PATH = DISTRIBUTION(...);` and nothing else", entry.place,
-                                    help=[*other, known_words("distributions", DISTRIBUTIONS)]))
+                raise Problem(
+                    error(
+                        "D224",
+                        "a sample holds `PATH = DISTRIBUTION(...);` and nothing else",
+                        entry.place,
+                        help=[*other, known_words("distributions", DISTRIBUTIONS)],
+                    )
+                )
             parts.append(_part(entry, names, paths))
     if complaints.faults > before:
         raise Problem(())
     if not parts:
-        raise Problem(error("D224", "this sample is empty", statement.place,
-                            help="write `PATH = uniform(a, b) UNIT;` in it"))
+        raise Problem(
+            error("D224", "this sample is empty", statement.place, help="write `PATH = uniform(a, b) UNIT;` in it")
+        )
     warning = None
     if design == "sobol" and count & (count - 1):
         lower = 1 << (count.bit_length() - 1)
-        warning = (f"{count} points of a Sobol sequence are less even than {lower} or {2 * lower}",
-                   place_of(call.positional[0]))
+        warning = (
+            f"{count} points of a Sobol sequence are less even than {lower} or {2 * lower}",
+            place_of(call.positional[0]),
+        )
     return Sample(design, count, seed, tuple(parts), warning)
 
 
 def _count(found: Value) -> int:
     number = found.number
-    if isinstance(number, Scalar) or found.dimension != PURE or not float(number).is_integer() \
-            or not 1 <= number <= MOST_SAMPLES:
+    if (
+        isinstance(number, Scalar)
+        or found.dimension != PURE
+        or not float(number).is_integer()
+        or not 1 <= number <= MOST_SAMPLES
+    ):
         raise Problem(error("D113", f"a number of samples is a whole number from 1 to {MOST_SAMPLES}", found.place))
     return int(number)
 
@@ -189,9 +228,14 @@ def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> Part:
         unit, call = call.unit, call.inner
     if not isinstance(call, Call) or call.name.text not in DISTRIBUTIONS:
         near = did_you_mean(call.name.text, DISTRIBUTIONS) if isinstance(call, Call) else ()
-        raise Problem(error("D225", f"`{path}` is drawn from a distribution", place_of(entry.value),
-                            help=[*near, f"write `{path} = uniform(a, b) UNIT;`",
-                                  known_words("distributions", DISTRIBUTIONS)]))
+        raise Problem(
+            error(
+                "D225",
+                f"`{path}` is drawn from a distribution",
+                place_of(entry.value),
+                help=[*near, f"write `{path} = uniform(a, b) UNIT;`", known_words("distributions", DISTRIBUTIONS)],
+            )
+        )
     name = call.name.text
     wanted = DISTRIBUTIONS[name]
     usage = f"write `{name}({', '.join(wanted)}) UNIT`"
@@ -201,8 +245,14 @@ def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> Part:
     check_still(path, entry, names, paths)
     for other in found[1:]:
         if not units.same(other.dimension, found[0].dimension):
-            raise Problem(error("D063", f"`{name}` of {units.text(found[0].dimension)} and "
-                                f"{units.text(other.dimension)}", other.place, help="all must be of one dimension"))
+            raise Problem(
+                error(
+                    "D063",
+                    f"`{name}` of {units.text(found[0].dimension)} and {units.text(other.dimension)}",
+                    other.place,
+                    help="all must be of one dimension",
+                )
+            )
     arguments = tuple(float(value.number) for value in found)
     _check_arguments(name, arguments, found)
     unit = unit or next((value.unit for value in found if value.unit is not None), None)
@@ -217,11 +267,29 @@ def _in_unit(expression: Expression, unit: Unit | None) -> Expression:
 
 def _check_arguments(name: str, arguments: tuple[float, ...], found: list[Any]) -> None:
     if name in ("normal", "truncated") and not arguments[1] > 0.0:
-        raise Problem(error("D225", "a standard deviation is above 0", found[1].place,
-                            help="a parameter that does not vary belongs in the run"))
+        raise Problem(
+            error(
+                "D225",
+                "a standard deviation is above 0",
+                found[1].place,
+                help="a parameter that does not vary belongs in the run",
+            )
+        )
     if name != "normal" and not arguments[-2] < arguments[-1]:
-        raise Problem(error("D225", f"`{name}` goes from a lower to a higher value", found[-1].place,
-                            help="change the two about, or leave the parameter out where they are equal"))
+        raise Problem(
+            error(
+                "D225",
+                f"`{name}` goes from a lower to a higher value",
+                found[-1].place,
+                help="change the two about, or leave the parameter out where they are equal",
+            )
+        )
     if name == "loguniform" and not arguments[0] * arguments[1] > 0.0:
-        raise Problem(error("D225", "the ends of a loguniform are both above or both below zero", found[0].place,
-                            help="`uniform` has no such limit"))
+        raise Problem(
+            error(
+                "D225",
+                "the ends of a loguniform are both above or both below zero",
+                found[0].place,
+                help="`uniform` has no such limit",
+            )
+        )

@@ -88,8 +88,12 @@ class Effects:
         if kind in ("let", "servo") or path in self.met or any(path in each.sets for each in self.scopes):
             self._tell_idle(complaints, scope, path, entry, where)
         elif path in (*BLOCKS, "record"):
-            complaints.error("D235", f"`{path}` cannot be set", entry.place,
-                             help="one value is set, not a block or a list: such as `rates.dynamics=1 kHz`")
+            complaints.error(
+                "D235",
+                f"`{path}` cannot be set",
+                entry.place,
+                help="one value is set, not a block or a list: such as `rates.dynamics=1 kHz`",
+            )
         elif path in scope.unvaried:
             complaints.error("D235", f"`{path}` cannot be set", entry.place, help=scope.unvaried[path].to_set())
         elif inside:
@@ -104,14 +108,21 @@ class Effects:
         lets, servos = scope.definitions.lets, scope.definitions.of_kind("servo")
         place = lets[first].name.place if path in lets else servos[first].place if first in servos else None
         told = "no noise is in it" if path == SEED_PATH else "nothing that is computed depends on it"
-        complaints.error("D236", f"`{path}` changes nothing in {where}", entry.place,
-                         also=[Label(place, "defined here")] if place is not None else [],
-                         help=f"{told}: leave it out, or name a run that uses it")
+        complaints.error(
+            "D236",
+            f"`{path}` changes nothing in {where}",
+            entry.place,
+            also=[Label(place, "defined here")] if place is not None else [],
+            help=f"{told}: leave it out, or name a run that uses it",
+        )
 
     def _tell_unknown(self, complaints: Complaints, scope: Scope, path: str, entry: Setting, where: str) -> None:
         first, _, rest = path.partition(".")
-        joints = list(dict.fromkeys(known.split(".")[1] for each in self.scopes for known in each.known
-                                    if known.startswith("initial.")))
+        joints = list(
+            dict.fromkeys(
+                known.split(".")[1] for each in self.scopes for known in each.known if known.startswith("initial.")
+            )
+        )
         servo = scope.definitions.of_kind("servo").get(first)
         also: list[Label] = []
         if rest in ("bed", "law") and first in joints:
@@ -146,8 +157,11 @@ def _is_number(scope: Scope, entry: Setting) -> bool:
 
 def _used(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> list[str]:
     """Those of these numbers, by path, from which something is computed in this run."""
-    there = {path: entry for path, entry in settings.items()
-             if path in scope.sets or goes(scope.definitions, entry) != "number"}
+    there = {
+        path: entry
+        for path, entry in settings.items()
+        if path in scope.sets or goes(scope.definitions, entry) != "number"
+    }
     if not there:
         return []
     found = _idle(scope, run, there)
@@ -164,8 +178,9 @@ def _used(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> lis
 def _idle(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> tuple[str, ...] | None:
     """Those that nothing depends on where they are inputs; None where something takes none."""
     graph = Graph()
-    varied = {path: replace(each, value=replace(each.value, number=graph.input(path)))
-              for path, each in scope.varied.items()}
+    varied = {
+        path: replace(each, value=replace(each.value, number=graph.input(path))) for path, each in scope.varied.items()
+    }
     for path, entry in settings.items():
         found = scope.names.evaluate(entry.value)
         assert isinstance(found, Value)

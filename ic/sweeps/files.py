@@ -23,8 +23,14 @@ def columns_of(definitions: Definitions, named: String, graph: Graph) -> tuple[l
     made: list[Varied | Chosen] = []
     for column in table.columns:
         if not _PATH.fullmatch(column.name):
-            raise Problem(error("D223", f"`{column.name[:40]}` is no path of a run", column.place,
-                                help="a column is named as `vary` would name it: `gearbox.kp [V*s/rad]`"))
+            raise Problem(
+                error(
+                    "D223",
+                    f"`{column.name[:40]}` is no path of a run",
+                    column.place,
+                    help="a column is named as `vary` would name it: `gearbox.kp [V*s/rad]`",
+                )
+            )
         words = table.words(column)
         if words is not None:
             options = [Option(text, Name((Word(text, place),), place), place) for text, place in words]
@@ -32,10 +38,17 @@ def columns_of(definitions: Definitions, named: String, graph: Graph) -> tuple[l
             continue
         numbers, measure = table.quantities(column)
         unit = Unit((), column.place, column.unit) if column.unit is not None else None
-        value = Value(graph.input(column.name), measure.dimension, column.place, column.unit is None,
-                      hertz=measure.hertz)
+        value = Value(
+            graph.input(column.name), measure.dimension, column.place, column.unit is None, hertz=measure.hertz
+        )
         made.append(Varied(column.name, column.place, np.array(numbers), value, unit, measure.scale))
     if not table.rows:
-        raise Problem(error("D223", f"`{table.file}` has no rows: no case is in it", named.place,
-                            help="write a row of values for each case"))
+        raise Problem(
+            error(
+                "D223",
+                f"`{table.file}` has no rows: no case is in it",
+                named.place,
+                help="write a row of values for each case",
+            )
+        )
     return made, [Place(table.file, line, 1, max(len(row), 1)) for line, row in table.rows]

@@ -95,9 +95,17 @@ class _Sweep:
         self.read_so_far[()] = read
         found = structures(sweep)
         if len(found) > MOST_STRUCTURES:
-            raise Problem(error("D229", f"sweep `{sweep.name}` is of {len(found)} structures", sweep.place,
-                                help=[f"{MOST_STRUCTURES} are possible, each with a program of its own",
-                                      "what is a number of a model, varied as such, needs no other structure"]))
+            raise Problem(
+                error(
+                    "D229",
+                    f"sweep `{sweep.name}` is of {len(found)} structures",
+                    sweep.place,
+                    help=[
+                        f"{MOST_STRUCTURES} are possible, each with a program of its own",
+                        "what is a number of a model, varied as such, needs no other structure",
+                    ],
+                )
+            )
         made: list[tuple[Group, np.ndarray]] = []
         dropped: dict[Place, int] = {}  # by each `exclude when`, of which a macro may bring other ones
         for choices, rows in found:
@@ -111,8 +119,10 @@ class _Sweep:
                     if one[0] is not None:
                         made.append(one[0])
             if self.complaints.faults > faults:
-                self.complaints.mark(noted, *(Label(option.place, f"where `{column.path}` is `{option.text}`")
-                                              for column, option in choices))
+                self.complaints.mark(
+                    noted,
+                    *(Label(option.place, f"where `{column.path}` is `{option.text}`") for column, option in choices),
+                )
                 return []
         self._tell_of_exclusions(dropped, bool(made))
         if not made:
@@ -144,14 +154,20 @@ class _Sweep:
         settings.check_sweep(sweep, self.complaints, definitions)
         return _Read(definitions, base, sweep, graph)
 
-    def _group(self, sweep: Sweep, choices: Choices,
-               rows: np.ndarray) -> tuple[tuple[Group, np.ndarray] | None, list[tuple[Place, int]]] | None:
+    def _group(
+        self, sweep: Sweep, choices: Choices, rows: np.ndarray
+    ) -> tuple[tuple[Group, np.ndarray] | None, list[tuple[Place, int]]] | None:
         """The cases of one structure, with their rows of the product; and how many each `exclude when` drops."""
         read = self._with_macros(sweep, choices)
         there = read.sweep
         definitions, run = put_in(read.definitions, read.base, choices)
-        scope = Scope(definitions, self.complaints, {varied.path: varied for varied in there.varied}, read.graph,
-                      settings=self.source.settings.numbers(definitions))
+        scope = Scope(
+            definitions,
+            self.complaints,
+            {varied.path: varied for varied in there.varied},
+            read.graph,
+            settings=self.source.settings.numbers(definitions),
+        )
         resolved = resolve_run(scope, run)
         self.source.effects.resolved(scope, run)
         check_coordinates(scope, complete=resolved is not None)
@@ -188,21 +204,37 @@ class _Sweep:
             definitions = self.source.settings.in_definitions(Definitions(deck, self.complaints))
             definition = definitions.of_kind("sweep").get(self.definition.name)
             if definition is None or definition.parts:
-                raise Problem(error("D226", f"with this macro the deck has no sweep `{sweep.name}`", sweep.place,
-                                    help="let the sweep stand outside `#if`"))
+                raise Problem(
+                    error(
+                        "D226",
+                        f"with this macro the deck has no sweep `{sweep.name}`",
+                        sweep.place,
+                        help="let the sweep stand outside `#if`",
+                    )
+                )
             read = self._read(definitions, definition)
             if read.sweep.sizes != sweep.sizes or _what_varies(read.sweep) != _what_varies(sweep):
-                raise Problem(error("D226", f"with this macro sweep `{sweep.name}` varies something else", sweep.place,
-                                    help="what is varied, and over how many values, must not depend on a varied macro"))
+                raise Problem(
+                    error(
+                        "D226",
+                        f"with this macro sweep `{sweep.name}` varies something else",
+                        sweep.place,
+                        help="what is varied, and over how many values, must not depend on a varied macro",
+                    )
+                )
             self.read_so_far[macros] = read
         return self.read_so_far[macros]
 
     def _tell_of_exclusions(self, dropped: Mapping[Place, int], some: bool) -> None:
         if not some and dropped:
             *others, last = dropped
-            self.complaints.error("D139", "every case is excluded", last,
-                                  also=[Label(place, "together with this") for place in others],
-                                  help="`exclude when` says which cases are left out, not which are kept")
+            self.complaints.error(
+                "D139",
+                "every case is excluded",
+                last,
+                also=[Label(place, "together with this") for place in others],
+                help="`exclude when` says which cases are left out, not which are kept",
+            )
         for place, count in dropped.items():
             if some and not count:
                 self.complaints.remark("D138", "this excludes no case", place, help="the sweep is the same without it")
@@ -226,16 +258,24 @@ class _Sweep:
 
 def _what_varies(sweep: Sweep) -> list[list[list[str]]]:
     """Axis by axis the paths, and what is chosen; numbers may differ."""
-    return [[[column.path, *(option.text for option in getattr(column, "options", ()))] for column in axis.columns]
-            for axis in sweep.axes]
+    return [
+        [[column.path, *(option.text for option in getattr(column, "options", ()))] for column in axis.columns]
+        for axis in sweep.axes
+    ]
 
 
 def _base(definitions: Definitions, definition: Definition, complaints: Complaints) -> Definition:
     of = definition.group.of
     assert of is not None  # a sweep without one is no definition
     if len(of.path) > 1:
-        raise Problem(error("D059", f"`{of.text}` is a path; the name of a run is needed", of.place,
-                            help=f"write `{of.path[0].text}`"))
+        raise Problem(
+            error(
+                "D059",
+                f"`{of.text}` is a path; the name of a run is needed",
+                of.place,
+                help=f"write `{of.path[0].text}`",
+            )
+        )
     return definitions.find_or_meant("run", Word(of.text, of.place), complaints)
 
 
@@ -279,8 +319,9 @@ def _numbered(name: str, made: Sequence[tuple[Group, np.ndarray]]) -> list[Group
     out = []
     for ((group, scope), rows), slug in zip(made, slugs, strict=True):
         positions = np.searchsorted(everything, rows).astype(float)
-        out.append((replace(group, name=f"{name}.{slug}", sweep=name, cases=replace(group.cases, positions=positions)),
-                    scope))
+        out.append(
+            (replace(group, name=f"{name}.{slug}", sweep=name, cases=replace(group.cases, positions=positions)), scope)
+        )
     return out
 
 
@@ -302,17 +343,21 @@ def _sum(source: Source, definition: Definition, within: tuple[str, ...]) -> lis
     known = {**source.definitions.of_kind("run"), **source.definitions.of_kind("sweep")}
     unknown = [named for named in definition.parts if named.text not in known]
     for named in unknown:  # first of all: a mistake in another part hides no name
-        source.complaints.error("D041", f"no run or sweep `{named.text}`", named.place,
-                                help=[*did_you_mean(named.text, known),
-                                      known_words("runs and sweeps of this deck", known)])
+        source.complaints.error(
+            "D041",
+            f"no run or sweep `{named.text}`",
+            named.place,
+            help=[*did_you_mean(named.text, known), known_words("runs and sweeps of this deck", known)],
+        )
     if unknown:
         return []
     parts = []
     for named in definition.parts:
         part = known[named.text]
         if named.text in (*within, definition.name):
-            raise Problem(error("D043", f"sweep `{definition.name}` is made of itself", named.place,
-                                help="leave it out"))
+            raise Problem(
+                error("D043", f"sweep `{definition.name}` is made of itself", named.place, help="leave it out")
+            )
         found = _sum(source, part, (*within, definition.name)) if part.parts else lower(source, part)
         if not found:
             return []
@@ -336,12 +381,30 @@ def _sum(source: Source, definition: Definition, within: tuple[str, ...]) -> lis
                 if len(again) > 1:
                     told = f"{len(again)} cases of `{named.text}` are in `{there}` too, the first is #{position}"
                 them = "it" if len(again) == 1 else "them"
-                raise Problem(error("D227", told, named.place, also=[Label(definition.place, "in this sweep")],
-                                    help=[f"exclude {them} in one of the two: each case stands in the table once",
-                                          f"`met cases DECK {named.text}` prints {them}"]))
+                raise Problem(
+                    error(
+                        "D227",
+                        told,
+                        named.place,
+                        also=[Label(definition.place, "in this sweep")],
+                        help=[
+                            f"exclude {them} in one of the two: each case stands in the table once",
+                            f"`met cases DECK {named.text}` prints {them}",
+                        ],
+                    )
+                )
             seen |= dict.fromkeys(ids, named.text)
             positions = (group.cases.table + first).astype(float)
-            made.append((replace(group, name=f"{definition.name}.{group.name}", sweep=definition.name,
-                                 cases=replace(group.cases, positions=positions)), scope))
+            made.append(
+                (
+                    replace(
+                        group,
+                        name=f"{definition.name}.{group.name}",
+                        sweep=definition.name,
+                        cases=replace(group.cases, positions=positions),
+                    ),
+                    scope,
+                )
+            )
         first += size
     return made

@@ -27,18 +27,24 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
         place = varied.place
         if path in scope.unvaried:
             why = scope.unvaried[path]
-            scope.complaints.error("D122", f"`{path}` cannot vary{' like this' if why.is_choice else ''}", place,
-                                   help=why.to_vary(path))
+            scope.complaints.error(
+                "D122", f"`{path}` cannot vary{' like this' if why.is_choice else ''}", place, help=why.to_vary(path)
+            )
             continue
         first, _, rest = path.partition(".")
         if path in ("integrator", "arm", "base") or rest in ("servo", "law", "bed", "servo.model", "servo.command"):
-            scope.complaints.error("D122", f"`{path}` cannot vary over numbers", place,
-                                   help=f"it varies over names: `vary {path} = [...];`")
+            scope.complaints.error(
+                "D122",
+                f"`{path}` cannot vary over numbers",
+                place,
+                help=f"it varies over names: `vary {path} = [...];`",
+            )
             continue
         also = _overridden(scope, first, rest)
         if first in ("rates", "duration", "record", "servos") or path in ONE_OF_TWO:
-            scope.complaints.error("D122", f"`{path}` cannot vary", place,
-                                   help="vary one of its parts, or what it names")
+            scope.complaints.error(
+                "D122", f"`{path}` cannot vary", place, help="vary one of its parts, or what it names"
+            )
         elif also is not None:
             scope.complaints.error(
                 "D137",
@@ -48,9 +54,15 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
                 help="every use overrides it, or the run does not use it; vary it where it is overridden",
             )
         else:
-            scope.complaints.error("D128", f"no parameter `{path}` in this run", place,
-                                   help=did_you_mean(path, (*scope.known, *scope.unvaried, *scope.definitions.lets))
-                                   or continued(scope, path) or ends(scope, path) or beginnings(scope))
+            scope.complaints.error(
+                "D128",
+                f"no parameter `{path}` in this run",
+                place,
+                help=did_you_mean(path, (*scope.known, *scope.unvaried, *scope.definitions.lets))
+                or continued(scope, path)
+                or ends(scope, path)
+                or beginnings(scope),
+            )
 
 
 def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
@@ -86,15 +98,27 @@ def continued(scope: Scope, path: str) -> list[str]:
     return []
 
 
-def coordinates(scope: Scope, sweep: Sweep, columns: dict[str, np.ndarray], dependents: dict[str, list[str]],
-                ) -> tuple[Coordinate, ...]:
+def coordinates(
+    scope: Scope,
+    sweep: Sweep,
+    columns: dict[str, np.ndarray],
+    dependents: dict[str, list[str]],
+) -> tuple[Coordinate, ...]:
     """The coordinates as a plan holds them. dependents: parameters whose formulas need each coordinate."""
     made = []
     for varied in sweep.varied:
         direct = [path for path in scope.sets.get(varied.path, ()) if path in scope.parameters]
         unit = varied.unit.text if varied.unit is not None else units.text(varied.value.dimension)
-        made.append(Coordinate(varied.path, unit, varied.scale, columns[varied.path],
-                               tuple(direct or dependents.get(varied.path, ())), varied.place))
+        made.append(
+            Coordinate(
+                varied.path,
+                unit,
+                varied.scale,
+                columns[varied.path],
+                tuple(direct or dependents.get(varied.path, ())),
+                varied.place,
+            )
+        )
     return tuple(made)
 
 
@@ -113,15 +137,27 @@ def idle(complaints: Complaints, sweep: Sweep, experiment: Experiment) -> None:
     with complaints.gather():
         for name in without_effect(experiment):
             if name in places:
-                complaints.error("D137", f"`{name}` changes nothing in this run", places[name],
-                                 help="nothing that the run computes depends on it: leave it out")
+                complaints.error(
+                    "D137",
+                    f"`{name}` changes nothing in this run",
+                    places[name],
+                    help="nothing that the run computes depends on it: leave it out",
+                )
             elif name == REPEAT:
-                complaints.error("D230", "there is no noise in this run, so a repeat is the same case again",
-                                 sweep.repeated, help=["leave `repeat` out",
-                                                       "a sensor may be noisy: `sensor qd = tachometer "
-                                                       "{ noise = 0.1 rad/s; }` in a servo",
-                                                       "and so may a bed: `substitute JOINT "
-                                                       "{ bed = emulated(faults = typical); }`"])
+                complaints.error(
+                    "D230",
+                    "there is no noise in this run, so a repeat is the same case again",
+                    sweep.repeated,
+                    help=[
+                        "leave `repeat` out",
+                        "a sensor may be noisy: `sensor qd = tachometer { noise = 0.1 rad/s; }` in a servo",
+                        "and so may a bed: `substitute JOINT { bed = emulated(faults = typical); }`",
+                    ],
+                )
             elif REPEAT not in experiment.cases.noise:
-                complaints.error("D230", "there is no noise in this run, so no case has noise of its own",
-                                 sweep.independent, help="leave `seeds` out")
+                complaints.error(
+                    "D230",
+                    "there is no noise in this run, so no case has noise of its own",
+                    sweep.independent,
+                    help="leave `seeds` out",
+                )

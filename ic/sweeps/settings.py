@@ -45,8 +45,9 @@ class Settings:
 
     def in_definitions(self, definitions: Definitions) -> Definitions:
         """The deck's definitions with what is set of lets and of servos."""
-        lets = [replace(definitions.lets[path_of(entry)], value=entry.value)
-                for entry in self.that_go(definitions, "let")]
+        lets = [
+            replace(definitions.lets[path_of(entry)], value=entry.value) for entry in self.that_go(definitions, "let")
+        ]
         servos: dict[str, Definition] = {}
         for entry in self.that_go(definitions, "servo"):
             name, *keys = (word.text for word in entry.path)
@@ -87,12 +88,21 @@ class Settings:
             if goes(definitions, entry) == "run":  # else it is a number of what the sweep chooses
                 found += [column for column in sweep.chosen if path.startswith(f"{column.path}.")]
             for column in found[:1]:
-                complaints.error("D233", f"this sets `{path}`, which the sweep varies", entry.place, help=VARIES,
-                                 also=[Label(column.place, f"`{column.path}` varies here")])
+                complaints.error(
+                    "D233",
+                    f"this sets `{path}`, which the sweep varies",
+                    entry.place,
+                    help=VARIES,
+                    also=[Label(column.place, f"`{column.path}` varies here")],
+                )
             if path == SEED and sweep.seed is not None:
-                complaints.error("D233", f"this sets the seed of runs, and sweep `{sweep.name}` has its own",
-                                 entry.place, also=[Label(sweep.place, "this sweep")],
-                                 help="leave one of the two out")
+                complaints.error(
+                    "D233",
+                    f"this sets the seed of runs, and sweep `{sweep.name}` has its own",
+                    entry.place,
+                    also=[Label(sweep.place, "this sweep")],
+                    help="leave one of the two out",
+                )
 
 
 def goes(definitions: Definitions, entry: Setting) -> Goes:
@@ -133,9 +143,23 @@ def _of_another_dimension(path: str, old: Value, new: Value, defined) -> Problem
     if new.bare:
         number = "..." if isinstance(new.number, Scalar) else f"{new.number:g}"
         unit = old.unit.text if old.unit is not None else wanted
-        return Problem(error("D060", f"`{path}` is in {wanted}, and this is a bare number", new.place, also=also,
-                             help=f"write `{number} {unit}`"))
+        return Problem(
+            error(
+                "D060",
+                f"`{path}` is in {wanted}, and this is a bare number",
+                new.place,
+                also=also,
+                help=f"write `{number} {unit}`",
+            )
+        )
     is_in = "a pure number" if old.dimension == PURE else f"in {wanted}"
     found = "a pure number" if new.dimension == PURE else f"in {units.text(new.dimension)}"
-    return Problem(error("D061", f"`{path}` is {is_in}, and this is {found}", new.place, also=also,
-                         help=mended(new, wanted, old.dimension)))
+    return Problem(
+        error(
+            "D061",
+            f"`{path}` is {is_in}, and this is {found}",
+            new.place,
+            also=also,
+            help=mended(new, wanted, old.dimension),
+        )
+    )

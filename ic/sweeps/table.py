@@ -70,8 +70,9 @@ def structures(sweep: Sweep) -> list[tuple[Choices, np.ndarray]]:
 # Exclusion
 
 
-def kept(scope: Scope, sweep: Sweep, values: Mapping[str, np.ndarray], choices: Choices, count: int,
-         structure: Structure) -> tuple[np.ndarray, list[int]]:
+def kept(
+    scope: Scope, sweep: Sweep, values: Mapping[str, np.ndarray], choices: Choices, count: int, structure: Structure
+) -> tuple[np.ndarray, list[int]]:
     """Which of these rows no `exclude when` drops, and how many each drops; warns where rounding decides.
 
     values, choices  what varies in the `count` rows, and what they have in common
@@ -92,8 +93,9 @@ def kept(scope: Scope, sweep: Sweep, values: Mapping[str, np.ndarray], choices: 
 class _Truths:
     """Conditions over rows of the table."""
 
-    def __init__(self, scope: Scope, values: Mapping[str, np.ndarray], choices: Choices, count: int,
-                 structure: Structure) -> None:
+    def __init__(
+        self, scope: Scope, values: Mapping[str, np.ndarray], choices: Choices, count: int, structure: Structure
+    ) -> None:
         self.scope, self.values, self.count, self.structure = scope, values, count, structure
         self.words = {column.path: option.text for column, option in choices}
         self.options = {column.path: [option.text for option in column.options] for column, _ in choices}
@@ -108,8 +110,14 @@ class _Truths:
                 return left & self.of(expression.right, asked & left)
             return left | self.of(expression.right, asked & ~left)
         if not isinstance(expression, Binary) or expression.operator not in COMPARISONS:
-            raise Problem(error("D130", "a comparison is needed here", place_of(expression),
-                                help="such as `gearbox.kp > 0.03 V*s/rad`, joined by `and`, `or`, `not`"))
+            raise Problem(
+                error(
+                    "D130",
+                    "a comparison is needed here",
+                    place_of(expression),
+                    help="such as `gearbox.kp > 0.03 V*s/rad`, joined by `and`, `or`, `not`",
+                )
+            )
         word = self._words(expression)
         return np.full(self.count, word) if word is not None else self._numbers(expression, asked)
 
@@ -121,13 +129,25 @@ class _Truths:
                 if text[:1].isdigit() or text[:1] in "-.":
                     return None
                 if expression.operator not in ("==", "!="):
-                    raise Problem(error("D130", f"`{side.text}` is a word, which is not less or more than another",
-                                        expression.place, help="compare with `==` or `!=`"))
+                    raise Problem(
+                        error(
+                            "D130",
+                            f"`{side.text}` is a word, which is not less or more than another",
+                            expression.place,
+                            help="compare with `==` or `!=`",
+                        )
+                    )
                 written = spell(other)
                 if written not in self.options[side.text]:
                     known = self.options[side.text]
-                    raise Problem(error("D130", f"`{side.text}` is never `{written}` in this sweep", place_of(other),
-                                        help=[*did_you_mean(written, known), known_words("it varies over", known)]))
+                    raise Problem(
+                        error(
+                            "D130",
+                            f"`{side.text}` is never `{written}` in this sweep",
+                            place_of(other),
+                            help=[*did_you_mean(written, known), known_words("it varies over", known)],
+                        )
+                    )
                 return (written == text) == (expression.operator == "==")
         return None
 
@@ -139,33 +159,61 @@ class _Truths:
             for one, other in (sides, sides[::-1]):
                 if one.bare and one.dimension == PURE and not isinstance(one.number, Scalar):
                     helps = f"write `{one.number:g} {units.text(other.dimension)}`"
-            raise Problem(error("D063", f"`{expression.operator}` of {named(sides[0])} and {named(sides[1])}",
-                                expression.place, also=[Label(side.place, named(side)) for side in sides], help=helps))
+            raise Problem(
+                error(
+                    "D063",
+                    f"`{expression.operator}` of {named(sides[0])} and {named(sides[1])}",
+                    expression.place,
+                    also=[Label(side.place, named(side)) for side in sides],
+                    help=helps,
+                )
+            )
         if None not in (hertz := [side.hertz for side in sides]) and hertz[0] != hertz[1]:
             scope.complaints.warn(
-                "D305", f"`{expression.operator}` of Hz and 1/s, which are taken for one", expression.place,
-                help=["if that is meant, write both sides in the same of the two",
-                      "if cycles a second are meant, write 2 pi times the number of Hz, in `1/s`"])
+                "D305",
+                f"`{expression.operator}` of Hz and 1/s, which are taken for one",
+                expression.place,
+                help=[
+                    "if that is meant, write both sides in the same of the two",
+                    "if cycles a second are meant, write 2 pi times the number of Hz, in `1/s`",
+                ],
+            )
         formulas = Formulas.of(scope.graph, [side.number for side in sides])
         left, right = (np.broadcast_to(np.asarray(x, dtype=float), count) for x in formulas.replay(self.values))
         lost = asked & (np.isnan(left) | np.isnan(right))
         cases = f"of {count} {'case' if count == 1 else 'cases'}"
         if lost.any():
-            raise Problem(error(
-                "D066", f"a side of this comparison has no value in {int(lost.sum())} {cases}", expression.place,
-                help=["it is the root of a negative number, or zero divided by zero",
-                      "ask before whether there is one: `exclude when x >= 0 m^2 and sqrt(x) > 1 m;`"]))
+            raise Problem(
+                error(
+                    "D066",
+                    f"a side of this comparison has no value in {int(lost.sum())} {cases}",
+                    expression.place,
+                    help=[
+                        "it is the root of a negative number, or zero divided by zero",
+                        "ask before whether there is one: `exclude when x >= 0 m^2 and sqrt(x) > 1 m;`",
+                    ],
+                )
+            )
         finite = np.isfinite(left) & np.isfinite(right) & (left != right) & asked
         edge = finite.copy()
         edge[finite] = np.abs(left - right)[finite] <= ROUNDING * np.maximum(np.abs(left), np.abs(right))[finite]
         if edge.any():
             row = int(np.flatnonzero(edge)[0])
             scope.complaints.remark(
-                "D127", f"rounding decides this comparison in {int(edge.sum())} {cases}", expression.place,
+                "D127",
+                f"rounding decides this comparison in {int(edge.sum())} {cases}",
+                expression.place,
                 also=[Label(sides[0].place, f"{float(left[row])!r}"), Label(sides[1].place, f"{float(right[row])!r}")],
-                help="compare with a limit between two values, not with one of them")
-        holds = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal, "==": np.equal,
-                 "!=": np.not_equal}[expression.operator]
+                help="compare with a limit between two values, not with one of them",
+            )
+        holds = {
+            "<": np.less,
+            "<=": np.less_equal,
+            ">": np.greater,
+            ">=": np.greater_equal,
+            "==": np.equal,
+            "!=": np.not_equal,
+        }[expression.operator]
         return np.asarray(holds(left, right))
 
     def _find(self, name: Name) -> Value | Values:
@@ -185,8 +233,14 @@ class _Truths:
                     numbers.add(own.number.ref if isinstance(own.number, Scalar) else own.number)
         if len(numbers) > 1:
             choice = " or ".join(f"`{path}`" for path in list(found)[:MOST_NAMED])
-            raise Problem(error("D165", f"`{name.text}` is not the same wherever it is used in this sweep", name.place,
-                                help=f"say which is meant: write {choice}"))
+            raise Problem(
+                error(
+                    "D165",
+                    f"`{name.text}` is not the same wherever it is used in this sweep",
+                    name.place,
+                    help=f"say which is meant: write {choice}",
+                )
+            )
         for settled in found.values():
             if isinstance(settled.value, (float, int, Scalar)):
                 measure = units.parse_unit(settled.unit)
@@ -197,13 +251,29 @@ class _Truths:
             later = "a metric" if name.text in {use.name for use in self.structure.metrics} else ""
             later = later or ("a channel" if name.text in channels(self.structure, [name.text]) else "")
             if later:
-                raise Problem(error("D065", f"`{name.text}` is {later}, which has no value before a case has run",
-                                    name.place, help="exclude by what varies, or by parameters of the run")) from None
+                raise Problem(
+                    error(
+                        "D065",
+                        f"`{name.text}` is {later}, which has no value before a case has run",
+                        name.place,
+                        help="exclude by what varies, or by parameters of the run",
+                    )
+                ) from None
             known = [*scope.varied, *self.words, *scope.known]
             if name.text in OF_RUN or (len(name.path) > 1 and name.path[-1].text in (*OF_JOINT, "command", "model")):
-                raise Problem(error("D065", f"`{name.text}` is no number, and does not vary in this sweep", name.place,
-                                    help=f"leave the comparison out, or `vary {name.text} = [...];`")) from None
-            raise Problem(error("D065", f"no value `{name.text}`", name.place,
-                                help=did_you_mean(name.text, known) or problem.diagnostics[0].help)) from None
-
-
+                raise Problem(
+                    error(
+                        "D065",
+                        f"`{name.text}` is no number, and does not vary in this sweep",
+                        name.place,
+                        help=f"leave the comparison out, or `vary {name.text} = [...];`",
+                    )
+                ) from None
+            raise Problem(
+                error(
+                    "D065",
+                    f"no value `{name.text}`",
+                    name.place,
+                    help=did_you_mean(name.text, known) or problem.diagnostics[0].help,
+                )
+            ) from None

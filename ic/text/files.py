@@ -123,8 +123,11 @@ class Files:
                 if at.count(os.sep) - directory.path.count(os.sep) >= 2:
                     folders.clear()
                 beside = os.path.relpath(at, directory.path or ".")
-                names += [os.path.normpath(os.path.join(beside, f)) for f in _shown(files, ending)
-                          if os.path.exists(os.path.join(at, f))]  # not a link to nowhere
+                names += [
+                    os.path.normpath(os.path.join(beside, f))
+                    for f in _shown(files, ending)
+                    if os.path.exists(os.path.join(at, f))
+                ]  # not a link to nowhere
                 if len(names) > MOST_LISTED or seen > MOST_SEEN:
                     return names[:MOST_LISTED]
         return names

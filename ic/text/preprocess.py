@@ -327,8 +327,12 @@ class _Preprocessor(Macros):
             near = did_you_mean(meant, CONDITIONALS if name.startswith(("if", "el", "end")) else DIRECTIVES)
             self._misspelt_ifs += any(f"`{each}`?" in " ".join(near) for each in ("if", "ifdef", "ifndef"))
             apart = directive.source.text[directive.offset - 1] != "#"
-            self.findings.error("D007", f"`#{name}` is not a directive", directive.place,
-                                help=[*near, *(["a comment begins with `//`"] if apart or not near else [])])
+            self.findings.error(
+                "D007",
+                f"`#{name}` is not a directive",
+                directive.place,
+                help=[*near, *(["a comment begins with `//`"] if apart or not near else [])],
+            )
         raise OutputDirective(Action.IgnoreAndRemove)
 
     def _announce(self, name: str, directive: Token, args: list[Token]) -> None:

@@ -59,8 +59,12 @@ def complain_of_stray(token: Token, findings: Findings) -> None:
     elif text.startswith("'"):
         tell("D004", "a stray `'`", token.place, help='a string is written in double quotes: `"text"`')
     elif text.startswith("#"):
-        tell("D004", f"a stray `{text}`", token.place,
-             help=["a comment begins with `//`", "a directive is the first thing on its line"])
+        tell(
+            "D004",
+            f"a stray `{text}`",
+            token.place,
+            help=["a comment begins with `//`", "a directive is the first thing on its line"],
+        )
     elif text == "\\":
         tell("D004", "a stray `\\`", token.place, help="it joins lines only as the last character of one")
     else:

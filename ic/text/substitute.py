@@ -144,8 +144,8 @@ class _Substitution:
         return made
 
     def string(self, body: list[Token], at: int) -> Token:
-        """`#` and the parameter, or the `__VA_OPT__(...)`, at `at`: its text as a string, white space being one blank.
-        """
+        """`#` and the parameter, or the `__VA_OPT__(...)`, at `at`: its text as a string, white space being one
+        blank."""
         token = body[at]
         if token.text == OPTIONAL:
             pieces = self.optional(body, at, self.end(body, at))

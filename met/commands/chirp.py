@@ -54,9 +54,7 @@ PROFILE = Profile(
         Parameter(name="f0", unit="Hz", above=0.0, doc="frequency at the beginning, cycles per second"),
         Parameter(name="f1", unit="Hz", above=0.0, doc="frequency at the end"),
         Parameter(name="over", unit="s", above=0.0, doc="how long the frequency changes"),
-        Parameter(
-            name="growth", shape="word", words=("linear", "exponential"), default="linear", doc="how it changes"
-        ),
+        Parameter(name="growth", shape="word", words=("linear", "exponential"), default="linear", doc="how it changes"),
         Parameter(name="offset", unit="command", default=0.0, doc="value about which it swings"),
         Parameter(name="phase", unit="rad", default=0.0, doc="angle at the beginning"),
         Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which it begins"),

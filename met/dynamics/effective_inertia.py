@@ -44,8 +44,12 @@ def effective_inertia(tree: Tree, solved: Solved) -> tuple[tuple[Real, Real], ..
         U, D0, D, Dinv, rotor = solved.U[i], solved.D0[i], solved.D[i], solved.Dinv[i], solved.rotor[i]
         B, (angular, linear) = Yp.B, (U[:3], U[3:])
         rows = (B[0:3], B[3:6], B[6:9])
-        halves = (apply_symmetric(Yp.A, angular), turn_vector(rows, linear),
-                  turn_vector_back(rows, angular), apply_symmetric(Yp.C, linear))
+        halves = (
+            apply_symmetric(Yp.A, angular),
+            turn_vector(rows, linear),
+            turn_vector_back(rows, angular),
+            apply_symmetric(Yp.C, linear),
+        )
         t = (*(x + y for x, y in zip(*halves[:2], strict=True)), *(x + y for x, y in zip(*halves[2:], strict=True)))
         s = dot(U, t)
         # 1/(1/D + s/D^2) - rotor over one denominator: the rotor may outweigh the arm a hundred times.

@@ -93,7 +93,8 @@ def mobility(found: Factors) -> Symmetric:
     return Symmetric(
         tuple(columns[j][i] for i, j in upper),  # type: ignore[arg-type]
         tuple(columns[j][i] for i in range(3) for j in range(3, 6)),  # type: ignore[arg-type]
-        tuple(columns[j + 3][i + 3] for i, j in upper))  # type: ignore[arg-type]
+        tuple(columns[j + 3][i + 3] for i, j in upper),  # type: ignore[arg-type]
+    )
 
 
 def _entry(M: Symmetric, i: int, j: int) -> Real:

@@ -63,7 +63,10 @@ class LinkMotion:
 
 
 def link_motions(
-    tree: Tree, q: Sequence[Real], qd: Sequence[Real], base: Pose = HERE,
+    tree: Tree,
+    q: Sequence[Real],
+    qd: Sequence[Real],
+    base: Pose = HERE,
     base_velocity: tuple[Vector, Vector] = (ZERO, ZERO),
 ) -> dict[str, LinkMotion]:
     """Every link by name. base: the base frame in the world; its angular and linear velocity in its own axes."""
@@ -103,8 +106,13 @@ def joint_rates(
 
 
 def link_acceleration(
-    tree: Tree, q: Sequence[Real], qd: Sequence[Real], qdd: Sequence[Real], link: str,
-    base_rate: Vector = ZERO, base_acceleration: tuple[Vector, Vector] = (ZERO, ZERO),
+    tree: Tree,
+    q: Sequence[Real],
+    qd: Sequence[Real],
+    qdd: Sequence[Real],
+    link: str,
+    base_rate: Vector = ZERO,
+    base_acceleration: tuple[Vector, Vector] = (ZERO, ZERO),
 ) -> tuple[Vector, Vector]:
     """Angular acceleration of a link, and acceleration of its frame's origin, in link axes, rad/s^2, m/s^2.
 

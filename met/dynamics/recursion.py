@@ -203,8 +203,9 @@ def solve(
         limits = (SINGULAR * tree.floating.mass, SINGULAR * tree.floating.reach)
         base, base_singular = factors(base_IA, limits)
         gyroscopic, centrifugal = rate_wrench(tree.floating.dynamic, base_w)
-        base_wd, base_a = accelerated(base, sub(base_load[0], add(base_p[0], gyroscopic)),
-                                      sub(base_load[1], add(base_p[1], centrifugal)))
+        base_wd, base_a = accelerated(
+            base, sub(base_load[0], add(base_p[0], gyroscopic)), sub(base_load[1], add(base_p[1], centrifugal))
+        )
         base_acceleration = _of_base_frame(tree, gravity, base_rate, base_wd, base_a)
 
     # Base to tips: accelerations, and what was to be solved.
@@ -219,7 +220,7 @@ def solve(
         others = [j for j in range(6) if j != k]
         through = dot([U[i][j] * Dinv[i] for j in others], [before[j] for j in others])
         own = e[i] - through + rest[i] * before[k]
-        after = (*before[:k], own, *before[k + 1:])
+        after = (*before[:k], own, *before[k + 1 :])
         wd[i], a[i] = after[:3], after[3:]  # type: ignore[assignment]
         found = choose(modes[i], own - before[k], qdd[i])
         needed = (*p[i][0], *p[i][1])[k] + dot(U[i], after)
@@ -229,10 +230,24 @@ def solve(
     D0 = tuple(U[i][joint.axis] for i, joint in enumerate(joints))
     D = tuple(x + y for x, y in zip(D0, rotor, strict=True))
     return Solved(
-        qdd=tuple(s[0] for s in solved), tau=tuple(s[1] for s in solved), tau_load=tuple(s[2] for s in solved),
-        D=D, singular=tuple(both(modes[i], D[i] <= SINGULAR * joints[i].reach) for i in range(n)),
-        mode=modes, rotor=tuple(rotor), steps=steps, w=tuple(w), wd=tuple(wd), a=tuple(a), U=tuple(U), D0=D0,
-        Dinv=tuple(Dinv), load=load, base_acceleration=base_acceleration, base_singular=base_singular, base=base,
+        qdd=tuple(s[0] for s in solved),
+        tau=tuple(s[1] for s in solved),
+        tau_load=tuple(s[2] for s in solved),
+        D=D,
+        singular=tuple(both(modes[i], D[i] <= SINGULAR * joints[i].reach) for i in range(n)),
+        mode=modes,
+        rotor=tuple(rotor),
+        steps=steps,
+        w=tuple(w),
+        wd=tuple(wd),
+        a=tuple(a),
+        U=tuple(U),
+        D0=D0,
+        Dinv=tuple(Dinv),
+        load=load,
+        base_acceleration=base_acceleration,
+        base_singular=base_singular,
+        base=base,
     )
 
 
@@ -293,7 +308,8 @@ def _handed_on(M: Symmetric, k: int, U: Six, Dinv: Real, rest: Real) -> Symmetri
     return Symmetric(
         tuple(entry(i, j) for i, j in upper),  # type: ignore[arg-type]
         tuple(entry(i, j) for i in range(3) for j in range(3, 6)),  # type: ignore[arg-type]
-        tuple(entry(i + 3, j + 3) for i, j in upper))  # type: ignore[arg-type]
+        tuple(entry(i + 3, j + 3) for i, j in upper),  # type: ignore[arg-type]
+    )
 
 
 def _apply(M: Symmetric, x: Wrench) -> Wrench:
@@ -301,8 +317,10 @@ def _apply(M: Symmetric, x: Wrench) -> Wrench:
     angular, linear = x
     B = M.B
     rows = (B[0:3], B[3:6], B[6:9])
-    return (add(apply_symmetric(M.A, angular), turn_vector(rows, linear)),
-            add(turn_vector_back(rows, angular), apply_symmetric(M.C, linear)))
+    return (
+        add(apply_symmetric(M.A, angular), turn_vector(rows, linear)),
+        add(turn_vector_back(rows, angular), apply_symmetric(M.C, linear)),
+    )
 
 
 def _truth(mode: object) -> Truth:
@@ -313,8 +331,9 @@ def _base(tree: Tree, gravity: Vector, acceleration: tuple[Vector, Vector], rate
     """Angular velocity and acceleration of the recursion's base frame, and its origin's acceleration less gravity."""
     R, p = tree.base
     wd, a = acceleration
-    a = add(shift_motion(0, p[0], wd, shift_motion(1, p[1], wd, shift_motion(2, p[2], wd, a))),
-            cross(rate, cross(rate, p)))
+    a = add(
+        shift_motion(0, p[0], wd, shift_motion(1, p[1], wd, shift_motion(2, p[2], wd, a))), cross(rate, cross(rate, p))
+    )
     return turn_vector_back(R, rate), turn_vector_back(R, wd), turn_vector_back(R, sub(a, gravity))
 
 

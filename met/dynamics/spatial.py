@@ -81,8 +81,7 @@ class Symmetric(NamedTuple):
         """Column k of the 6x6."""
         if k < 3:
             row = AT[k]
-            return (self.A[row[0]], self.A[row[1]], self.A[row[2]],
-                    self.B[3 * k], self.B[3 * k + 1], self.B[3 * k + 2])
+            return (self.A[row[0]], self.A[row[1]], self.A[row[2]], self.B[3 * k], self.B[3 * k + 1], self.B[3 * k + 2])
         row = AT[k - 3]
         return (self.B[k - 3], self.B[k], self.B[k + 3], self.C[row[0]], self.C[row[1]], self.C[row[2]])
 
@@ -133,6 +132,7 @@ def inverse(pose: Pose) -> Pose:
 
 # -- rigid inertia ---------------------------------------------------------------------------------------------------
 
+
 def rigid_about_centre(mass: Real, com: Vector, inertia: Six) -> Rigid:
     """Rigid in the link frame from inertia about the centre of mass, (xx, yy, zz, xy, xz, yz) in link axes."""
     xx, yy, zz, xy, xz, yz = inertia
@@ -145,9 +145,18 @@ def rigid_shift(body: Rigid, p: Vector) -> Rigid:
     moved = add(h, scale(m, p))
     # I - h x p x - p x h' x with h' = h + m p, entry by entry.
     e = tuple(h[i] * p[i] + p[i] * moved[i] for i in range(3))
-    return Rigid(m, moved, (
-        I[0] + (e[1] + e[2]), I[1] - (h[0] * p[1] + p[0] * moved[1]), I[2] - (h[0] * p[2] + p[0] * moved[2]),
-        I[3] + (e[0] + e[2]), I[4] - (h[1] * p[2] + p[1] * moved[2]), I[5] + (e[0] + e[1])))
+    return Rigid(
+        m,
+        moved,
+        (
+            I[0] + (e[1] + e[2]),
+            I[1] - (h[0] * p[1] + p[0] * moved[1]),
+            I[2] - (h[0] * p[2] + p[0] * moved[2]),
+            I[3] + (e[0] + e[2]),
+            I[4] - (h[1] * p[2] + p[1] * moved[2]),
+            I[5] + (e[0] + e[1]),
+        ),
+    )
 
 
 def rigid_turn(body: Rigid, R: Matrix) -> Rigid:
@@ -155,9 +164,18 @@ def rigid_turn(body: Rigid, R: Matrix) -> Rigid:
     m, h, I = body  # noqa: E741
     full = ((I[0], I[1], I[2]), (I[1], I[3], I[4]), (I[2], I[4], I[5]))
     half = product(R, full)
-    return Rigid(m, turn_vector(R, h), (
-        dot(half[0], R[0]), dot(half[0], R[1]), dot(half[0], R[2]),
-        dot(half[1], R[1]), dot(half[1], R[2]), dot(half[2], R[2])))
+    return Rigid(
+        m,
+        turn_vector(R, h),
+        (
+            dot(half[0], R[0]),
+            dot(half[0], R[1]),
+            dot(half[0], R[2]),
+            dot(half[1], R[1]),
+            dot(half[1], R[2]),
+            dot(half[2], R[2]),
+        ),
+    )
 
 
 def rigid_raise(body: Rigid, pose: Pose) -> Rigid:
@@ -181,7 +199,8 @@ def add_rigid(M: Symmetric, body: Rigid) -> Symmetric:
     return Symmetric(
         tuple(x + y for x, y in zip(M.A, body.I, strict=True)),  # type: ignore[arg-type]
         (B[0], B[1] - hz, B[2] + hy, B[3] + hz, B[4], B[5] - hx, B[6] - hy, B[7] + hx, B[8]),
-        (C[0] + m, C[1], C[2], C[3] + m, C[4], C[5] + m))
+        (C[0] + m, C[1], C[2], C[3] + m, C[4], C[5] + m),
+    )
 
 
 def symmetric_sum(M: Symmetric, N: Symmetric) -> Symmetric:
@@ -189,6 +208,7 @@ def symmetric_sum(M: Symmetric, N: Symmetric) -> Symmetric:
 
 
 # -- planar turns and shifts along an axis ---------------------------------------------------------------------------
+
 
 def _others(axis: int) -> tuple[int, int]:
     return ((1, 2), (2, 0), (0, 1))[axis]
@@ -222,8 +242,11 @@ def raise_turned(axis: int, turn: Turn, M: Symmetric) -> Symmetric:
     quarter = _quarter(turn)
     if quarter == 0:
         return M
-    return Symmetric(_turn_symmetric(axis, turn, quarter, M.A), _turn_general(axis, turn, quarter, M.B),
-                     _turn_symmetric(axis, turn, quarter, M.C))
+    return Symmetric(
+        _turn_symmetric(axis, turn, quarter, M.A),
+        _turn_general(axis, turn, quarter, M.B),
+        _turn_symmetric(axis, turn, quarter, M.C),
+    )
 
 
 def _turn_symmetric(axis: int, turn: Turn, quarter: int | None, A: Six) -> Six:

@@ -192,8 +192,17 @@ class _Builder:
             angle = 0.0
             if body.kind == "revolute" and all_constant(zero) and 0.0 not in zero:
                 angle, zero = math.atan2(zero[1], zero[0]), NO_TURN
-            joints[i] = Joint(name=body.joint, kind=body.kind, parent=self.parent[i], swing=swing,  # type: ignore
-                              offset=offset, twist=twist, angle=angle, zero=zero, slide=slide)
+            joints[i] = Joint(
+                name=body.joint,
+                kind=body.kind,  # type: ignore[arg-type]
+                parent=self.parent[i],
+                swing=swing,
+                offset=offset,
+                twist=twist,
+                angle=angle,
+                zero=zero,
+                slide=slide,
+            )
         frames = {}
         rigid: list[Rigid] = [NO_INERTIA] * len(self.links)
         ground = NO_INERTIA if free else None

@@ -47,8 +47,7 @@ def loads(p: Any, world: World) -> Loads:
 
     x, v, w = (turn_vector_back(other, vector) for vector in (apart, moving, turning))
     force = turn_vector(other, _minus(_each(p.stiffness, x), _each(p.damping, v)))
-    moment = turn_vector(other, sub(restoring(p.turning, product(transposed(other), own)),
-                                    _each(p.turning_damping, w)))
+    moment = turn_vector(other, sub(restoring(p.turning, product(transposed(other), own)), _each(p.turning_damping, w)))
     back = scale(-1.0, add(moment, cross(apart, force)))
     return Loads(forces=(Force(p.link, force, moment, p.at), Force(p.to, scale(-1.0, force), back, p.to_at)))
 

@@ -18,11 +18,19 @@ ENVIRONMENT = Environment(
     doc=__doc__,
     parameters=(
         Parameter(
-            name="damping", unit="N*m*s/rad", default=0.0, at_least=0.0, joints="revolute",
+            name="damping",
+            unit="N*m*s/rad",
+            default=0.0,
+            at_least=0.0,
+            joints="revolute",
             doc="torque per joint rate, the same at all revolute joints",
         ),
         Parameter(
-            name="sliding", unit="N*s/m", default=0.0, at_least=0.0, joints="prismatic",
+            name="sliding",
+            unit="N*s/m",
+            default=0.0,
+            at_least=0.0,
+            joints="prismatic",
             doc="force per joint rate, the same at all prismatic joints",
         ),
     ),

@@ -41,7 +41,10 @@ ENVIRONMENT = Environment(
         Parameter(name="moment", unit="N*m", shape="vector", default=ZEROS, doc="moment, besides that of the force"),
         Parameter(name="point", unit="m", shape="vector", default=ZEROS, doc="where the force acts, link frame"),
         Parameter(
-            name="axes", shape="word", words=("world", "link"), default="world",
+            name="axes",
+            shape="word",
+            words=("world", "link"),
+            default="world",
             doc="axes of force and moment: the world's, or the link's, which turn with it",
         ),
         *WINDOW,

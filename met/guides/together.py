@@ -30,7 +30,10 @@ def course(p: Any, joints: Sequence[Any], begins: Sequence[Real], t: Real) -> li
         late = maximum(late, absolute(way) / joint.max_acceleration)
     s, rate = trapezoid.course(
         SimpleNamespace(
-            start=0.0, to=1.0, begin=p.begin, max_rate=1.0 / where(slow == 0.0, 1.0, slow),
+            start=0.0,
+            to=1.0,
+            begin=p.begin,
+            max_rate=1.0 / where(slow == 0.0, 1.0, slow),
             max_acceleration=1.0 / where(late == 0.0, 1.0, late),
         ),
         t,
@@ -51,9 +54,7 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
 GUIDE = Guide(
     name="together",
     doc=__doc__,
-    parameters=(
-        Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which the move begins"),
-    ),
+    parameters=(Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which the move begins"),),
     of_joint=(
         Parameter(name="to", unit="joint", doc="position after the move"),
         Parameter(name="max_rate", unit="joint/s", above=0.0, doc="rate that is not exceeded"),

@@ -22,9 +22,7 @@ METRIC = Metric(
     name="final",
     doc=__doc__,
     unit="of",
-    memory=(
-        Memory(name="last", unit="of", doc="latest value"),
-    ),
+    memory=(Memory(name="last", unit="of", doc="latest value"),),
     update=update,
     result=result,
 )

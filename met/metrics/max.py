@@ -23,9 +23,7 @@ METRIC = Metric(
     name="max",
     doc=__doc__,
     unit="of",
-    memory=(
-        Memory(name="most", unit="of", doc="largest so far", start=-math.inf),
-    ),
+    memory=(Memory(name="most", unit="of", doc="largest so far", start=-math.inf),),
     update=update,
     result=result,
 )

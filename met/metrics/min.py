@@ -23,9 +23,7 @@ METRIC = Metric(
     name="min",
     doc=__doc__,
     unit="of",
-    memory=(
-        Memory(name="least", unit="of", doc="smallest so far", start=math.inf),
-    ),
+    memory=(Memory(name="least", unit="of", doc="smallest so far", start=math.inf),),
     update=update,
     result=result,
 )

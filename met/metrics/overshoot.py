@@ -34,9 +34,7 @@ METRIC = Metric(
     doc=__doc__,
     unit="1",
     share=True,
-    parameters=(
-        Parameter(name="target", unit="of", doc="value to be reached"),
-    ),
+    parameters=(Parameter(name="target", unit="of", doc="value to be reached"),),
     memory=(
         Memory(name="first", unit="of", doc="first value"),
         Memory(name="beyond", unit="of", doc="furthest beyond the target so far, below 0 short of it", start=-math.inf),

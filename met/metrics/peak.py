@@ -22,9 +22,7 @@ METRIC = Metric(
     name="peak",
     doc=__doc__,
     unit="of",
-    memory=(
-        Memory(name="most", unit="of", doc="largest size so far"),
-    ),
+    memory=(Memory(name="most", unit="of", doc="largest size so far"),),
     update=update,
     result=result,
 )

@@ -29,8 +29,14 @@ METRIC = Metric(
     unit="s",
     parameters=(
         Parameter(name="target", unit="of", doc="value to be reached"),
-        Parameter(name="band", unit="1", default=0.02, at_least=0.0, share=True,
-                  doc="half width of the band, share of the target"),
+        Parameter(
+            name="band",
+            unit="1",
+            default=0.02,
+            at_least=0.0,
+            share=True,
+            doc="half width of the band, share of the target",
+        ),
         Parameter(name="within", unit="of", default=0.0, at_least=0.0, doc="half width of the band, added to it"),
     ),
     memory=(

@@ -25,6 +25,7 @@ from met.plan import Experiment, Formula, Structure
 
 DIGEST_BYTES = 8
 
+
 def in_key(field: dataclasses.Field[Any]) -> str:
     """When a field of a structure is in its key: "always", "where set" or "never" (`met.frozen.keyed`)."""
     return str(field.metadata.get(IN_KEY, "always"))

@@ -46,8 +46,9 @@ def named(structure: Structure, parameter: Parameter) -> tuple[str, ...]:
     return (*of_arm, *parameter.words)
 
 
-def tests(experiment: Experiment, uses: Iterable[tuple[str, tuple[Parameter, ...]]]
-          ) -> Iterator[tuple[str, list[str], Holds, str]]:
+def tests(
+    experiment: Experiment, uses: Iterable[tuple[str, tuple[Parameter, ...]]]
+) -> Iterator[tuple[str, list[str], Holds, str]]:
     """What must hold of numbers in every case: path, the numbers' paths, the test, and what to say."""
     for prefix, parameters in uses:
         for parameter in parameters:
@@ -59,8 +60,9 @@ def tests(experiment: Experiment, uses: Iterable[tuple[str, tuple[Parameter, ...
                 yield path, [path, other], _is_less, f"it should be less than `{parameter.less_than}`"
 
 
-def _check_list(experiment: Experiment, prefix: str, parameter: Parameter, numbers: tuple[Any, ...], where: str
-                ) -> None:
+def _check_list(
+    experiment: Experiment, prefix: str, parameter: Parameter, numbers: tuple[Any, ...], where: str
+) -> None:
     if parameter.as_many_as and (numbers or parameter.default is None):
         other = experiment.parameters.get(f"{prefix}.{parameter.as_many_as}")
         if other is not None and isinstance(other.value, tuple) and len(other.value) != len(numbers):

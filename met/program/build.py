@@ -247,9 +247,7 @@ class Builder:
     def _metric(self, tape: Tape, name: str) -> tuple[Values, Values]:
         metric = next(model for known, model, _ in self.machine.metrics if known == name)
         owner = f"metric `{name}` (model {metric.name})"
-        p = parameters(
-            owner, f"metrics.{name}", metric.parameters, lambda path: self.machine.value(path, tape.read)
-        )
+        p = parameters(owner, f"metrics.{name}", metric.parameters, lambda path: self.machine.value(path, tape.read))
         held = {memory.name: tape.read(f"{METRIC}{name}.{memory.name}") for memory in metric.memory}
         return p, Values(owner, held)
 

@@ -18,9 +18,7 @@ def state(tape: Tape, joints: Sequence[str], states: Sequence[str], copy: str = 
     )
 
 
-def store(
-    tape: Tape, active: Truth, joints: Sequence[str], states: Sequence[str], y: Motion, copy: str = ""
-) -> None:
+def store(tape: Tape, active: Truth, joints: Sequence[str], states: Sequence[str], y: Motion, copy: str = "") -> None:
     """Makes y the state, or the copy of it under this prefix, where active."""
     for joint, q, qd in zip(joints, y.q, y.qd, strict=True):
         keep(tape, active, f"{copy}{joint}.q", q)

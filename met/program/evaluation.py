@@ -279,9 +279,7 @@ def gravity(machine: Machine, read: ReadCell, y: Motion, time: Real) -> Vector:
     return _environment(machine, laden(machine, read), read, y, base, time, time).gravity
 
 
-def brakes(
-    machine: Machine, read: ReadCell, y: Motion, time: Real, begin: Real
-) -> dict[str, Real]:
+def brakes(machine: Machine, read: ReadCell, y: Motion, time: Real, begin: Real) -> dict[str, Real]:
     """Dry friction that environment models put on joints at state y, by name, N m (N)."""
     if not machine.braked:
         return {}

@@ -67,9 +67,7 @@ class Split:
     share: Real
 
 
-def split_at_rest(
-    y: Motion, k1: Slope, y_new: Motion, h: Real, s: Sequence[Real | None], *, may_split: Truth
-) -> Split:
+def split_at_rest(y: Motion, k1: Slope, y_new: Motion, h: Real, s: Sequence[Real | None], *, may_split: Truth) -> Split:
     """Find the first instant in the step at which something that slides comes to rest, and stop there.
 
     Between its ends the step is the parabola through y with slope k1 and through y_new. Where `may_split` is false
@@ -121,4 +119,3 @@ def _part_way(y: Motion, k1: Slope, y_new: Motion, h: Real, share: Real) -> Moti
     return Motion(
         bend(along.q, y_new.q, straight.q), bend(along.qd, y_new.qd, straight.qd), bend(along.x, y_new.x, straight.x)
     )
-

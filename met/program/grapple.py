@@ -140,4 +140,3 @@ class Grapple:
 def _yields(drive: Drive | None) -> Truth:
     """Whether a blow moves the joint."""
     return True if drive is None or drive.given is None else not_(drive.given)
-

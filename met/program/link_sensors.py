@@ -153,9 +153,7 @@ def start(machine: Machine, tape: Tape, gravity: Callable[[Motion], Vector]) -> 
         sensing.begin(machine, tape, fitted, measured(machine, fitted, tape.read, felt))
 
 
-def slopes(
-    machine: Machine, read: ReadCell, felt: Aboard, own: Mapping[str, Real]
-) -> tuple[Real, ...]:
+def slopes(machine: Machine, read: ReadCell, felt: Aboard, own: Mapping[str, Real]) -> tuple[Real, ...]:
     """Slopes of the sensors' states at a stage, in their order. own: the states, by channel."""
     found: dict[str, Real] = {}
     for fitted in machine.sensors:

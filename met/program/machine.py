@@ -248,9 +248,7 @@ class Machine:
         return f"payloads.{link}" if any(each.name == link for each in self.structure.payloads) else f"links.{link}"
 
     def servo_values(self, actuator: Actuator, read: ReadCell) -> Values:
-        return parameters(
-            actuator.owner, actuator.path, actuator.parts.parameters, lambda path: self.value(path, read)
-        )
+        return parameters(actuator.owner, actuator.path, actuator.parts.parameters, lambda path: self.value(path, read))
 
     def asked(self, actuator: Actuator, read: ReadCell, time: Real) -> Asked:
         """What the joint's command asks at a time; kind "none" where it has none."""
@@ -350,8 +348,9 @@ class Machine:
             raise Problem(error("E219", message, use.place, help=help))
         if level != 0.0 and any(model.loose is not None for _, model in self.failing.get(use.joint, ())):
             level = None  # it comes and goes
-        return replace(bare, level=level, gives=drive.given is not None, strays=drive.astray is not False,
-                       levels=levels)
+        return replace(
+            bare, level=level, gives=drive.given is not None, strays=drive.astray is not False, levels=levels
+        )
 
     def _fitted(self, use: SensorUse | LinkSensor, path: str) -> Fitted:
         declared, states, memory = (models.sensor_parts(use, group) for group in ("parameters", "states", "memory"))

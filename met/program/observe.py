@@ -148,14 +148,21 @@ class Observed:
         """Of the arm, and of each payload that flies for a time, whoever carries it."""
         found, base = self.derivative, self.base
         total = energy(
-            self.tree, self.q, self.qd, rotor=found.solved.rotor, gravity=found.gravity, base=base.pose,
+            self.tree,
+            self.q,
+            self.qd,
+            rotor=found.solved.rotor,
+            gravity=found.gravity,
+            base=base.pose,
             base_velocity=(base.w, base.v),
         )
         for payload in self.machine.flying:
             body = payloads.body_of(self.machine, payload, self.read)
             own = energy_of(body, self.seen[payload.name], found.gravity)
             total = Energy(
-                total.kinetic + own.kinetic, total.potential + own.potential, add(total.linear, own.linear),
+                total.kinetic + own.kinetic,
+                total.potential + own.potential,
+                add(total.linear, own.linear),
                 add(total.angular, own.angular),
             )
         return total

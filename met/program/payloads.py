@@ -191,5 +191,3 @@ def way(machine: Machine, payload: Payload, read: ReadCell, motion: LinkMotion, 
 def _keep_body(tape: Tape, active: Truth, payload: Payload, body: Rigid) -> None:
     for i, x in enumerate((body.mass, *body.h, *body.I)):
         cells.keep(tape, active, cell(payload, f"body.{i}"), x)
-
-

@@ -87,9 +87,7 @@ def begin(machine: Machine, tape: Tape, fitted: Fitted, value: Real) -> None:
     tape.write(fitted.path, value)
 
 
-def followed(
-    machine: Machine, fitted: Fitted, read: ReadCell, own: Mapping[str, Real], value: Real
-) -> dict[str, Real]:
+def followed(machine: Machine, fitted: Fitted, read: ReadCell, own: Mapping[str, Real], value: Real) -> dict[str, Real]:
     """Slopes of the states of a sensor that has a circuit, by channel. own: the states, by channel."""
     assert fitted.sensor.follow is not None
     p, states = values(machine, fitted, read), _states(fitted, own.__getitem__)

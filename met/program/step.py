@@ -204,7 +204,7 @@ class Step:
         found = self._derivative(tape, self.state(tape, STAGE), tape.read(f"{STAGE}fraction"))
         for joint, qdd in zip(self.coordinates, found.slope.qdd, strict=True):
             tape.write(f"{STAGE}{joint}.qdd", qdd)
-        for joint, qd in zip(self.coordinates[len(self.joints):], found.slope.qd[len(self.joints):], strict=True):
+        for joint, qd in zip(self.coordinates[len(self.joints) :], found.slope.qd[len(self.joints) :], strict=True):
             tape.write(f"{STAGE}{joint}.qd", qd)  # of a turn no rate of the state
         for name, slope in zip(self.states, found.slope.xd, strict=True):
             tape.write(f"{STAGE}slope:{name}", slope)
@@ -267,9 +267,7 @@ class Step:
         stands = base.base_of(self.machine, tape.read, y, tape.read("instant"))
         return Observed(self.machine, tape.read, y, stands, lambda: self._derivative(tape, y, 0.0))
 
-    def _derivative(
-        self, tape: Tape, y: Motion, fraction: Real, told: dict[int, Real] | None = None
-    ) -> Derivative:
+    def _derivative(self, tape: Tape, y: Motion, fraction: Real, told: dict[int, Real] | None = None) -> Derivative:
         """The derivative at the state y, at the share `fraction` of the dynamics step that began last.
 
         told  accelerations of the substituted joints; None: those that the law gives
@@ -279,8 +277,14 @@ class Step:
             for actuator in self.machine.actuators
         ]
         return derivative(
-            self.machine, tape.read, y=y, held=held, friction=self._friction(tape),
-            time=self._time(tape, fraction), begin=tape.read("instant"), part=tape.part,
+            self.machine,
+            tape.read,
+            y=y,
+            held=held,
+            friction=self._friction(tape),
+            time=self._time(tape, fraction),
+            begin=tape.read("instant"),
+            part=tape.part,
             told=self.beds.given(tape, fraction) if told is None else told,
         )
 

@@ -183,9 +183,7 @@ class Substituted:
         for each in self.mounted:
             self.advance_bed(tape, each, self.period, seed=seed, repeat=repeat, tick=tick)
 
-    def advance_bed(
-        self, tape: Tape, each: Mounted, period: float, *, seed: Real, repeat: Real, tick: Real
-    ) -> None:
+    def advance_bed(self, tape: Tape, each: Mounted, period: float, *, seed: Real, repeat: Real, tick: Real) -> None:
         """One emulated bed, by period s under what its amplifiers hold; its noise is that of the number `tick`."""
         p = self._bed_values(tape, each)
         wire = Wire(tape.read(f"{each.joint}.bed.drive_voltage"), tape.read(f"{each.joint}.bed.load_current"))
@@ -337,9 +335,7 @@ class Substituted:
         tape.write(f"{name}.bed.load_current", applied.current)
         return applied
 
-    def _look_ahead(
-        self, tape: Tape, Lambda: list[list[Real]], b_0: list[Real], applied: Sequence[Wire]
-    ) -> None:
+    def _look_ahead(self, tape: Tape, Lambda: list[list[Real]], b_0: list[Real], applied: Sequence[Wire]) -> None:
         """The observer's state at the next tick, and the rate that the joint's own motor would have then."""
         sides = []
         for each, wire in zip(self.mounted, applied, strict=True):

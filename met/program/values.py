@@ -90,6 +90,7 @@ def returned(
         listed = ", ".join(given) or "nothing"
         message = f"{owner}: {what} gave back {listed}; declared are {', '.join(names) or 'none'}"
         remedy = "give back every declared name and no other" if all_of_them else "give back declared names alone"
-        raise Problem(error("E212", message, help=[*(near for name in unknown for near in did_you_mean(name, names)),
-                                                   remedy]))
+        raise Problem(
+            error("E212", message, help=[*(near for name in unknown for near in did_you_mean(name, names)), remedy])
+        )
     return given

@@ -43,9 +43,7 @@ def control(p: Any, held: Any, seen: Seen) -> Control:
         return Control({"current_cmd": clip(current, -p.i_max, p.i_max)}, {"integral": 0.0})
     error = _error(p, seen.asked, seen.q, seen.qd)
     wanted = p.kp * error + p.ki * held.integral
-    return Control(
-        {"current_cmd": clip(wanted, -p.i_max, p.i_max)}, {"integral": _within(error, wanted, p.i_max)}
-    )
+    return Control({"current_cmd": clip(wanted, -p.i_max, p.i_max)}, {"integral": _within(error, wanted, p.i_max)})
 
 
 def _error(p: Any, asked: Asked, q: Real, qd: Real) -> Real:
@@ -152,7 +150,11 @@ SERVO = Servo(
     parameters=(
         RATIO,
         Parameter(
-            name="k_position", unit="1/s", default=0.0, at_least=0.0, needed_for=("position",),
+            name="k_position",
+            unit="1/s",
+            default=0.0,
+            at_least=0.0,
+            needed_for=("position",),
             doc="gain from position error to rate asked, used under a position command alone",
         ),
         Parameter(name="feed_forward", default=1.0, doc="share of the rate of a position command that is asked ahead"),
@@ -168,7 +170,10 @@ SERVO = Servo(
         *FRICTION,
         replace(LOSS, only=ELASTIC),
         Parameter(
-            name="gear", shape="word", words=("elastic", "rigid"), default="elastic",
+            name="gear",
+            shape="word",
+            words=("elastic", "rigid"),
+            default="elastic",
             doc="whether the gear winds up, or motor and joint are one inertia",
         ),
         *gear.parameters(ELASTIC),

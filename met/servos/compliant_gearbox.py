@@ -45,9 +45,7 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
     return geared(p, states, joint, tau_m, p.tau_max, {"motor_torque": tau_m})
 
 
-def geared(
-    p: Any, states: Any, joint: JointMotion, tau_m: Real, strongest: Real, shown: Mapping[str, Real]
-) -> Drive:
+def geared(p: Any, states: Any, joint: JointMotion, tau_m: Real, strongest: Real, shown: Mapping[str, Real]) -> Drive:
     """A motor behind the gear that gives this torque, N m, and at most the strongest; shown: its own signals."""
     w = states.motor_rate
     rate = w / p.ratio - joint.qd

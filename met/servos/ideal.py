@@ -53,12 +53,19 @@ SERVO = Servo(
     commands=("rate", "position", "acceleration"),
     parameters=(
         Parameter(
-            name="bandwidth", unit="1/s", default=0.0, at_least=0.0, needed_for=("rate", "position"),
+            name="bandwidth",
+            unit="1/s",
+            default=0.0,
+            at_least=0.0,
+            needed_for=("rate", "position"),
             above_where_needed=0.0,
             doc="how fast an error dies away, used under a rate or position command",
         ),
         Parameter(
-            name="rotor", unit="effort*s^2/joint", default=0.0, at_least=0.0,
+            name="rotor",
+            unit="effort*s^2/joint",
+            default=0.0,
+            at_least=0.0,
             doc="inertia of the drive, seen at the joint: its share of tau",
         ),
     ),

@@ -34,7 +34,10 @@ SERVO = Servo(
     doc=__doc__,
     parameters=(
         Parameter(
-            name="release", unit="s", default=math.inf, at_least=0.0,
+            name="release",
+            unit="s",
+            default=math.inf,
+            at_least=0.0,
             doc="time at which the joint is set free; never unless written",
         ),
     ),

@@ -26,9 +26,7 @@ ARMATURE = (
         name="kt", unit="N*m/A", above=0.0, source=TABLE_1, doc="torque constant, and back-EMF constant in V s/rad"
     ),
 )  # fmt: skip
-TAU_MAX = Parameter(
-    name="tau_max", unit="N*m", above=0.0, source=TABLE_1, doc="largest motor torque, before friction"
-)
+TAU_MAX = Parameter(name="tau_max", unit="N*m", above=0.0, source=TABLE_1, doc="largest motor torque, before friction")
 """What servos with a motor declare."""
 
 

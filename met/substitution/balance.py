@@ -113,5 +113,3 @@ def solved(
         rest = sum((rows[i][j] * qdd[j] for j in range(i + 1, m)), 0.0)
         qdd[i] = where(slides[i], (right[i] - rest) / rows[i][i], 0.0)
     return qdd
-
-

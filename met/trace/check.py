@@ -46,10 +46,10 @@ def check_nodes(where: str, nodes: Sequence[Node]) -> None:
         if op not in OPERANDS:
             raise ValueError(f"{where}: node {i} is {op!r}, which is no operation")
         count = OPERANDS[op]
-        rest = node[1 + count:]
+        rest = node[1 + count :]
         if len(node) < 1 + count or [type(each) for each in rest] != ([_REST[op]] if op in _REST else []):
             raise ValueError(f"{where}: node {i} is {node!r}, and `{op}` has {count} operands")
-        for position, ref in enumerate(node[1:1 + count], start=1):
+        for position, ref in enumerate(node[1 : 1 + count], start=1):
             if not isinstance(ref, int) or not 0 <= ref >> 1 < i:
                 raise ValueError(f"{where}: node {i} takes {ref!r}, which is no node before it")
             if (nodes[ref >> 1][0] in TRUTHS) != ((op, position) in _TRUTH_OPERANDS):

@@ -49,8 +49,12 @@ def _plain(name: str, *values: Any) -> Any:
     return np.float64(PLAIN[name](*values))
 
 
-def _elementary(record: Callable[[Scalar], Scalar], plain: Callable[[float], float],
-                array: Callable[[Any], Any], farthest: float = math.inf) -> Callable[[Real], Real]:
+def _elementary(
+    record: Callable[[Scalar], Scalar],
+    plain: Callable[[float], float],
+    array: Callable[[Any], Any],
+    farthest: float = math.inf,
+) -> Callable[[Real], Real]:
     """One function of one number in its three forms; not a number beyond `farthest`."""
 
     def function(x: Any) -> Any:

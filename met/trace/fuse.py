@@ -42,7 +42,7 @@ def _fuse(nodes: Sequence[Node], roots: Sequence[int], result: list[Node], decid
         uses[ref >> 1] = 2
     for i in order:
         node = nodes[i]
-        for ref in node[1:1 + OPERANDS[node[0]]]:
+        for ref in node[1 : 1 + OPERANDS[node[0]]]:
             uses[ref >> 1] += 1
             user[ref >> 1] = i
 

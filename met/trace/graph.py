@@ -30,10 +30,33 @@ Real = float | Scalar
 Truth = bool | Mask
 
 OPERANDS = {
-    "const": 0, "input": 0, "cell": 0, "tick": 0, "time": 0, "false": 0,
-    "abs": 1, "sqrt": 1, "floor": 1, "rint": 1, "bit": 1, "pow2": 1, "exponent": 1, "significand": 1, "gather": 1,
-    "add": 2, "sub": 2, "mul": 2, "div": 2, "lt": 2, "le": 2, "eq": 2, "and": 2, "flip": 2,
-    "fma": 3, "where": 3, "philox": 6,
+    "const": 0,
+    "input": 0,
+    "cell": 0,
+    "tick": 0,
+    "time": 0,
+    "false": 0,
+    "abs": 1,
+    "sqrt": 1,
+    "floor": 1,
+    "rint": 1,
+    "bit": 1,
+    "pow2": 1,
+    "exponent": 1,
+    "significand": 1,
+    "gather": 1,
+    "add": 2,
+    "sub": 2,
+    "mul": 2,
+    "div": 2,
+    "lt": 2,
+    "le": 2,
+    "eq": 2,
+    "and": 2,
+    "flip": 2,
+    "fma": 3,
+    "where": 3,
+    "philox": 6,
 }
 """Operations and how many operands each has: they stand at positions 1, 2, 3 of the node."""
 
@@ -285,7 +308,7 @@ def live(nodes: Sequence[Node], roots: Iterable[int]) -> list[int]:
         if not needed[i]:
             needed[i] = 1
             node = nodes[i]
-            for ref in node[1:1 + OPERANDS[node[0]]]:
+            for ref in node[1 : 1 + OPERANDS[node[0]]]:
                 if not needed[ref >> 1]:
                     stack.append(ref >> 1)
     return [i for i, need in enumerate(needed) if need]
@@ -295,8 +318,8 @@ def show(nodes: Sequence[Node], i: int) -> str:
     """One node as text, its operands by number."""
     node = nodes[i]
     count = OPERANDS[node[0]]
-    words = [("~" if nodes[ref >> 1][0] in TRUTHS else "-") * (ref & 1) + f"%{ref >> 1}" for ref in node[1:1 + count]]
-    return " ".join([str(node[0]), *words, *(str(rest) for rest in node[1 + count:])])
+    words = [("~" if nodes[ref >> 1][0] in TRUTHS else "-") * (ref & 1) + f"%{ref >> 1}" for ref in node[1 : 1 + count]]
+    return " ".join([str(node[0]), *words, *(str(rest) for rest in node[1 + count :])])
 
 
 def evaluate(nodes: Sequence[Node], order: Iterable[int], leaf: Any, *, arrays: bool) -> dict[int, Any]:
@@ -311,12 +334,12 @@ def evaluate(nodes: Sequence[Node], order: Iterable[int], leaf: Any, *, arrays: 
             values[i] = node[1] if op == "const" else False if op == "false" else leaf(node)
             continue
         operands = []
-        for ref in node[1:1 + count]:
+        for ref in node[1 : 1 + count]:
             value = values[ref >> 1]
             if ref & 1:
                 value = np.logical_not(value) if nodes[ref >> 1][0] in TRUTHS else -value
             operands.append(value)
-        values[i] = table[op](*operands, *node[1 + count:])
+        values[i] = table[op](*operands, *node[1 + count :])
     return values
 
 
@@ -345,8 +368,11 @@ class Formulas:
     def __post_init__(self) -> None:
         """What comes back from JSON as lists is tuples again."""
         object.__setattr__(self, "inputs", tuple(self.inputs))
-        object.__setattr__(self, "nodes", tuple(
-            tuple(tuple(part) if isinstance(part, list) else part for part in node) for node in self.nodes))
+        object.__setattr__(
+            self,
+            "nodes",
+            tuple(tuple(tuple(part) if isinstance(part, list) else part for part in node) for node in self.nodes),
+        )
         object.__setattr__(self, "outputs", tuple(self.outputs))
 
     @staticmethod
@@ -361,15 +387,21 @@ class Formulas:
             count = OPERANDS[node[0]]
             if node[0] in ("cell", "tick", "time"):
                 raise ValueError("formulas are made of inputs; a program's memory and time are not theirs")
-            operands = (number[ref >> 1] | ref & 1 for ref in node[1:1 + count])
-            nodes.append(_spelled((node[0], *operands, *node[1 + count:])))
+            operands = (number[ref >> 1] | ref & 1 for ref in node[1 : 1 + count])
+            nodes.append(_spelled((node[0], *operands, *node[1 + count :])))
         inputs = tuple(node[1] for node in nodes if node[0] == "input")
         return Formulas(inputs, tuple(nodes), tuple(number[ref >> 1] | ref & 1 for ref in refs))
 
     def replay(self, values: Mapping[str, Any]) -> list[Any]:
         """The outputs from values by name: floats, numpy arrays of one shape, or scalars being recorded."""
-        nodes = [("const", float(node[1])) if node[0] == "const" else
-                 (*node[:2], tuple(map(float, node[2]))) if node[0] == "gather" else node for node in self.nodes]
+        nodes = [
+            ("const", float(node[1]))
+            if node[0] == "const"
+            else (*node[:2], tuple(map(float, node[2])))
+            if node[0] == "gather"
+            else node
+            for node in self.nodes
+        ]
         graph = next((x.graph for x in values.values() if isinstance(x, Scalar)), None)
         if graph is not None:
             return _respliced(graph, nodes, self.outputs, values)
@@ -377,28 +409,41 @@ class Formulas:
         with np.errstate(all="ignore"):
             results = evaluate(nodes, range(len(nodes)), lambda node: values[node[1]], arrays=arrays)
         truths = [nodes[ref >> 1][0] in TRUTHS for ref in self.outputs]
-        return [results[ref >> 1] if not ref & 1 else ~np.bool_(results[ref >> 1]) if truth else -results[ref >> 1]
-                for ref, truth in zip(self.outputs, truths, strict=True)]
+        return [
+            results[ref >> 1] if not ref & 1 else ~np.bool_(results[ref >> 1]) if truth else -results[ref >> 1]
+            for ref, truth in zip(self.outputs, truths, strict=True)
+        ]
 
 
 def _respliced(graph: Graph, nodes: Sequence[Node], outputs: Sequence[int], values: Mapping[str, Any]) -> list[Any]:
     """The formulas once more, in another graph."""
     makers: dict[str, Any] = {
-        "add": graph.add, "sub": lambda a, b: graph.add(a, b ^ 1), "mul": graph.mul, "div": graph.div,
-        "fma": graph.fma, "where": graph.where, "eq": graph.equal, "and": graph.both, "bit": graph.bit,
-        "flip": graph.flip, "philox": graph.philox, "gather": lambda index, table: graph.gather(table, index),
-        "const": graph.constant, "false": lambda: FALSE}
+        "add": graph.add,
+        "sub": lambda a, b: graph.add(a, b ^ 1),
+        "mul": graph.mul,
+        "div": graph.div,
+        "fma": graph.fma,
+        "where": graph.where,
+        "eq": graph.equal,
+        "and": graph.both,
+        "bit": graph.bit,
+        "flip": graph.flip,
+        "philox": graph.philox,
+        "gather": lambda index, table: graph.gather(table, index),
+        "const": graph.constant,
+        "false": lambda: FALSE,
+    }
     refs: list[int] = []
     for node in nodes:
         op, count = node[0], OPERANDS[node[0]]
-        operands = [refs[ref >> 1] ^ ref & 1 for ref in node[1:1 + count]]
+        operands = [refs[ref >> 1] ^ ref & 1 for ref in node[1 : 1 + count]]
         if op == "input":
             value = values[node[1]]
             refs.append(value.ref if isinstance(value, Scalar) else graph.constant(value))
         elif op in ("lt", "le"):
             refs.append(graph.less(op, *operands))
         elif op in makers:
-            refs.append(makers[op](*operands, *node[1 + count:]))
+            refs.append(makers[op](*operands, *node[1 + count :]))
         else:
             refs.append(graph.unary(op, *operands))
     kinds = [Mask if nodes[ref >> 1][0] in TRUTHS else Scalar for ref in outputs]

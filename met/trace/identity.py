@@ -68,9 +68,7 @@ class _Writer:
         self.sections: dict[int, int] = {}
         self.lines: list[str] = []
         body = (*recording.start, *recording.tick, *recording.end)
-        self.needed = cells_behind(
-            recording.sections, body, self.outputs, self.columns, known=frozenset(self.state)
-        )
+        self.needed = cells_behind(recording.sections, body, self.outputs, self.columns, known=frozenset(self.state))
 
     def key(self) -> str:
         """The SHA-256 of what is written."""
@@ -124,13 +122,14 @@ class _Writer:
         for i in order:
             node = section.nodes[i]
             count = OPERANDS[node[0]]
-            operands = (place[ref >> 1] | ref & 1 for ref in node[1:1 + count])
-            self._put(node[0], *operands, *(self._written(node[0], rest) for rest in node[1 + count:]))
+            operands = (place[ref >> 1] | ref & 1 for ref in node[1 : 1 + count])
+            self._put(node[0], *operands, *(self._written(node[0], rest) for rest in node[1 + count :]))
         for cell, ref in section.stores:
             if cell in self.needed:
                 self._put("store", self._cell(cell), place[ref >> 1] | ref & 1)
         for kind, places, roots in (
-            ("output", self.outputs, section.outputs), ("column", self.columns, section.records)
+            ("output", self.outputs, section.outputs),
+            ("column", self.columns, section.records),
         ):
             for number, ref in roots:
                 if number in places:

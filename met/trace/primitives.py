@@ -92,8 +92,9 @@ def _fused_arrays(a: Any, b: Any, c: Any) -> Any:
     result = np.where((product == 0.0) & (c == 0.0), product + c, result)
     rest = np.asarray(~usual)
     if rest.any():
-        result[rest] = [fused(*three) for three in zip(a[rest].tolist(), b[rest].tolist(), c[rest].tolist(),
-                                                       strict=True)]
+        result[rest] = [
+            fused(*three) for three in zip(a[rest].tolist(), b[rest].tolist(), c[rest].tolist(), strict=True)
+        ]
     return result
 
 

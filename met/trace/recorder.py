@@ -97,12 +97,20 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
                     phase.body(tape)
             made[key] = len(sections)
             names = list(dict.fromkeys(phase.name for phase in phases))
-            sections.append(Section(
-                "+".join(names[:3] + ["..."] * (len(names) > 3)), tuple(tape.graph.nodes),
-                tuple((name, value.ref) for name, value in tape.written.items()
-                      if tape.graph.nodes[value.ref >> 1] != ("cell", name) or value.ref & 1),
-                tuple((column, value.ref) for column, value in sorted(tape.records.items())),
-                tuple((number, value.ref) for number, value in sorted(tape.outputs.items())), tuple(tape.parts)))
+            sections.append(
+                Section(
+                    "+".join(names[:3] + ["..."] * (len(names) > 3)),
+                    tuple(tape.graph.nodes),
+                    tuple(
+                        (name, value.ref)
+                        for name, value in tape.written.items()
+                        if tape.graph.nodes[value.ref >> 1] != ("cell", name) or value.ref & 1
+                    ),
+                    tuple((column, value.ref) for column, value in sorted(tape.records.items())),
+                    tuple((number, value.ref) for number, value in sorted(tape.outputs.items())),
+                    tuple(tape.parts),
+                )
+            )
         return made[key]
 
     def steps(body: tuple[Control, ...], where: str) -> tuple[Step, ...]:
@@ -131,8 +139,9 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
         return tuple(result)
 
     _refuse_nested_records(program)
-    start, tick, end = (steps(body, where) for body, where in
-                        ((program.start, "start"), (program.tick, "tick"), (program.end, "end")))
+    start, tick, end = (
+        steps(body, where) for body, where in ((program.start, "start"), (program.tick, "tick"), (program.end, "end"))
+    )
     _check_complete(program, sections)
     asked = {node.cell for node in walk((*program.start, *program.tick, *program.end)) if isinstance(node, WhileAny)}
     kept = _without_dead_stores(sections, asked)
@@ -197,8 +206,10 @@ def _without_dead_stores(sections: list[Section], asked: set[str]) -> list[Secti
             return kept
         more = now - read
         read |= now
-        kept = [_storing(one, read) if any(name in more for name, _ in one.stores) else old
-                for one, old in zip(sections, kept, strict=True)]
+        kept = [
+            _storing(one, read) if any(name in more for name, _ in one.stores) else old
+            for one, old in zip(sections, kept, strict=True)
+        ]
 
 
 def _storing(section: Section, read: set[str]) -> Section:

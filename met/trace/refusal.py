@@ -17,13 +17,45 @@ _HERE = os.path.dirname(os.path.abspath(__file__)) + os.sep
 _CHOOSE = "where(condition, a, b) computes both and keeps one"
 RECORDS = "`math`, numpy and `float()` need plain numbers: met.trace has sin, sqrt, atan2 and others, which record"
 
-_OURS = {"sin": "sin", "cos": "cos", "tan": "tan", "exp": "exp", "log": "log", "tanh": "tanh", "atan2": "atan2",
-         "arctan2": "atan2", "asin": "asin", "arcsin": "asin", "acos": "acos", "arccos": "acos", "atan": "atan",
-         "arctan": "atan", "sqrt": "sqrt", "floor": "floor", "rint": "rint", "round": "rint", "fabs": "absolute",
-         "abs": "absolute", "absolute": "absolute", "min": "minimum", "max": "maximum", "minimum": "minimum",
-         "maximum": "maximum", "fmin": "minimum", "fmax": "maximum", "clip": "clip", "sign": "sign", "where": "where",
-         "isnan": "is_nan", "isfinite": "isfinite", "trunc": "floor", "fma": "fma", "any": "any_of", "all": "all_of",
-         "copysign": "sign"}
+_OURS = {
+    "sin": "sin",
+    "cos": "cos",
+    "tan": "tan",
+    "exp": "exp",
+    "log": "log",
+    "tanh": "tanh",
+    "atan2": "atan2",
+    "arctan2": "atan2",
+    "asin": "asin",
+    "arcsin": "asin",
+    "acos": "acos",
+    "arccos": "acos",
+    "atan": "atan",
+    "arctan": "atan",
+    "sqrt": "sqrt",
+    "floor": "floor",
+    "rint": "rint",
+    "round": "rint",
+    "fabs": "absolute",
+    "abs": "absolute",
+    "absolute": "absolute",
+    "min": "minimum",
+    "max": "maximum",
+    "minimum": "minimum",
+    "maximum": "maximum",
+    "fmin": "minimum",
+    "fmax": "maximum",
+    "clip": "clip",
+    "sign": "sign",
+    "where": "where",
+    "isnan": "is_nan",
+    "isfinite": "isfinite",
+    "trunc": "floor",
+    "fma": "fma",
+    "any": "any_of",
+    "all": "all_of",
+    "copysign": "sign",
+}
 
 
 def place_of_caller() -> tuple[Place, str]:

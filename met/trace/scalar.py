@@ -126,9 +126,19 @@ class Scalar:
 
     def __array_ufunc__(self, ufunc: Any, method: str, *operands: Any, **options: Any) -> Any:
         """Lets numpy's own numbers stand left of an operator; numpy's functions are refused."""
-        name = {"add": "__radd__", "subtract": "__rsub__", "multiply": "__rmul__", "true_divide": "__rtruediv__",
-                "divide": "__rtruediv__", "less": "__gt__", "less_equal": "__ge__", "greater": "__lt__",
-                "greater_equal": "__le__", "equal": "__eq__", "not_equal": "__ne__"}.get(ufunc.__name__)
+        name = {
+            "add": "__radd__",
+            "subtract": "__rsub__",
+            "multiply": "__rmul__",
+            "true_divide": "__rtruediv__",
+            "divide": "__rtruediv__",
+            "less": "__gt__",
+            "less_equal": "__ge__",
+            "greater": "__lt__",
+            "greater_equal": "__le__",
+            "equal": "__eq__",
+            "not_equal": "__ne__",
+        }.get(ufunc.__name__)
         if name is None or method != "__call__" or len(operands) != 2 or getattr(operands[0], "ndim", 1) != 0:
             refuse(f"numpy's `{ufunc.__name__}` of a recorded number", function=ufunc.__name__)
         return getattr(self, name)(float(operands[0]))
@@ -146,8 +156,10 @@ class Scalar:
         refuse("a whole number from a recorded one", "met.trace.floor or rint, which record")
 
     def __index__(self) -> NoReturn:
-        refuse("an index or a count from a recorded number",
-               "gather(table, index) looks up a table; where(condition, a, b) chooses between two values")
+        refuse(
+            "an index or a count from a recorded number",
+            "gather(table, index) looks up a table; where(condition, a, b) chooses between two values",
+        )
 
     def __round__(self, digits: int | None = None) -> NoReturn:
         refuse("rounding of a recorded number", "met.trace.rint")

@@ -113,9 +113,7 @@ def _deck(name: str) -> tuple[Body, ...]:
     )
 
 
-def _body(
-    rng: np.random.Generator, number: int, parent: int, at: Sequence[float], rpy: Sequence[float]
-) -> Body:
+def _body(rng: np.random.Generator, number: int, parent: int, at: Sequence[float], rpy: Sequence[float]) -> Body:
     """A revolute joint about z and a link of no symmetry at all, of matter that could be."""
     spread = rng.standard_normal((3, 3)) * 0.1
     second = spread @ spread.T

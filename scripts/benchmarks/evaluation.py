@@ -137,8 +137,5 @@ BENCHMARKS: tuple[Benchmark, ...] = (
     *_benchmarks("dynamic", "any mode, rotors", {"2R": 5.5, "7R": 55.0, "30R": 380.0}, dynamic=True),
     *_benchmarks("avx2.static", "torque mode on AVX2", _AVX2, dynamic=False, cpu="haswell"),
     *_benchmarks("avx2.dynamic", "any mode, rotors, on AVX2", _AVX2, dynamic=True, cpu="haswell"),
-    *(
-        Benchmark(f"pin.{arm.name}", "pin.abaInParallel, one thread", "ns", partial(_peers, arm))
-        for arm in ARMS
-    ),
+    *(Benchmark(f"pin.{arm.name}", "pin.abaInParallel, one thread", "ns", partial(_peers, arm)) for arm in ARMS),
 )

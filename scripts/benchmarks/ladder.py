@@ -54,23 +54,32 @@ OTHERS: Mapping[str, Variant] = {
     "tachometer on all": Variant("sensor qd = tachometer { resolution = 1e-3 rad/s; }"),
     "tachometer with a filter": Variant("sensor qd = tachometer { filter = butterworth;  cutoff = 2 kHz; }"),
     "tachometer with noise": Variant("sensor qd = tachometer { noise = 1e-4 rad/s; }"),
-    "accelerometer": Variant(sensor=f"accelerometer {{ link = {_LINK};  at = [0, 0, 0.1] m;  along = [1, 0, 0];  "
-                             "cutoff = 200 Hz; }"),
+    "accelerometer": Variant(
+        sensor=f"accelerometer {{ link = {_LINK};  at = [0, 0, 0.1] m;  along = [1, 0, 0];  cutoff = 200 Hz; }}"
+    ),
     "gyroscope": Variant(sensor=f"gyroscope {{ link = {_LINK};  along = [0, 0, 1]; }}"),
-    "gyroscope with a filter": Variant(sensor=f"gyroscope {{ link = {_LINK};  along = [0, 0, 1];  "
-                                       "filter = butterworth;  cutoff = 200 Hz; }"),
+    "gyroscope with a filter": Variant(
+        sensor=f"gyroscope {{ link = {_LINK};  along = [0, 0, 1];  filter = butterworth;  cutoff = 200 Hz; }}"
+    ),
     "base prescribed": Variant(base="prescribed { x = sine(amplitude = 1 cm, frequency = 1 Hz); }"),
     "base free": Variant(base="free;"),
     "wrench": Variant(environment=f"used = wrench {{ link = {_LINK};  force = [1, 2, 3] N; }}"),
-    "wrench_table": Variant(environment=f"used = wrench_table {{ link = {_LINK};  times = [0, 1, 2] s;  "
-                            "force_x = [0, 3, 1] N; }"),
+    "wrench_table": Variant(
+        environment=f"used = wrench_table {{ link = {_LINK};  times = [0, 1, 2] s;  force_x = [0, 3, 1] N; }}"
+    ),
     "spring": Variant(environment=f"used = spring {{ link = {_LINK};  to = world;  stiffness = 10 N/m; }}"),
-    "bushing": Variant(environment=f"used = bushing {{ link = {_LINK};  to = world;  stiffness = [9, 9, 9] N/m;  "
-                       "turning = [1, 1, 1] N*m/rad; }"),
-    "plume, 1 cell": Variant(environment=f"used = plume {{ link = {_LINK};  width = 1 m;  height = 1 m;  cells = 1;  "
-                             "thrust = 10 N;  exponent = 6;  nozzle = [3, 0, 1] m;  axis = [-1, 0, 0]; }"),
-    "plume, 36 cells": Variant(environment=f"used = plume {{ link = {_LINK};  width = 1 m;  height = 1 m;  cells = 6;  "
-                               "thrust = 10 N;  exponent = 6;  nozzle = [3, 0, 1] m;  axis = [-1, 0, 0]; }"),
+    "bushing": Variant(
+        environment=f"used = bushing {{ link = {_LINK};  to = world;  stiffness = [9, 9, 9] N/m;  "
+        "turning = [1, 1, 1] N*m/rad; }"
+    ),
+    "plume, 1 cell": Variant(
+        environment=f"used = plume {{ link = {_LINK};  width = 1 m;  height = 1 m;  cells = 1;  "
+        "thrust = 10 N;  exponent = 6;  nozzle = [3, 0, 1] m;  axis = [-1, 0, 0]; }"
+    ),
+    "plume, 36 cells": Variant(
+        environment=f"used = plume {{ link = {_LINK};  width = 1 m;  height = 1 m;  cells = 6;  "
+        "thrust = 10 N;  exponent = 6;  nozzle = [3, 0, 1] m;  axis = [-1, 0, 0]; }"
+    ),
     "gravity_gradient": Variant(environment="used = gravity_gradient { radius = 6.8e6 m;  frame = inertial; }"),
     "joint_stop": Variant(
         environment=f"used = joint_stop {{ joint = {_JOINT};  upper = 9 rad;  stiffness = 1 N*m/rad; }}"

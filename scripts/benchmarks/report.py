@@ -35,7 +35,7 @@ def read(path: Path) -> dict[str, Any]:
     except ValueError as reason:
         raise Unreadable(f"{path}: not JSON: {reason}") from None
     if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise Unreadable(f"{path}: not a report of this scripts/benchmark (no \"format\": \"{FORMAT}\")")
+        raise Unreadable(f'{path}: not a report of this scripts/benchmark (no "format": "{FORMAT}")')
     return data
 
 

@@ -22,8 +22,8 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYT
 
 
 def run(*words: str, deck: str = "") -> tuple[float, float]:
-    """Wall time (s) and memory (MiB) of `scripts/met` with these words, where `deck.ic` is this text and nothing else.
-    """
+    """Wall time (s) and memory (MiB) of `scripts/met` with these words, where `deck.ic` is this text and nothing
+    else."""
     with tempfile.TemporaryDirectory() as directory:
         if deck:
             Path(directory, "deck.ic").write_text(deck, encoding="utf-8")

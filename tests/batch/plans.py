@@ -187,9 +187,7 @@ def answering(monkeypatch: Any) -> None:
         monkeypatch.setattr(engine, name, mine)
 
 
-def answer(
-    experiment: Any, cases: Any = None, *, record: bool = True, fails: frozenset[int] = frozenset()
-) -> Any:
+def answer(experiment: Any, cases: Any = None, *, record: bool = True, fails: frozenset[int] = frozenset()) -> Any:
     """What `met.run.run` gives back, by closed formulas: first-order rise of the rates; cases in `fails` break off."""
     from met.run import Run
 

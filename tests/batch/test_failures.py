@@ -29,7 +29,9 @@ from met.run import DONE, FAILED, LOST, TIMED_OUT
 from tests.batch import plans, poisoned, whole
 from tests.batch.door import ARM
 
-DECK = ARM + """
+DECK = (
+    ARM
+    + """
 run open {
     arm      = door;
     initial  { grip.q = 0.5 rad; }
@@ -45,6 +47,7 @@ default sweep pushes of open {
     vary initial.hinge.qd = [0.01 .. 0.99 by 0.01, 1e120] rad/s;       // the last is too much for its square
 }
 """
+)
 
 POISON = {"row_1234": "SIGKILL", "row_4321": "SIGSEGV", "row_7777": "SIGKILL", "row_2500": "sleep", "row_9001": "sleep"}
 POISONED = [1234, 2500, 4321, 7777, 9001]
@@ -194,9 +197,7 @@ class TestTenThousandCases:
         for variable in ("q", "qd", "end", "fast", "case_id", "cause", "status", "n_valid"):
             assert alike(before[variable][[row]], again[variable]), variable
 
-    def test_all_that_failed_are_run_again(
-        self, ran: tuple[Path, int, str], undisturbed: Path, here: Path
-    ) -> None:
+    def test_all_that_failed_are_run_again(self, ran: tuple[Path, int, str], undisturbed: Path, here: Path) -> None:
         status, said = told(["run", str(ran[0]), "--failed", "--no-picture"])
         again, before = values(here / "a.failed.h5"), values(undisturbed)
         rows = sorted([*POISONED, *DIVERGE])

@@ -104,7 +104,8 @@ def test_the_verdict_sums_up_the_sweep(
     monkeypatch.chdir(tmp_path)
     assert main(["run", "deck.ic", "it", "--no-picture"]) == 1
     told = capsys.readouterr().out
-    assert """\
+    assert (
+        """\
 it: 6 of 6 cases reached their end, of 2 structures
   require end > 150 mrad  met by 3 of 6 (50 %)
 
@@ -112,7 +113,9 @@ it: 6 of 6 cases reached their end, of 2 structures
   median of the cases:                    mrad
   it.drive                  3         0  95.05
   it.brisk                  3         3  190.5
-""" in told
+"""
+        in told
+    )
 
 
 @pytest.mark.slow

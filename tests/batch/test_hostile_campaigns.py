@@ -40,7 +40,9 @@ run brief like nominal { duration = 1 s; }
 sweep kinds of brief { vary integrator = [modified_euler, rk4, midpoint]; }
 """
 
-DOOR = ARM + """run open {
+DOOR = (
+    ARM
+    + """run open {
     arm = door;
     initial { grip.q = 0.5 rad; }
     rates { dynamics = 100 Hz;  record = 20 Hz; }
@@ -50,6 +52,7 @@ DOOR = ARM + """run open {
 }
 default sweep pushes of open { vary initial.hinge.qd = [0.01, 1e120] rad/s; }     // the last is too much for its square
 """
+)
 
 
 def deck(folder: Path, text: str = DECK, *select: str) -> Plan:
@@ -190,9 +193,7 @@ def test_histories_that_are_written_do_not_stay_in_memory(here: Path, monkeypatc
     assert peak < 12 << 20
 
 
-def test_what_decides_whose_histories_are_kept_takes_little_memory(
-    here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_decides_whose_histories_are_kept_takes_little_memory(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     peaks = []
     results = merge.results
 

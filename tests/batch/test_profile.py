@@ -79,7 +79,9 @@ def test_what_a_deck_gives_is_shown_whole(here: Path, capsys: pytest.CaptureFixt
     shown = re.sub(r"\d[\d,.]*", "#", capsys.readouterr().out)
     shown = re.sub(r"compiled|found in the cache", "come by", shown)
     shown = re.sub(r"\((\w*#)?\w*\)|# m?s\b|# [KM]iB", "#", shown)
-    assert re.sub(r" {2,}", "  ", shown) == """\
+    assert (
+        re.sub(r" {2,}", "  ", shown)
+        == """\
 brief: # joints, # case, modified_euler, steps of #
 
   a step of a case  times  operations  flops  ns  share
@@ -106,6 +108,7 @@ brief: # joints, # case, modified_euler, steps of #
   made  recorded in #, come by in #
   folded  # parameters that no case varies
 """
+    )
 
 
 @pytest.mark.slow

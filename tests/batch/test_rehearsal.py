@@ -77,7 +77,9 @@ def test_a_model_that_ends_its_process_is_named(
     monkeypatch.setattr(rehearsal, "LEAST_SECONDS", 4.0)
     file = offered(does)
     assert cli.main(["run", "deck.ic", "stopped", "--timeout", "1 s", "-o", "a.h5"]) == cli.BAD_INPUT
-    assert capsys.readouterr().err == f"""\
+    assert (
+        capsys.readouterr().err
+        == f"""\
 error[E217]: a model of `stopped` cannot be recorded: in `drive`, a process that tried it {how}
  --> {file}:9:5
   |
@@ -88,6 +90,7 @@ error[E217]: a model of `stopped` cannot be recorded: in `drive`, a process that
 
 1 error
 """
+    )
     assert not Path("a.h5.campaign").exists()
 
 

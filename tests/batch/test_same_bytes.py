@@ -75,9 +75,7 @@ def test_threads(here: Path, plan: Plan, undisturbed: bytes, threads: int) -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize("processes", [1, 2, 3, 4])
-def test_processes(
-    here: Path, plan: Plan, undisturbed: bytes, processes: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_processes(here: Path, plan: Plan, undisturbed: bytes, processes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     small_tasks(monkeypatch, 5)
     assert batch.run(plan, output="a.h5", processes=processes).path.read_bytes() == undisturbed
 

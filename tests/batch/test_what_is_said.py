@@ -88,7 +88,6 @@ class TestWhatIsSaid:
         )
         assert (here / "two_link.png").read_bytes() == b"\x89PNG mine"
 
-
     def test_a_metric_without_a_value_is_not_called_a_failure(
         self, here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -75,8 +75,19 @@ def test_the_standard_decks_can_be_included_together(tmp_path: Path) -> None:
     compiled = ic.check(together, select="all")
     assert compiled.plan is not None, compiled.diagnostics
     arms = {each.structure.arm for each in compiled.plan.experiments}
-    assert arms == {"ets_vii", "free_flyer", "manutec_r3", "manutec_r3_library", "manutec_r3_one_axis", "panda",
-                    "puma_560", "shuttle_arm", "stanford_arm", "station_arm", "two_link"}
+    assert arms == {
+        "ets_vii",
+        "free_flyer",
+        "manutec_r3",
+        "manutec_r3_library",
+        "manutec_r3_one_axis",
+        "panda",
+        "puma_560",
+        "shuttle_arm",
+        "stanford_arm",
+        "station_arm",
+        "two_link",
+    }
 
 
 def test_of_decks_included_together_none_is_the_default_but_the_decks_own(tmp_path: Path) -> None:
@@ -85,8 +96,10 @@ def test_of_decks_included_together_none_is_the_default_but_the_decks_own(tmp_pa
     with pytest.raises(Problem) as caught:
         ic.compile(tmp_path / "none.ic")
     (told,) = caught.value.diagnostics
-    assert (told.code, told.message) == ("D162", "this deck has 2 runs and sweeps, and several included files mark a "
-                                                 "`default`")
+    assert (told.code, told.message) == (
+        "D162",
+        "this deck has 2 runs and sweeps, and several included files mark a `default`",
+    )
     (tmp_path / "own.ic").write_text(both + "default run mine like puma_reach { duration = 1 s; }\n", encoding="utf-8")
     (made,) = ic.compile(tmp_path / "own.ic").experiments
     assert made.name == "mine"

@@ -45,13 +45,16 @@ def test_accelerations_are_those_of_pinocchio_built_from_the_published_tables(tm
     seed = 20190401
     random = np.random.default_rng(seed)
     q, qd = random.uniform(-2.5, 2.5, (8, 7)), random.uniform(-2.0, 2.0, (8, 7))
-    deck = BARE + f"""
+    deck = (
+        BARE
+        + f"""
         run fall {{
             arm = bare;  environment {{ gravity = [0, 0, -9.81] m/s^2; }}
             rates {{ dynamics = 1 kHz; }}  duration = 1 ms;  record = [qdd];
         }}
         sweep poses of fall {{ zip {{ {zipped("q", q, "rad")} {zipped("qd", qd, "rad/s")} }} }}
     """
+    )
     found = engine.run(experiment(tmp_path, deck, "poses")).signals["qdd"][:, 0]
     model = panda()
     data = model.createData()
@@ -66,13 +69,16 @@ def test_holding_the_ready_pose_takes_the_gravity_torques_of_pinocchio_and_of_fr
         f"{j} = panda_{j} {{ f_c = 0 N*m;  command = position({v!r} rad); }}"
         for j, v in zip(JOINTS, READY.tolist(), strict=True)
     )
-    deck = BARE + f"""
+    deck = (
+        BARE
+        + f"""
         run hold {{
             arm = bare;  servos {{ {servos} }}  initial {{ {pose(READY)} }}
             environment {{ gravity = [0, 0, -9.81] m/s^2; }}
             rates {{ dynamics = 1 kHz; servos = 1 kHz; record = 1 Hz; }}  duration = 10 s;  record = [q, tau];
         }}
     """
+    )
     signals = engine.run(experiment(tmp_path, deck, "hold")).signals
     q, tau = signals["q"][0, -1], signals["tau"][0, -1]
     np.testing.assert_allclose(q, READY, atol=1e-9)  # settled: the slowest mode is 10 /s or so

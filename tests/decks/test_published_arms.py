@@ -192,7 +192,8 @@ def test_three_links_of_ets_vii_are_published_as_no_bodies_and_stand_in_the_deck
         assert found == list(published.ETS_VII[i].inertia) and lacks(found) <= 0.0
         # half of one per cent nearer to what is published, and it is none again
         nearer = np.array(found) + 0.005 * np.array(six) * (np.array(found) != np.array(six)) * (
-            np.sign(np.array(six)) * np.sign(np.array(six) - np.array(found)))
+            np.sign(np.array(six)) * np.sign(np.array(six) - np.array(found))
+        )
         assert i not in mended or lacks(nearer) > 0.0
 
 

@@ -66,7 +66,8 @@ def test_what_is_asked_stays_within_the_limits_and_no_error_is_hidden(case: tupl
     z = np.where(s < rise, 0.01 * s**2, np.where(s < whole - rise, even, falling))
     path = place[0] + np.stack([0.0 * t, 0.0 * t, z], axis=1)
     np.testing.assert_allclose(
-        run.signals["guides.tip.error"][n], np.linalg.norm(place - path, axis=1), rtol=0, atol=1e-11)
+        run.signals["guides.tip.error"][n], np.linalg.norm(place - path, axis=1), rtol=0, atol=1e-11
+    )
 
 
 def test_at_the_end_of_its_reach_the_error_is_what_cannot_be_reached_and_what_the_damping_costs() -> None:

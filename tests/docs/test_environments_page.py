@@ -43,9 +43,17 @@ def test_its_table_of_a_plates_cells_is_what_the_model_gives() -> None:
     for n, at, row in rows:
         exponent, far = float(n or exponent), float(at)
         K = (exponent + 2.0) / (4.0 * np.pi) * THRUST
-        exact = 16.0 * K / (exponent + 2.0) * quad(
-            lambda a, far=far, n=exponent: 1.0 - (1.0 + (0.5 / np.cos(a) / far) ** 2) ** (-0.5 * n - 1.0),
-            0.0, np.pi / 4.0, epsrel=1e-13)[0]
+        exact = (
+            16.0
+            * K
+            / (exponent + 2.0)
+            * quad(
+                lambda a, far=far, n=exponent: 1.0 - (1.0 + (0.5 / np.cos(a) / far) ** 2) ** (-0.5 * n - 1.0),
+                0.0,
+                np.pi / 4.0,
+                epsrel=1e-13,
+            )[0]
+        )
         link = Link(np.diag([1.0, -1.0, -1.0]), (0.0, 0.0, far))
         for cells, stated in zip((1, 2, 4, 6, 8), row.split(" | "), strict=True):
             force = felt(link, nozzle=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), width=1.0, height=1.0, cells=cells,

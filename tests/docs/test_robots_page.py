@@ -49,18 +49,22 @@ def test_the_deck_made_from_the_file_sweeps_what_hangs_on_it(folder: Path) -> No
         assert (data["status"] == 0).all()
 
 
-def test_explain_prints_the_files_line(folder: Path, monkeypatch: pytest.MonkeyPatch,
-                                       capsys: pytest.CaptureFixture[str]) -> None:
+def test_explain_prints_the_files_line(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(folder)
     (command,) = (each for each in COMMANDS if "explain" in each)
     assert cli.main(shlex.split(command)[1:]) == 0
-    assert capsys.readouterr().out == """\
+    assert (
+        capsys.readouterr().out
+        == """\
 links.bar.com.x = 0.5 m
  --> swing.urdf:5:20
   |
 5 |       <origin xyz="0.5 0 0"/>
   |                    ^^^^^^^ written here
 """
+    )
 
 
 def test_every_type_of_joint_that_is_read_is_on_the_page() -> None:

@@ -1,6 +1,5 @@
 """Opening a line to a bed: what it is not, who else has it, and whether it is fast enough; whole messages."""
 
-
 from __future__ import annotations
 
 import os

@@ -33,7 +33,7 @@ def components(guide: Any, words: Mapping[str, str]) -> tuple[str, ...]:
 def followers(guide: Any, words: Mapping[str, str], link: str) -> tuple[str, ...]:
     """The joints that follow the guide: those of the small arm that carry its link, and inboard ones to be enough."""
     own = CARRIERS[link or "tip"]
-    return (*list(INBOARD)[:max(len(components(guide, words)) - len(own), 0)], *own)
+    return (*list(INBOARD)[: max(len(components(guide, words)) - len(own), 0)], *own)
 
 
 def inboard(kinds: Mapping[str, JointKind]) -> dict[str, str]:

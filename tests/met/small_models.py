@@ -93,8 +93,8 @@ class Small:
 
 DRIVEN = {
     "more": "servo turner { model = rigid_gearbox; ratio = 100; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; "
-            "resistance = 1 ohm; kt = 0.05 N*m/A; tau_max = 1 N*m; j_m = 1e-4 kg*m^2; }\n"
-            "servo pusher like turner { ratio = 100 rad/m; }",
+    "resistance = 1 ohm; kt = 0.05 N*m/A; tau_max = 1 N*m; j_m = 1e-4 kg*m^2; }\n"
+    "servo pusher like turner { ratio = 100 rad/m; }",
     "servos": "hinge = turner { command = rate(0.5 rad/s); }; slide = pusher { command = rate(0.1 m/s); };",
 }
 """Servos with a law and a motor on both joints, for models that are about these."""
@@ -403,8 +403,11 @@ class Use:
         written = [f"{self.key(self.parameter(name))} = {text};" for name, text in entries.items()]
         others = {} if self.for_all else {joint: kind for joint, kind in kinds.items() if joint != self.joint}
         for wanted in self.of_joint:
-            written += [f"{joint}.{wanted.name} = {replace(self, joint=alike[kind]).text(wanted, value)};"
-                        for joint, kind in others.items() if (value := self.small.values.get(wanted.name)) is not None]
+            written += [
+                f"{joint}.{wanted.name} = {replace(self, joint=alike[kind]).text(wanted, value)};"
+                for joint, kind in others.items()
+                if (value := self.small.values.get(wanted.name)) is not None
+            ]
         body = small_guides.body(self.model, small_guides.components(self.model, self.chosen), written)
         own = dict.fromkeys(JOINTS, JOINTS[self.joint]) if self.for_all else {}
         return {
@@ -416,8 +419,11 @@ class Use:
     def put(self, folder: Path) -> Use:
         """Writes the file that a course from a file reads, beside the deck; gives itself."""
         if getattr(self.model, "from_file", False):
-            columns = [(self.joint, in_words(ASKED[self.command], WORDS[JOINTS[self.joint]]))] if self.command else [
-                (parameter.name, parameter.unit) for parameter in self.model.parameters if parameter.as_many_as]
+            columns = (
+                [(self.joint, in_words(ASKED[self.command], WORDS[JOINTS[self.joint]]))]
+                if self.command
+                else [(parameter.name, parameter.unit) for parameter in self.model.parameters if parameter.as_many_as]
+            )
             heads = "".join(f", {name} [{unit}]" for name, unit in columns)
             rows = "".join(f"{t}{f', {x}' * len(columns)}\n" for t, x in zip(TIMES, (0.0, 0.5, 0.2), strict=True))
             (folder / FILES[self.kind]).write_text(f"time [s]{heads}\n{rows}", encoding="utf-8")
@@ -441,7 +447,7 @@ def in_words(unit: str, words: Mapping[str, str]) -> str:
 
     def factor(found: re.Match[str]) -> str:
         text = words.get(found[0], found[0])
-        alone = unit[:found.start()][-1:] != "/" and unit[found.end():][:1] != "^"
+        alone = unit[: found.start()][-1:] != "/" and unit[found.end() :][:1] != "^"
         return text if alone or text.isalpha() else f"({text})"
 
     text = re.sub(r"[A-Za-z]+", factor, unit)

@@ -19,11 +19,18 @@ from tests.ic.small_decks import changed
 from tests.met.program.free_flyers import ARM, RUN
 
 STATE = RUN[RUN.index("        base.position") : RUN.index("    }\n    environment")]
-SHAKEN = changed(RUN, (STATE, ""), ("base     = free;", """\
+SHAKEN = changed(
+    RUN,
+    (STATE, ""),
+    (
+        "base     = free;",
+        """\
 base = prescribed {
         x   = sine(amplitude = 20 cm, frequency = 1 Hz);
         yaw = table(times = [0, 1] s, values = [0, 0] rad);
-    }"""))
+    }""",
+    ),
+)
 
 
 def plan(folder: Path, text: str) -> Plan:

@@ -80,9 +80,7 @@ def test_it_runs_from_a_small_deck_and_its_bits_depend_on_the_case_alone(
 @pytest.mark.slow
 @pytest.mark.parametrize("servo", [name for name, model in models.find_own("servo").items() if model.commands])
 @pytest.mark.parametrize("course", models.find_own("command"))
-def test_every_servo_takes_every_course_of_every_command_that_it_knows(
-    servo: str, course: str, tmp_path: Path
-) -> None:
+def test_every_servo_takes_every_course_of_every_command_that_it_knows(servo: str, course: str, tmp_path: Path) -> None:
     for command in models.find("servo", servo).commands:
         use = Use("command", course, command=command, carrier=servo).put(tmp_path)
         deck = experiment(tmp_path, use.deck(), select=["it"])
@@ -92,6 +90,7 @@ def test_every_servo_takes_every_course_of_every_command_that_it_knows(
 
 def test_a_parameter_may_be_declared_for_each_of_several_words() -> None:
     """Never twice for one word, nor beside one that is there under all."""
+
     def names(*only: tuple[str, tuple[str, ...]] | None) -> list[str]:
         return models.there_together([Parameter(name="x", doc="a number", only=each) for each in only])
 

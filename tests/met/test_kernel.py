@@ -108,9 +108,19 @@ def machine_like_program():
         t.output("q", t.read("q"))
         t.output("time", t.time)
 
-    return Program(300.0, (Run(begin),), (
-        Every(3, (Run(servo),)), Unless0((Run(step), Run(ask), WhileAny("left", 4, (Run(halve),)))), Record(row, 2),
-    ), (Run(finish),), ("q", "gain"), 5, ("q", "time"))
+    return Program(
+        300.0,
+        (Run(begin),),
+        (
+            Every(3, (Run(servo),)),
+            Unless0((Run(step), Run(ask), WhileAny("left", 4, (Run(halve),)))),
+            Record(row, 2),
+        ),
+        (Run(finish),),
+        ("q", "gain"),
+        5,
+        ("q", "time"),
+    )
 
 
 def some_cases(count, seed=0):
@@ -178,7 +188,7 @@ def test_bits_do_not_depend_on_threads_order_or_company():
     order = np.random.default_rng(1).permutation(300)
     assert k.run(inputs[order], 60)[0].tobytes() == rows[order].tobytes()
     for case in (0, 17, 299):
-        assert k.run(inputs[case:case + 1], 60)[0].tobytes() == rows[case:case + 1].tobytes()
+        assert k.run(inputs[case : case + 1], 60)[0].tobytes() == rows[case : case + 1].tobytes()
 
 
 def test_bits_do_not_depend_on_recording():
@@ -204,11 +214,38 @@ def test_rows_of_any_width_reach_their_case(columns):
 # Random expressions
 
 
-UNARY = [lambda x: -x, abs, sqrt, sin, cos, tan, exp, log, tanh, floor, rint, sign, lambda x: x * x, lambda x: x**3,
-         lambda x: clip(x, -1.0, 2.0), lambda x: gather((0.5, -1.0, 3.0), x), lambda x: 1.0 / x]
-BINARY = [lambda a, b: a + b, lambda a, b: a - b, lambda a, b: a * b, lambda a, b: a / b, minimum, maximum, atan2,
-          lambda a, b: where(a < b, a, -b), lambda a, b: where(either(a == b, not_(a <= 1.0)), b, a * 0.5),
-          lambda a, b: where(both(a > 0.0, is_nan(b)), 7.0, a), lambda a, b: a * 3.0 + b]
+UNARY = [
+    lambda x: -x,
+    abs,
+    sqrt,
+    sin,
+    cos,
+    tan,
+    exp,
+    log,
+    tanh,
+    floor,
+    rint,
+    sign,
+    lambda x: x * x,
+    lambda x: x**3,
+    lambda x: clip(x, -1.0, 2.0),
+    lambda x: gather((0.5, -1.0, 3.0), x),
+    lambda x: 1.0 / x,
+]
+BINARY = [
+    lambda a, b: a + b,
+    lambda a, b: a - b,
+    lambda a, b: a * b,
+    lambda a, b: a / b,
+    minimum,
+    maximum,
+    atan2,
+    lambda a, b: where(a < b, a, -b),
+    lambda a, b: where(either(a == b, not_(a <= 1.0)), b, a * 0.5),
+    lambda a, b: where(both(a > 0.0, is_nan(b)), 7.0, a),
+    lambda a, b: a * 3.0 + b,
+]
 
 
 def test_a_row_may_be_longer_than_a_threads_stack():
@@ -237,10 +274,17 @@ def test_a_row_may_be_longer_than_a_threads_stack():
 @st.composite
 def expressions(draw):
     """Functions of three numbers, as lists of steps over what is there already."""
-    return draw(st.lists(st.one_of(
-        st.tuples(st.sampled_from(UNARY), st.integers(0, 40)),
-        st.tuples(st.sampled_from(BINARY), st.integers(0, 40), st.integers(0, 40)),
-        st.tuples(st.just(fma), st.integers(0, 40), st.integers(0, 40), st.integers(0, 40))), min_size=3, max_size=40))
+    return draw(
+        st.lists(
+            st.one_of(
+                st.tuples(st.sampled_from(UNARY), st.integers(0, 40)),
+                st.tuples(st.sampled_from(BINARY), st.integers(0, 40), st.integers(0, 40)),
+                st.tuples(st.just(fma), st.integers(0, 40), st.integers(0, 40), st.integers(0, 40)),
+            ),
+            min_size=3,
+            max_size=40,
+        )
+    )
 
 
 def build(steps, x, y, z):
@@ -250,8 +294,17 @@ def build(steps, x, y, z):
     return values[4:]
 
 
-NUMBERS = np.array([[0.3, -1.7, 2.5], [1e-3, 40.0, -7.0], [0.0, 1.0, -1.0], [math.nan, 1.0, 2.0], [1.0, math.nan, 0.1],
-                    [math.inf, 1.0, -2.0], [-3.0, 1e10, 1e-10]])
+NUMBERS = np.array(
+    [
+        [0.3, -1.7, 2.5],
+        [1e-3, 40.0, -7.0],
+        [0.0, 1.0, -1.0],
+        [math.nan, 1.0, 2.0],
+        [1.0, math.nan, 0.1],
+        [math.inf, 1.0, -2.0],
+        [-3.0, 1e10, 1e-10],
+    ]
+)
 
 
 def as_program(steps):
@@ -285,8 +338,10 @@ STEADY = [*BINARY[:3], lambda a, b: where(a < b, a, b), lambda a, b: a * 0.5 + b
 
 @pytest.mark.slow
 @settings(max_examples=40, deadline=None)
-@given(st.lists(st.tuples(st.sampled_from(STEADY), st.integers(0, 40), st.integers(0, 40)), min_size=3, max_size=25),
-       st.integers(0, 2**32 - 1))
+@given(
+    st.lists(st.tuples(st.sampled_from(STEADY), st.integers(0, 40), st.integers(0, 40)), min_size=3, max_size=25),
+    st.integers(0, 2**32 - 1),
+)
 def test_machine_code_agrees_with_plain_floats_to_rounding(steps, seed):
     # the same steps over sizes bound what rounding can do: each step may lose one part in 2^52 of what went in. A
     # choice by comparison may fall either way within that, and then both values are within it
@@ -346,10 +401,22 @@ def test_a_long_section_cut_into_pieces_has_the_same_bits():
         t.write("swap b", a + 1.0)
 
     start = Phase("start", lambda t: [t.write(f"x{i}", t.input("x") * (i + 1)) for i in range(12)])
-    end = Phase("end", lambda t: [t.output(f"o{i}", t.read(f"x{i}")) for i in range(12)] + [
-        t.output("a", t.read("swap a")), t.output("b", t.read("swap b"))])
-    program = Program(1.0, (Run(start),), (Run(Phase("long", body)),), (Run(end),), ("x",), 0,
-                      (*(f"o{i}" for i in range(12)), "a", "b"))
+    end = Phase(
+        "end",
+        lambda t: (
+            [t.output(f"o{i}", t.read(f"x{i}")) for i in range(12)]
+            + [t.output("a", t.read("swap a")), t.output("b", t.read("swap b"))]
+        ),
+    )
+    program = Program(
+        1.0,
+        (Run(start),),
+        (Run(Phase("long", body)),),
+        (Run(end),),
+        ("x",),
+        0,
+        (*(f"o{i}" for i in range(12)), "a", "b"),
+    )
     recording, machine = record(program), llvm.machine()
     inputs = np.linspace(-0.1, 0.1, 11)[:, None]
     results = []
@@ -473,8 +540,15 @@ def test_what_code_is_made_for_is_part_of_its_name(empty_cache):
     assert kernel.compile(program).cached
 
 
-@pytest.mark.parametrize("damage", [lambda data: b"", lambda data: data[:-7], lambda data: b"?" * len(data),
-                                    lambda data: data[:200] + bytes([data[200] ^ 1]) + data[201:]])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda data: b"",
+        lambda data: data[:-7],
+        lambda data: b"?" * len(data),
+        lambda data: data[:200] + bytes([data[200] ^ 1]) + data[201:],
+    ],
+)
 def test_a_damaged_entry_is_made_anew(empty_cache, damage):
     outcome(answer(1.0))
     (path,) = folder().glob("*/*.o")
@@ -503,10 +577,14 @@ def others_may_write_its_folder(entry, monkeypatch):
     entry.parent.chmod(0o777)
 
 
-@pytest.mark.parametrize("spoil, told, why", [
-    (by_another_user, "*/*.o", "it is another user's"), (others_may_write_it, "*/*.o", "others may write it"),
-    (others_may_write_its_folder, "*", "others may write it"),
-])
+@pytest.mark.parametrize(
+    "spoil, told, why",
+    [
+        (by_another_user, "*/*.o", "it is another user's"),
+        (others_may_write_it, "*/*.o", "others may write it"),
+        (others_may_write_its_folder, "*", "others may write it"),
+    ],
+)
 def test_what_another_user_may_have_written_is_not_run_and_told(empty_cache, monkeypatch, capsys, spoil, told, why):
     cache._tell.cache_clear()
     assert outcome(answer(1.0)) == (2.0, False)
@@ -541,10 +619,17 @@ def test_an_entry_under_another_name_is_made_anew(empty_cache):
     assert outcome(answer(2.0)) == (3.0, False)
 
 
-@pytest.mark.parametrize("home, base, expected", [
-    ("/h", "", "/h/.cache/met"), ("/h", "/x", "/x/met"), ("/h", "x", "/h/.cache/met"), ("", "/x", "/x/met"),
-    ("", "", "/own/.cache/met"), ("h", "", "/own/.cache/met"),
-])
+@pytest.mark.parametrize(
+    "home, base, expected",
+    [
+        ("/h", "", "/h/.cache/met"),
+        ("/h", "/x", "/x/met"),
+        ("/h", "x", "/h/.cache/met"),
+        ("", "/x", "/x/met"),
+        ("", "", "/own/.cache/met"),
+        ("h", "", "/own/.cache/met"),
+    ],
+)
 def test_where_the_cache_is(monkeypatch, home, base, expected):
     monkeypatch.delenv("MET_CACHE_DIR")
     monkeypatch.setenv("HOME", home)
@@ -591,5 +676,9 @@ def test_a_hit_loads_without_the_optimiser(empty_cache, monkeypatch):
 
 def test_importing_the_kernel_does_not_import_llvm():
     code = "import sys, met.backends.llvm.kernel; sys.exit('llvmlite' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False, env={**os.environ, "PYTHONPATH": os.pathsep.join(
-        sys.path)}).returncode == 0
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], check=False, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        ).returncode
+        == 0
+    )

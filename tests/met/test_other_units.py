@@ -66,7 +66,9 @@ def test_what_is_proposed_has_the_size_and_the_kind_that_pint_gives_the_word(
     for help in remedy(word, "2"):
         quoted = help.partition("`")[2].partition("`")[0]
         if (
-            word in ("degC", "degF", "degR") or "temperatures" in help or "as a force" in help
+            word in ("degC", "degF", "degR")
+            or "temperatures" in help
+            or "as a force" in help
             or help.startswith(("no unit", "a prefix"))
         ):
             assert "did you mean" not in help

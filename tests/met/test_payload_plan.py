@@ -51,8 +51,13 @@ def test_the_key_of_an_arm_without_payloads_is_what_it_was_and_others_have_their
     without = replace(two, payloads=())
     assert "payloads" not in plan_file.encode(type(without), without)
     box, crate = two.payloads
-    some = (without, two, replace(two, payloads=(box,)), replace(two, payloads=(replace(box, released=False), crate)),
-            replace(two, payloads=(replace(box, link="upper"), crate)))
+    some = (
+        without,
+        two,
+        replace(two, payloads=(box,)),
+        replace(two, payloads=(replace(box, released=False), crate)),
+        replace(two, payloads=(replace(box, link="upper"), crate)),
+    )
     assert len({structure_key(each) for each in some}) == len(some)
     drawn = replace(two, payloads=(replace(box, shape=None, place=None), crate))
     assert structure_key(drawn) == structure_key(two)
@@ -75,27 +80,40 @@ def value(path: str, to: object) -> Change:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("change", "said"), [
-    (box(name="upper"), "structure.payloads[0].name: `upper` is there twice"),
-    (box(name="world"), "structure.payloads[0].name: `world` is there twice"),
-    (box(name="crate"), "structure.payloads[1].name: `crate` is there twice"),
-    (box(name="a box"), "structure.payloads[0].name: 'a box' is no name: letters, digits and _"),
-    (box(link="hook"), "structure.payloads[0].link: there is no link `hook`"),
-    (box(grappled="yes"), "structure.payloads[0].grappled: it should be true or false"),
-    (lambda e: (e["structure"].update(velocity_products=False), e["structure"].pop("base")),
-     "structure.velocity_products: a payload that flies needs them"),
-    (value("box.mass", 0.0), "parameters.payloads.box.mass: what flies has mass"),
-    (value("box.inertia.xx", 0.0),
-     "parameters.payloads.box.inertia: a principal moment is not above 0: what flies turns about all axes"),
-    (value("box.release", 0.8), "parameters.payloads.box.release: it is not after `grapple`"),
-    (value("crate.mass", -1.0), "parameters.payloads.crate.mass: it should be at least 0"),
-    (value("crate.inertia.xy", 9.0),
-     "parameters.payloads.crate.inertia: a principal moment is below 0: no body has that"),
-    (lambda e: e["parameters"]["payloads.box.rate.x"].update(unit="m/s"),
-     "parameters.payloads.box.rate.x.unit: it should be rad/s"),
-    (lambda e: e["parameters"].update({"payloads.box.colour": e["parameters"]["payloads.box.mass"]}),
-     "parameters.payloads.box.colour: nothing in this run has this parameter"),
-])
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (box(name="upper"), "structure.payloads[0].name: `upper` is there twice"),
+        (box(name="world"), "structure.payloads[0].name: `world` is there twice"),
+        (box(name="crate"), "structure.payloads[1].name: `crate` is there twice"),
+        (box(name="a box"), "structure.payloads[0].name: 'a box' is no name: letters, digits and _"),
+        (box(link="hook"), "structure.payloads[0].link: there is no link `hook`"),
+        (box(grappled="yes"), "structure.payloads[0].grappled: it should be true or false"),
+        (
+            lambda e: (e["structure"].update(velocity_products=False), e["structure"].pop("base")),
+            "structure.velocity_products: a payload that flies needs them",
+        ),
+        (value("box.mass", 0.0), "parameters.payloads.box.mass: what flies has mass"),
+        (
+            value("box.inertia.xx", 0.0),
+            "parameters.payloads.box.inertia: a principal moment is not above 0: what flies turns about all axes",
+        ),
+        (value("box.release", 0.8), "parameters.payloads.box.release: it is not after `grapple`"),
+        (value("crate.mass", -1.0), "parameters.payloads.crate.mass: it should be at least 0"),
+        (
+            value("crate.inertia.xy", 9.0),
+            "parameters.payloads.crate.inertia: a principal moment is below 0: no body has that",
+        ),
+        (
+            lambda e: e["parameters"]["payloads.box.rate.x"].update(unit="m/s"),
+            "parameters.payloads.box.rate.x.unit: it should be rad/s",
+        ),
+        (
+            lambda e: e["parameters"].update({"payloads.box.colour": e["parameters"]["payloads.box.mass"]}),
+            "parameters.payloads.box.colour: nothing in this run has this parameter",
+        ),
+    ],
+)
 def test_a_plan_that_somebody_broke_is_told(tmp_path: Path, change: Change, said: str) -> None:
     plan_file.write(plan(tmp_path), tmp_path / "p.json")
     document = json.loads((tmp_path / "p.json").read_text(encoding="utf-8"))

@@ -76,41 +76,67 @@ def test_a_plan_with_guides_is_read_as_it_was_written(tmp_path: Path) -> None:
         (guide(0, name="a tip"), "structure.guides[0].name: 'a tip' is no name: letters, digits and _"),
         (guide(1, name="tip"), "structure.guides[1].name: `tip` is there twice"),
         (guide(0, divisor=0), "structure.guides[0].divisor: it should be a whole number from 1 to 1000000000000"),
-        (guide(1, divisor=2),
-         "structure.guides[1].divisor: of a guide that does not tick it should be that of the dynamics"),
-        (lambda e: (e["structure"]["schedule"].update(dynamics=2, ticks=1000), guide(0, divisor=3)(e),
-                    guide(1, divisor=2)(e)),
-         "structure.guides[0].divisor: it should be a multiple of that of the dynamics, 2"),
-        (guide(0, joints=["low"]), "structure.guides[0].joints: it should be those whose servos follow it, in the "
-         "arm's order: low, high"),
-        (guide(0, joints=["high", "low"]), "structure.guides[0].joints: it should be those whose servos follow it, in "
-         "the arm's order: low, high"),
-        (command(0, guide="top"), "structure.guides[0].joints: it should be those whose servos follow it, in the "
-         "arm's order: high"),
-        (lambda e: (command(2, guide="top")(e), e["structure"]["guides"].pop()),
-         "structure.servos[2].command.guide: there is no guide `top`"),
-        (command(2, kind="rate"),
-         "structure.servos[2].command.kind: a together gives no command `rate`, but position"),
+        (
+            guide(1, divisor=2),
+            "structure.guides[1].divisor: of a guide that does not tick it should be that of the dynamics",
+        ),
+        (
+            lambda e: (
+                e["structure"]["schedule"].update(dynamics=2, ticks=1000),
+                guide(0, divisor=3)(e),
+                guide(1, divisor=2)(e),
+            ),
+            "structure.guides[0].divisor: it should be a multiple of that of the dynamics, 2",
+        ),
+        (
+            guide(0, joints=["low"]),
+            "structure.guides[0].joints: it should be those whose servos follow it, in the arm's order: low, high",
+        ),
+        (
+            guide(0, joints=["high", "low"]),
+            "structure.guides[0].joints: it should be those whose servos follow it, in the arm's order: low, high",
+        ),
+        (
+            command(0, guide="top"),
+            "structure.guides[0].joints: it should be those whose servos follow it, in the arm's order: high",
+        ),
+        (
+            lambda e: (command(2, guide="top")(e), e["structure"]["guides"].pop()),
+            "structure.servos[2].command.guide: there is no guide `top`",
+        ),
+        (command(2, kind="rate"), "structure.servos[2].command.kind: a together gives no command `rate`, but position"),
         (command(2, model="ramp"), "structure.servos[2].command.model: a command that follows a guide has none"),
-        (course(0, component="w"),
-         "structure.guides[0].courses[0].component: it should be one of: x, y, z, roll, pitch, yaw"),
-        (course(1, component="x"), "structure.guides[0].courses[1].component: it should be one of: y, z, roll, pitch, "
-         "yaw"),
-        (lambda e: e["structure"]["guides"][1].update(courses=[{"component": "x", "model": "ramp"}]),
-         "structure.guides[1].courses[0].component: it should be one of: none"),
+        (
+            course(0, component="w"),
+            "structure.guides[0].courses[0].component: it should be one of: x, y, z, roll, pitch, yaw",
+        ),
+        (
+            course(1, component="x"),
+            "structure.guides[0].courses[1].component: it should be one of: y, z, roll, pitch, yaw",
+        ),
+        (
+            lambda e: e["structure"]["guides"][1].update(courses=[{"component": "x", "model": "ramp"}]),
+            "structure.guides[1].courses[0].component: it should be one of: none",
+        ),
         (value("tip.x.values", [0.0]), "parameters.guides.tip.x.values: there are 1 for 2 times"),
         (value("tip.x.times", [1.0, 0.0]), "parameters.guides.tip.x.times: they do not rise"),
         (value("tip.link", {"word": "tow"}), "parameters.guides.tip.link.value: it should name one of the arm's links"),
         (value("tip.link", {"word": "one"}), "parameters.guides.tip.link: joint `high` does not carry link `one`"),
-        (value("tip.guides", {"word": "zz"}),
-         "parameters.guides.tip.guides.value: it should be a word: pose, position, xy, xz, yz"),
+        (
+            value("tip.guides", {"word": "zz"}),
+            "parameters.guides.tip.guides.value: it should be a word: pose, position, xy, xz, yz",
+        ),
         (value("tip.guides", {"word": "xz"}), "parameters.guides.tip.y: this component is not guided"),
         (value("tip.guides", {"word": "pose"}), "parameters.guides.tip: there are 2 joints for 6 components"),
         (value("tip.low.max_rate", 0.0), "parameters.guides.tip.low.max_rate.value: it should be above 0"),
-        (lambda e: e["parameters"]["guides.move.out.to"].update(unit="rad"),
-         "parameters.guides.move.out.to.unit: it should be m"),
-        (lambda e: e["structure"]["record"][1].update(channels=["guides.tip.eror"]),
-         "structure.record[1].channels: there is no channel `guides.tip.eror`"),
+        (
+            lambda e: e["parameters"]["guides.move.out.to"].update(unit="rad"),
+            "parameters.guides.move.out.to.unit: it should be m",
+        ),
+        (
+            lambda e: e["structure"]["record"][1].update(channels=["guides.tip.eror"]),
+            "structure.record[1].channels: there is no channel `guides.tip.eror`",
+        ),
     ],
 )
 def test_what_a_plan_says_wrong_of_guides_is_placed(change: Change, said: str, tmp_path: Path) -> None:
@@ -121,8 +147,9 @@ def test_what_a_plan_says_wrong_of_guides_is_placed(change: Change, said: str, t
     assert caught.value.diagnostics[0].message == f"the plan p.json is damaged: experiments[0].{said}"
 
 
-@pytest.mark.parametrize(("path", "what"), [("guides.tip.speed", "guides.tip.link"),
-                                            ("guides.tip.low.max_rat", "guides.tip.low.max_rate")])
+@pytest.mark.parametrize(
+    ("path", "what"), [("guides.tip.speed", "guides.tip.link"), ("guides.tip.low.max_rat", "guides.tip.low.max_rate")]
+)
 def test_a_parameter_that_no_guide_has_is_told(path: str, what: str, tmp_path: Path) -> None:
     document = json.loads(text(tmp_path))
     parameters = document["experiments"][0]["parameters"]
@@ -131,7 +158,9 @@ def test_a_parameter_that_no_guide_has_is_told(path: str, what: str, tmp_path: P
         plan_file.loads(json.dumps(document), "p.json")
     (diagnostic,) = caught.value.diagnostics
     assert (diagnostic.code, diagnostic.message) == (
-        "E304", f"p.json: run `it`: parameter `{path}` is none of its model's")
+        "E304",
+        f"p.json: run `it`: parameter `{path}` is none of its model's",
+    )
 
 
 def test_a_parameter_that_is_missing_takes_its_default(tmp_path: Path) -> None:
@@ -141,7 +170,9 @@ def test_a_parameter_that_is_missing_takes_its_default(tmp_path: Path) -> None:
     experiment["parameters"].pop("guides.tip.high.max_rate")
     (read,) = plan_file.loads(json.dumps(document), "p.json").experiments
     assert (read.parameters["guides.tip.gain"].value, read.parameters["guides.tip.high.max_rate"].value) == (
-        1.0, float("inf"))
+        1.0,
+        float("inf"),
+    )
     assert read.notes[-2:] == (
         "`guides.tip.gain` is not in the plan (schema 1): its default, 1.0 1/s, is taken",
         "`guides.tip.high.max_rate` is not in the plan (schema 1): its default, inf rad/s, is taken",

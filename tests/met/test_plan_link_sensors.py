@@ -94,7 +94,9 @@ def test_a_parameter_that_no_sensor_has_is_told_and_one_that_is_missing_takes_it
         plan_file.loads(json.dumps(document), "p.json")
     (diagnostic,) = caught.value.diagnostics
     assert (diagnostic.code, diagnostic.message) == (
-        "E304", "p.json: run `it`: parameter `sensors.up.nois` is none of its model's")
+        "E304",
+        "p.json: run `it`: parameter `sensors.up.nois` is none of its model's",
+    )
 
 
 @pytest.mark.parametrize(("unit", "said"), [

@@ -48,9 +48,14 @@ class LinkState:
 class DenseArm:
     """Bodies (parents before children) on a base at rest, or on one that moves as `base` says (its J are not read)."""
 
-    def __init__(self, bodies: Sequence[Body], gravity: Sequence[float] = (0.0, 0.0, 0.0),
-                 rotor: Sequence[float] | None = None, wrenches: Wrenches | None = None,
-                 base: LinkState | None = None) -> None:
+    def __init__(
+        self,
+        bodies: Sequence[Body],
+        gravity: Sequence[float] = (0.0, 0.0, 0.0),
+        rotor: Sequence[float] | None = None,
+        wrenches: Wrenches | None = None,
+        base: LinkState | None = None,
+    ) -> None:
         self.bodies = bodies
         self.base = base
         self.n = sum(body.kind != "fixed" for body in bodies)
@@ -187,11 +192,11 @@ def eliminate(A: Array, B: Array) -> Array:
     """A^-1 B of a symmetric positive definite A, by Gauss: numpy's own solver knows no long floats."""
     A, B = np.array(A, LONG), np.array(B, LONG)
     for k in range(len(A)):
-        share = A[k + 1:, k:k + 1] / A[k, k]
-        A[k + 1:, k:] -= share * A[k, k:]
-        B[k + 1:] -= share * B[k]
+        share = A[k + 1 :, k : k + 1] / A[k, k]
+        A[k + 1 :, k:] -= share * A[k, k:]
+        B[k + 1 :] -= share * B[k]
     for k in reversed(range(len(A))):
-        B[k] = (B[k] - A[k, k + 1:] @ B[k + 1:]) / A[k, k]
+        B[k] = (B[k] - A[k, k + 1 :] @ B[k + 1 :]) / A[k, k]
     return B
 
 

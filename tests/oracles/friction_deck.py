@@ -42,23 +42,26 @@ def friction_deck(joints: int, cases: int, *, duration: str = "1.6 s", limbs: bo
         return "[" + ", ".join(f"{x:.4f}" for x in values) + f"] {unit}"
 
     levels = [0.0 if case % 5 == 2 else pick.uniform(0.005, 0.05) for case in range(cases)]
-    return SERVO + "\n".join([
-        *lines,
-        "run back_and_forth {",
-        f"    arm = swung;  servos {{ {' '.join(f'j{i} = swinging;' for i in range(joints))} }}",
-        "    initial { j0.q = away; }",
-        "    environment { gravity = [0, 0, -9.81] m/s^2; }",
-        "    rates { base = 1 kHz; dynamics = 250 Hz; servos = 1 kHz; record = 50 Hz; }",
-        f"    duration = {duration};",
-        "    record = [q, qd, qdd, tau];",
-        "    metric top = max { of = j0.qd; }",
-        "}",
-        "sweep many of back_and_forth {",
-        "    zip {",
-        f"        level = {listed(levels, 'N*m')};",
-        f"        swing = {listed([pick.uniform(0.0, 1.5) for _ in range(cases)], 'rad/s')};",
-        f"        away = {listed([pick.uniform(-1.0, 1.0) for _ in range(cases)], 'rad')};",
-        f"        links.link{joints - 1}.mass = {listed([pick.uniform(0.2, 1.0) for _ in range(cases)], 'kg')};",
-        "    }",
-        "}", "",
-    ])
+    return SERVO + "\n".join(
+        [
+            *lines,
+            "run back_and_forth {",
+            f"    arm = swung;  servos {{ {' '.join(f'j{i} = swinging;' for i in range(joints))} }}",
+            "    initial { j0.q = away; }",
+            "    environment { gravity = [0, 0, -9.81] m/s^2; }",
+            "    rates { base = 1 kHz; dynamics = 250 Hz; servos = 1 kHz; record = 50 Hz; }",
+            f"    duration = {duration};",
+            "    record = [q, qd, qdd, tau];",
+            "    metric top = max { of = j0.qd; }",
+            "}",
+            "sweep many of back_and_forth {",
+            "    zip {",
+            f"        level = {listed(levels, 'N*m')};",
+            f"        swing = {listed([pick.uniform(0.0, 1.5) for _ in range(cases)], 'rad/s')};",
+            f"        away = {listed([pick.uniform(-1.0, 1.0) for _ in range(cases)], 'rad')};",
+            f"        links.link{joints - 1}.mass = {listed([pick.uniform(0.2, 1.0) for _ in range(cases)], 'kg')};",
+            "    }",
+            "}",
+            "",
+        ]
+    )

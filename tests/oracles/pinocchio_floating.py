@@ -115,9 +115,7 @@ class FloatingPinocchio:
 
     def momentum(self, base, q, qd) -> tuple[Array, Array]:
         """Angular momentum about the world's origin, linear momentum."""
-        pin.forwardKinematics(
-            self.model, self.data, self.configuration(base, q), self.velocity(base.w, base.v, qd)
-        )
+        pin.forwardKinematics(self.model, self.data, self.configuration(base, q), self.velocity(base.w, base.v, qd))
         total = pin.Force.Zero()
         for j in range(1, self.model.njoints):
             total += self.data.oMi[j].act(self.model.inertias[j] * self.data.v[j])

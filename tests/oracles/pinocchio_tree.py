@@ -61,7 +61,8 @@ class PinocchioTree:
             xx, yy, zz, xy, xz, yz = body.inertia
             J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], float)
             model.appendBodyToJoint(
-                joint_of[-1], pin.Inertia(float(body.mass), np.array(body.com, float), J), placed[-1])
+                joint_of[-1], pin.Inertia(float(body.mass), np.array(body.com, float), J), placed[-1]
+            )
         self.model, self.joint_of, self.placed = model, joint_of, placed
         self.link = {body.name: b for b, body in enumerate(bodies)}
         self.at = [model.joints[model.getJointId(name)].idx_v for name in self.names]

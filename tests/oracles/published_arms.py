@@ -185,8 +185,10 @@ def _r3(rows: Sequence[tuple], foot: float) -> tuple[Part, ...]:
     """The library's y, up, is the world's z."""
     places = [(0.0, 0.0, foot), *(row[1] for row in rows[:-1])]
     turns = [turn(X, HALF), *[np.eye(3)] * 5]
-    return tuple(Part(at, R, axis, mass, com, inertia)
-                 for at, R, (axis, _, mass, com, inertia) in zip(places, turns, rows, strict=True))
+    return tuple(
+        Part(at, R, axis, mass, com, inertia)
+        for at, R, (axis, _, mass, com, inertia) in zip(places, turns, rows, strict=True)
+    )
 
 
 R3, R3_LIBRARY = _r3(_R3, 0.0), _r3(_R3_LIBRARY, 0.351)

@@ -36,9 +36,11 @@ def random_deck(seed: int, *, friction: bool = True) -> str:
         parent = "base" if i == 0 else pick.choice([f"link{j}" for j in range(i)])
         kind = "prismatic" if prismatic else "revolute"
         shape = pick.choice(
-            [f"rod(length = {number(0.2, 1)} m, along = {pick.choice('xyz')})",
-             f"box(size = [{number(0.1, 1)}, {number(0.1, 1)}, {number(0.1, 1)}] m)",
-             f"cylinder(radius = {number(0.05, 0.2)} m, length = {number(0.2, 1)} m, along = {pick.choice('xyz')})"]
+            [
+                f"rod(length = {number(0.2, 1)} m, along = {pick.choice('xyz')})",
+                f"box(size = [{number(0.1, 1)}, {number(0.1, 1)}, {number(0.1, 1)}] m)",
+                f"cylinder(radius = {number(0.05, 0.2)} m, length = {number(0.2, 1)} m, along = {pick.choice('xyz')})",
+            ]
         )
         arm.append(f"    link link{i} {{ mass = {number(0.5, 10)} kg; shape = {shape}; }}")
         arm.append(
@@ -50,17 +52,24 @@ def random_deck(seed: int, *, friction: bool = True) -> str:
             kind = pick.choice(["rate", "rate", "position", "torque"])
             unit = {"rate": f"{joint}/s", "position": joint, "torque": effort}[kind]
             course = pick.choice(
-                [f"{number(-1, 1)} {unit}",
-                 f"sine(amplitude = {number(0.1, 1)} {unit}, frequency = {number(1, 4)} Hz)",
-                 f"ramp(to = {number(-1, 1)} {unit}, begin = 0.05 s, over = 0.2 s)",
-                 f"step(to = {number(-1, 1)} {unit}, at = 0.1 s)",
-                 f"table(times = [0, 0.1, 0.25] s, values = [0, {number(-1, 1)}, {number(-1, 1)}] {unit})"]
+                [
+                    f"{number(-1, 1)} {unit}",
+                    f"sine(amplitude = {number(0.1, 1)} {unit}, frequency = {number(1, 4)} Hz)",
+                    f"ramp(to = {number(-1, 1)} {unit}, begin = 0.05 s, over = 0.2 s)",
+                    f"step(to = {number(-1, 1)} {unit}, at = 0.1 s)",
+                    f"table(times = [0, 0.1, 0.25] s, values = [0, {number(-1, 1)}, {number(-1, 1)}] {unit})",
+                ]
             )
             f_c = number(0.001, 0.05) if friction and pick.random() < 0.6 else "0"
             servos.append(
                 GEARBOX.format(
-                    name=f"servo{i}", ratio=number(60, 150), ratio_unit="rad/m" if prismatic else "",
-                    kp=number(0.02, 0.2), ki=number(0.1, 1), tau_max=number(0.1, 0.5), f_c=f_c,
+                    name=f"servo{i}",
+                    ratio=number(60, 150),
+                    ratio_unit="rad/m" if prismatic else "",
+                    kp=number(0.02, 0.2),
+                    ki=number(0.1, 1),
+                    tau_max=number(0.1, 0.5),
+                    f_c=f_c,
                     command=f"{kind}({course})",
                 )
             )
@@ -73,18 +82,23 @@ def random_deck(seed: int, *, friction: bool = True) -> str:
         for i in range(count)
         for unit in (["m"] if f"joint j{i} prismatic" in "\n".join(arm) else ["rad"])
     )
-    return "\n".join([
-        *servos,
-        "arm random {", *arm, "}",
-        "run it {",
-        f"    arm = random;  servos {{ {' '.join(uses)} }}",
-        f"    initial {{ {initial} }}",
-        f"    environment {{ {gravity} {damping} velocity_products = {pick.choice(['on', 'on', 'off'])}; }}",
-        f"    rates {{ base = 1 kHz; dynamics = {dynamics}; servos = {pick.choice(['250 Hz', '1 kHz'])};"
-        f" record = 250 Hz; }}",
-        "    duration = 0.4 s;",
-        "    record = [q, qd, qdd, tau];",
-        "    metric peak = max { of = j0.q; }",
-        "    metric size = rms { of = j0.qd; }",
-        "}", "",
-    ])
+    return "\n".join(
+        [
+            *servos,
+            "arm random {",
+            *arm,
+            "}",
+            "run it {",
+            f"    arm = random;  servos {{ {' '.join(uses)} }}",
+            f"    initial {{ {initial} }}",
+            f"    environment {{ {gravity} {damping} velocity_products = {pick.choice(['on', 'on', 'off'])}; }}",
+            f"    rates {{ base = 1 kHz; dynamics = {dynamics}; servos = {pick.choice(['250 Hz', '1 kHz'])};"
+            f" record = 250 Hz; }}",
+            "    duration = 0.4 s;",
+            "    record = [q, qd, qdd, tau];",
+            "    metric peak = max { of = j0.q; }",
+            "    metric size = rms { of = j0.qd; }",
+            "}",
+            "",
+        ]
+    )

@@ -55,13 +55,19 @@ def random_tree(
     def numbers(size: float) -> tuple[float, ...]:
         return tuple(float(x) for x in size * rng.standard_normal(n))
 
-    wrenches = {
-        body.name: (_vector(rng, 2.0), _vector(rng, 5.0)) for body in bodies if rng.random() < 0.4
-    }
+    wrenches = {body.name: (_vector(rng, 2.0), _vector(rng, 5.0)) for body in bodies if rng.random() < 0.4}
     rotor = tuple(float(x) for x in np.where(rng.random(n) < 0.5, 10.0 ** rng.uniform(-2, 2, n), 0.0))
     return RandomArm(
-        seed, tuple(bodies), numbers(2.0), numbers(1.5), numbers(10.0), numbers(3.0),
-        tuple(bool(x) for x in rng.random(n) < 0.6), rotor, _vector(rng, 6.0), wrenches,
+        seed,
+        tuple(bodies),
+        numbers(2.0),
+        numbers(1.5),
+        numbers(10.0),
+        numbers(3.0),
+        tuple(bool(x) for x in rng.random(n) < 0.6),
+        rotor,
+        _vector(rng, 6.0),
+        wrenches,
     )
 
 
@@ -94,7 +100,14 @@ def _body(rng: np.random.Generator, number: int, kind: str, parent: int, square:
     second = mass * spread @ spread.T
     J = np.trace(second) * np.eye(3) - second
     return Body(
-        name=f"link{number}", joint=f"joint{number}", kind=kind, parent=parent, at=at, rpy=rpy,
-        axis=tuple(float(x) for x in axis), mass=mass, com=_vector(rng, 0.3),
+        name=f"link{number}",
+        joint=f"joint{number}",
+        kind=kind,
+        parent=parent,
+        at=at,
+        rpy=rpy,
+        axis=tuple(float(x) for x in axis),
+        mass=mass,
+        com=_vector(rng, 0.3),
         inertia=tuple(float(J[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))),
     )

@@ -53,6 +53,7 @@ class UrdfPinocchio:
     def torques(self, q: Mapping[str, float], qd: Mapping[str, float], qdd: Mapping[str, float]) -> dict[str, float]:
         return self._named(pin.rnea(self.model, self.data, self._q(q), self._v(qd), self._v(qdd)))
 
-    def accelerations(self, q: Mapping[str, float], qd: Mapping[str, float],
-                      tau: Mapping[str, float]) -> dict[str, float]:
+    def accelerations(
+        self, q: Mapping[str, float], qd: Mapping[str, float], tau: Mapping[str, float]
+    ) -> dict[str, float]:
         return self._named(pin.aba(self.model, self.data, self._q(q), self._v(qd), self._v(tau)))

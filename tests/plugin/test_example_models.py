@@ -23,9 +23,7 @@ from tests.ic.small_decks import check, experiment, told
 HERE = Path(__file__).parent
 PAGE = (HERE.parents[1] / "docs" / "models.md").read_text(encoding="utf-8")
 
-SERVO = SimpleNamespace(
-    gain=np.float64(200.0), limit=np.float64(30.0), lag=np.float64(0.01), rotor=np.float64(2.0)
-)
+SERVO = SimpleNamespace(gain=np.float64(200.0), limit=np.float64(30.0), lag=np.float64(0.01), rotor=np.float64(2.0))
 WIND = SimpleNamespace(
     link="upper", velocity=(3.0, 0.0, 4.0), point=(1.0, 0.0, 0.0), area=np.float64(0.5), density=np.float64(1.2)
 )

@@ -81,8 +81,14 @@ def test_a_prismatic_joint_follows_its_own_motor(joints: tuple[str, ...], law: s
     """r of the slide from 0.4 to 21, of the swing to 6; commanded to 0.03 m/s and 0.03 rad/s."""
     for command, limit in (("slow", 0.5), (REVERSING, 0.6)):
         text = CRANE.replace("COMMAND", command.replace("-slow", "-0.03 m/s").replace("slow", "0.03 m/s"))
-        made = deck(joints, law=law, arm=("crane", ("slide", "swing"), text), command=command,
-                    servo={"slide": "spindle"}, sweep=HEAVIER)
+        made = deck(
+            joints,
+            law=law,
+            arm=("crane", ("slide", "swing"), text),
+            command=command,
+            servo={"slide": "spindle"},
+            sweep=HEAVIER,
+        )
         worst = Worst(f"{law}, {' and '.join(joints)}, {'from rest' if command == 'slow' else 'reversing'}, %")
         for number, joint in enumerate(joints):
             for case, figure in enumerate(measured(joint, number, made)):

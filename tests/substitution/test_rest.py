@@ -48,14 +48,18 @@ def test_the_shaft_passes_through_rest_with_the_joint() -> None:
     assert [len(rows) for rows in found] == [1, 1] and abs(int(found[0][0]) - int(found[1][0])) <= 20
 
 
-HANGING = ("one_rod", ("shoulder",), """
+HANGING = (
+    "one_rod",
+    ("shoulder",),
+    """
     let load = 100 kg;
     let pull = 0 m/s^2;
     arm one_rod {
         link upper { mass = load; shape = rod(length = reach, along = x); }
         joint shoulder revolute { parent = base; child = upper; axis = y; }
     }
-""")
+""",
+)
 
 
 @pytest.mark.slow

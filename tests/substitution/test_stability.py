@@ -17,13 +17,17 @@ from tests.substitution.hybrid import RATIO, ROTOR, compiled, deck, inertias, lo
 
 slow = pytest.mark.slow
 REACH = 2.0  # m, length of the rod
-ONE = ("one_rod", ("shoulder",), """
+ONE = (
+    "one_rod",
+    ("shoulder",),
+    """
     let load = 100 kg;
     arm one_rod {
         link upper { mass = load; shape = rod(length = reach, along = x); }
         joint shoulder revolute { parent = base; child = upper; axis = z; }
     }
-""")
+""",
+)
 
 # The limits of an independent model for measured acceleration, 50 Hz filter, by rate in Hz and delay in ticks.
 INDEPENDENT = {(100, 0): 2.05, (1000, 0): 5.4, (100, 1): 1.25, (1000, 1): 2.85}
@@ -129,8 +133,12 @@ def test_joints_by_measured_acceleration_together_grow_by_the_largest_r_of_all_t
     heavier = np.linspace(2.4, 4.2, 73)
     wanted = [float(r) for r in np.linalg.eigvalsh([inertias(each) / ROTOR for each in heavier])[:, -1]]
     masses = [", ".join(f"{mass * each:.9g}" for each in heavier) for mass in (40.0, 20.0)]
-    text = deck(("shoulder", "elbow"), law="measured_acceleration", duration=5.0,
-                sweep=f"zip {{ links.upper.mass = [{masses[0]}] kg;  links.lower.mass = [{masses[1]}] kg; }}")
+    text = deck(
+        ("shoulder", "elbow"),
+        law="measured_acceleration",
+        duration=5.0,
+        sweep=f"zip {{ links.upper.mass = [{masses[0]}] kg;  links.lower.mass = [{masses[1]}] kg; }}",
+    )
     own, bench = ran(text, "own"), ran(text, "bench")
     worst = Worst("largest r of two joints where they grow, against 5.4, as a share")
     for number, joint in enumerate(("shoulder", "elbow")):

@@ -1,7 +1,7 @@
 """The C back end: a program as C, one case at a time, for computers without LLVM, such as a motor bed's controller.
 
-    emit       the text, and what its inputs and outputs are called there;  functions: what it calls
-    library    running it here, by way of the system's C compiler
+emit       the text, and what its inputs and outputs are called there;  functions: what it calls
+library    running it here, by way of the system's C compiler
 """
 
 from __future__ import annotations

@@ -152,9 +152,11 @@ class _Emitter:
                 lines += [f"    double r{i}[4];", f"    {self._call('philox', nodes, node, f'r{i}')};"]
             value = f"{drawn[node[1:7]]}[{node[7]}]" if op == "philox" else self._value(nodes, node)
             lines.append(f"    const {'int' if op in TRUTHS else 'double'} v{i} = {value};")
-        for place, ref in (*((self.cells[name], ref) for name, ref in section.stores),
-                           *((f"row[{column}]", ref) for column, ref in section.records),
-                           *((self.outputs[self.program.outputs[n]], ref) for n, ref in section.outputs)):
+        for place, ref in (
+            *((self.cells[name], ref) for name, ref in section.stores),
+            *((f"row[{column}]", ref) for column, ref in section.records),
+            *((self.outputs[self.program.outputs[n]], ref) for n, ref in section.outputs),
+        ):
             lines.append(f"    met.{place} = {self._of(nodes, ref)};")
         return _function(f"{self.names[number]}(void)", lines)
 
@@ -167,7 +169,7 @@ class _Emitter:
             return f"met.{self.cells[node[1]]}"
         if op in ("tick", "time"):
             return f"met.{op}"
-        operands = [self._of(nodes, ref) for ref in node[1:1 + OPERANDS[op]]]
+        operands = [self._of(nodes, ref) for ref in node[1 : 1 + OPERANDS[op]]]
         if op in _INFIX:
             return f" {_INFIX[op]} ".join(operands)
         if op in ("add", "sub"):
@@ -185,7 +187,7 @@ class _Emitter:
         """A call of the function for a node, with its operands and what else it says."""
         self.called.add(op)
         count = OPERANDS[op]
-        words = [self._of(nodes, ref) for ref in node[1:1 + count]]
+        words = [self._of(nodes, ref) for ref in node[1 : 1 + count]]
         if op in ("bit", "flip"):
             words.append(str(node[1 + count]))
         return f"met_{op}({', '.join([*words, *more])})"

@@ -71,20 +71,27 @@ MET_LOCAL double met_of(uint64_t bits)
     return both.number;
 }
 """),
-    "abs": Function("""\
+    "abs": Function(
+        """\
 MET_LOCAL double met_abs(double x)
 {
     return met_of(met_bits(x) & UINT64_C(0x7FFFFFFFFFFFFFFF));
 }
-""", ("bits", "of")),
-    "signed": Function("""\
+""",
+        ("bits", "of"),
+    ),
+    "signed": Function(
+        """\
 /* x with the sign of y. */
 MET_LOCAL double met_signed(double x, double y)
 {
     return met_of((met_bits(x) & UINT64_C(0x7FFFFFFFFFFFFFFF)) | (met_bits(y) & UINT64_C(0x8000000000000000)));
 }
-""", ("bits", "of")),
-    "floor": Function("""\
+""",
+        ("bits", "of"),
+    ),
+    "floor": Function(
+        """\
 MET_LOCAL double met_floor(double x)
 {
     double whole;
@@ -92,41 +99,59 @@ MET_LOCAL double met_floor(double x)
     whole = (double)(int64_t)x;
     return met_signed(whole > x ? whole - 1.0 : whole, x);
 }
-""", ("abs", "signed")),
-    "rint": Function("""\
+""",
+        ("abs", "signed"),
+    ),
+    "rint": Function(
+        """\
 MET_LOCAL double met_rint(double x)
 {
     const double size = met_abs(x);
     if (!(size < 4503599627370496.0)) return x;
     return met_signed((size + 4503599627370496.0) - 4503599627370496.0, x);
 }
-""", ("abs", "signed")),
-    "flip": Function("""\
+""",
+        ("abs", "signed"),
+    ),
+    "flip": Function(
+        """\
 /* x, or -x where bit n of t is set. */
 MET_LOCAL double met_flip(double x, double t, int n)
 {
     return met_of(met_bits(x) ^ ((met_bits(t) << (63 - n)) & UINT64_C(0x8000000000000000)));
 }
-""", ("bits", "of")),
-    "bit": Function("""\
+""",
+        ("bits", "of"),
+    ),
+    "bit": Function(
+        """\
 MET_LOCAL int met_bit(double x, int n)
 {
     return (int)((met_bits(x) >> n) & 1U);
 }
-""", ("bits",)),
-    "exponent": Function("""\
+""",
+        ("bits",),
+    ),
+    "exponent": Function(
+        """\
 MET_LOCAL double met_exponent(double x)
 {
     return (double)((int)((met_bits(x) >> 52) & 0x7FFU) - 1023);
 }
-""", ("bits",)),
-    "significand": Function("""\
+""",
+        ("bits",),
+    ),
+    "significand": Function(
+        """\
 MET_LOCAL double met_significand(double x)
 {
     return met_of((met_bits(x) & UINT64_C(0x000FFFFFFFFFFFFF)) | UINT64_C(0x3FF0000000000000));
 }
-""", ("bits", "of")),
-    "gather": Function("""\
+""",
+        ("bits", "of"),
+    ),
+    "gather": Function(
+        """\
 /* Entry number `index` (its whole part) of a table that ends at `last`. */
 MET_LOCAL double met_gather(const uint64_t *table, double last, double index)
 {
@@ -135,15 +160,20 @@ MET_LOCAL double met_gather(const uint64_t *table, double last, double index)
     held = held < last ? held : last;
     return met_of(table[(int32_t)held]);
 }
-""", ("of",)),
-    "usual": Function("""\
+""",
+        ("of",),
+    ),
+    "usual": Function(
+        """\
 /* Whether x is finite and not 0. Comparisons of doubles are dear where they are made of whole numbers. */
 MET_LOCAL int met_usual(double x)
 {
     const uint64_t size = met_bits(x) << 1;
     return size != 0 && size < UINT64_C(0xFFE0000000000000);
 }
-""", ("bits",)),
+""",
+        ("bits",),
+    ),
     "top": Function("""\
 /* Number of the highest bit that is set; x is not 0. */
 MET_LOCAL int met_top(uint64_t x)
@@ -162,7 +192,8 @@ MET_LOCAL int met_top(uint64_t x)
 #endif
 }
 """),
-    "split": Function("""\
+    "split": Function(
+        """\
 /* |x| = m 2^e, m in [2^52, 2^53): gives e. x is finite and not 0. */
 MET_LOCAL int met_split(double x, uint64_t *m)
 {
@@ -177,8 +208,11 @@ MET_LOCAL int met_split(double x, uint64_t *m)
     *m = fraction << shift;
     return -1074 - shift;
 }
-""", ("bits", "top")),
-    "sqrt": Function("""\
+""",
+        ("bits", "top"),
+    ),
+    "sqrt": Function(
+        """\
 /* The square root: 54 bits of it, one by one; the last one rounds, for no root lies half way. */
 MET_LOCAL double met_sqrt(double x)
 {
@@ -203,7 +237,9 @@ MET_LOCAL double met_sqrt(double x)
     }
     return met_of(((uint64_t)(e / 2 + 1048) << 52) + ((root + 1) >> 1));
 }
-""", ("of", "split")),
+""",
+        ("of", "split"),
+    ),
     "jam": Function("""\
 typedef struct { uint64_t high, low; } met_wide;
 
@@ -227,7 +263,8 @@ MET_LOCAL void met_jam(met_wide *x, int n)
     x->low |= lost != 0;
 }
 """),
-    "sum": Function("""\
+    "sum": Function(
+        """\
 /* x 2^e + y 2^f, rounded to nearest; neither is 0, the highest bit of each is its bit 124 or 125; signs by bit 63. */
 MET_LOCAL double met_sum(uint64_t x_sign, met_wide *x, int e, uint64_t y_sign, met_wide *y, int f)
 {
@@ -270,8 +307,11 @@ MET_LOCAL double met_sum(uint64_t x_sign, met_wide *x, int e, uint64_t y_sign, m
     if (e >= 2046) return met_of(x_sign | UINT64_C(0x7FF0000000000000));
     return met_of(x_sign | (((uint64_t)e << 52) + m));
 }
-""", ("of", "top", "jam")),
-    "add": Function("""\
+""",
+        ("of", "top", "jam"),
+    ),
+    "add": Function(
+        """\
 #if MET_OWN_SUM
 MET_LOCAL double met_add(double a, double b)
 {
@@ -293,8 +333,11 @@ MET_LOCAL double met_add(double a, double b)
     return a + b;
 }
 #endif
-""", ("usual", "bits", "split", "sum")),
-    "fma": Function("""\
+""",
+        ("usual", "bits", "split", "sum"),
+    ),
+    "fma": Function(
+        """\
 #if MET_HAS_FMA
 /* Never put in its caller's place: gcc makes -a*b - c of -(a*b + c), whose zero has the other sign. */
 __attribute__((__noinline__)) MET_LOCAL double met_fma(double a, double b, double c)
@@ -323,14 +366,20 @@ MET_LOCAL double met_fma(double a, double b, double c)
     return met_sum((met_bits(a) ^ met_bits(b)) & sign, &x, e, met_bits(c) & sign, &y, f);
 }
 #endif
-""", ("usual", "bits", "split", "sum")),
-    "pow2": Function("""\
+""",
+        ("usual", "bits", "split", "sum"),
+    ),
+    "pow2": Function(
+        """\
 MET_LOCAL double met_pow2(double k)
 {
     return met_of(met_bits(met_add(k, 4503599627371519.0)) << 52);
 }
-""", ("bits", "of", "add")),
-    "philox": Function(f"""\
+""",
+        ("bits", "of", "add"),
+    ),
+    "philox": Function(
+        f"""\
 /* Philox4x32-10 of four words of a counter and two of a key; not numbers where one is no word. */
 MET_LOCAL void met_philox(double c0, double c1, double c2, double c3, double k0, double k1, double *result)
 {{
@@ -361,7 +410,9 @@ MET_LOCAL void met_philox(double c0, double c1, double c2, double c3, double k0,
     }}
     for (i = 0; i < 4; i++) result[i] = (double)w[i];
 }}
-""", ("of",)),
+""",
+        ("of",),
+    ),
 }
 """By name, each after those that it calls; in C the names begin with `met_`."""
 

@@ -1,9 +1,9 @@
 """The LLVM back end, the default: vector code that runs as many cases at once as a register has lanes.
 
-    emit      a recorded program as LLVM IR, as text;  entry: the function around its sections
-    pieces    long sections cut into functions;  philox: the generator under the noise
-    machine   IR to machine code in memory, by llvmlite
-    kernel    running it: blocks of cases, threads, single steps
+emit      a recorded program as LLVM IR, as text;  entry: the function around its sections
+pieces    long sections cut into functions;  philox: the generator under the noise
+machine   IR to machine code in memory, by llvmlite
+kernel    running it: blocks of cases, threads, single steps
 """
 
 from __future__ import annotations

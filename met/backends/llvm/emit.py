@@ -27,8 +27,17 @@ _ATTRIBUTES = (f"alwaysinline {_WIDE}", f"noinline {_WIDE}", "noinline", _WIDE)
 _COMPARE = {"lt": "olt", "le": "ole", "eq": "oeq"}
 
 
-def emit(recording: Recording, lanes: int, *, vector: int | None = None, width: int = 8, inline: bool = True,
-         above: int = CUT_ABOVE, shortest: int = SHORTEST, longest: int = LONGEST) -> str:
+def emit(
+    recording: Recording,
+    lanes: int,
+    *,
+    vector: int | None = None,
+    width: int = 8,
+    inline: bool = True,
+    above: int = CUT_ABOVE,
+    shortest: int = SHORTEST,
+    longest: int = LONGEST,
+) -> str:
     """The IR of a program. All of this is a matter of speed alone.
 
     lanes   cases a block
@@ -88,8 +97,9 @@ def _remark(name: str) -> str:
 class _Emitter:
     """Writes one module."""
 
-    def __init__(self, recording: Recording, lanes: int, vector: int, width: int, inline: bool,
-                 sizes: tuple[int, int, int]) -> None:
+    def __init__(
+        self, recording: Recording, lanes: int, vector: int, width: int, inline: bool, sizes: tuple[int, int, int]
+    ) -> None:
         self.recording = recording
         self.lanes = lanes
         self.count = vector
@@ -124,13 +134,24 @@ class _Emitter:
                 symbol = f'@"{name}"' if len(pieces) == 1 else f'@"{name}#{i}"'
                 self.calls[-1].append(symbol)
                 self.functions.append(self._function(symbol, section, piece))
-        tables = [f"{symbol} = private unnamed_addr constant [{len(table)} x double] "
-                  f"[{', '.join('double ' + number(x) for x in table)}], align 64"
-                  for table, symbol in self.tables.items()]
+        tables = [
+            f"{symbol} = private unnamed_addr constant [{len(table)} x double] "
+            f"[{', '.join('double ' + number(x) for x in table)}], align 64"
+            for table, symbol in self.tables.items()
+        ]
         rows = [spread(self.lanes, self.width)] if self.recording.program.columns else []
         main = entry(self.recording, self.calls, self.lanes, self.count, self.scratch)
-        return "\n".join([*tables, *self.functions, *rows, main, *self.declared.values(),
-                          *(f"attributes #{n} = {{ {words} }}" for n, words in enumerate(_ATTRIBUTES)), ""])
+        return "\n".join(
+            [
+                *tables,
+                *self.functions,
+                *rows,
+                main,
+                *self.declared.values(),
+                *(f"attributes #{n} = {{ {words} }}" for n, words in enumerate(_ATTRIBUTES)),
+                "",
+            ]
+        )
 
     def _intrinsic(self, name: str, result: str, *arguments: str) -> str:
         self.declared.setdefault(name, f"declare {result} @{name}({', '.join(arguments)})")
@@ -215,7 +236,7 @@ class _Emitter:
         def compute(i: int) -> None:
             node = nodes[i]
             op = node[0]
-            operands = [of(ref) for ref in node[1:1 + OPERANDS[op]]]
+            operands = [of(ref) for ref in node[1 : 1 + OPERANDS[op]]]
             to = f"%v{i}"
             if op in _ARITHMETIC:
                 put(f"  {to} = {_ARITHMETIC[op]} {V} {operands[0]}, {operands[1]}")
@@ -286,8 +307,11 @@ class _Emitter:
         def leave(stores: Iterable[tuple[str, Any, int]]) -> None:
             ready = [(kind, where, of(ref)) for kind, where, ref in stores]
             for kind, where, value in ready:
-                base, i = {"cell": ("state", self.state.get(where)), "record": ("row", where),
-                           "output": ("outputs", where)}[kind]
+                base, i = {
+                    "cell": ("state", self.state.get(where)),
+                    "record": ("row", where),
+                    "output": ("outputs", where),
+                }[kind]
                 assert i is not None
                 name = _remark(where if kind == "cell" else "")
                 put(f"  store {V} {value}, ptr {slot(base, i, f'{base}.{i}')}, align {self.align}{name}")
@@ -299,7 +323,12 @@ class _Emitter:
             leave(piece.stores.get(position, ()))
         leave(piece.tail)
         attributes = "#0" if piece.small and self.inline else "#1"
-        return "\n".join([
-            f"define private void {symbol}(ptr noalias %state, ptr noalias readonly %inputs, ptr noalias %scratch, "
-            f"ptr noalias %row, ptr noalias %outputs, double %tick, double %time) {attributes} {{", *lines,
-            "  ret void", "}"])
+        return "\n".join(
+            [
+                f"define private void {symbol}(ptr noalias %state, ptr noalias readonly %inputs, ptr noalias %scratch, "
+                f"ptr noalias %row, ptr noalias %outputs, double %tick, double %time) {attributes} {{",
+                *lines,
+                "  ret void",
+                "}",
+            ]
+        )

@@ -33,8 +33,9 @@ def number(value: float) -> str:
 class _Entry:
     """Writes the entry function. `calls` are the symbols of each section's pieces."""
 
-    def __init__(self, recording: Recording, calls: Sequence[Sequence[str]], lanes: int, vector: int,
-                 scratch: int) -> None:
+    def __init__(
+        self, recording: Recording, calls: Sequence[Sequence[str]], lanes: int, vector: int, scratch: int
+    ) -> None:
         self.recording = recording
         self.program = recording.program
         self.calls = calls
@@ -75,8 +76,10 @@ class _Entry:
         apart = " #2" if self.rare else ""
         for symbol in self.calls[section]:
             for part in self.parts:
-                self.put(f"  call void {symbol}(ptr %state.{part}, ptr %inputs.{part}, ptr %scratch.{part}, "
-                         f"ptr {rows[part]}, ptr %outputs.{part}, double {tick}, double {time}){apart}")
+                self.put(
+                    f"  call void {symbol}(ptr %state.{part}, ptr %inputs.{part}, ptr %scratch.{part}, "
+                    f"ptr {rows[part]}, ptr %outputs.{part}, double {tick}, double {time}){apart}"
+                )
 
     def due(self, divisor: int) -> str:
         """Whether the divisor divides the tick's number."""
@@ -104,19 +107,23 @@ class _Entry:
         n = self.label("w")
         vector = f"<{self.lanes} x double>"
         self.counters.append(f"  %{n}.p = alloca i64")
-        self.put(f"  store i64 0, ptr %{n}.p",
-                 f"  br label %ask.{n}", f"ask.{n}:",
-                 f"  %{n}.count = load i64, ptr %{n}.p",
-                 f"  %{n}.left = icmp ult i64 %{n}.count, {condition.at_most}",
-                 f"  %{n}.cell = getelementptr i8, ptr %state.b, i64 {8 * self.lanes * self.state[condition.cell]}",
-                 f"  %{n}.value = load {vector}, ptr %{n}.cell, align {min(64, 8 * self.lanes)}",
-                 f"  %{n}.lanes = fcmp une {vector} %{n}.value, zeroinitializer",
-                 f"  %{n}.bits = bitcast <{self.lanes} x i1> %{n}.lanes to i{self.lanes}",
-                 f"  %{n}.any = icmp ne i{self.lanes} %{n}.bits, 0",
-                 f"  %{n} = and i1 %{n}.left, %{n}.any",
-                 f"  br i1 %{n}, label %do.{n}, label %after.{n}", f"do.{n}:",
-                 f"  %{n}.next = add i64 %{n}.count, 1",
-                 f"  store i64 %{n}.next, ptr %{n}.p")
+        self.put(
+            f"  store i64 0, ptr %{n}.p",
+            f"  br label %ask.{n}",
+            f"ask.{n}:",
+            f"  %{n}.count = load i64, ptr %{n}.p",
+            f"  %{n}.left = icmp ult i64 %{n}.count, {condition.at_most}",
+            f"  %{n}.cell = getelementptr i8, ptr %state.b, i64 {8 * self.lanes * self.state[condition.cell]}",
+            f"  %{n}.value = load {vector}, ptr %{n}.cell, align {min(64, 8 * self.lanes)}",
+            f"  %{n}.lanes = fcmp une {vector} %{n}.value, zeroinitializer",
+            f"  %{n}.bits = bitcast <{self.lanes} x i1> %{n}.lanes to i{self.lanes}",
+            f"  %{n}.any = icmp ne i{self.lanes} %{n}.bits, 0",
+            f"  %{n} = and i1 %{n}.left, %{n}.any",
+            f"  br i1 %{n}, label %do.{n}, label %after.{n}",
+            f"do.{n}:",
+            f"  %{n}.next = add i64 %{n}.count, 1",
+            f"  store i64 %{n}.next, ptr %{n}.p",
+        )
         self.rare += 1
         self.steps(body)
         self.rare -= 1
@@ -128,9 +135,11 @@ class _Entry:
         self.put(f"  %{n} = and i1 {due}, %recording")
 
         def body() -> None:
-            self.put(f"  %{n}.filled = load i64, ptr %filled",
-                     f"  %{n}.offset = mul i64 %{n}.filled, {self.row_bytes}",
-                     f"  %{n}.place = getelementptr i8, ptr %tile, i64 %{n}.offset")
+            self.put(
+                f"  %{n}.filled = load i64, ptr %filled",
+                f"  %{n}.offset = mul i64 %{n}.filled, {self.row_bytes}",
+                f"  %{n}.place = getelementptr i8, ptr %tile, i64 %{n}.offset",
+            )
             self.call(node.section, f"%{n}.place")
 
         self.guarded(f"%{n}", "record", body)
@@ -141,85 +150,114 @@ class _Entry:
         self.put(f"  %row = and i1 {due}, %recording")
 
         def body() -> None:
-            self.put("  %row.filled = load i64, ptr %filled",
-                     "  %row.more = add i64 %row.filled, 1",
-                     "  store i64 %row.more, ptr %filled",
-                     f"  %row.full = icmp eq i64 %row.more, {self.tile_rows}")
+            self.put(
+                "  %row.filled = load i64, ptr %filled",
+                "  %row.more = add i64 %row.filled, 1",
+                "  store i64 %row.more, ptr %filled",
+                f"  %row.full = icmp eq i64 %row.more, {self.tile_rows}",
+            )
             self.guarded("%row.full", "full", lambda: self.flush(str(self.tile_rows * self.program.columns)))
 
         self.guarded("%row", "recorded", body)
 
     def flush(self, count: str) -> None:
         n = self.label("flush")
-        self.put(f"  %{n}.to = load ptr, ptr %target",
-                 f"  call void @spread(ptr %tile, i64 {count}, ptr %{n}.to, i64 %stride, i64 %most)",
-                 f"  %{n}.bytes = shl i64 {count}, 3",
-                 f"  %{n}.next = getelementptr i8, ptr %{n}.to, i64 %{n}.bytes",
-                 f"  store ptr %{n}.next, ptr %target",
-                 "  store i64 0, ptr %filled")
+        self.put(
+            f"  %{n}.to = load ptr, ptr %target",
+            f"  call void @spread(ptr %tile, i64 {count}, ptr %{n}.to, i64 %stride, i64 %most)",
+            f"  %{n}.bytes = shl i64 {count}, 3",
+            f"  %{n}.next = getelementptr i8, ptr %{n}.to, i64 %{n}.bytes",
+            f"  store ptr %{n}.next, ptr %target",
+            "  store i64 0, ptr %filled",
+        )
 
     def text(self) -> str:
         base_hz = number(self.program.base_hz)
         slots = (("inputs", len(self.program.inputs)), ("outputs", len(self.program.outputs)))
-        self.put("  br label %block", "block:",
-                 "  %b = phi i64 [ 0, %entry ], [ %b.next, %block.end ]")
+        self.put("  br label %block", "block:", "  %b = phi i64 [ 0, %entry ], [ %b.next, %block.end ]")
         for name, count in slots:
-            self.put(f"  %{name}.offset = mul i64 %b, {8 * self.lanes * count}",
-                     f"  %{name}.b = getelementptr i8, ptr %{name}, i64 %{name}.offset")
-        self.put("  %state.offset = mul i64 %b, %state.stride",
-                 "  %state.b = getelementptr i8, ptr %state, i64 %state.offset")
+            self.put(
+                f"  %{name}.offset = mul i64 %b, {8 * self.lanes * count}",
+                f"  %{name}.b = getelementptr i8, ptr %{name}, i64 %{name}.offset",
+            )
+        self.put(
+            "  %state.offset = mul i64 %b, %state.stride",
+            "  %state.b = getelementptr i8, ptr %state, i64 %state.offset",
+        )
         for part in self.parts:
             for name in ("state.b", "inputs.b", "outputs.b", "scratch"):
-                self.put(f"  %{name.removesuffix('.b')}.{part} = getelementptr i8, ptr %{name}, "
-                         f"i64 {part * self.part_bytes}")
-        self.put(f"  %case = mul i64 %b, {self.lanes}",
-                 "  %case.offset = mul i64 %case, %stride",
-                 "  %rows.b = getelementptr double, ptr %rows, i64 %case.offset",
-                 "  store ptr %rows.b, ptr %target",
-                 "  store i64 0, ptr %filled",
-                 "  %behind = sub i64 %cases, %case",
-                 "  %most = sub i64 %behind, 1",
-                 "  %fresh = icmp eq i64 %first, 0")
+                self.put(
+                    f"  %{name.removesuffix('.b')}.{part} = getelementptr i8, ptr %{name}, i64 {part * self.part_bytes}"
+                )
+        self.put(
+            f"  %case = mul i64 %b, {self.lanes}",
+            "  %case.offset = mul i64 %case, %stride",
+            "  %rows.b = getelementptr double, ptr %rows, i64 %case.offset",
+            "  store ptr %rows.b, ptr %target",
+            "  store i64 0, ptr %filled",
+            "  %behind = sub i64 %cases, %case",
+            "  %most = sub i64 %behind, 1",
+            "  %fresh = icmp eq i64 %first, 0",
+        )
         self.rare += 1
         self.guarded("%fresh", "start", self._start)
         self.rare -= 1
-        self.put("  %some = icmp sle i64 %first, %last",
-                 "  br label %ticks", "ticks:",
-                 "  br i1 %some, label %tick.head, label %ticks.end", "tick.head:",
-                 "  %k = phi i64 [ %first, %ticks ], [ %k.next, %tick.end ]",
-                 "  %tick = sitofp i64 %k to double",
-                 f"  %time = fdiv double %tick, {base_hz}")
+        self.put(
+            "  %some = icmp sle i64 %first, %last",
+            "  br label %ticks",
+            "ticks:",
+            "  br i1 %some, label %tick.head, label %ticks.end",
+            "tick.head:",
+            "  %k = phi i64 [ %first, %ticks ], [ %k.next, %tick.end ]",
+            "  %tick = sitofp i64 %k to double",
+            f"  %time = fdiv double %tick, {base_hz}",
+        )
         self.now = ("%k", "%tick", "%time")
         self.steps(self.recording.tick)
         if self.program.columns:
             self.row_done()
-        self.put("  br label %tick.end", "tick.end:",
-                 "  %k.next = add i64 %k, 1",
-                 "  %again = icmp sle i64 %k.next, %last",
-                 "  br i1 %again, label %tick.head, label %ticks.end", "ticks.end:")
+        self.put(
+            "  br label %tick.end",
+            "tick.end:",
+            "  %k.next = add i64 %k, 1",
+            "  %again = icmp sle i64 %k.next, %last",
+            "  br i1 %again, label %tick.head, label %ticks.end",
+            "ticks.end:",
+        )
         if self.program.columns:
-            self.put("  %rest.rows = load i64, ptr %filled",
-                     f"  %rest = mul i64 %rest.rows, {self.program.columns}",
-                     "  %rest.any = icmp ne i64 %rest, 0")
+            self.put(
+                "  %rest.rows = load i64, ptr %filled",
+                f"  %rest = mul i64 %rest.rows, {self.program.columns}",
+                "  %rest.any = icmp ne i64 %rest, 0",
+            )
             self.guarded("%rest.any", "rest", lambda: self.flush("%rest"))
         self.now = ("%last", "%tick.last", "%time.last")
         self.rare += 1
         self.guarded("%ending", "end", lambda: self.steps(self.recording.end))
-        self.put("  br label %block.end", "block.end:",
-                 "  %b.next = add i64 %b, 1",
-                 "  %more = icmp slt i64 %b.next, %blocks",
-                 "  br i1 %more, label %block, label %out", "out:")
+        self.put(
+            "  br label %block.end",
+            "block.end:",
+            "  %b.next = add i64 %b, 1",
+            "  %more = icmp slt i64 %b.next, %blocks",
+            "  br i1 %more, label %block, label %out",
+            "out:",
+        )
         work, done = self._work()
         self.put(*done, "  ret void", "}")
         head = [
             f"define void @{ENTRY}(ptr noalias readonly %inputs, ptr noalias %state, ptr noalias %rows, "
             "ptr noalias %outputs, i64 %blocks, i64 %first, i64 %last, i64 %cases, i64 %stride, "
-            "i64 %state.stride) #3 {", "entry:",
-            *work, "  %filled = alloca i64", "  %target = alloca ptr", *self.counters,
+            "i64 %state.stride) #3 {",
+            "entry:",
+            *work,
+            "  %filled = alloca i64",
+            "  %target = alloca ptr",
+            *self.counters,
             "  %recording = icmp ne ptr %rows, null",
             "  %ending = icmp ne ptr %outputs, null",
             "  %tick.last = sitofp i64 %last to double",
-            f"  %time.last = fdiv double %tick.last, {base_hz}"]
+            f"  %time.last = fdiv double %tick.last, {base_hz}",
+        ]
         return "\n".join([*head, *self.lines])
 
     def _work(self) -> tuple[list[str], list[str]]:
@@ -227,19 +265,25 @@ class _Entry:
         tile = max(1, self.tile_rows * self.program.columns) * self.lanes
         scratch = -(-max(1, self.scratch) * self.lanes // 8) * 8
         if 8 * (scratch + tile) <= _STACK:
-            return [f"  %scratch = alloca [{scratch} x double], align 64",
-                    f"  %tile = alloca [{tile} x double], align 64"], []
-        return [f"  %work = call ptr @malloc(i64 {8 * (scratch + tile) + 64})",
-                "  %work.past = ptrtoint ptr %work to i64",
-                "  %work.low = and i64 %work.past, 63",
-                "  %work.skip = sub i64 64, %work.low",
-                "  %scratch = getelementptr i8, ptr %work, i64 %work.skip",
-                f"  %tile = getelementptr i8, ptr %scratch, i64 {8 * scratch}"], ["  call void @free(ptr %work)"]
+            return [
+                f"  %scratch = alloca [{scratch} x double], align 64",
+                f"  %tile = alloca [{tile} x double], align 64",
+            ], []
+        return [
+            f"  %work = call ptr @malloc(i64 {8 * (scratch + tile) + 64})",
+            "  %work.past = ptrtoint ptr %work to i64",
+            "  %work.low = and i64 %work.past, 63",
+            "  %work.skip = sub i64 64, %work.low",
+            "  %scratch = getelementptr i8, ptr %work, i64 %work.skip",
+            f"  %tile = getelementptr i8, ptr %scratch, i64 {8 * scratch}",
+        ], ["  call void @free(ptr %work)"]
 
     def _start(self) -> None:
         if self.state:
-            self.put("  call void @llvm.memset.p0.i64(ptr align 64 %state.b, i8 0, "
-                     f"i64 {8 * self.lanes * len(self.state)}, i1 false)")
+            self.put(
+                "  call void @llvm.memset.p0.i64(ptr align 64 %state.b, i8 0, "
+                f"i64 {8 * self.lanes * len(self.state)}, i1 false)"
+            )
         self.steps(self.recording.start)
 
 
@@ -250,8 +294,9 @@ def entry(recording: Recording, calls: Sequence[Sequence[str]], lanes: int, vect
     scratch  slots that pieces share
     """
     text = _Entry(recording, calls, lanes, vector, scratch).text()
-    return (text + "\ndeclare void @llvm.memset.p0.i64(ptr, i8, i64, i1)"
-            "\ndeclare ptr @malloc(i64)\ndeclare void @free(ptr)")
+    return (
+        text + "\ndeclare void @llvm.memset.p0.i64(ptr, i8, i64, i1)\ndeclare ptr @malloc(i64)\ndeclare void @free(ptr)"
+    )
 
 
 def spread(lanes: int, width: int) -> str:
@@ -260,38 +305,59 @@ def spread(lanes: int, width: int) -> str:
     Squares of `width` values and lanes are transposed in registers; what is left over goes one by one. Lanes beyond
     the last case (`most`) write what that case writes, where it does.
     """
-    lines = ["define private void @spread(ptr noalias readonly %tile, i64 %count, ptr %to, i64 %stride, i64 %most) "
-             "#1 {", "entry:",
-             f"  %whole = and i64 %count, {-width}",
-             "  br label %group", "group:",
-             "  %g = phi i64 [ 0, %entry ], [ %g.next, %done ]",
-             "  %g.bytes = shl i64 %g, 3",
-             "  %from = getelementptr i8, ptr %tile, i64 %g.bytes"]
+    lines = [
+        "define private void @spread(ptr noalias readonly %tile, i64 %count, ptr %to, i64 %stride, i64 %most) #1 {",
+        "entry:",
+        f"  %whole = and i64 %count, {-width}",
+        "  br label %group",
+        "group:",
+        "  %g = phi i64 [ 0, %entry ], [ %g.next, %done ]",
+        "  %g.bytes = shl i64 %g, 3",
+        "  %from = getelementptr i8, ptr %tile, i64 %g.bytes",
+    ]
     for j in range(width):
-        lines += [f"  %lane.{j} = add i64 %g, {j}",
-                  f"  %there.{j} = call i64 @llvm.umin.i64(i64 %lane.{j}, i64 %most)",
-                  f"  %offset.{j} = mul i64 %there.{j}, %stride",
-                  f"  %to.{j} = getelementptr double, ptr %to, i64 %offset.{j}"]
+        lines += [
+            f"  %lane.{j} = add i64 %g, {j}",
+            f"  %there.{j} = call i64 @llvm.umin.i64(i64 %lane.{j}, i64 %most)",
+            f"  %offset.{j} = mul i64 %there.{j}, %stride",
+            f"  %to.{j} = getelementptr double, ptr %to, i64 %offset.{j}",
+        ]
     lines += _squares(lanes, width)
-    return "\n".join([*lines, "done:", f"  %g.next = add i64 %g, {width}", f"  %g.more = icmp ult i64 %g.next, {lanes}",
-                      "  br i1 %g.more, label %group, label %out", "out:", "  ret void", "}",
-                      "declare i64 @llvm.umin.i64(i64, i64)"])
+    return "\n".join(
+        [
+            *lines,
+            "done:",
+            f"  %g.next = add i64 %g, {width}",
+            f"  %g.more = icmp ult i64 %g.next, {lanes}",
+            "  br i1 %g.more, label %group, label %out",
+            "out:",
+            "  ret void",
+            "}",
+            "declare i64 @llvm.umin.i64(i64, i64)",
+        ]
+    )
 
 
 def _squares(lanes: int, width: int) -> list[str]:
     """The loop over all values of the lanes at `from`: squares first, then what is left, one by one."""
     vector = f"<{width} x double>"
-    lines = ["  br label %ask", "ask:",
-             "  %i = phi i64 [ 0, %group ], [ %i.next, %do ]",
-             "  %go = icmp ult i64 %i, %whole",
-             "  br i1 %go, label %do, label %more", "do:",
-             f"  %i.bytes = mul i64 %i, {8 * lanes}",
-             "  %square = getelementptr i8, ptr %from, i64 %i.bytes"]
+    lines = [
+        "  br label %ask",
+        "ask:",
+        "  %i = phi i64 [ 0, %group ], [ %i.next, %do ]",
+        "  %go = icmp ult i64 %i, %whole",
+        "  br i1 %go, label %do, label %more",
+        "do:",
+        f"  %i.bytes = mul i64 %i, {8 * lanes}",
+        "  %square = getelementptr i8, ptr %from, i64 %i.bytes",
+    ]
     names = []
     for j in range(width):
         names.append(f"%a1.{j}")
-        lines += [f"  %p{j} = getelementptr i8, ptr %square, i64 {8 * lanes * j}",
-                  f"  {names[-1]} = load {vector}, ptr %p{j}, align {8 * width}"]
+        lines += [
+            f"  %p{j} = getelementptr i8, ptr %square, i64 {8 * lanes * j}",
+            f"  {names[-1]} = load {vector}, ptr %p{j}, align {8 * width}",
+        ]
     s = 1
     while s < width:
         turned = list(names)
@@ -300,22 +366,33 @@ def _squares(lanes: int, width: int) -> list[str]:
         for j in (j for j in range(width) if not j & s):
             for mask, to in ((low, j), (high, j + s)):
                 turned[to] = f"%a{2 * s}.{to}"
-                lines.append(f"  {turned[to]} = shufflevector {vector} {names[j]}, {vector} {names[j + s]}, "
-                             f"<{width} x i32> <{mask}>")
+                lines.append(
+                    f"  {turned[to]} = shufflevector {vector} {names[j]}, {vector} {names[j + s]}, "
+                    f"<{width} x i32> <{mask}>"
+                )
         names = turned
         s *= 2
     for j in range(width):
-        lines += [f"  %q{j} = getelementptr double, ptr %to.{j}, i64 %i",
-                  f"  store {vector} {names[j]}, ptr %q{j}, align 8"]
-    lines += [f"  %i.next = add i64 %i, {width}", "  br label %ask", "more:",
-              "  %t = phi i64 [ %whole, %ask ], [ %t.next, %one ]",
-              "  %left = icmp ult i64 %t, %count",
-              "  br i1 %left, label %one, label %done", "one:",
-              f"  %t.bytes = mul i64 %t, {8 * lanes}",
-              "  %row = getelementptr i8, ptr %from, i64 %t.bytes"]
+        lines += [
+            f"  %q{j} = getelementptr double, ptr %to.{j}, i64 %i",
+            f"  store {vector} {names[j]}, ptr %q{j}, align 8",
+        ]
+    lines += [
+        f"  %i.next = add i64 %i, {width}",
+        "  br label %ask",
+        "more:",
+        "  %t = phi i64 [ %whole, %ask ], [ %t.next, %one ]",
+        "  %left = icmp ult i64 %t, %count",
+        "  br i1 %left, label %one, label %done",
+        "one:",
+        f"  %t.bytes = mul i64 %t, {8 * lanes}",
+        "  %row = getelementptr i8, ptr %from, i64 %t.bytes",
+    ]
     for j in range(width):
-        lines += [f"  %l{j} = getelementptr double, ptr %row, i64 {j}",
-                  f"  %x{j} = load double, ptr %l{j}, align 8",
-                  f"  %s{j} = getelementptr double, ptr %to.{j}, i64 %t",
-                  f"  store double %x{j}, ptr %s{j}, align 8"]
+        lines += [
+            f"  %l{j} = getelementptr double, ptr %row, i64 {j}",
+            f"  %x{j} = load double, ptr %l{j}, align 8",
+            f"  %s{j} = getelementptr double, ptr %to.{j}, i64 %t",
+            f"  store double %x{j}, ptr %s{j}, align 8",
+        ]
     return [*lines, "  %t.next = add i64 %t, 1", "  br label %more"]

@@ -87,12 +87,19 @@ def written(
 
 def _refuse_or_warn(machine: Machine) -> None:
     if os.environ.get("MET_ALLOW_NO_FMA") != "1":
-        raise Problem(error(
-            "E210", f"this processor ({machine.cpu}) has no fused multiply-add, which results depend on to the bit",
-            help=("run on a processor with FMA (Intel since 2013, AMD since 2012, every arm64)",
-                  "MET_ALLOW_NO_FMA=1 computes the same bits here, many times slower")))
-    warnings.warn(f"{machine.cpu} has no fused multiply-add: each is computed by software, many times slower",
-                  stacklevel=4)
+        raise Problem(
+            error(
+                "E210",
+                f"this processor ({machine.cpu}) has no fused multiply-add, which results depend on to the bit",
+                help=(
+                    "run on a processor with FMA (Intel since 2013, AMD since 2012, every arm64)",
+                    "MET_ALLOW_NO_FMA=1 computes the same bits here, many times slower",
+                ),
+            )
+        )
+    warnings.warn(
+        f"{machine.cpu} has no fused multiply-add: each is computed by software, many times slower", stacklevel=4
+    )
 
 
 @frozen
@@ -142,8 +149,14 @@ class Kernel:
         divisor = self.program.record_divisor
         return last // divisor - (first + divisor - 1) // divisor + 1
 
-    def run(self, inputs: np.ndarray, ticks: int, record: bool = True, threads: int | None = None,
-            progress: Callable[[int], None] | None = None) -> tuple[np.ndarray | None, np.ndarray]:
+    def run(
+        self,
+        inputs: np.ndarray,
+        ticks: int,
+        record: bool = True,
+        threads: int | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> tuple[np.ndarray | None, np.ndarray]:
         """Runs cases from tick 0 to tick `ticks`, both done.
 
         inputs    [case, input], in the order of `program.inputs`
@@ -210,10 +223,20 @@ class Kernel:
             at = None
             if record and rows is not None:
                 at = rows.ctypes.data + self.rows(0, first - 1) * rows.strides[1] if first else rows.ctypes.data
-            self.entry(packed.ctypes.data, state.ctypes.data, at, results.ctypes.data, blocks, first,
-                       min(first + stretch - 1, ticks), cases, rows.strides[0] // 8 if rows is not None else 0, 0)
+            self.entry(
+                packed.ctypes.data,
+                state.ctypes.data,
+                at,
+                results.ctypes.data,
+                blocks,
+                first,
+                min(first + stretch - 1, ticks),
+                cases,
+                rows.strides[0] // 8 if rows is not None else 0,
+                0,
+            )
         width = outputs.shape[1]
-        flat = results.reshape(-1)[:blocks * width * lanes].reshape(blocks, width, lanes)
+        flat = results.reshape(-1)[: blocks * width * lanes].reshape(blocks, width, lanes)
         outputs[:] = flat.transpose(0, 2, 1).reshape(blocks * lanes, width)[:cases]
 
     def block(self, inputs: np.ndarray) -> Block:
@@ -254,8 +277,18 @@ class Block:
         """The same, with the rows [case, row, column] of those ticks."""
         count = max(0, self.kernel.rows(first, last))
         rows = np.empty((self.cases, count, self.kernel.program.columns))
-        self._entry(self._inputs, self._state, rows.ctypes.data if rows.size else None, self._outputs, 1, first, last,
-                    self.cases, rows.shape[1] * rows.shape[2], 0)
+        self._entry(
+            self._inputs,
+            self._state,
+            rows.ctypes.data if rows.size else None,
+            self._outputs,
+            1,
+            first,
+            last,
+            self.cases,
+            rows.shape[1] * rows.shape[2],
+            0,
+        )
         return rows
 
     def cells(self) -> Mapping[str, np.ndarray]:
@@ -277,15 +310,15 @@ def _aligned(shape: tuple[int, ...]) -> np.ndarray:
     size = int(np.prod(shape)) * 8
     raw = np.zeros(size + 64, dtype=np.uint8)
     offset = -raw.ctypes.data % 64
-    return raw[offset:offset + size].view(np.float64).reshape(shape)
+    return raw[offset : offset + size].view(np.float64).reshape(shape)
 
 
 def _pack(inputs: np.ndarray, packed: np.ndarray) -> None:
     """[case, input] into [block][input][lane]; lanes beyond the last case repeat it."""
     blocks, width, lanes = packed.shape
     whole = len(inputs) // lanes
-    packed[:whole] = inputs[:whole * lanes].reshape(whole, lanes, width).transpose(0, 2, 1)
+    packed[:whole] = inputs[: whole * lanes].reshape(whole, lanes, width).transpose(0, 2, 1)
     if whole < blocks:
-        rest = inputs[whole * lanes:]
-        packed[whole, :, :len(rest)] = rest.T
-        packed[whole, :, len(rest):] = rest[-1][:, None]
+        rest = inputs[whole * lanes :]
+        packed[whole, :, : len(rest)] = rest.T
+        packed[whole, :, len(rest) :] = rest[-1][:, None]

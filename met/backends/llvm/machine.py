@@ -53,10 +53,12 @@ def machine(cpu: str | None = None) -> Machine:
         features = llvm.get_host_cpu_features()
         width = 2 if arm else 8 if features.get("avx512f") else 4 if features.get("avx") else 2
         return Machine(llvm.get_host_cpu_name(), features.flatten(), width, arm or bool(features.get("fma")))
-    text = ('define <8 x double> @f(<8 x double> %a) #0 {\n'
-            '  %b = call <8 x double> @llvm.fma.v8f64(<8 x double> %a, <8 x double> %a, <8 x double> %a)\n'
-            '  ret <8 x double> %b\n}\ndeclare <8 x double> @llvm.fma.v8f64(<8 x double>, <8 x double>, <8 x double>)\n'
-            'attributes #0 = { "prefer-vector-width"="512" }\n')
+    text = (
+        "define <8 x double> @f(<8 x double> %a) #0 {\n"
+        "  %b = call <8 x double> @llvm.fma.v8f64(<8 x double> %a, <8 x double> %a, <8 x double> %a)\n"
+        "  ret <8 x double> %b\n}\ndeclare <8 x double> @llvm.fma.v8f64(<8 x double>, <8 x double>, <8 x double>)\n"
+        'attributes #0 = { "prefer-vector-width"="512" }\n'
+    )
     assembly = _target_machine(Machine(cpu, "", 2, True)).emit_assembly(llvm.parse_assembly(text))
     width = 2 if arm else 8 if "%zmm" in assembly else 4 if "%ymm" in assembly else 2
     return Machine(cpu, "", width, arm or "vfmadd" in assembly)
@@ -73,8 +75,9 @@ def _target_machine(target: Machine, level: int | None = None) -> Any:
         _ready_for_all()
     triple = llvm.Target.from_triple(target.triple or llvm.get_process_triple())
     opt = 2 if level is None else level
-    return triple.create_target_machine(cpu=target.cpu, features=target.features, opt=opt, reloc="pic",
-                                        codemodel="small")
+    return triple.create_target_machine(
+        cpu=target.cpu, features=target.features, opt=opt, reloc="pic", codemodel="small"
+    )
 
 
 def versions() -> str:
@@ -136,4 +139,3 @@ class Loaded:
         library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(ENTRY)
         self._tracker = library.link(self._compiler, "met")
         self.address: int = self._tracker[ENTRY]
-

@@ -63,8 +63,10 @@ class PhiloxWriter:
         for n in range(ROUNDS):
             if n:
                 k0, k1 = (op(f"add {bits} {k}, splat (i64 {by})") for k, by in ((k0, GROWTH[0]), (k1, GROWTH[1])))
-            p0, p1 = (op(f"mul {bits} {self._low(c)}, splat (i64 {by})")
-                      for c, by in ((c0, MULTIPLIERS[0]), (c2, MULTIPLIERS[1])))
+            p0, p1 = (
+                op(f"mul {bits} {self._low(c)}, splat (i64 {by})")
+                for c, by in ((c0, MULTIPLIERS[0]), (c2, MULTIPLIERS[1]))
+            )
             h0, h1 = (op(f"lshr {bits} {p}, splat (i64 32)") for p in (p0, p1))
             c0, c2 = (op(f"xor {bits} {op(f'xor {bits} {h}, {c}')}, {k}") for h, c, k in ((h1, c1, k0), (h0, c3, k1)))
             c1, c3 = p1, p0

@@ -63,19 +63,21 @@ def cut(section: Section, above: int = CUT_ABOVE, shortest: int = SHORTEST, long
     loaded: dict[str, int] = {}
     seen: set[tuple[int, str]] = set()
     for n, i in enumerate(body):
-        for ref in nodes[i][1:1 + OPERANDS[nodes[i][0]]]:
+        for ref in nodes[i][1 : 1 + OPERANDS[nodes[i][0]]]:
             node = nodes[ref >> 1]
             if node[0] == "cell" and (piece_of[n], node[1]) not in seen:
                 seen.add((piece_of[n], node[1]))
                 loaded[node[1]] = n
-    all_stores: list[tuple[str, Any, int]] = [*(("cell", name, ref) for name, ref in section.stores),
-                  *(("record", column, ref) for column, ref in section.records),
-                  *(("output", slot, ref) for slot, ref in section.outputs)]
+    all_stores: list[tuple[str, Any, int]] = [
+        *(("cell", name, ref) for name, ref in section.stores),
+        *(("record", column, ref) for column, ref in section.records),
+        *(("output", slot, ref) for slot, ref in section.outputs),
+    ]
     at_end = {nodes[ref >> 1][1] for _, _, ref in all_stores if nodes[ref >> 1][0] == "cell"}
 
     asked: dict[int, int] = {}
     for n, i in enumerate(body):
-        for ref in nodes[i][1:1 + OPERANDS[nodes[i][0]]]:
+        for ref in nodes[i][1 : 1 + OPERANDS[nodes[i][0]]]:
             if ref >> 1 in number:
                 asked[ref >> 1] = max(asked.get(ref >> 1, 0), piece_of[n])
     for kind, where, ref in all_stores:
@@ -110,7 +112,7 @@ def check(section: Section, pieces: list[Piece]) -> None:
                 raise ValueError(f"{section.name}: piece {number} takes node {i}, which it does not have")
 
         for n, i in piece.body:
-            for ref in nodes[i][1:1 + OPERANDS[nodes[i][0]]]:
+            for ref in nodes[i][1 : 1 + OPERANDS[nodes[i][0]]]:
                 taken(ref)
             here.add(i)
             if i in piece.keep:
@@ -130,7 +132,7 @@ def _bounds(section: Section, body: list[int], number: dict[int, int], shortest:
     change = [0] * (len(body) + 2)
     last_use = list(range(len(body)))
     for n, i in enumerate(body):
-        for ref in nodes[i][1:1 + OPERANDS[nodes[i][0]]]:
+        for ref in nodes[i][1 : 1 + OPERANDS[nodes[i][0]]]:
             if ref >> 1 in number:
                 last_use[number[ref >> 1]] = n
     for n, use in enumerate(last_use):
@@ -163,7 +165,7 @@ def _assign_scratch(pieces: list[Piece], body: list[int], piece_of: list[int], a
                     slot, slots = slots, slots + 1
                 piece.keep[i] = slot
                 ending.setdefault(until, []).append(slot)
-                for later in pieces[p + 1:until + 1]:
+                for later in pieces[p + 1 : until + 1]:
                     later.kept[i] = slot
         free.extend(sorted(ending.pop(p, ()), reverse=True))
     for piece in pieces:

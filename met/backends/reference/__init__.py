@@ -1,7 +1,7 @@
 """The reference back end: a recording carried out operation by operation over numpy arrays, with the others' bits.
 
-    listing    a recording as text
-    interpret  running it;  plain: a program by itself, phase by phase over floats
+listing    a recording as text
+interpret  running it;  plain: a program by itself, phase by phase over floats
 """
 
 from __future__ import annotations

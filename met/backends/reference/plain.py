@@ -60,8 +60,9 @@ class PlainTape:
         return nullcontext()
 
 
-def execute(program: Program, inputs: Mapping[str, float] | Sequence[float], ticks: int) -> tuple[np.ndarray,
-                                                                                                  dict[str, float]]:
+def execute(
+    program: Program, inputs: Mapping[str, float] | Sequence[float], ticks: int
+) -> tuple[np.ndarray, dict[str, float]]:
     """Runs one case from tick 0 to tick `ticks`, both done: (rows [rows, columns], outputs by name).
 
     inputs   by name, or in the order of `program.inputs`

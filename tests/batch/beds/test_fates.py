@@ -37,13 +37,16 @@ def test_a_case_whose_bed_did_not_arm_is_driven_the_next_time(met_bed: Met, on_p
     port = on_pty(device)
     status, _, complaint = run(met_bed, port, "--lock-step")
     assert status == cli.BAD_INPUT
-    assert complaint == f"""\
+    assert (
+        complaint
+        == f"""\
 error[E406]: bed `model` has stopped itself, and is to be cleared first: torque did not change the measured rate
  = help: look whether the tachometer is connected, and whether the shaft is free
  = help: then `met bed clear --port {port}`; `met bed run --clear` does so before each case
 
 1 error
 """
+    )
     assert not Path("a.h5").exists()
     assert met_bed("clear", "--port", port) == (cli.YES, f"""\
 bed `model` at {port}: cleared: torque did not change the measured rate

@@ -353,12 +353,15 @@ def test_two_joints_on_one_line_are_told() -> None:
 
 def test_a_joint_that_is_on_no_bed_is_told() -> None:
     done = run("wired", "shuolder=emulated")
-    assert done.stderr == """\
+    assert (
+        done.stderr
+        == """\
 error[E418]: port `shuolder=emulated`: joint `shuolder` is on no bed here
  = help: on a bed here: `shoulder`
 
 1 error
 """
+    )
 
 
 def test_a_baud_rate_that_cannot_be_is_told() -> None:

@@ -84,9 +84,7 @@ error[E426]: bed `model` has no time of its own, so that nothing can be late
 """)
 
 
-def test_a_bed_that_is_reset_meanwhile(
-    jitter: Callable[..., tuple[int, str, str]], on_pty: Callable[..., str]
-) -> None:
+def test_a_bed_that_is_reset_meanwhile(jitter: Callable[..., tuple[int, str, str]], on_pty: Callable[..., str]) -> None:
     class Rebooting(Listening):
         def take(self, data: bytes) -> bytes:
             if self.boots == 1 and self.kinds.count(READ) > 20:

@@ -18,6 +18,7 @@ pytestmark = pytest.mark.alone
 
 __all__ = ["DECK"]  # deck.ic
 
+
 @pytest.fixture
 def probe(met_bed: Callable[..., tuple[int, str, str]]) -> Callable[..., tuple[int, str, str]]:
     """`met bed probe ...`: exit status, what was said, and what was complained of."""
@@ -80,12 +81,15 @@ def test_faults_that_are_latched_and_their_remedies(
     port = on_pty(device)
     status, said, _ = probe("--port", port)
     assert status == cli.YES
-    assert """\
+    assert (
+        """\
   fault: no new command came within the deadman's time
     = help: the computer or the line was late: leave the computer less to do, or exchange at a lower rate
   fault: torque did not change the measured rate
     = help: look whether the tachometer is connected, and whether the shaft is free
-""" in said
+"""
+        in said
+    )
     assert "\n  state     stopped\n" in said
     found = json.loads(probe("--port", port, "--format", "json")[1])
     assert [each["name"] for each in found["faults"]] == ["deadman", "tachometer_dead"]
@@ -103,8 +107,6 @@ def test_an_adapter_that_keeps_bytes_back_is_warned_of(
   warning: the adapter of {port} keeps bytes back for up to 16 ms: exchanges will be late
     = help: `echo 1 | sudo tee {file}`, after each time that it is plugged in
 """ in probe("--port", port)[1]
-
-
 
 
 @pytest.mark.parametrize(("words", "message"), [
@@ -146,9 +148,7 @@ error[E428]: old.transcript is a transcript, and no bed that could be asked
 error[E400]: /dev/nobody cannot be opened: no such file or directory
 """),
 ])  # fmt: skip
-def test_what_is_wrong(
-    probe: Callable[..., tuple[int, str, str]], here: Path, words: str, message: str
-) -> None:
+def test_what_is_wrong(probe: Callable[..., tuple[int, str, str]], here: Path, words: str, message: str) -> None:
     (here / "old.transcript").write_bytes(b"MET bed transcript 1\n")
     status, said, complaint = probe(*words.split())
     assert (status, said) == (cli.BAD_INPUT, "")

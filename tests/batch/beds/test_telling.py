@@ -93,9 +93,7 @@ def test_a_case_is_told_by_the_time_that_is_on_the_disk(here: Path) -> None:
     executor.driving = Driving(path, 1000.0, 30.0)
     now[0] = 10.0
     telling.advance(1, 0)
-    assert stream.getvalue() == (
-        "wired   38 %  1 of 4 cases, 15 of 30 s  0.05 cases/s  50 s left  emulated\n"
-    )
+    assert stream.getvalue() == ("wired   38 %  1 of 4 cases, 15 of 30 s  0.05 cases/s  50 s left  emulated\n")
     executor.driving = Driving(here / "none", 1000.0, 30.0)
     assert executor.driving.done == 0.0
 

@@ -20,11 +20,18 @@ LINKS = ("base", "upper", "lower")
 RECORD = "record   = [q, links.base.position, links.base.orientation, links.upper.position, links.lower.position];\n}\n"
 SHORT = RUN[: RUN.index("record   =")] + RECORD
 STATE = SHORT[SHORT.index("        base.position") : SHORT.index("    }\n    environment")]
-SHAKEN = changed(SHORT, (STATE, ""), ("base     = free;", """\
+SHAKEN = changed(
+    SHORT,
+    (STATE, ""),
+    (
+        "base     = free;",
+        """\
 base     = prescribed {
         x   = sine(amplitude = 20 cm, frequency = 1 Hz);
         yaw = trapezoid(to = 50 deg, max_rate = 40 deg/s, max_acceleration = 60 deg/s^2);
-    }"""))
+    }""",
+    ),
+)
 SWEEPS = {
     "free": (SHORT, "vary initial.base.rate.x = [0, 1] rad/s;"),
     "prescribed": (SHAKEN, "vary base.x.amplitude = [0, 0.3] m;"),
@@ -45,10 +52,12 @@ def test_frames_in_a_notebook_are_where_the_archive_has_the_links(tmp_path: Path
     with batch.open(made(tmp_path, *SWEEPS[kind])) as data:
         frames = data.met.frames()
         for link in LINKS:
-            np.testing.assert_allclose(frames["position"].sel(link=link), data[f"links.{link}.position"],
-                                       rtol=0, atol=1e-12)
-        np.testing.assert_allclose(frames["orientation"].sel(link="base"), data["links.base.orientation"],
-                                   rtol=0, atol=1e-12)
+            np.testing.assert_allclose(
+                frames["position"].sel(link=link), data[f"links.{link}.position"], rtol=0, atol=1e-12
+            )
+        np.testing.assert_allclose(
+            frames["orientation"].sel(link="base"), data["links.base.orientation"], rtol=0, atol=1e-12
+        )
         one = data.isel(recorded_case=1, case=1).met.frames("lower")
         kept = data["links.lower.position"][1]
         np.testing.assert_allclose(one["position"].sel(link="lower"), kept, rtol=0, atol=1e-12)

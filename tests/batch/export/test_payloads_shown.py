@@ -27,8 +27,9 @@ def test_frames_are_where_the_archive_has_the_links(tmp_path: Path) -> None:
     with batch.open(tmp_path / "deck.h5") as data:
         frames = data.met.frames()
         assert frames.link.values.tolist() == ["base", "upper", "lower"]
-        np.testing.assert_allclose(frames["position"].sel(link="lower"), data["links.lower.position"], rtol=0,
-                                   atol=1e-12)
+        np.testing.assert_allclose(
+            frames["position"].sel(link="lower"), data["links.lower.position"], rtol=0, atol=1e-12
+        )
         crate = data["payloads.crate.position"].values[0]
         box = data["payloads.box.position"].values[0]
     read = Mcap(export(tmp_path / "deck.h5").path)

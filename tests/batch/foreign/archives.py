@@ -17,7 +17,9 @@ import ic
 from met import cli
 from tests.batch.door import ARM
 
-DECK = ARM + """
+DECK = (
+    ARM
+    + """
 run open {
     arm = door;
     initial { hinge.qd = 0.1 rad/s; }
@@ -29,6 +31,7 @@ run open {
 }
 sweep masses of open { vary links.leaf.mass = [3, 4, 5] kg;  vary integrator = [modified_euler, rk4]; }
 """
+)
 
 CASES = 3
 

@@ -1,6 +1,6 @@
 """Archives with something else in them than MET writes: chosen by a seed, one to three changes each.
 
-    python -m tests.batch.foreign.mutations FIRST LAST     tries these seeds, and shows what breaks
+python -m tests.batch.foreign.mutations FIRST LAST     tries these seeds, and shows what breaks
 """
 
 from __future__ import annotations

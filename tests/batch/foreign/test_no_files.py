@@ -26,6 +26,7 @@ from tests.batch.foreign.archives import DECK, met
 @pytest.fixture(autouse=True)
 def patience() -> Iterator[None]:
     """What hangs fails."""
+
     def too_long(*_: object) -> None:
         raise AssertionError("it waits for something that never comes")
 
@@ -149,9 +150,7 @@ def test_a_shard_with_a_hole_of_a_terabyte_counts_as_none(campaign: Path) -> Non
     assert f"shard {first.name} is larger than its cases make it; its 8 cases are run again" in notes
 
 
-def test_rows_with_a_hole_of_a_terabyte_are_damaged(
-    here: Path, engine: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rows_with_a_hole_of_a_terabyte_are_damaged(here: Path, engine: None, monkeypatch: pytest.MonkeyPatch) -> None:
     short_tasks(monkeypatch)
     begin(Path("a.h5"), cases=list(range(30)))
     os.truncate("a.h5.campaign/rows.0.npy", 1 << 40)
@@ -190,9 +189,7 @@ def test_a_link_in_the_place_of_the_lock_is_refused_and_what_it_leads_to_is_left
 
 
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir])
-def test_a_pipe_or_a_folder_in_the_place_of_the_lock_is_refused(
-    make: Callable[[Path], None], campaign: Path
-) -> None:
+def test_a_pipe_or_a_folder_in_the_place_of_the_lock_is_refused(make: Callable[[Path], None], campaign: Path) -> None:
     (campaign / "lock").unlink()
     make(campaign / "lock")
     assert refused(Path("a.h5")).startswith("error[E350]: a.h5.campaign/lock is not a regular file\n")

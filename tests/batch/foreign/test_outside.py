@@ -28,6 +28,7 @@ Trap = Callable[[Any, str], None]
 
 def external(file: Any, other: str) -> None:
     """A deck's text that is another file."""
+
     def make() -> None:
         file["provenance"].create_dataset("source_text", (1,), f"S{len(SECRET)}", external=[(other, 0, len(SECRET))])
 
@@ -141,9 +142,7 @@ def test_what_leads_out_of_an_archive_is_refused_by_its_name(
 
 
 @pytest.mark.parametrize("trap", [external, virtual, growing, external_link, of_a_group], ids=lambda t: t.__name__)
-def test_a_named_pipe_to_which_an_archive_leads_is_not_waited_for(
-    trap: Trap, archive: Path, tmp_path: Path
-) -> None:
+def test_a_named_pipe_to_which_an_archive_leads_is_not_waited_for(trap: Trap, archive: Path, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with changed(archive, tmp_path) as (copy, file):
         trap(file, str(tmp_path / "pipe"))

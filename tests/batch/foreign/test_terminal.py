@@ -82,6 +82,7 @@ def test_json_for_programs_has_neither_and_is_json(archive: Path, tmp_path: Path
         poisoned(file)
         file["open"].attrs["gain"] = float("nan")
     said = met("show", str(copy), "--format", "json").text
+
     def refuse(word: str) -> None:
         raise AssertionError(word)
 
@@ -159,9 +160,11 @@ def test_a_report_escapes_what_would_end_its_script(archive: Path, tmp_path: Pat
     assert met("report", str(copy), "-o", str(page), "--title", "<script>alert(1)</script>").status == 0
     text = page.read_text(encoding="utf-8")
     assert "alert(1)" in text
-    assert "<script>alert" not in text and "<img src=x" not in text and "</script><" not in text.replace(
-        "</script></body>", ""
-    ).replace("</script>\n<", "")
+    assert (
+        "<script>alert" not in text
+        and "<img src=x" not in text
+        and "</script><" not in text.replace("</script></body>", "").replace("</script>\n<", "")
+    )
 
 
 @pytest.mark.slow

@@ -187,17 +187,20 @@ def test_what_cannot_be_placed(reaches: xarray.Dataset, tmp_path: Path) -> None:
     )  # fmt: skip
     remedy = "  `record = [q, ...]` in the run keeps where its joints are; then run it again"
     assert said(lambda: reaches[["qd", "n_valid"]].met.frames()) == (
-        "E370", "the links of `reaches` cannot be placed: q is not in this Dataset\n" + remedy
+        "E370",
+        "the links of `reaches` cannot be placed: q is not in this Dataset\n" + remedy,
     )
     assert said(lambda: reaches.sel(joint=["lift", "swing", "roll"]).met.frames()) == (
-        "E370", "the links of `reaches` cannot be placed: point.q, pan.q is not in this Dataset\n" + remedy
+        "E370",
+        "the links of `reaches` cannot be placed: point.q, pan.q is not in this Dataset\n" + remedy,
     )
     assert said(lambda: reaches.sel(joint="lift").met.frames()) == (
-        "E370", "the links of `reaches` cannot be placed: swing.q, roll.q, point.q, pan.q is not in this Dataset\n"
-        + remedy
+        "E370",
+        "the links of `reaches` cannot be placed: swing.q, roll.q, point.q, pan.q is not in this Dataset\n" + remedy,
     )
     assert said(lambda: reaches[["q"]].mean("recorded_case", keep_attrs=True).met.frames()) == (
-        "E389", "it is not known of which case this q is: `recorded_case` is gone"
+        "E389",
+        "it is not known of which case this q is: `recorded_case` is gone",
     )
 
 

@@ -179,5 +179,6 @@ class TestMessages:
 
     def test_no_cases(self, tuning: xarray.Dataset) -> None:
         assert said(lambda: tuning.isel(case=[]).met.grid("settle")) == (
-            "E388", "there are no cases of which `settle` could be"
+            "E388",
+            "there are no cases of which `settle` could be",
         )

@@ -94,11 +94,14 @@ def test_a_block_is_in_one_unit(tmp_path: Path) -> None:
 
 
 def test_two_parameters_that_follow_from_a_third_share_its_dimension(tmp_path: Path) -> None:
-    text = BRIEF + """sweep rows of brief {
+    text = (
+        BRIEF
+        + """sweep rows of brief {
     zip { gearbox.kp = [0.01, 0.01, 0.02, 0.02] V*s/rad;  gearbox.ki = [60, 90, 60, 90] mV/rad;
           reach_back = [0.1, 0.2, 0.3, 0.4] rad; }
 }
 """
+    )
     with made(tmp_path, text, "rows") as data:
         grid = data.met.grid("volts")
         assert dict(grid.sizes) == {"reach_back": 4} and grid.notnull().all()

@@ -114,7 +114,8 @@ def test_what_is_of_no_archive(archive: Path) -> None:
         "E389", "this Dataset is of no archive: it has no attribute `experiment`"
     )  # fmt: skip
     assert said(lambda: xarray.DataTree(other).met.grid()) == (
-        "E389", "this DataTree is of no archive: nothing in it has an attribute `experiment`"
+        "E389",
+        "this DataTree is of no archive: nothing in it has an attribute `experiment`",
     )
 
 
@@ -232,5 +233,6 @@ class TestUnits:
 
         with batch.open(decks.made(tmp_path, "pick")) as data:
             assert said(lambda: data.met.in_units(qd="deg/s")) == (
-                "E386", "`qd` has units of its own at each joint: m/s, rad/s"
+                "E386",
+                "`qd` has units of its own at each joint: m/s, rad/s",
             )

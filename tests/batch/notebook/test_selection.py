@@ -228,7 +228,8 @@ class TestMessages:
             "  cases here: #0 to #20; or the beginning of a case_id"
         )  # fmt: skip
         assert said(lambda: tuning.met.sel({"gearbox.kp": 0.01}, case="#20")) == (
-            "E387", "case '#20' is none of those that are chosen by the other values"
+            "E387",
+            "case '#20' is none of those that are chosen by the other values",
         )
         assert said(lambda: tuning.isel(case=0, recorded_case=0).met.sel(case=0)) == (
             "E385", "this Dataset has no dimension of cases\n"
@@ -237,7 +238,8 @@ class TestMessages:
 
     def test_what_a_part_of_a_dataset_does_not_say(self, tuning: xarray.Dataset) -> None:
         assert said(lambda: tuning[["settle"]].met.sel(failed=True)) == (
-            "E385", "how cases ended is not in this Dataset: it lacks the variable `status`"
+            "E385",
+            "how cases ended is not in this Dataset: it lacks the variable `status`",
         )
         assert said(lambda: tuning[["settle", "status"]].met.sel(met=True)) == (
             "E385", "how cases ended is not in this Dataset: it lacks the variable `met`\n"

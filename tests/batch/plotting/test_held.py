@@ -125,9 +125,7 @@ def test_lines_of_a_panel_are_equally_thick(ran: dict[str, ArchiveFile], figures
         assert len({line.get_linewidth() for line in ax.lines if line.get_label() != DOTS["label"]}) == 1
 
 
-def test_a_line_that_lies_on_another_has_gaps(
-    ran: dict[str, ArchiveFile], figures: list[Any], tmp_path: Path
-) -> None:
+def test_a_line_that_lies_on_another_has_gaps(ran: dict[str, ArchiveFile], figures: list[Any], tmp_path: Path) -> None:
     draw(ran["turning"], tmp_path / "a.png", ["q", "tau"])
     styles = [[line.get_linestyle() for line in ax.lines if line.get_label() != DOTS["label"]]
               for ax in shown(figures[0])]  # fmt: skip
@@ -137,5 +135,3 @@ def test_a_line_that_lies_on_another_has_gaps(
 def test_a_terminal_shows_the_same_units(ran: dict[str, ArchiveFile]) -> None:
     text = show(ran["slew"], ["q", "qd"])
     assert "q  (deg)  joint position" in text and "qd  (deg/s)  joint rate" in text
-
-

@@ -145,7 +145,8 @@ class TestNames:
     @pytest.mark.parametrize(
         ("name", "shown_as"),
         [
-            (b"na\xffme.h5", "na\\udcffme.h5"), (b"con\x08trol.h5", "con\\x08trol.h5"),
+            (b"na\xffme.h5", "na\\udcffme.h5"),
+            (b"con\x08trol.h5", "con\\x08trol.h5"),
             (b"two\nlines.h5", "two\\nlines.h5"),
         ],
         ids=["byte", "control", "line"],

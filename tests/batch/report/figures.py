@@ -1,15 +1,15 @@
 """Pictures of docs/report.md: the reports of real runs, as a browser shows them.
 
-    python -m tests.batch.report.figures          writes docs/figures/report_*.png
+python -m tests.batch.report.figures          writes docs/figures/report_*.png
 
-    report_page.png       the head of a report: the Panda's payload sweep
-    report_points.png     its cases, one of which is chosen, and two parameters at once
-    report_signals.png    its worst cases, near to
-    report_stability.png  a motor on a bed, under arms of ten weights
-    report_narrow.png     the head of the same on a telephone, dark
-    report_against.png           the story of docs/diff.md: the head of after.h5 against before.h5
-    report_against_signals.png   what was before under what is now
-    report_against_points.png    the metric of each case, and where it was; a map of the change
+report_page.png       the head of a report: the Panda's payload sweep
+report_points.png     its cases, one of which is chosen, and two parameters at once
+report_signals.png    its worst cases, near to
+report_stability.png  a motor on a bed, under arms of ten weights
+report_narrow.png     the head of the same on a telephone, dark
+report_against.png           the story of docs/diff.md: the head of after.h5 against before.h5
+report_against_signals.png   what was before under what is now
+report_against_points.png    the metric of each case, and where it was; a map of the change
 """
 
 from __future__ import annotations

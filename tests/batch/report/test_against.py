@@ -423,5 +423,3 @@ def test_a_structure_says_how_many_met_all_before(here: Path) -> None:
     assert table is not None and table.heads[:4] == ("integrator", "cases", "meet all", "before")
     assert [row[3] for row in table.rows] == ["3 (100 %)", "3 (100 %)"]
     assert all(row[2] != "3 (100 %)" for row in table.rows)
-
-

@@ -328,10 +328,13 @@ class TestStability:
 
     @pytest.mark.slow
     def test_tells_from_where_where_an_arm_may_be_too_light(self, tmp_path: Path) -> None:
-        deck = archives.DECK + """
+        deck = (
+            archives.DECK
+            + """
             run stiff like there { shoulder { bed = emulated;  law = measured_acceleration; } duration = 0.1 s; }
             sweep light of stiff { vary gearbox.kp = [0.02, 1] V*s/rad;  vary gearbox.ratio = [1570, 5000]; }
         """
+        )
         batch.run(archives.compiled(tmp_path, "light", deck=deck), output=tmp_path / "a.h5")
         found = gathered(tmp_path / "a.h5").sections[0].stability
         assert found is not None and found.spans

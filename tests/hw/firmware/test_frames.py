@@ -127,9 +127,9 @@ def test_every_flipped_bit_and_every_missing_or_doubled_byte_of_a_command_is_dro
     device = Device()
     device.ready()
     good = frame(wire.DRIVE, 3, struct.pack("<iiB", 100, -50, 0))
-    bad = [bytes([*good[:k], good[k] ^ 1 << bit, *good[k + 1:]]) for k in range(len(good) - 1) for bit in range(8)]
-    bad += [good[:k] + good[k + 1:] for k in range(len(good) - 1)]
-    bad += [good[:k] + good[k:k + 1] + good[k:] for k in range(len(good) - 1)]
+    bad = [bytes([*good[:k], good[k] ^ 1 << bit, *good[k + 1 :]]) for k in range(len(good) - 1) for bit in range(8)]
+    bad += [good[:k] + good[k + 1 :] for k in range(len(good) - 1)]
+    bad += [good[:k] + good[k : k + 1] + good[k:] for k in range(len(good) - 1)]
     for each in bad:
         device.boot()
         device.number = 0

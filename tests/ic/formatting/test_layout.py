@@ -218,7 +218,7 @@ def test_a_long_comment_moves_as_a_whole() -> None:
 
 def test_comments_and_preprocessor_lines_keep_what_is_in_them() -> None:
     text = (
-        '#include   <two_link.ic>\t// a\n#  define  ROD( N,M )  link N{mass=M;}  \\\n\t  shape=x\n'
+        "#include   <two_link.ic>\t// a\n#  define  ROD( N,M )  link N{mass=M;}  \\\n\t  shape=x\n"
         "//\ttabs  and   blanks\n#if  A==1\n#endif\n"
     )
     assert fmt(text.replace("\n", "  \n")) == text
@@ -341,7 +341,9 @@ def test_a_layout_that_would_change_a_token_a_line_or_a_comment_is_refused(chang
 def test_a_refusal_names_the_place_and_asks_for_a_report() -> None:
     with pytest.raises(Problem) as caught:
         prove("a.ic", "let a = 1;\nlet b = 2;\n", "let a = 1;\nlet b = 3;\n")
-    assert render(caught.value.diagnostics, caught.value.sources) == """\
+    assert (
+        render(caught.value.diagnostics, caught.value.sources)
+        == """\
 error[E340]: laying out this deck would change what it says, so it is left as it is: a defect of MET
  --> a.ic:2:1
   |
@@ -351,3 +353,4 @@ error[E340]: laying out this deck would change what it says, so it is left as it
 
 1 error
 """
+    )

@@ -108,7 +108,9 @@ def test_a_soundly_compiled_deck_is_no_fault(tmp_path: Path, monkeypatch: pytest
 
 def test_findings_are_told_with_their_decks() -> None:
     found = Findings(12, (Fault("KeyError in a.py:f", 7, "x = 1;", "Traceback ...\n"),), (0.5, 3))
-    assert told(found, 5) == """\
+    assert (
+        told(found, 5)
+        == """\
 12 decks of seed 5; the slowest, number 3, took 0.5 s
 
 === KeyError in a.py:f (deck 7)
@@ -116,6 +118,7 @@ Traceback ...
 
 --- the deck
 x = 1;"""
+    )
 
 
 @pytest.mark.slow

@@ -44,15 +44,22 @@ def test_a_base_is_fixed_unless_the_run_says_more(tmp_path: Path) -> None:
 def test_a_free_base_begins_where_initial_says(tmp_path: Path) -> None:
     begins = "initial { base.position = [1, 2, 3] m; base.rate = [0, 0, 1] rad/s; }"
     assert numbers(tmp_path, ("initial {}", begins)) == {
-        "initial.base.position.x": 1.0, "initial.base.position.y": 2.0, "initial.base.position.z": 3.0,
+        "initial.base.position.x": 1.0,
+        "initial.base.position.y": 2.0,
+        "initial.base.position.z": 3.0,
         **{f"initial.base.{name}.{axis}": 0.0 for name in ("rpy", "velocity") for axis in "xyz"},
-        "initial.base.rate.x": 0.0, "initial.base.rate.y": 0.0, "initial.base.rate.z": 1.0,
+        "initial.base.rate.x": 0.0,
+        "initial.base.rate.y": 0.0,
+        "initial.base.rate.z": 1.0,
     }
 
 
 def test_a_prescribed_base_has_a_course_for_each_component_that_is_written(tmp_path: Path) -> None:
     assert numbers(tmp_path, ("base = free;", SHAKEN)) == {
-        "base.x.amplitude": 0.01, "base.x.frequency": 2.0, "base.x.offset": 0.0, "base.x.phase": 0.0,
+        "base.x.amplitude": 0.01,
+        "base.x.frequency": 2.0,
+        "base.x.offset": 0.0,
+        "base.x.phase": 0.0,
         "base.yaw.value": pytest.approx(0.17453292519943295),
     }
     base = experiment(tmp_path, ARM, changed(RUN, ("base = free;", SHAKEN))).structure.base
@@ -269,7 +276,9 @@ def test_a_mistake_is_told_with_its_place_and_a_remedy(tmp_path: Path, base: str
 
 def test_a_free_base_without_mass_is_told(tmp_path: Path) -> None:
     arm = changed(ARM, ("    link base { mass = 50 kg; shape = sphere(radius = 1 m); }\n", ""))
-    assert told(check(tmp_path, arm, RUN)) == """\
+    assert (
+        told(check(tmp_path, arm, RUN))
+        == """\
 error[D254]: the base moves freely and has no mass
  --> deck.ic:7:5
   |
@@ -280,6 +289,7 @@ error[D254]: the base moves freely and has no mass
 
 1 error
 """
+    )
 
 
 def test_a_free_base_whose_body_is_written_without_mass_needs_a_mass_and_no_second_body(tmp_path: Path) -> None:
@@ -295,27 +305,35 @@ def test_a_free_base_that_loses_its_mass_in_a_case_is_told(tmp_path: Path) -> No
 
 
 def test_a_link_fixed_to_the_base_is_its_mass_as_well(tmp_path: Path) -> None:
-    arm = changed(ARM, ("    link base", "    link hull"),
-                  ("    joint hinge", "    joint mount fixed { parent = base; child = hull; }\n    joint hinge"))
+    arm = changed(
+        ARM,
+        ("    link base", "    link hull"),
+        ("    joint hinge", "    joint mount fixed { parent = base; child = hull; }\n    joint hinge"),
+    )
     assert told(check(tmp_path, arm, RUN)) == ""
 
 
 def test_no_joint_is_called_base_and_none_has_it_for_a_child(tmp_path: Path) -> None:
     text = changed(ARM, ("joint hinge", "joint base"))
-    assert told(check(tmp_path, text, RUN)).partition("\n\n")[0] == """\
+    assert (
+        told(check(tmp_path, text, RUN)).partition("\n\n")[0]
+        == """\
 error[D166]: `base` begins paths of its own, so no joint may be called so
  --> deck.ic:4:5
   |
 4 |     joint base revolute { parent = base; child = bar; axis = z; }
   |     ^^^^^^^^^^^^^^^^^^^
   = help: give the joint another name"""
+    )
     text = changed(ARM, ("child = bar", "child = base"))
     assert "error[D093]: the base cannot be a child\n" in told(check(tmp_path, text, RUN))
 
 
 def test_a_component_varies_by_its_parameters(tmp_path: Path) -> None:
     sweep = "sweep some of it { vary base.x = [1, 2] cm; }"
-    assert told(check(tmp_path, ARM, changed(RUN, ("base = free;", SHAKEN)), sweep, select=["some"])) == """\
+    assert (
+        told(check(tmp_path, ARM, changed(RUN, ("base = free;", SHAKEN)), sweep, select=["some"]))
+        == """\
 error[D122]: `base.x` cannot vary
   --> deck.ic:15:25
    |
@@ -325,11 +343,14 @@ error[D122]: `base.x` cannot vary
 
 1 error
 """
+    )
 
 
 def test_a_spin_that_the_step_does_not_follow_is_warned_of(tmp_path: Path) -> None:
     spun = changed(RUN, ("initial {}", "initial { base.rate = [150, 0, 200] rad/s; }"))
-    assert told(check(tmp_path, ARM, spun)) == """\
+    assert (
+        told(check(tmp_path, ARM, spun))
+        == """\
 warning[D300]: the base turns by 0.25 rad in a step of the dynamics
  --> deck.ic:9:27
   |
@@ -339,17 +360,21 @@ warning[D300]: the base turns by 0.25 rad in a step of the dynamics
   = help: a steady spin about a principal axis through the frame's origin needs less
 
 1 warning
-"""  # noqa: E501 - a message is as wide as it is
+"""
+    )
     assert told(check(tmp_path, ARM, changed(spun, ("duration", "integrator = rk4; duration")))) == ""
     sweep = "sweep some of it { vary initial.base.rate.x = [100, 300] rad/s; }"
-    found = check(tmp_path, ARM, changed(RUN, ("initial {}", "initial { base.rate = [0, 0, 10] rad/s; }")), sweep,
-                  select=["some"])
+    found = check(
+        tmp_path, ARM, changed(RUN, ("initial {}", "initial { base.rate = [0, 0, 10] rad/s; }")), sweep, select=["some"]
+    )
     assert [d.message for d in found.diagnostics] == ["the base turns by 0.3 rad in a step of the dynamics"]
 
 
 def test_a_kind_of_command_is_no_course_of_a_base(tmp_path: Path) -> None:
     text = changed(RUN, ("base = free;", "base = prescribed { yaw = rate(1 rad/s); }"))
-    assert told(check(tmp_path, ARM, text)) == """\
+    assert (
+        told(check(tmp_path, ARM, text))
+        == """\
 error[D250]: `yaw` of the base is told its positions, and `rate` is a kind of command of servos
  --> deck.ic:8:31
   |
@@ -359,3 +384,4 @@ error[D250]: `yaw` of the base is told its positions, and `rate` is a kind of co
 
 1 error
 """
+    )

@@ -60,7 +60,9 @@ HZ = ("bandwidth = 5 s^-1", "bandwidth = 5 Hz")
 
 
 def test_hertz_for_a_rate_constant(tmp_path: Path) -> None:
-    assert told(check(tmp_path, deck(HZ))) == """\
+    assert (
+        told(check(tmp_path, deck(HZ)))
+        == """\
 warning[D305]: `bandwidth` of servo `still` is in 1/s, and 5 Hz is taken as 5 1/s
  --> deck.ic:7:42
   |
@@ -71,6 +73,7 @@ warning[D305]: `bandwidth` of servo `still` is in 1/s, and 5 Hz is taken as 5 1/
 
 1 warning
 """
+    )
 
 
 DOUBTS = {

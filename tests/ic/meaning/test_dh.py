@@ -21,7 +21,6 @@ from tests.oracles.package import Package
 
 pin = Package("pinocchio")
 
-# ruff: noqa: E501 - messages are as wide as they are
 
 SEED = 1955
 RUN = """
@@ -86,7 +85,9 @@ def test_a_joints_frame_moves_as_the_product_of_its_row(convention: str, kind: s
         for q in (0.0, 0.7):
             found = at(CONVENTIONS[convention](*row), kind, q)
             # some ten roundings of numbers up to 3 m
-            np.testing.assert_allclose(found, dh.link(convention, dh.moved(row, kind, q)), atol=1e-14, err_msg=f"{row}, {SEED=}")
+            np.testing.assert_allclose(
+                found, dh.link(convention, dh.moved(row, kind, q)), atol=1e-14, err_msg=f"{row}, {SEED=}"
+            )
 
 
 @pytest.mark.parametrize("convention", list(CONVENTIONS))
@@ -171,7 +172,9 @@ def test_accelerations_are_those_of_pinocchio_by_the_same_table(
         model = dh.model(convention, own, kinds, given)
         wanted = pin.aba(model, model.createData(), q[case], qd[case], np.zeros(6))
         # rounding, times the condition number of the mass matrix (up to some 1e3)
-        np.testing.assert_allclose(found[case], wanted, rtol=1e-11, atol=1e-11 * np.abs(wanted).max(), err_msg=f"{SEED=}")
+        np.testing.assert_allclose(
+            found[case], wanted, rtol=1e-11, atol=1e-11 * np.abs(wanted).max(), err_msg=f"{SEED=}"
+        )
 
 
 def test_a_plan_has_the_frame_and_the_rows_numbers_are_explained_and_varied(tmp_path: Path) -> None:
@@ -278,7 +281,9 @@ def test_a_mistake_in_a_row_is_told(tmp_path: Path, written: str, message: str) 
 
 def test_what_follows_from_a_row_cannot_vary_by_itself(tmp_path: Path) -> None:
     said = told(check(tmp_path, ONE.replace("XXX", "dh = craig(a = 1 m);"), RUN, SWEEP, select=["many"]))
-    assert said.rpartition("\n\n")[0] + "\n" == """\
+    assert (
+        said.rpartition("\n\n")[0] + "\n"
+        == """\
 error[D122]: `j0.at.x` cannot vary
   --> deck.ic:10:27
    |
@@ -286,3 +291,4 @@ error[D122]: `j0.at.x` cannot vary
    |                           ^^^^^^^
    = help: it follows from `j0.dh`; vary one of: `j0.dh.a`, `j0.dh.alpha`, `j0.dh.d`, `j0.dh.theta`
 """
+    )

@@ -10,8 +10,6 @@ from met import run as engine
 from met.diagnostic import Problem
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told
 
-# ruff: noqa: E501 - messages are as wide as they are
-
 
 def run_with(environment: str) -> str:
     return changed(RUN, ("    duration", f"    environment {{ {environment} }}\n    duration"))
@@ -27,7 +25,9 @@ SLOW = changed(SERVO, ("ratio = 100;", "ratio = 100; rate = 500 Hz;"))
 
 def test_a_window_that_holds_no_tick_of_the_law_is_told(tmp_path: Path) -> None:
     run = run_with("fault = runaway { joint = hinge;  from = 0.501 s;  until = 0.5015 s; }")
-    assert shown(tmp_path, ARM, SLOW, run) == """\
+    assert (
+        shown(tmp_path, ARM, SLOW, run)
+        == """\
 warning[D168]: environment `fault` never acts: the law of joint `hinge` ticks at 0.5 s and at 0.502 s, and not in between
   --> deck.ic:15:60
    |
@@ -35,6 +35,7 @@ warning[D168]: environment `fault` never acts: the law of joint `hinge` ticks at
    |                                                            ^^^^^^^
    = help: change that, or leave it out
 """
+    )
 
 
 @pytest.mark.parametrize("failure", [
@@ -54,7 +55,9 @@ def test_nor_is_one_on_a_law_that_is_continuous(tmp_path: Path) -> None:
 
 def test_of_two_that_run_away_at_a_time_the_one_that_does_nothing_is_told(tmp_path: Path) -> None:
     run = run_with("up = runaway { joint = hinge; }  down = runaway { joint = hinge;  level = -1;  from = 0.4 s; }")
-    assert shown(tmp_path, ARM, SERVO, run) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, run)
+        == """\
 warning[D293]: `up` does nothing from 0.4 s on: `down` acts on the same of joint `hinge` then, and stands later
   --> deck.ic:15:77
    |
@@ -63,6 +66,7 @@ warning[D293]: `up` does nothing from 0.4 s on: `down` acts on the same of joint
   ::: deck.ic:15:19  this one
    = help: let one end before the other begins
 """
+    )
     ended = changed(run, ("runaway { joint = hinge; }", "runaway { joint = hinge;  until = 0.4 s; }"))
     assert codes(tmp_path, ARM, SERVO, ended) == []
 
@@ -77,7 +81,9 @@ def test_of_two_sensors_that_are_dead_those_of_one_quantity_alone(second: str, s
 
 def test_damping_of_joints_that_slide_on_an_arm_without_any_is_told(tmp_path: Path) -> None:
     run = run_with("grease = joint_damping { sliding = 3 N*s/m; };")
-    assert shown(tmp_path, ARM, SERVO, run) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, run)
+        == """\
 warning[D168]: `sliding` of environment `grease` changes nothing: no joint of arm `swing` is prismatic
   --> deck.ic:15:54
    |
@@ -85,6 +91,7 @@ warning[D168]: `sliding` of environment `grease` changes nothing: no joint of ar
    |                                                      ^^^^^^^
    = help: leave it out
 """
+    )
     assert codes(tmp_path, ARM, SERVO, run_with("grease = joint_damping { damping = 3 N*m*s/rad; };")) == []
 
 
@@ -93,7 +100,9 @@ LOCKED = "servo drive { model = locked;  release = 0.1 s; }\n"
 
 def test_a_brake_on_a_joint_that_is_told_its_acceleration_is_an_error_of_the_check(tmp_path: Path) -> None:
     run = run_with("stay = brake { joint = hinge;  torque = 4 N*m; }")
-    assert shown(tmp_path, ARM, LOCKED, run) == """\
+    assert (
+        shown(tmp_path, ARM, LOCKED, run)
+        == """\
 error[D291]: `stay` puts friction on joint `hinge`, which servo `drive` (locked) tells its acceleration
   --> deck.ic:10:42
    |
@@ -102,6 +111,7 @@ error[D291]: `stay` puts friction on joint `hinge`, which servo `drive` (locked)
   ::: deck.ic:8:14  its servo
    = help: leave it out for this joint: no friction slows down or holds what is told its acceleration
 """
+    )
     ideal = "servo drive { model = ideal;  bandwidth = 5 1/s;  command = rate(0.1 rad/s); }\n"
     assert codes(tmp_path, ARM, ideal, run) == ["D291"]
     assert codes(tmp_path, ARM, SERVO, run) == codes(tmp_path, ARM, "servo drive { model = passive; }\n", run) == []
@@ -130,7 +140,9 @@ servo drive {
 
 def test_a_drive_that_would_run_away_without_a_limit_is_an_error(tmp_path: Path) -> None:
     run = run_with("fault = runaway { joint = hinge; }")
-    assert shown(tmp_path, ARM, CASCADE, run) == """\
+    assert (
+        shown(tmp_path, ARM, CASCADE, run)
+        == """\
 error[D292]: `fault` would drive joint `hinge` with all that servo `drive` (cascade) can give, and that has no limit
   --> deck.ic:14:45
    |
@@ -139,13 +151,16 @@ error[D292]: `fault` would drive joint `hinge` with all that servo `drive` (casc
   ::: deck.ic:12:14  its servo
    = help: write `i_max = ... A;` in the servo: largest current that is asked
 """
+    )
     assert codes(tmp_path, ARM, changed(CASCADE, ("ki = 0.5", "i_max = 5 A;  ki = 0.5")), run) == []
 
 
 def test_a_joint_that_begins_beyond_its_stop_is_told(tmp_path: Path) -> None:
     stop = "end = joint_stop { joint = hinge;  lower = -20 deg;  upper = 20 deg;  stiffness = 100 N*m/rad; };"
     run = changed(run_with(stop), ("    duration", "    initial { hinge.q = 0.5 rad; }\n    duration"))
-    assert shown(tmp_path, ARM, SERVO, run) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, run)
+        == """\
 warning[D294]: joint `hinge` begins at 0.5 rad, beyond an end of `end`: above 0.349066 rad
   --> deck.ic:16:25
    |
@@ -154,6 +169,7 @@ warning[D294]: joint `hinge` begins at 0.5 rad, beyond an end of `end`: above 0.
   ::: deck.ic:15:19  this one
    = help: the run begins with what drives it back: begin within, or move the end
 """
+    )
     for within in ("20 deg", "0.349066 rad"):  # which is above 20 deg in the seventh digit
         assert codes(tmp_path, ARM, SERVO, changed(run, ("0.5 rad", within))) == []
     sweep = "sweep starts of hold { vary initial.hinge.q = [0, -30] deg; }\n"

@@ -64,9 +64,7 @@ def test_what_the_help_says_to_write(tmp_path: Path, name: str) -> None:
 def test_a_links_number_in_a_run_goes_to_an_arm_like_the_runs(tmp_path: Path) -> None:
     text = "run it like hold { links.bar.mass = 3 kg; }\n"
     (found,) = check(tmp_path, ARM, SERVO, RUN, text, select="all").diagnostics
-    assert found.help == (
-        "it is the arm's: `arm OTHER like swing { bar { mass = 3 kg; } }`, and `arm = OTHER;` here",
-    )
+    assert found.help == ("it is the arm's: `arm OTHER like swing { bar { mass = 3 kg; } }`, and `arm = OTHER;` here",)
     arm, use = re.findall("`(.*?)`", found.help[0])
     followed = f"{arm}\n" + text.replace("links.bar.mass = 3 kg;", use)
     assert check(tmp_path, ARM, SERVO, RUN, followed, select="all").diagnostics == ()

@@ -11,8 +11,6 @@ from met import run
 from tests.ic.small_decks import changed, check, codes, experiment, told
 from tests.oracles.plan_tree import pinocchio
 
-# ruff: noqa: E501 - messages are as wide as they are
-
 YOKE = """\
 arm wrist {
     link yoke { mass = 0 kg; }
@@ -37,18 +35,23 @@ run fall {
 @pytest.mark.oracle
 def test_a_yoke_without_mass_and_a_point_move_as_in_pinocchio(tmp_path: Path) -> None:
     found = experiment(tmp_path, YOKE, FALL)
-    assert [found.parameters[f"links.yoke.inertia.{each}"].value for each in ("xx", "yy", "zz", "xy", "xz", "yz")] == [0.0] * 6
+    assert [found.parameters[f"links.yoke.inertia.{each}"].value for each in ("xx", "yy", "zz", "xy", "xz", "yz")] == [
+        0.0
+    ] * 6
     ours = run.run(found).signals["qdd"][0, 0]
     theirs = pinocchio(found, gravity=(0.0, 0.0, -9.81)).accelerations((0.3, -0.4), (1.0, 2.0), (0.0, 0.0), {})
     np.testing.assert_allclose(ours, theirs, rtol=1e-12)  # rounding
 
 
-@pytest.mark.parametrize(("piece", "code"), [
-    ("mass = 0 kg; inertia = [1, 1, 1] kg*m^2;", "D087"),
-    ("mass = 0 kg; inertia = [1, 1, 1, 0, 0, 0.1] kg*m^2;", "D087"),
-    ("mass = 1 kg; inertia = [0, 1, 2] kg*m^2;", "D087"),
-    ("mass = 1 kg;", "D089"),
-])
+@pytest.mark.parametrize(
+    ("piece", "code"),
+    [
+        ("mass = 0 kg; inertia = [1, 1, 1] kg*m^2;", "D087"),
+        ("mass = 0 kg; inertia = [1, 1, 1, 0, 0, 0.1] kg*m^2;", "D087"),
+        ("mass = 1 kg; inertia = [0, 1, 2] kg*m^2;", "D087"),
+        ("mass = 1 kg;", "D089"),
+    ],
+)
 def test_only_what_has_no_mass_needs_no_inertia_and_has_none(tmp_path: Path, piece: str, code: str) -> None:
     assert codes(tmp_path, changed(YOKE, ("link tool { mass = 0 kg; }", f"link tool {{ {piece} }}")), FALL) == [code]
 
@@ -56,7 +59,9 @@ def test_only_what_has_no_mass_needs_no_inertia_and_has_none(tmp_path: Path, pie
 def test_a_joint_that_moves_nothing_with_mass_is_told_and_not_those_behind_it(tmp_path: Path) -> None:
     arm = changed(YOKE, ("mass = 2 kg; com = [0.1, 0.2, 0.3] m; inertia = [0.2, 0.3, 0.4] kg*m^2;", "mass = 0 kg;"),
                   ("mass = 0.1 kg; inertia = [0, 0, 0] kg*m^2;", "mass = 0 kg;"))  # fmt: skip
-    assert told(check(tmp_path, arm, FALL)) == """\
+    assert (
+        told(check(tmp_path, arm, FALL))
+        == """\
 error[D217]: joint `roll` moves nothing that has mass
  --> deck.ic:6:5
   |
@@ -67,6 +72,7 @@ error[D217]: joint `roll` moves nothing that has mass
 
 1 error
 """
+    )
 
 
 def test_a_sweep_may_take_a_mass_to_zero_where_another_is_left(tmp_path: Path) -> None:
@@ -77,9 +83,13 @@ def test_a_sweep_may_take_a_mass_to_zero_where_another_is_left(tmp_path: Path) -
 
 
 def test_a_sweep_that_leaves_a_joint_nothing_is_told_with_its_case(tmp_path: Path) -> None:
-    arm = changed(YOKE, ("inertia = [0.2, 0.3, 0.4] kg*m^2;", "shape = sphere(radius = 5 cm);"), ("mass = 0.1 kg", "mass = 0 kg"))
+    arm = changed(
+        YOKE, ("inertia = [0.2, 0.3, 0.4] kg*m^2;", "shape = sphere(radius = 5 cm);"), ("mass = 0.1 kg", "mass = 0 kg")
+    )
     sweep = "sweep many of fall { vary links.bar.mass = [2, 0] kg; }\n"
-    assert told(check(tmp_path, arm, FALL, sweep, select=["many"])) == """\
+    assert (
+        told(check(tmp_path, arm, FALL, sweep, select=["many"]))
+        == """\
 error[D217]: joint `roll` moves nothing that has mass; case #1 breaks it
  --> deck.ic:6:5
   |
@@ -91,3 +101,4 @@ error[D217]: joint `roll` moves nothing that has mass; case #1 breaks it
 
 1 error
 """
+    )

@@ -14,8 +14,6 @@ from met.plan.file import dumps, loads
 from met.plan.keys import structure_key
 from tests.ic.small_decks import changed, check, experiment, told
 
-# ruff: noqa: E501 - messages are as wide as they are
-
 ARM = """\
 arm pair {
     link one { mass = 2 kg; shape = rod(length = 1 m, along = x); }
@@ -57,11 +55,23 @@ def test_a_guide_is_what_the_servos_that_name_it_follow(tmp_path: Path) -> None:
 
 def test_its_parameters(tmp_path: Path) -> None:
     assert numbers(tmp_path) == {
-        "guides.tip.link": "two", "guides.tip.guides": "xy", "guides.tip.loop": "closed",
-        "guides.tip.jacobian": "arm", "guides.tip.point.x": 1.0, "guides.tip.point.y": 0.0, "guides.tip.point.z": 0.0,
-        "guides.tip.max_damping": 0.1, "guides.tip.threshold": 0.2, "guides.tip.gain": 1.0, "guides.tip.length": 1.0,
-        "guides.tip.low.max_rate": 1.0, "guides.tip.high.max_rate": 1.0,
-        "guides.tip.x.start": 0.0, "guides.tip.x.to": -0.2, "guides.tip.x.begin": 0.0, "guides.tip.x.over": 1.0,
+        "guides.tip.link": "two",
+        "guides.tip.guides": "xy",
+        "guides.tip.loop": "closed",
+        "guides.tip.jacobian": "arm",
+        "guides.tip.point.x": 1.0,
+        "guides.tip.point.y": 0.0,
+        "guides.tip.point.z": 0.0,
+        "guides.tip.max_damping": 0.1,
+        "guides.tip.threshold": 0.2,
+        "guides.tip.gain": 1.0,
+        "guides.tip.length": 1.0,
+        "guides.tip.low.max_rate": 1.0,
+        "guides.tip.high.max_rate": 1.0,
+        "guides.tip.x.start": 0.0,
+        "guides.tip.x.to": -0.2,
+        "guides.tip.x.begin": 0.0,
+        "guides.tip.x.over": 1.0,
     }
 
 
@@ -124,7 +134,10 @@ def test_every_guide_has_a_kind_and_a_name_of_its_own() -> None:
 
 
 MISTAKES = [
-    ("guide tip = resolved_rate {", "guide tip {", """\
+    (
+        "guide tip = resolved_rate {",
+        "guide tip {",
+        """\
 error[D270]: guide `tip` has no model
   --> deck.ic:11:5
    |
@@ -134,8 +147,12 @@ error[D270]: guide `tip` has no model
    = help: guide models: resolved_rate, together
 
 1 error
-"""),
-    ("guide tip = resolved_rate {", "guide tip = resolved_rat {", """\
+""",
+    ),
+    (
+        "guide tip = resolved_rate {",
+        "guide tip = resolved_rat {",
+        """\
 error[D140]: no guide model `resolved_rat`
   --> deck.ic:11:17
    |
@@ -145,8 +162,12 @@ error[D140]: no guide model `resolved_rat`
    = help: guide models: resolved_rate, together
 
 1 error
-"""),
-    ("guide tip = resolved_rate {", "guide tip one = resolved_rate {", """\
+""",
+    ),
+    (
+        "guide tip = resolved_rate {",
+        "guide tip one = resolved_rate {",
+        """\
 error[D270]: `one` after the name of a guide
   --> deck.ic:11:15
    |
@@ -156,8 +177,12 @@ error[D270]: `one` after the name of a guide
    = help: guide models: resolved_rate, together
 
 1 error
-"""),
-    ("guide tip = resolved_rate {", "guides tip = resolved_rate {", """\
+""",
+    ),
+    (
+        "guide tip = resolved_rate {",
+        "guides tip = resolved_rate {",
+        """\
 error[D065]: no value `tip`
  --> deck.ic:7:66
   |
@@ -174,8 +199,12 @@ error[D108]: no `guides` in a run
    = help: a run has: arm, base, servos, initial, environment, rates, integrator, duration, record, tolerances, seed, guide NAME, substitute JOINT, sensor NAME, payload NAME, metric NAME, require
 
 2 errors
-"""),
-    ("link = two;", "link = tow;", """\
+""",
+    ),
+    (
+        "link = two;",
+        "link = tow;",
+        """\
 error[D159]: no link `tow` in arm `pair`
   --> deck.ic:12:16
    |
@@ -185,8 +214,12 @@ error[D159]: no link `tow` in arm `pair`
    = help: links: one, two
 
 1 error
-"""),
-    ("link = two;", "link = one;", """\
+""",
+    ),
+    (
+        "link = two;",
+        "link = one;",
+        """\
 error[D276]: joint `high` follows guide `tip`, and does not carry link `one`
   --> deck.ic:11:5
    |
@@ -195,8 +228,12 @@ error[D276]: joint `high` follows guide `tip`, and does not carry link `one`
    = help: give it a command of its own, or guide a link that it carries
 
 1 error
-"""),
-    ("max_damping = 0.1 m;", "", """\
+""",
+    ),
+    (
+        "max_damping = 0.1 m;",
+        "",
+        """\
 error[D075]: guide `tip` has no `max_damping`
   --> deck.ic:11:5
    |
@@ -205,8 +242,12 @@ error[D075]: guide `tip` has no `max_damping`
    = help: write `max_damping = ... m;` (lambda at a singularity; 0: none)
 
 1 error
-"""),
-    ("max_rate = 1 rad/s;", "max_rate = 1 m/s;", """\
+""",
+    ),
+    (
+        "max_rate = 1 rad/s;",
+        "max_rate = 1 m/s;",
+        """\
 error[D061]: `max_rate` of joint `low` of guide `tip` is in rad/s, and this is in m/s
   --> deck.ic:13:55
    |
@@ -215,8 +256,12 @@ error[D061]: `max_rate` of joint `low` of guide `tip` is in rad/s, and this is i
    = help: write it in rad/s, deg/s or rpm
 
 1 error
-"""),
-    ("max_rate = 1 rad/s;", "low.max_rate = 0 rad/s;", """\
+""",
+    ),
+    (
+        "max_rate = 1 rad/s;",
+        "low.max_rate = 0 rad/s;",
+        """\
 error[D077]: `max_rate` of joint `low` of guide `tip` must be above 0 rad/s
   --> deck.ic:13:59
    |
@@ -225,8 +270,12 @@ error[D077]: `max_rate` of joint `low` of guide `tip` must be above 0 rad/s
    = help: write a number above 0 rad/s (rate that is not exceeded)
 
 1 error
-"""),
-    ("max_rate = 1 rad/s;", "lo.max_rate = 1 rad/s;", """\
+""",
+    ),
+    (
+        "max_rate = 1 rad/s;",
+        "lo.max_rate = 1 rad/s;",
+        """\
 error[D141]: guide `tip` has no `lo.max_rate`
   --> deck.ic:13:44
    |
@@ -236,8 +285,12 @@ error[D141]: guide `tip` has no `lo.max_rate`
    = help: it has: link, point, guides, max_damping, threshold, gain, length, loop, jacobian, rate, x, y, z, roll, pitch, yaw, max_rate, low.max_rate, high.max_rate
 
 1 error
-"""),
-    ("x = ramp(", "z = ramp(", """\
+""",
+    ),
+    (
+        "x = ramp(",
+        "z = ramp(",
+        """\
 error[D274]: `z` is not guided by guide `tip`
   --> deck.ic:13:9
    |
@@ -247,8 +300,12 @@ error[D274]: `z` is not guided by guide `tip`
    = help: leave it out, or guide more
 
 1 error
-"""),
-    ("x = ramp(to = -20 cm, over = 1 s);", "x { to = 1 m; }", """\
+""",
+    ),
+    (
+        "x = ramp(to = -20 cm, over = 1 s);",
+        "x { to = 1 m; }",
+        """\
 error[D274]: `x` of guide `tip` is a value or a course in time
   --> deck.ic:13:9
    |
@@ -257,8 +314,12 @@ error[D274]: `x` of guide `tip` is a value or a course in time
    = help: write `x = ramp(to = 1 m, over = 10 s);`
 
 1 error
-"""),
-    ("guides = xy;", "guides = pose;", """\
+""",
+    ),
+    (
+        "guides = xy;",
+        "guides = pose;",
+        """\
 error[D275]: guide `tip` moves 2 joints and guides 6 components: x, y, z, roll, pitch, yaw
   --> deck.ic:11:5
    |
@@ -268,8 +329,12 @@ error[D275]: guide `tip` moves 2 joints and guides 6 components: x, y, z, roll, 
    = help: `guides` may be: pose, position, xy, xz, yz
 
 1 error
-"""),
-    ("guides = xy;", "guides = xy; rate = 2 kHz;", """\
+""",
+    ),
+    (
+        "guides = xy;",
+        "guides = xy; rate = 2 kHz;",
+        """\
 error[D277]: guide `tip` ticks at 2000 Hz, between the steps of the dynamics
   --> deck.ic:12:62
    |
@@ -279,8 +344,12 @@ error[D277]: guide `tip` ticks at 2000 Hz, between the steps of the dynamics
    = help: give the guide a `rate` that divides 1000 Hz, or quicken the dynamics
 
 1 error
-"""),
-    ("servos = 500 Hz;", "servos = continuous;", """\
+""",
+    ),
+    (
+        "servos = 500 Hz;",
+        "servos = continuous;",
+        """\
 error[D277]: guide `tip` has no rate, and the servos are continuous
   --> deck.ic:11:5
    |
@@ -289,8 +358,12 @@ error[D277]: guide `tip` has no rate, and the servos are continuous
    = help: write `rate = 100 Hz;` in the guide
 
 1 error
-"""),
-    ("low = follow; high = follow;", "low = follow { command = rate(0 rad/s); }; high = follow { command = rate(0 rad/s); };", """\
+""",
+    ),
+    (
+        "low = follow; high = follow;",
+        "low = follow { command = rate(0 rad/s); }; high = follow { command = rate(0 rad/s); };",
+        """\
 error[D272]: no joint follows guide `tip`
   --> deck.ic:11:5
    |
@@ -299,8 +372,12 @@ error[D272]: no joint follows guide `tip`
    = help: write `command = rate(tip);` in the servo of each joint that it moves, or leave the guide out
 
 1 error
-"""),
-    ("low = follow; high = follow;", "low = follow { command = acceleration(tip); }; high = follow;", """\
+""",
+    ),
+    (
+        "low = follow; high = follow;",
+        "low = follow { command = acceleration(tip); }; high = follow;",
+        """\
 error[D273]: guide `tip` (resolved_rate) commands no acceleration
   --> deck.ic:10:14
    |
@@ -310,8 +387,12 @@ error[D273]: guide `tip` (resolved_rate) commands no acceleration
    = help: write `command = rate(tip);` for joint `low`
 
 1 error
-"""),
-    ("low = follow; high = follow;", "low = follow { command = rate(tp); }; high = follow;", """\
+""",
+    ),
+    (
+        "low = follow; high = follow;",
+        "low = follow { command = rate(tp); }; high = follow;",
+        """\
 error[D278]: no guide, value or course in time `tp`
   --> deck.ic:10:44
    |
@@ -321,8 +402,12 @@ error[D278]: no guide, value or course in time `tp`
    = help: guides of this run: tip
 
 1 error
-"""),
-    ("guides.tip.error", "guides.tip.eror", """\
+""",
+    ),
+    (
+        "guides.tip.error",
+        "guides.tip.eror",
+        """\
 error[D125]: no channel `guides.tip.eror`
   --> deck.ic:19:18
    |
@@ -332,8 +417,12 @@ error[D125]: no channel `guides.tip.eror`
    = help: channels of `guides`: guides.tip.error, guides.tip.turn_error, guides.tip.manipulability, guides.tip.damping, guides.tip.share
 
 1 error
-"""),
-    ("guides = xy;", "guides = xy; gain = 1000 1/s;", """\
+""",
+    ),
+    (
+        "guides = xy;",
+        "guides = xy; gain = 1000 1/s;",
+        """\
 error[D279]: guide `tip` is unstable at 500 Hz
   --> deck.ic:11:5
    |
@@ -342,8 +431,12 @@ error[D279]: guide `tip` is unstable at 500 Hz
    = help: what it takes off in a second, its gain, must stay below twice its rate, 1000/s, and well below what its servos can follow
 
 1 error
-"""),
-    ("run it {", "let tip = 3;\nrun it {", """\
+""",
+    ),
+    (
+        "run it {",
+        "let tip = 3;\nrun it {",
+        """\
 error[D271]: `tip` is a value, so no guide can be called so
   --> deck.ic:12:5
    |
@@ -353,7 +446,8 @@ error[D271]: `tip` is a value, so no guide can be called so
    = help: give the guide another name: `rate(NAME)` is to mean one thing
 
 1 error
-"""),
+""",
+    ),
 ]
 
 
@@ -365,7 +459,9 @@ def test_a_mistake_is_told_with_its_place_and_a_remedy(tmp_path: Path, text: str
 def test_a_run_that_guides_less_is_told_what_to_remove(tmp_path: Path) -> None:
     run = "run other like it { tip { guides = xz; } }\n"
     y = changed(RUN, ("x = ramp", "y = ramp"))
-    assert told(check(tmp_path, ARM, y, run, select=["other"])) == """\
+    assert (
+        told(check(tmp_path, ARM, y, run, select=["other"]))
+        == """\
 error[D274]: `y` is not guided by guide `tip`
   --> deck.ic:21:36
    |
@@ -377,15 +473,19 @@ error[D274]: `y` is not guided by guide `tip`
 
 1 error
 """
+    )
 
 
 def test_a_unit_and_a_course_are_no_names_of_guides(tmp_path: Path) -> None:
     for name, what in (("m", "a unit"), ("step", "a course in time")):
         text = told(check(tmp_path, ARM, changed(RUN, ("guide tip", f"guide {name}"))))
-        assert f"""\
+        assert (
+            f"""\
 error[D271]: `{name}` is {what}, so no guide can be called so
   --> deck.ic:11:5
-""" in text
+"""
+            in text
+        )
 
 
 def test_at_a_singularity_a_damped_guide_stays_and_another_fails(tmp_path: Path) -> None:
@@ -404,7 +504,9 @@ def test_at_a_singularity_a_damped_guide_stays_and_another_fails(tmp_path: Path)
 
 
 def test_a_joint_is_not_called_as_a_component_of_the_path(tmp_path: Path) -> None:
-    assert told(check(tmp_path, ARM.replace("high", "x"), RUN.replace("high", "x"))) == """\
+    assert (
+        told(check(tmp_path, ARM.replace("high", "x"), RUN.replace("high", "x")))
+        == """\
 error[D274]: `x` of guide `tip` is a component of its path, and a joint that follows it
   --> deck.ic:13:9
    |
@@ -414,13 +516,19 @@ error[D274]: `x` of guide `tip` is a component of its path, and a joint that fol
 
 1 error
 """
+    )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("vary", [
-    "high.at.x = [1, 1.2] m", "initial.low.q = [10, 30] deg", "guides.tip.point.x = [0.5, 1] m",
-    "guides.tip.gain = [1, 100] 1/s",
-])
+@pytest.mark.parametrize(
+    "vary",
+    [
+        "high.at.x = [1, 1.2] m",
+        "initial.low.q = [10, 30] deg",
+        "guides.tip.point.x = [0.5, 1] m",
+        "guides.tip.gain = [1, 100] 1/s",
+    ],
+)
 def test_what_a_sweep_varies_reaches_the_law(vary: str, tmp_path: Path) -> None:
     run = engine.run(experiment(tmp_path, ARM, RUN, f"sweep s of it {{ vary {vary}; }}", select=["s"]))
     assert run.cause == ["", ""]
@@ -429,10 +537,16 @@ def test_what_a_sweep_varies_reaches_the_law(vary: str, tmp_path: Path) -> None:
 
 VARY = [
     ("guides.tip = [1, 2]", "cannot vary", "it is a guide: vary a parameter of it, `guides.tip.PARAMETER`"),
-    ("guides.tip.x = [1, 2] m", "cannot vary",
-     "it is a course in time: vary a parameter of it, `guides.tip.x.PARAMETER`"),
-    ("guides.tip.rate = [100, 200] Hz", "cannot vary",
-     "it decides the program: write a run for each, and `sweep NAME = ONE + OTHER;`"),
+    (
+        "guides.tip.x = [1, 2] m",
+        "cannot vary",
+        "it is a course in time: vary a parameter of it, `guides.tip.x.PARAMETER`",
+    ),
+    (
+        "guides.tip.rate = [100, 200] Hz",
+        "cannot vary",
+        "it decides the program: write a run for each, and `sweep NAME = ONE + OTHER;`",
+    ),
 ]
 
 
@@ -445,7 +559,9 @@ def test_what_of_a_guide_does_not_vary(vary: str, message: str, remedy: str, tmp
 
 
 def test_a_guide_that_does_nothing_or_in_part_is_told(tmp_path: Path) -> None:
-    assert told(check(tmp_path, ARM, changed(RUN, ("threshold = 0.2 m", "threshold = 0 m")))) == """\
+    assert (
+        told(check(tmp_path, ARM, changed(RUN, ("threshold = 0.2 m", "threshold = 0 m"))))
+        == """\
 warning[D301]: guide `tip` is never damped: no singular value is below a `threshold` of 0 m
   --> deck.ic:12:69
    |
@@ -455,16 +571,26 @@ warning[D301]: guide `tip` is never damped: no singular value is below a `thresh
 
 1 warning
 """
+    )
     bare = changed(RUN, ("threshold = 0.2 m", "threshold = 0 m"), ("max_damping = 0.1 m", "max_damping = 0 m"))
     assert told(check(tmp_path, ARM, bare)) == ""
-    together = changed(RUN, ("""\
+    together = changed(
+        RUN,
+        (
+            """\
         link = two; point = [1, 0, 0] m; guides = xy; max_damping = 0.1 m; threshold = 0.2 m;
         x = ramp(to = -20 cm, over = 1 s); max_rate = 1 rad/s;
-""", "        to = 1 rad; max_rate = 1 rad/s; max_acceleration = 1 rad/s^2; begin = 1 s;\n"),
-                       ("resolved_rate", "together"), (", guides.tip.error", ""))
+""",
+            "        to = 1 rad; max_rate = 1 rad/s; max_acceleration = 1 rad/s^2; begin = 1 s;\n",
+        ),
+        ("resolved_rate", "together"),
+        (", guides.tip.error", ""),
+    )
     (found,) = check(tmp_path, changed(ARM, ("rate(tip)", "position(tip)")), together).diagnostics
     assert (found.code, found.message) == (
-        "D301", "guide `tip` moves nothing: it would begin at 1 s, and the run ends at 1 s")
+        "D301",
+        "guide `tip` moves nothing: it would begin at 1 s, and the run ends at 1 s",
+    )
 
 
 def test_words_of_a_guide_vary(tmp_path: Path) -> None:

@@ -34,8 +34,17 @@ def test_the_paper_deck_means_what_the_paper_says() -> None:
     assert [use.divisor for use in run.structure.servos] == [1, 1]
     assert not run.structure.velocity_products
     expected = {  # Hill, Hopping and Price 1989, table 1, in SI
-        "ratio": 1570.0, "kp": 0.020, "ki": 0.125, "v_max": 20.0, "resistance": 2.05, "kt": 0.061, "tau_max": 0.144,
-        "j_m": 6.38e-5, "f_c": 0.0205, "f_v": 2.58e-5, "command.value": 0.03,
+        "ratio": 1570.0,
+        "kp": 0.020,
+        "ki": 0.125,
+        "v_max": 20.0,
+        "resistance": 2.05,
+        "kt": 0.061,
+        "tau_max": 0.144,
+        "j_m": 6.38e-5,
+        "f_c": 0.0205,
+        "f_v": 2.58e-5,
+        "command.value": 0.03,
     }
     for joint in ("shoulder", "elbow"):
         assert {name: run.parameters[f"{joint}.servo.{name}"].value for name in expected} == expected
@@ -95,15 +104,23 @@ def test_gravity_is_a_vector_in_the_environment(tmp_path: Path) -> None:
         ),
     )
     assert [(use.name, use.model) for use in run.structure.environment] == [
-        ("gravity", "gravity"), ("grease", "joint_damping")]
+        ("gravity", "gravity"),
+        ("grease", "joint_damping"),
+    ]
     assert run.parameters["environment.gravity.g.z"].value == -9.81
     assert run.parameters["environment.gravity.g.z"].unit == "m/s^2"
     assert run.parameters["environment.grease.damping"].value == 2.0
 
 
 def test_an_initial_state_is_for_all_joints_or_one(tmp_path: Path) -> None:
-    arm = changed(ARM, ("axis = z; }", "axis = z; }\nlink tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n"
-                        "joint wrist revolute { parent = bar; child = tip; axis = z; }"))
+    arm = changed(
+        ARM,
+        (
+            "axis = z; }",
+            "axis = z; }\nlink tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n"
+            "joint wrist revolute { parent = bar; child = tip; axis = z; }",
+        ),
+    )
     run = changed(RUN, ("duration", "initial { q = 90 deg; wrist.q = 1 rad; qd = [1, 2] rad/s; }\nduration"))
     parameters = experiment(tmp_path, arm, SERVO, run).parameters
     assert parameters["initial.hinge.q"].value == pytest.approx(math.pi / 2, rel=1e-15)
@@ -138,8 +155,10 @@ def test_a_table_is_two_lists(tmp_path: Path) -> None:
 def test_a_record_is_of_all_joints_or_of_one(tmp_path: Path) -> None:
     run = experiment(tmp_path, ARM, SERVO, changed(RUN, ("[q]", "[q, hinge.qd, servo.voltage]")))
     assert [(each.name, each.channels, each.joints) for each in run.structure.record] == [
-        ("q", ("hinge.q",), ("hinge",)), ("hinge.qd", ("hinge.qd",), ()),
-        ("servo.voltage", ("hinge.servo.voltage",), ("hinge",))]
+        ("q", ("hinge.q",), ("hinge",)),
+        ("hinge.qd", ("hinge.qd",), ()),
+        ("servo.voltage", ("hinge.servo.voltage",), ("hinge",)),
+    ]
     assert isinstance(run.structure.record[0], Recorded)
 
 
@@ -153,8 +172,10 @@ def test_a_requirement_is_in_si_and_may_be_written_either_way_round(tmp_path: Pa
         RUN, ("duration", "metric top = max { of = hinge.qd; } require top < 60 rpm; require 1 deg/s <= top;\nduration")
     )
     found = [(each.text, each.comparison, each.limit) for each in experiment(tmp_path, ARM, SERVO, run).requirements]
-    assert found == [("top < 60 rpm", "<", pytest.approx(2 * math.pi, rel=1e-15)),
-                     ("1 deg/s <= top", ">=", pytest.approx(math.pi / 180, rel=1e-15))]
+    assert found == [
+        ("top < 60 rpm", "<", pytest.approx(2 * math.pi, rel=1e-15)),
+        ("1 deg/s <= top", ">=", pytest.approx(math.pi / 180, rel=1e-15)),
+    ]
 
 
 def test_a_joint_without_a_servo_is_passive(tmp_path: Path) -> None:
@@ -231,7 +252,9 @@ def test_explain_says_value_place_overridden_places_and_names(tmp_path: Path) ->
     assert found.place is not None and found.place.line == 13
     assert [place.line for place in found.overrode] == [9]
     assert [(label.text, label.place.line) for label in found.names] == [
-        ("gain = 2 * base_gain", 2), ("base_gain = 2 V*s/rad", 1)]
+        ("gain = 2 * base_gain", 2),
+        ("base_gain = 2 V*s/rad", 1),
+    ]
     assert found.doc == "gain on the motor's rate error"
 
 
@@ -254,7 +277,9 @@ def test_explain_of_nothing_offers_the_nearest() -> None:
 @pytest.mark.slow
 def test_compiling_loads_nothing_heavy() -> None:
     """What would take longer to load than the whole of `met check` may take."""
-    program = (f"import sys, ic; ic.compile({str(TWO_LINK)!r}, select='all');"
-               "print(*(set(sys.modules) & {'llvmlite', 'h5py', 'scipy', 'xarray', 'matplotlib', 'dask'}))")
+    program = (
+        f"import sys, ic; ic.compile({str(TWO_LINK)!r}, select='all');"
+        "print(*(set(sys.modules) & {'llvmlite', 'h5py', 'scipy', 'xarray', 'matplotlib', 'dask'}))"
+    )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []

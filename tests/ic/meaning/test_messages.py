@@ -9,8 +9,6 @@ import pytest
 from ic.meaning import checks
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, told
 
-# ruff: noqa: E501 - messages are as wide as they are
-
 
 def shown(folder: Path, *parts: str) -> str:
     """What is said of a deck, without the counting line."""
@@ -18,7 +16,9 @@ def shown(folder: Path, *parts: str) -> str:
 
 
 def test_an_unknown_key(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, changed(SERVO, ("ratio = 100;", "ratio = 100; kpp = 3;")), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, changed(SERVO, ("ratio = 100;", "ratio = 100; kpp = 3;")), RUN)
+        == """\
 error[D141]: servo `drive` has no `kpp`
  --> deck.ic:7:18
   |
@@ -27,10 +27,13 @@ error[D141]: servo `drive` has no `kpp`
   = help: did you mean `kp`?
   = help: it has: ratio, kp, ki, v_max, k_position, resistance, kt, tau_max, j_m, f_c, f_v, friction, model, command, rate
 """
+    )
 
 
 def test_a_wrong_unit(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, changed(SERVO, ("ratio = 100", "ratio = 36 mm")), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, changed(SERVO, ("ratio = 100", "ratio = 36 mm")), RUN)
+        == """\
 error[D061]: `ratio` of servo `drive` is a pure number, and this is in m
  --> deck.ic:7:13
   |
@@ -38,10 +41,13 @@ error[D061]: `ratio` of servo `drive` is a pure number, and this is in m
   |             ^^^^^
   = help: leave the unit out; `%` is the only unit of a pure number
 """
+    )
 
 
 def test_hertz_where_an_angular_rate_belongs(tmp_path: Path) -> None:
-    assert shown(tmp_path, "let slow = 0.1 Hz;\n", ARM, changed(SERVO, ("0.1 rad/s", "slow")), RUN) == """\
+    assert (
+        shown(tmp_path, "let slow = 0.1 Hz;\n", ARM, changed(SERVO, ("0.1 rad/s", "slow")), RUN)
+        == """\
 error[D061]: the command of servo `drive` is in rad/s, and this is in 1/s
   --> deck.ic:10:20
    |
@@ -50,10 +56,13 @@ error[D061]: the command of servo `drive` is in rad/s, and this is in 1/s
   ::: deck.ic:1:5  `slow` is defined here
    = help: Hz counts cycles without an angle: write rad/s, deg/s, rpm or cycle/s
 """
+    )
 
 
 def test_a_bare_number(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, changed(SERVO, ("0.1 V*s/rad", "0.1")), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, changed(SERVO, ("0.1 V*s/rad", "0.1")), RUN)
+        == """\
 error[D060]: `kp` of servo `drive` is in V*s/rad, and this is a bare number
  --> deck.ic:7:23
   |
@@ -61,10 +70,13 @@ error[D060]: `kp` of servo `drive` is in V*s/rad, and this is a bare number
   |                       ^^^
   = help: write `0.1 V*s/rad`
 """
+    )
 
 
 def test_a_unit_inside_brackets_that_have_one(tmp_path: Path) -> None:
-    assert shown(tmp_path, changed(ARM, ("axis = z;", "axis = z; at = [0, 1 mm, 0] m;")), SERVO, RUN) == """\
+    assert (
+        shown(tmp_path, changed(ARM, ("axis = z;", "axis = z; at = [0, 1 mm, 0] m;")), SERVO, RUN)
+        == """\
 error[D062]: a unit inside brackets that have one after them, `m`
  --> deck.ic:3:77
   |
@@ -73,10 +85,13 @@ error[D062]: a unit inside brackets that have one after them, `m`
  ::: deck.ic:3:84  this one is for all the bare numbers inside
   = help: give each number its own unit, or none of them
 """
+    )
 
 
 def test_an_unknown_name(tmp_path: Path) -> None:
-    assert shown(tmp_path, changed(ARM, ("2 kg", "mas")), "let mass = 2 kg;\n", SERVO, RUN) == """\
+    assert (
+        shown(tmp_path, changed(ARM, ("2 kg", "mas")), "let mass = 2 kg;\n", SERVO, RUN)
+        == """\
 error[D065]: no value `mas`
  --> deck.ic:2:23
   |
@@ -84,11 +99,25 @@ error[D065]: no value `mas`
   |                       ^^^
   = help: did you mean `mass`?
 """
+    )
 
 
 def test_a_joint_loop(tmp_path: Path) -> None:
-    deck = (changed(ARM, ("parent = base", "parent = tip"), ("axis = z; }", "axis = z; }\n    link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n    joint wrist revolute { parent = bar; child = tip; axis = x; }")), SERVO, RUN)
-    assert shown(tmp_path, *deck) == """\
+    deck = (
+        changed(
+            ARM,
+            ("parent = base", "parent = tip"),
+            (
+                "axis = z; }",
+                "axis = z; }\n    link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n    joint wrist revolute { parent = bar; child = tip; axis = x; }",
+            ),
+        ),
+        SERVO,
+        RUN,
+    )
+    assert (
+        shown(tmp_path, *deck)
+        == """\
 error[D086]: these joints make a loop, which hangs on no base: bar -> tip -> bar
  --> deck.ic:3:5
   |
@@ -97,11 +126,19 @@ error[D086]: these joints make a loop, which hangs on no base: bar -> tip -> bar
  ::: deck.ic:5:5  joint `wrist`
   = help: one of them should have `parent = base;`
 """
+    )
 
 
 def test_a_negative_mass_that_came_through_a_macro(tmp_path: Path) -> None:
-    deck = ("#define BAR(MASS) link bar { mass = MASS; shape = sphere(radius = 1 cm); }\n", changed(ARM, ("link bar { mass = 2 kg; shape = rod(length = 1 m, along = x); }", "BAR(-2 kg)")), SERVO, RUN)
-    assert shown(tmp_path, *deck) == """\
+    deck = (
+        "#define BAR(MASS) link bar { mass = MASS; shape = sphere(radius = 1 cm); }\n",
+        changed(ARM, ("link bar { mass = 2 kg; shape = rod(length = 1 m, along = x); }", "BAR(-2 kg)")),
+        SERVO,
+        RUN,
+    )
+    assert (
+        shown(tmp_path, *deck)
+        == """\
 error[D077]: `mass` of link `bar` must be at least 0 kg
  --> deck.ic:3:9
   |
@@ -110,11 +147,14 @@ error[D077]: `mass` of link `bar` must be at least 0 kg
   = help: write a number of at least 0 kg (mass of the link)
   = note: in expansion of macro BAR, used at deck.ic:3:5
 """
+    )
 
 
 def test_an_inertia_that_no_body_has(tmp_path: Path) -> None:
     deck = (changed(ARM, ("shape = rod(length = 1 m, along = x)", "inertia = [1, 1, 3] kg*m^2")), SERVO, RUN)
-    assert shown(tmp_path, *deck) == """\
+    assert (
+        shown(tmp_path, *deck)
+        == """\
 error[D087]: the inertia of link `bar` is no body's
  --> deck.ic:2:39
   |
@@ -123,6 +163,7 @@ error[D087]: the inertia of link `bar` is no body's
   = help: inertia is about the centre of mass, in link axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2
   = help: products have the sign of -sum(m x y)
 """
+    )
 
 
 @pytest.mark.parametrize("at_once", [1, 3, 100])
@@ -138,8 +179,14 @@ def test_an_inertia_that_some_cases_have_is_told_by_the_first_of_them(
 
 
 def test_a_link_in_the_air(tmp_path: Path) -> None:
-    deck = (changed(ARM, ("joint hinge", "link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n    joint hinge")), SERVO, RUN)
-    assert shown(tmp_path, *deck) == """\
+    deck = (
+        changed(ARM, ("joint hinge", "link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n    joint hinge")),
+        SERVO,
+        RUN,
+    )
+    assert (
+        shown(tmp_path, *deck)
+        == """\
 error[D099]: link `tip` hangs in the air: no joint of arm `swing` has it for a child
  --> deck.ic:3:5
   |
@@ -147,10 +194,13 @@ error[D099]: link `tip` hangs in the air: no joint of arm `swing` has it for a c
   |     ^^^^^^^^
   = help: write `joint NAME revolute { parent = base; child = tip; axis = z; }`
 """
+    )
 
 
 def test_rates_that_do_not_divide(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("servos = 1 kHz", "servos = 300 Hz"))) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, changed(RUN, ("servos = 1 kHz", "servos = 300 Hz")))
+        == """\
 error[D100]: `servos` at 300 Hz does not divide the base rate, 1000 Hz
   --> deck.ic:14:40
    |
@@ -160,10 +210,13 @@ error[D100]: `servos` at 300 Hz does not divide the base rate, 1000 Hz
    = help: nearest that fit: 333.333 Hz, written (1000/3) Hz, 250 Hz (1000/4)
    = help: or a base rate that all divide: `base = 3000 Hz;` in `rates`
 """
+    )
 
 
 def test_a_duration_between_steps(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("1 s", "1.0005 s"))) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, changed(RUN, ("1 s", "1.0005 s")))
+        == """\
 error[D101]: a duration of 1.0005 s is 1000.5 steps of the dynamics
   --> deck.ic:15:16
    |
@@ -172,10 +225,13 @@ error[D101]: a duration of 1.0005 s is 1000.5 steps of the dynamics
   ::: deck.ic:14:24  a step is 0.001 s
    = help: nearest that fit: 1 s, 1.001 s
 """
+    )
 
 
 def test_an_unstable_step(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, changed(SERVO, ("1e-4", "1e-6")), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, changed(SERVO, ("1e-4", "1e-6")), RUN)
+        == """\
 error[D104]: servo `drive` is unstable with modified_euler at this rate of the dynamics
   --> deck.ic:14:24
    |
@@ -183,10 +239,13 @@ error[D104]: servo `drive` is unstable with modified_euler at this rate of the d
    |                        ^^^^^ h * lambda = 2.5; the slowest rate that fits is 2000 Hz
    = help: h * lambda must stay below 2; lambda is the servo's fastest rate constant, on any arm
 """
+    )
 
 
 def test_a_servo_on_no_joint(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("hinge = drive", "hing = drive"))) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, changed(RUN, ("hinge = drive", "hing = drive")))
+        == """\
 error[D144]: no joint `hing` in arm `swing`
   --> deck.ic:13:14
    |
@@ -195,10 +254,13 @@ error[D144]: no joint `hing` in arm `swing`
    = help: did you mean `hinge`?
    = help: joints: hinge
 """
+    )
 
 
 def test_a_model_where_a_definition_belongs(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("hinge = drive", "hinge = rigid_gearbox"))) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, changed(RUN, ("hinge = drive", "hinge = rigid_gearbox")))
+        == """\
 error[D147]: `rigid_gearbox` is a servo model; a servo definition is needed here
   --> deck.ic:13:22
    |
@@ -207,10 +269,13 @@ error[D147]: `rigid_gearbox` is a servo model; a servo definition is needed here
    = help: a standard deck defines a servo of this name: add `#include <servos/rigid_gearbox.ic>`
    = help: `servo NAME { model = rigid_gearbox; ... }`, and `hinge = NAME;`
 """
+    )
 
 
 def test_an_unknown_model(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, changed(SERVO, ("rigid_gearbox", "rigid_gearbx")), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, changed(SERVO, ("rigid_gearbox", "rigid_gearbx")), RUN)
+        == """\
 error[D140]: no servo model `rigid_gearbx`
  --> deck.ic:6:13
   |
@@ -219,10 +284,13 @@ error[D140]: no servo model `rigid_gearbx`
   = help: did you mean `rigid_gearbox`?
   = help: servo models: cascade, compliant_gearbox, ideal, locked, passive, rigid_gearbox
 """
+    )
 
 
 def test_a_model_with_its_parameters_behind_its_name(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, changed(SERVO, ("model = rigid_gearbox;", "model = rigid_gearbox(f_c = 1 N*m);")), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, changed(SERVO, ("model = rigid_gearbox;", "model = rigid_gearbox(f_c = 1 N*m);")), RUN)
+        == """\
 error[D143]: `model = rigid_gearbox` takes neither parentheses nor braces
  --> deck.ic:6:13
   |
@@ -230,10 +298,13 @@ error[D143]: `model = rigid_gearbox` takes neither parentheses nor braces
   |             ^^^^^^^^^^^^^^^^^^^^^^^^^^
   = help: write `model = rigid_gearbox;`, and its parameters beside it
 """
+    )
 
 
 def test_an_integrator_with_parameters(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("duration", "integrator = rk4 { step = 1 ms; }  duration"))) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, changed(RUN, ("duration", "integrator = rk4 { step = 1 ms; }  duration")))
+        == """\
 error[D143]: `integrator = rk4` takes neither parentheses nor braces
   --> deck.ic:15:18
    |
@@ -241,10 +312,13 @@ error[D143]: `integrator = rk4` takes neither parentheses nor braces
    |                  ^^^
    = help: write `integrator = rk4;`: an integrator has no parameters
 """
+    )
 
 
 def test_a_parent_with_arguments(tmp_path: Path) -> None:
-    assert shown(tmp_path, changed(ARM, ("parent = base;", "parent = base(2);")), SERVO, RUN) == """\
+    assert (
+        shown(tmp_path, changed(ARM, ("parent = base;", "parent = base(2);")), SERVO, RUN)
+        == """\
 error[D094]: a link's name is needed for parent
  --> deck.ic:3:37
   |
@@ -252,10 +326,13 @@ error[D094]: a link's name is needed for parent
   |                                     ^^^^^^^
   = help: links: base, bar
 """
+    )
 
 
 def test_a_shape_with_a_value_without_a_name(tmp_path: Path) -> None:
-    assert shown(tmp_path, changed(ARM, ("rod(length = 1 m,", "rod(2 m, length = 1 m,")), SERVO, RUN) == """\
+    assert (
+        shown(tmp_path, changed(ARM, ("rod(length = 1 m,", "rod(2 m, length = 1 m,")), SERVO, RUN)
+        == """\
 error[D153]: `rod` takes its values by name
  --> deck.ic:2:41
   |
@@ -263,11 +340,14 @@ error[D153]: `rod` takes its values by name
   |                                         ^^^
   = help: write `rod(length = ..., along = ...)`
 """
+    )
 
 
 def test_an_environment_with_a_value_without_a_name(tmp_path: Path) -> None:
     run = changed(RUN, ("duration", "environment { oil = joint_damping(2, damping = 1 N*m*s/rad); }\n    duration"))
-    assert shown(tmp_path, ARM, SERVO, run) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, run)
+        == """\
 error[D153]: `joint_damping` takes its values by name
   --> deck.ic:15:39
    |
@@ -275,10 +355,15 @@ error[D153]: `joint_damping` takes its values by name
    |                                       ^
    = help: write `joint_damping(damping = ..., sliding = ...)`
 """
+    )
 
 
 def test_a_metric_with_a_value_without_a_name(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("duration", "metric top = max(hinge.q, of = hinge.qd);\n    duration"))) == """\
+    assert (
+        shown(
+            tmp_path, ARM, SERVO, changed(RUN, ("duration", "metric top = max(hinge.q, of = hinge.qd);\n    duration"))
+        )
+        == """\
 error[D153]: `max` takes its values by name
   --> deck.ic:15:22
    |
@@ -286,10 +371,13 @@ error[D153]: `max` takes its values by name
    |                      ^^^^^^^
    = help: write `max(of = ...)`
 """
+    )
 
 
 def test_a_metric_of_what_is_no_channel(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("duration", "metric top = max { of = [hinge.q]; }\n    duration"))) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, changed(RUN, ("duration", "metric top = max { of = [hinge.q]; }\n    duration")))
+        == """\
 error[D125]: a channel is needed here
   --> deck.ic:15:29
    |
@@ -297,10 +385,13 @@ error[D125]: a channel is needed here
    |                             ^^^^^^^^^
    = help: write `of = CHANNEL;`, such as `of = shoulder.qd;`
 """
+    )
 
 
 def test_a_servo_without_a_command(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, changed(SERVO, ("    command = rate(0.1 rad/s);\n", "")), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, changed(SERVO, ("    command = rate(0.1 rad/s);\n", "")), RUN)
+        == """\
 error[D149]: servo `drive` has no command
   --> deck.ic:12:22
    |
@@ -309,11 +400,14 @@ error[D149]: servo `drive` has no command
    = help: write `command = rate(...);`, in the definition or for this joint
    = help: rigid_gearbox takes rate(...), position(...), torque(...)
 """
+    )
 
 
 def test_a_table_whose_times_do_not_rise(tmp_path: Path) -> None:
     deck = (ARM, changed(SERVO, ("0.1 rad/s", "table(times = [0, 2, 1] s, values = [0, 1, 2] rad/s)")), RUN)
-    assert shown(tmp_path, *deck) == """\
+    assert (
+        shown(tmp_path, *deck)
+        == """\
 error[D156]: `times` of `table` must rise, and number 3, 1 s, follows 2 s
  --> deck.ic:9:34
   |
@@ -321,11 +415,14 @@ error[D156]: `times` of `table` must rise, and number 3, 1 s, follows 2 s
   |                                  ^^^^^^^^^^^
   = help: sort the points; for a jump, two times close together
 """
+    )
 
 
 def test_a_table_with_a_value_too_many(tmp_path: Path) -> None:
     deck = (ARM, changed(SERVO, ("0.1 rad/s", "table(times = [0, 2] s, values = [0, 1, 2] rad/s)")), RUN)
-    assert shown(tmp_path, *deck) == """\
+    assert (
+        shown(tmp_path, *deck)
+        == """\
 error[D154]: `values` of `table` has 3 numbers, and `times` 2
  --> deck.ic:9:53
   |
@@ -334,10 +431,13 @@ error[D154]: `values` of `table` has 3 numbers, and `times` 2
  ::: deck.ic:9:34  `times`
   = help: they go together, one to one
 """
+    )
 
 
 def test_a_table_without_values(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, changed(SERVO, ("0.1 rad/s", "table(times = [0, 2] s)")), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, changed(SERVO, ("0.1 rad/s", "table(times = [0, 2] s)")), RUN)
+        == """\
 error[D075]: `table` has no `values`
  --> deck.ic:9:20
   |
@@ -345,10 +445,13 @@ error[D075]: `table` has no `values`
   |                    ^^^^^
   = help: write `values = [...] rad/s` (values at those times, as many)
 """
+    )
 
 
 def test_an_unknown_channel(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("[q]", "[q, hinge.servo.volts]"))) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, changed(RUN, ("[q]", "[q, hinge.servo.volts]")))
+        == """\
 error[D125]: no channel `hinge.servo.volts`
   --> deck.ic:16:18
    |
@@ -357,11 +460,18 @@ error[D125]: no channel `hinge.servo.volts`
    = help: did you mean `hinge.servo.voltage`?
    = help: channels of `hinge`: hinge.q, hinge.qd, hinge.qdd, hinge.tau, hinge.tau_load, hinge.J_eff, hinge.b, hinge.mode, hinge.reaction, hinge.servo.command, hinge.servo.voltage, hinge.servo.integral, hinge.servo.motor_rate, hinge.servo.motor_torque
 """
+    )
 
 
 def test_an_unknown_metric(tmp_path: Path) -> None:
-    deck = (ARM, SERVO, changed(RUN, ("duration", "metric top = max { of = hinge.qd; }\n    require tip < 1 rad/s;\n    duration")))
-    assert shown(tmp_path, *deck) == """\
+    deck = (
+        ARM,
+        SERVO,
+        changed(RUN, ("duration", "metric top = max { of = hinge.qd; }\n    require tip < 1 rad/s;\n    duration")),
+    )
+    assert (
+        shown(tmp_path, *deck)
+        == """\
 error[D132]: no metric `tip`
   --> deck.ic:16:13
    |
@@ -370,11 +480,14 @@ error[D132]: no metric `tip`
    = help: did you mean `top`?
    = help: metrics of this run: top
 """
+    )
 
 
 def test_an_unknown_sweep_path(tmp_path: Path) -> None:
     deck = (ARM, SERVO, RUN, "default sweep it of hold { vary links.bra.mass = [1, 2] kg; }\n")
-    assert shown(tmp_path, *deck) == """\
+    assert (
+        shown(tmp_path, *deck)
+        == """\
 error[D128]: no parameter `links.bra.mass` in this run
   --> deck.ic:18:33
    |
@@ -382,11 +495,19 @@ error[D128]: no parameter `links.bra.mass` in this run
    |                                 ^^^^^^^^^^^^^^
    = help: did you mean `links.bar.mass`?
 """
+    )
 
 
 def test_a_parameter_set_twice_in_a_sweep(tmp_path: Path) -> None:
-    deck = (ARM, SERVO, RUN, "default sweep it of hold {\n    vary drive.kp = [1, 2] V*s/rad;\n    vary hinge.servo.kp = [1, 2] V*s/rad;\n}\n")
-    assert shown(tmp_path, *deck) == """\
+    deck = (
+        ARM,
+        SERVO,
+        RUN,
+        "default sweep it of hold {\n    vary drive.kp = [1, 2] V*s/rad;\n    vary hinge.servo.kp = [1, 2] V*s/rad;\n}\n",
+    )
+    assert (
+        shown(tmp_path, *deck)
+        == """\
 error[D123]: `drive.kp` and `hinge.servo.kp` both set `hinge.servo.kp`
   --> deck.ic:20:10
    |
@@ -395,10 +516,13 @@ error[D123]: `drive.kp` and `hinge.servo.kp` both set `hinge.servo.kp`
   ::: deck.ic:19:10  the first
    = help: vary one of them, or different joints
 """
+    )
 
 
 def test_a_sweep_over_words(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, RUN, "default sweep it of hold { vary links.bar.mass = [light]; }\n") == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, RUN, "default sweep it of hold { vary links.bar.mass = [light]; }\n")
+        == """\
 error[D122]: `links.bar.mass` cannot vary over words
   --> deck.ic:18:51
    |
@@ -407,10 +531,19 @@ error[D122]: `links.bar.mass` cannot vary over words
    = help: write a run for each, `like` the first, and `sweep NAME = ONE + OTHER;`
    = help: where a number is meant, define it: `let light = ...;`
 """
+    )
 
 
 def test_a_misspelt_value_of_a_sweep_is_no_word(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, RUN, "let heavy = 2 kg;\ndefault sweep it of hold { vary links.bar.mass = [heavi]; }\n") == """\
+    assert (
+        shown(
+            tmp_path,
+            ARM,
+            SERVO,
+            RUN,
+            "let heavy = 2 kg;\ndefault sweep it of hold { vary links.bar.mass = [heavi]; }\n",
+        )
+        == """\
 error[D065]: no value `heavi`
   --> deck.ic:19:51
    |
@@ -418,11 +551,14 @@ error[D065]: no value `heavi`
    |                                                   ^^^^^
    = help: did you mean `heavy`?
 """
+    )
 
 
 def test_a_bad_case(tmp_path: Path) -> None:
     deck = (ARM, SERVO, RUN, "default sweep it of hold { vary links.bar.mass = [1000, -2, -1] g; }\n")
-    assert shown(tmp_path, *deck) == """\
+    assert (
+        shown(tmp_path, *deck)
+        == """\
 error[D077]: `mass` of link `bar` must be at least 0 kg; case #1 breaks it, and 1 more
   --> deck.ic:18:33
    |
@@ -431,20 +567,26 @@ error[D077]: `mass` of link `bar` must be at least 0 kg; case #1 breaks it, and 
    = help: case #1: links.bar.mass = -2 g
    = help: write a number of at least 0 kg (mass of the link)
 """
+    )
 
 
 def test_several_runs(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, RUN, "run other like hold { duration = 2 s; }\n") == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, RUN, "run other like hold { duration = 2 s; }\n")
+        == """\
 error[D162]: this deck has 2 runs and sweeps, and none is marked `default`
 ::: deck.ic:11:1  hold
 ::: deck.ic:18:1  other
  = help: name one: hold, other
  = help: or write `default run ...` for one of them
 """
+    )
 
 
 def test_a_fast_servo(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, changed(SERVO, ("1e-4", "2.5e-6")), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, changed(SERVO, ("1e-4", "2.5e-6")), RUN)
+        == """\
 warning[D105]: servo `drive` is fast for the dynamics' step: h * lambda = 1
   --> deck.ic:14:24
    |
@@ -452,10 +594,13 @@ warning[D105]: servo `drive` is fast for the dynamics' step: h * lambda = 1
    |                        ^^^^^ h = 0.001 s
    = help: stable below 2 with modified_euler, true to the motion below 0.5: the slowest rate that fits is 2000 Hz
 """
+    )
 
 
 def test_a_run_whose_block_is_missing(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, RUN, "run longer like hold\nrun other like hold { duration = 3 s; }\n") == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, RUN, "run longer like hold\nrun other like hold { duration = 3 s; }\n")
+        == """\
 error[D047]: the block of run `longer` is missing
   --> deck.ic:18:12
    |
@@ -463,10 +608,13 @@ error[D047]: the block of run `longer` is missing
    |            ^^^^
    = help: write `{ ... }` behind its base, or `;` where nothing differs
 """
+    )
 
 
 def test_an_entry_of_a_block_written_as_a_path(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("duration", "rates.base = 2 kHz;\n    duration"))) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, changed(RUN, ("duration", "rates.base = 2 kHz;\n    duration")))
+        == """\
 error[D109]: a run has no `rates.base`
   --> deck.ic:15:5
    |
@@ -474,11 +622,14 @@ error[D109]: a run has no `rates.base`
    |     ^^^^^^^^^^
    = help: write `rates { base = 2 kHz; }`
 """
+    )
 
 
 def test_a_block_of_a_run_with_a_name_of_its_own(tmp_path: Path) -> None:
     named = "run other like hold { rates fast { record = 50 Hz; } }\n"
-    assert told(check(tmp_path, ARM, SERVO, RUN, named, select="all")) == """\
+    assert (
+        told(check(tmp_path, ARM, SERVO, RUN, named, select="all"))
+        == """\
 error[D108]: `fast` after `rates`, which takes no name
   --> deck.ic:18:23
    |
@@ -488,10 +639,13 @@ error[D108]: `fast` after `rates`, which takes no name
 
 1 error
 """
+    )
 
 
 def test_something_appended_to_a_list_of_a_name_that_is_not_there(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, SERVO, changed(RUN, ("record = [q];", "record = [q]; recrod += [qd];"))) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, changed(RUN, ("record = [q];", "record = [q]; recrod += [qd];")))
+        == """\
 error[D056]: nothing is in `recrod` yet to append to
   --> deck.ic:16:19
    |
@@ -499,11 +653,14 @@ error[D056]: nothing is in `recrod` yet to append to
    |                   ^^^^^^
    = help: did you mean `record`?
 """
+    )
 
 
 def test_a_metric_with_two_names(tmp_path: Path) -> None:
     run = changed(RUN, ("record = [q];", "record = [q];\n    metric top fast = max { of = hinge.qd; }"))
-    assert shown(tmp_path, ARM, SERVO, run) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, run)
+        == """\
 error[D129]: `fast` after the name of a metric
   --> deck.ic:17:16
    |
@@ -511,6 +668,7 @@ error[D129]: `fast` after the name of a metric
    |                ^^^^
    = help: write `metric top = MODEL { of = CHANNEL; }`
 """
+    )
 
 
 def test_a_joint_that_is_set_to_something(tmp_path: Path) -> None:
@@ -533,7 +691,9 @@ error[D085]: link `bar` needs a block
 
 def test_remove_with_a_kind(tmp_path: Path) -> None:
     run = "default run other like hold { metric top = max { of = hinge.qd; }\n    remove metric top; }\n"
-    assert shown(tmp_path, ARM, SERVO, RUN, run) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, RUN, run)
+        == """\
 error[D057]: `remove` takes a name, and nothing else
   --> deck.ic:19:5
    |
@@ -541,3 +701,4 @@ error[D057]: `remove` takes a name, and nothing else
    |     ^^^^^^^^^^^^^
    = help: write `remove top;`
 """
+    )

@@ -14,8 +14,9 @@ from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, told
 OF_RUN = "a run has: arm, base, servos, initial, environment, rates, integrator, duration, record, tolerances, seed"
 OF_JOINT = "it has: parent, child, at, rpy, axis, dh"
 OF_LINK = "it has: mass, com, inertia, shape"
-OF_SERVO = ("it has: ratio, kp, ki, v_max, k_position, resistance, kt, tau_max, j_m, f_c, f_v, friction, model, "
-            "command, rate")
+OF_SERVO = (
+    "it has: ratio, kp, ki, v_max, k_position, resistance, kt, tau_max, j_m, f_c, f_v, friction, model, command, rate"
+)
 MODELS = "servo models: cascade, compliant_gearbox, ideal, locked, passive, rigid_gearbox"
 OF_PAYLOAD = "it has: mass, com, inertia, shape, on, at, rpy, grapple, release, position, attitude, velocity, rate"
 RATES = "rates: dynamics, servos, record, base"
@@ -23,17 +24,20 @@ RATES = "rates: dynamics, servos, record, base"
 POSITION = changed(SERVO, ("command = rate(0.1 rad/s)", "k_position = 5 1/s; command = position(0.1 rad)"))
 FOLLOWED = changed(SERVO, ("0.1 rad/s)", 'trajectory(file = "moves.csv"))'))
 METRIC = changed(RUN, ("duration", "metric m = max { of = hinge.qd; }\n    duration"))
-PAYLOAD = changed(
-    RUN, ("duration", "payload box { on = bar; mass = 1 kg; inertia = [1, 1, 1] kg*m^2; }\n    duration")
-)
+PAYLOAD = changed(RUN, ("duration", "payload box { on = bar; mass = 1 kg; inertia = [1, 1, 1] kg*m^2; }\n    duration"))
 TABLE = changed(
     RUN, ("duration", 'environment { push = wrench_table { link = bar; file = "loads.csv"; } }\n    duration')
 )
 BED = changed(RUN, ("[q]", "[hinge.servo.voltage]"),
               ("duration", "substitute hinge { law = torque_balance; }\n    duration"))  # fmt: skip
 GUIDED = changed(SERVO, ("command = rate(0.1 rad/s)", "k_position = 5 1/s; command = position(home)"))
-GUIDE = changed(RUN, ("duration", "guide home = together { hinge.to = 1 rad; max_rate = 1 rad/s; "
-                                  "max_acceleration = 1 rad/s^2; }\n    duration"))
+GUIDE = changed(
+    RUN,
+    (
+        "duration",
+        "guide home = together { hinge.to = 1 rad; max_rate = 1 rad/s; max_acceleration = 1 rad/s^2; }\n    duration",
+    ),
+)
 
 
 @pytest.mark.slow
@@ -71,7 +75,12 @@ GUIDE = changed(RUN, ("duration", "guide home = together { hinge.to = 1 rad; max
      ("it has: begin, to, max_rate, max_acceleration, hinge.to, hinge.max_rate, hinge.max_acceleration",)),
 ])  # fmt: skip
 def test_a_misspelt_key_is_told_once(
-    deck: tuple[str, ...], written: str, misspelt: str, code: str, message: str, remedies: tuple[str, ...],
+    deck: tuple[str, ...],
+    written: str,
+    misspelt: str,
+    code: str,
+    message: str,
+    remedies: tuple[str, ...],
     tmp_path: Path,
 ) -> None:
     (tmp_path / "moves.csv").write_text("time [s], hinge [rad/s]\n0, 0\n1, 1\n", encoding="utf-8")
@@ -83,7 +92,9 @@ def test_a_misspelt_key_is_told_once(
     word, meant = misspelt.split(" ")[0], written.split(" ")[0]
     margin = " " * len(str(number))
     helps = "".join(f"{margin} = help: {each}\n" for each in (f"did you mean `{meant}`?", *remedies))
-    assert told(check(tmp_path, text)) == f"""\
+    assert (
+        told(check(tmp_path, text))
+        == f"""\
 error[{code}]: {message}
 {margin}--> deck.ic:{number}:{line.index(word) + 1}
 {margin} |
@@ -92,11 +103,14 @@ error[{code}]: {message}
 {helps}
 1 error
 """
+    )
 
 
 def test_what_is_missing_besides_is_told(tmp_path: Path) -> None:
     joint = changed(ARM, ("parent = base; child = bar", "parnt = base"))
-    assert told(check(tmp_path, joint, SERVO, RUN)) == """\
+    assert (
+        told(check(tmp_path, joint, SERVO, RUN))
+        == """\
 error[D092]: joint `hinge` has no child
  --> deck.ic:3:5
   |
@@ -114,12 +128,15 @@ error[D141]: joint `hinge` has no `parnt`
 
 2 errors
 """
+    )
 
 
 def test_it_is_told_beside_a_joint_that_is_not_there(tmp_path: Path) -> None:
     stop = "environment { wall = joint_stop { joint = hing; upper = 1 rad; stifness = 10 N*m/rad; } }"
     run = changed(RUN, ("duration", f"{stop}\n    duration"))
-    assert told(check(tmp_path, ARM, SERVO, run)) == """\
+    assert (
+        told(check(tmp_path, ARM, SERVO, run))
+        == """\
 error[D159]: no joint `hing` in arm `swing`
   --> deck.ic:15:47
    |
@@ -138,11 +155,14 @@ error[D141]: environment `wall` has no `stifness`
 
 2 errors
 """
+    )
 
 
 def test_a_word_like_nothing_is_taken_for_nothing(tmp_path: Path) -> None:
     servo = changed(SERVO, ("tau_max =", "strength ="))
-    assert told(check(tmp_path, ARM, servo, RUN)) == f"""\
+    assert (
+        told(check(tmp_path, ARM, servo, RUN))
+        == f"""\
 error[D075]: servo `drive` has no `tau_max`
  --> deck.ic:5:1
   |
@@ -159,3 +179,4 @@ error[D141]: servo `drive` has no `strength`
 
 2 errors
 """
+    )

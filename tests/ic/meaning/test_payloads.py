@@ -98,8 +98,10 @@ error[D262]: `world` is the ground, so no payload may be called so
 """,
     ),
     "the ground's name, beside who means the ground": (
-        (("payload box {", "payload world {"),
-         ("environment {}", "environment { line = spring { link = bar; to = world; stiffness = 1 N/m; } }")),
+        (
+            ("payload box {", "payload world {"),
+            ("environment {}", "environment { line = spring { link = bar; to = world; stiffness = 1 N/m; } }"),
+        ),
         """\
 error[D262]: `world` is the ground, so no payload may be called so
  --> deck.ic:9:5
@@ -340,7 +342,7 @@ error[D125]: no channel `payloads.box.positon`
    = help: channels of `payloads.box`: payloads.box.position, payloads.box.orientation, payloads.box.velocity, payloads.box.rate, payloads.box.distance, payloads.box.carried
 
 1 error
-""",  # noqa: E501 - a message is as wide as it is
+""",
     ),
     "a wrench on what is not there": (
         (("environment {}", "environment { w = wrench { link = bix; force = [1, 0, 0] N; } }"),),
@@ -391,8 +393,18 @@ def test_a_payload_is_held_from_the_start_unless_it_is_grappled(tmp_path: Path) 
 def test_one_that_is_grappled_says_how_it_flies(tmp_path: Path) -> None:
     values = found(tmp_path, FLIES)
     names = dict.fromkeys(path.split(".")[2] for path in values)
-    assert list(names) == ["mass", "com", "inertia", "at", "position", "attitude", "velocity", "rate", "grapple",
-                           "release"]
+    assert list(names) == [
+        "mass",
+        "com",
+        "inertia",
+        "at",
+        "position",
+        "attitude",
+        "velocity",
+        "rate",
+        "grapple",
+        "release",
+    ]
     assert [values[f"payloads.box.velocity.{axis}"] for axis in "xyz"] == [0.0, -1.0, 0.0]
     assert (values["payloads.box.grapple"], values["payloads.box.release"]) == (3.0, 8.0)
     (box,) = experiment(tmp_path, ARM, changed(RUN, FLIES)).structure.payloads
@@ -407,11 +419,16 @@ run other like it {
 }
 run without like it { remove box; }
 """
-    payloads = {name: experiment(tmp_path, ARM, RUN, more, select=[name]).structure.payloads
-                for name in ("it", "other", "without")}
+    payloads = {
+        name: experiment(tmp_path, ARM, RUN, more, select=[name]).structure.payloads
+        for name in ("it", "other", "without")
+    }
     told_of = {name: [(each.name, each.link, each.released) for each in some] for name, some in payloads.items()}
-    assert told_of == {"it": [("box", "hand", False)], "other": [("box", "hand", True), ("ball", "base", False)],
-                       "without": []}
+    assert told_of == {
+        "it": [("box", "hand", False)],
+        "other": [("box", "hand", True), ("ball", "base", False)],
+        "without": [],
+    }
     assert found(tmp_path, more=more, select=["other"])["payloads.box.mass"] == 7.0
 
 
@@ -425,8 +442,12 @@ def test_a_sweep_varies_what_a_payload_is_and_when(tmp_path: Path) -> None:
         "payloads.box.mass", "payloads.box.grapple"}  # fmt: skip
 
 
-@pytest.mark.parametrize(("sweep", "message"), [
-    ("vary payloads.box.release = [3, 2.5, 4] s;", """\
+@pytest.mark.parametrize(
+    ("sweep", "message"),
+    [
+        (
+            "vary payloads.box.release = [3, 2.5, 4] s;",
+            """\
 error[D264]: payload `box` is not released after it is grappled; case #0 breaks it, and 1 more
   --> deck.ic:14:20
    |
@@ -436,8 +457,11 @@ error[D264]: payload `box` is not released after it is grappled; case #0 breaks 
    = help: write a later `release`, or an earlier `grapple`
 
 1 error
-"""),
-    ("vary payloads.box.on = [1, 2];", """\
+""",
+        ),
+        (
+            "vary payloads.box.on = [1, 2];",
+            """\
 error[D122]: `payloads.box.on` cannot vary
   --> deck.ic:23:25
    |
@@ -446,8 +470,11 @@ error[D122]: `payloads.box.on` cannot vary
    = help: it decides the program: write a run for each, and `sweep NAME = ONE + OTHER;`
 
 1 error
-"""),
-    ("vary payloads.box.size = [1, 2] m;", """\
+""",
+        ),
+        (
+            "vary payloads.box.size = [1, 2] m;",
+            """\
 error[D128]: no parameter `payloads.box.size` in this run
   --> deck.ic:23:25
    |
@@ -456,8 +483,10 @@ error[D128]: no parameter `payloads.box.size` in this run
    = help: did you mean `payloads.box.shape.size`?
 
 1 error
-"""),
-])
+""",
+        ),
+    ],
+)
 def test_what_a_sweep_cannot_vary_is_told(tmp_path: Path, sweep: str, message: str) -> None:
     more = f"sweep many of it {{ {sweep} }}\n"
     assert told(check(tmp_path, ARM, changed(RUN, FLIES), more, select=["many"])) == message
@@ -465,7 +494,9 @@ def test_what_a_sweep_cannot_vary_is_told(tmp_path: Path, sweep: str, message: s
 
 def test_a_block_that_looks_like_a_payload_is_told_how_to_be_one(tmp_path: Path) -> None:
     more = "run other like it { crate { mass = 3 kg; } }\n"
-    assert told(check(tmp_path, ARM, RUN, more, select=["other"])) == """\
+    assert (
+        told(check(tmp_path, ARM, RUN, more, select=["other"]))
+        == """\
 error[D109]: nothing named `crate` in run `other` to change
   --> deck.ic:19:21
    |
@@ -476,12 +507,17 @@ error[D109]: nothing named `crate` in run `other` to change
 
 1 error
 """
+    )
 
 
 def test_a_load_on_what_the_ground_holds_is_told(tmp_path: Path) -> None:
-    changes = (("on    = hand", "on    = base"), ("environment {}", "environment { w = wrench { link = box; force = "
-                                                                   "[1, 0, 0] N; } }"))
-    assert told(check(tmp_path, ARM, changed(RUN, *changes))) == """\
+    changes = (
+        ("on    = hand", "on    = base"),
+        ("environment {}", "environment { w = wrench { link = box; force = [1, 0, 0] N; } }"),
+    )
+    assert (
+        told(check(tmp_path, ARM, changed(RUN, *changes)))
+        == """\
 warning[D256]: environment `w` changes nothing: link `base` is part of the ground
   --> deck.ic:14:39
    |
@@ -491,11 +527,14 @@ warning[D256]: environment `w` changes nothing: link `base` is part of the groun
 
 1 warning
 """
+    )
 
 
 def test_a_run_that_removes_where_a_payload_begins_is_told_so(tmp_path: Path) -> None:
     run = "run other like it { box { remove position; } }\n"
-    assert told(check(tmp_path, ARM, changed(RUN, FLIES), run, select=["other"])) == """\
+    assert (
+        told(check(tmp_path, ARM, changed(RUN, FLIES), run, select=["other"]))
+        == """\
 error[D075]: payload `box` has no `position`
   --> deck.ic:23:27
    |
@@ -506,6 +545,7 @@ error[D075]: payload `box` has no `position`
 
 1 error
 """
+    )
 
 
 BARE = changed(ARM, ("link hand { mass = 1 kg; shape = sphere(radius = 0.1 m); }", "link hand { mass = 0 kg; }"))
@@ -513,15 +553,25 @@ BARE = changed(ARM, ("link hand { mass = 1 kg; shape = sphere(radius = 0.1 m); }
 
 def test_a_payload_that_is_carried_throughout_is_mass_to_its_joint_and_one_that_goes_is_named(tmp_path: Path) -> None:
     """And its motion is that of a link behind a fixed joint."""
-    merged = changed(BARE, ("    joint hinge", "    link box { mass = 5 kg; shape = box(size = [0.2, 0.3, 0.4] m); }\n"
-                            "    joint grip fixed { parent = hand; child = box; }\n    joint hinge"))
+    merged = changed(
+        BARE,
+        (
+            "    joint hinge",
+            "    link box { mass = 5 kg; shape = box(size = [0.2, 0.3, 0.4] m); }\n"
+            "    joint grip fixed { parent = hand; child = box; }\n    joint hinge",
+        ),
+    )
     falls = ("environment {}", "initial { wrist.q = 1 rad; } environment { gravity = [1, -9, 0] m/s^2; }")
-    found, wanted = (engine.run(experiment(tmp_path, arm, changed(run, falls, ("duration = 10 s", "duration = 1 s"))))
-                     for arm, run in ((BARE, RUN), (merged, RUN.replace(BOX, ""))))
+    found, wanted = (
+        engine.run(experiment(tmp_path, arm, changed(run, falls, ("duration = 10 s", "duration = 1 s"))))
+        for arm, run in ((BARE, RUN), (merged, RUN.replace(BOX, "")))
+    )
     assert found.cause == wanted.cause == [""]
     np.testing.assert_allclose(found.signals["q"], wanted.signals["q"], rtol=0, atol=1e-12)
     goes = changed(RUN, ("    }\n    env", "        release = 3 s;\n    }\n    env"))
-    assert told(check(tmp_path, BARE, goes)) == """\
+    assert (
+        told(check(tmp_path, BARE, goes))
+        == """\
 error[D217]: joint `wrist` moves nothing that has mass
  --> deck.ic:5:5
   |
@@ -533,17 +583,21 @@ error[D217]: joint `wrist` moves nothing that has mass
 
 1 error
 """
+    )
     sweep = "sweep light of it { vary payloads.box.mass = [5, 0] kg; }"
     run = changed(RUN, ("shape = box(size = [0.2, 0.3, 0.4] m);", "inertia = [0, 0, 0] kg*m^2;"))
     assert [each.code for each in check(tmp_path, BARE, run, sweep, select=["light"]).diagnostics] == ["D217"]
 
 
 def test_a_payload_that_a_free_base_carries_throughout_is_its_mass(tmp_path: Path) -> None:
-    run = changed(RUN, ("    arm = crane;\n", "    arm = crane;\n    base = free;\n"),
-                  ("on    = hand;", "on    = base;"))
+    run = changed(
+        RUN, ("    arm = crane;\n", "    arm = crane;\n    base = free;\n"), ("on    = hand;", "on    = base;")
+    )
     assert told(check(tmp_path, ARM, run)) == ""
     goes = changed(run, ("on    = base;\n", "on    = base;\n        release = 3 s;\n"))
-    assert told(check(tmp_path, ARM, goes)) == """\
+    assert (
+        told(check(tmp_path, ARM, goes))
+        == """\
 error[D254]: the base moves freely and has no mass
  --> deck.ic:9:5
   |
@@ -555,6 +609,7 @@ error[D254]: the base moves freely and has no mass
 
 1 error
 """
+    )
 
 
 def test_a_payload_that_spins_too_fast_for_the_step_is_warned_of(tmp_path: Path) -> None:
@@ -570,7 +625,9 @@ warning[D300]: payload `box` turns by 0.25 rad in a step of the dynamics
 
 def test_a_time_that_is_not_written_does_not_vary_and_the_remedy_says_why(tmp_path: Path) -> None:
     sweep = "sweep late of it { vary payloads.box.release = [1, 2] s; }"
-    assert told(check(tmp_path, ARM, RUN, sweep, select=["late"])) == """\
+    assert (
+        told(check(tmp_path, ARM, RUN, sweep, select=["late"]))
+        == """\
 error[D122]: `payloads.box.release` cannot vary
   --> deck.ic:19:25
    |
@@ -580,3 +637,4 @@ error[D122]: `payloads.box.release` cannot vary
 
 1 error
 """
+    )

@@ -36,7 +36,9 @@ servo drive {
 
 
 def test_a_sensor_of_what_the_law_does_not_read_is_told(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, sensed(SERVO, "q"), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, sensed(SERVO, "q"), RUN)
+        == """\
 warning[D290]: sensor `q` changes nothing: the law of servo `drive` (rigid_gearbox) does not read `q`
  --> deck.ic:9:5
   |
@@ -45,10 +47,13 @@ warning[D290]: sensor `q` changes nothing: the law of servo `drive` (rigid_gearb
   = help: it reads under a rate command: qd
   = help: leave it out, or record it: `record += [hinge.servo.sensor.q];`
 """
+    )
 
 
 def test_so_is_a_dead_one(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, IDEAL, dead("qd")) == """\
+    assert (
+        shown(tmp_path, ARM, IDEAL, dead("qd"))
+        == """\
 warning[D168]: environment `fault` never acts: the law of servo `drive` (ideal) does not read `qd`
   --> deck.ic:10:62
    |
@@ -57,6 +62,7 @@ warning[D168]: environment `fault` never acts: the law of servo `drive` (ideal) 
    = help: it reads nothing of its joint under a rate command
    = help: change that, or leave it out
 """
+    )
 
 
 @pytest.mark.slow

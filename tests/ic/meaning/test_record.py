@@ -89,18 +89,23 @@ def test_every_name_that_a_record_may_write_compiles_and_survives_a_plan_file(tm
 
 
 def test_a_link_does_not_have_what_a_joint_has(tmp_path: Path) -> None:
-    assert shown(tmp_path, "links.hook.J_eff") == """\
+    assert (
+        shown(tmp_path, "links.hook.J_eff")
+        == """\
 error[D125]: no channel `links.hook.J_eff`
   --> deck.ic:22:15
    |
 22 |     record = [links.hook.J_eff];
    |               ^^^^^^^^^^^^^^^^
    = help: channels of `links.hook`: links.hook.position, links.hook.orientation, links.hook.velocity, links.hook.rate, links.hook.jacobian
-"""  # noqa: E501 - as it is printed
+"""
+    )
 
 
 def test_an_unknown_name_is_answered_with_what_there_is(tmp_path: Path) -> None:
-    assert shown(tmp_path, "power") == """\
+    assert (
+        shown(tmp_path, "power")
+        == """\
 error[D125]: no channel `power`
   --> deck.ic:22:15
    |
@@ -108,11 +113,14 @@ error[D125]: no channel `power`
    |               ^^^^^
    = help: channels of all joints: q, qd, qdd, tau, tau_load, J_eff, b, mode, reaction, servo.command, servo.voltage, servo.integral, servo.motor_rate, servo.motor_torque
    = help: channels of the arm, and of a link: energy, momentum, links.bar.position, links.bar.orientation, links.bar.velocity, links.bar.rate, links.bar.jacobian
-"""  # noqa: E501 - as it is printed
+"""
+    )
 
 
 def test_one_variable_recorded_under_two_names(tmp_path: Path) -> None:
-    assert shown(tmp_path, "energy.kinetic, energy") == """\
+    assert (
+        shown(tmp_path, "energy.kinetic, energy")
+        == """\
 error[D040]: `energy.kinetic` is recorded twice
   --> deck.ic:22:31
    |
@@ -121,6 +129,7 @@ error[D040]: `energy.kinetic` is recorded twice
   ::: deck.ic:22:15  first
    = help: leave one out
 """
+    )
 
 
 def test_a_metric_watches_one_number(tmp_path: Path) -> None:
@@ -128,7 +137,9 @@ def test_a_metric_watches_one_number(tmp_path: Path) -> None:
         return told(check(tmp_path, ARM, SERVO, changed(RUN, ("[q];", f"[]; metric top = max {{ of = {channel}; }}"))))
 
     assert of("links.hook.position.z") == ""
-    assert of("links.hook.position") == """\
+    assert (
+        of("links.hook.position")
+        == """\
 error[D125]: `links.hook.position` is 3 channels
   --> deck.ic:22:42
    |
@@ -138,6 +149,7 @@ error[D125]: `links.hook.position` is 3 channels
 
 1 error
 """
+    )
     assert "= help: a metric watches one of them: `hinge.q`, `rail.q`\n" in of("q")
     assert "= help: did you mean `energy.kinetic`?\n" in of("energy.kinetik")
 

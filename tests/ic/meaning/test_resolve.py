@@ -104,8 +104,9 @@ def test_definitions_are_referred_to_not_copied(tmp_path: Path) -> None:
 
 def test_a_part_of_a_use_can_be_changed_in_a_run_like_it(tmp_path: Path) -> None:
     first = "run first like hold { servos { hinge = drive { kp = 2 V*s/rad; }; } }\n"
-    run = experiment(tmp_path, ARM, SERVO, RUN, first,
-                     "run it like first { servos { hinge { ki = 7 V/rad; } } }", select=["it"])
+    run = experiment(
+        tmp_path, ARM, SERVO, RUN, first, "run it like first { servos { hinge { ki = 7 V/rad; } } }", select=["it"]
+    )
     assert run.parameters["hinge.servo.kp"].value == 2.0
     assert run.parameters["hinge.servo.ki"].value == 7.0
 

@@ -23,14 +23,17 @@ def divisors(run: Experiment) -> tuple[float, int, int, int]:
     return schedule.base_hz, schedule.dynamics, schedule.record, run.structure.servos[0].divisor
 
 
-@pytest.mark.parametrize(("rates", "expected"), [
-    ("dynamics = 1 kHz; servos = 500 Hz; record = 50 Hz;", (1000.0, 1, 20, 2)),
-    ("dynamics = 100 Hz; servos = 1 kHz; record = 50 Hz;", (1000.0, 10, 20, 1)),          # the fastest is the base
-    ("dynamics = 1 kHz; servos = 500 Hz;", (1000.0, 1, 1, 2)),                            # recorded at every step
-    ("dynamics = 1 kHz; servos = 1 kHz; base = 4 kHz;", (4000.0, 4, 4, 4)),
-    ("dynamics = 1 kHz; servos = (1000/3) Hz; record = 100 Hz;", (1000.0, 1, 10, 3)),     # exact, though no decimal is
-    ("dynamics = 200 Hz; servos = 300 Hz; record = 100 Hz; base = 600 Hz;", (600.0, 3, 6, 2)),
-])
+@pytest.mark.parametrize(
+    ("rates", "expected"),
+    [
+        ("dynamics = 1 kHz; servos = 500 Hz; record = 50 Hz;", (1000.0, 1, 20, 2)),
+        ("dynamics = 100 Hz; servos = 1 kHz; record = 50 Hz;", (1000.0, 10, 20, 1)),  # the fastest is the base
+        ("dynamics = 1 kHz; servos = 500 Hz;", (1000.0, 1, 1, 2)),  # recorded at every step
+        ("dynamics = 1 kHz; servos = 1 kHz; base = 4 kHz;", (4000.0, 4, 4, 4)),
+        ("dynamics = 1 kHz; servos = (1000/3) Hz; record = 100 Hz;", (1000.0, 1, 10, 3)),  # exact, though no decimal is
+        ("dynamics = 200 Hz; servos = 300 Hz; record = 100 Hz; base = 600 Hz;", (600.0, 3, 6, 2)),
+    ],
+)
 def test_rates_are_divisors_of_the_base(tmp_path: Path, rates: str, expected: tuple[float, ...]) -> None:
     assert divisors(experiment(tmp_path, *with_rates(rates))) == expected
 
@@ -67,10 +70,16 @@ def test_a_rate_faster_than_a_written_base_is_told(tmp_path: Path) -> None:
     assert codes(tmp_path, *with_rates("dynamics = 1 kHz; servos = 2 kHz; base = 1 kHz;")) == ["D100"]
 
 
-@pytest.mark.parametrize(("value", "fraction"), [
-    (1000 / 3, Fraction(1000, 3)), (0.1, Fraction(1, 10)), (25.0, Fraction(25)), (333.3, Fraction(3333, 10)),
-    (20.01, Fraction(2001, 100)),
-])
+@pytest.mark.parametrize(
+    ("value", "fraction"),
+    [
+        (1000 / 3, Fraction(1000, 3)),
+        (0.1, Fraction(1, 10)),
+        (25.0, Fraction(25)),
+        (333.3, Fraction(3333, 10)),
+        (20.01, Fraction(2001, 100)),
+    ],
+)
 def test_a_number_is_the_simplest_fraction_that_it_can_be(value: float, fraction: Fraction) -> None:
     assert exact(value) == fraction
 
@@ -99,11 +108,18 @@ def test_a_duration_that_cannot_be_is_told(tmp_path: Path, duration: str, code: 
     assert code in codes(tmp_path, *with_rates(RATES, duration))
 
 
-@pytest.mark.parametrize(("rates", "code"), [
-    ("servos = 1 kHz;", "D117"), ("dynamics = 1 kHz;", "D118"), ("dynamics = 1 kHz; servo = 1 kHz;", "D116"),
-    ("dynamics = 0 Hz; servos = 1 kHz;", "D077"), ("dynamics = 60 rpm; servos = 1 kHz;", "D061"),
-    ("dynamics = 1000; servos = 1 kHz;", "D060"), ("dynamics = continuous; servos = 1 kHz;", "D106"),
-])
+@pytest.mark.parametrize(
+    ("rates", "code"),
+    [
+        ("servos = 1 kHz;", "D117"),
+        ("dynamics = 1 kHz;", "D118"),
+        ("dynamics = 1 kHz; servo = 1 kHz;", "D116"),
+        ("dynamics = 0 Hz; servos = 1 kHz;", "D077"),
+        ("dynamics = 60 rpm; servos = 1 kHz;", "D061"),
+        ("dynamics = 1000; servos = 1 kHz;", "D060"),
+        ("dynamics = continuous; servos = 1 kHz;", "D106"),
+    ],
+)
 def test_rates_that_cannot_be_are_told(tmp_path: Path, rates: str, code: str) -> None:
     assert code in codes(tmp_path, *with_rates(rates))
 
@@ -147,11 +163,14 @@ def test_stability_of_a_sweep_is_that_of_its_worst_case(tmp_path: Path) -> None:
     assert "case #2" in diagnostic.message
 
 
-@pytest.mark.parametrize(("change", "more"), [
-    (("resistance = 1 ohm", "resistance = 0 ohm"), ""),
-    (("j_m = 1e-4 kg*m^2", "j_m = 0 kg*m^2"), ""),
-    (("", ""), "sweep it of hold { vary drive.resistance = [0, 1] ohm; }"),
-])
+@pytest.mark.parametrize(
+    ("change", "more"),
+    [
+        (("resistance = 1 ohm", "resistance = 0 ohm"), ""),
+        (("j_m = 1e-4 kg*m^2", "j_m = 0 kg*m^2"), ""),
+        (("", ""), "sweep it of hold { vary drive.resistance = [0, 1] ohm; }"),
+    ],
+)
 def test_nothing_is_computed_of_a_servo_whose_parameter_is_out_of_range(
     tmp_path: Path, change: tuple[str, str], more: str
 ) -> None:

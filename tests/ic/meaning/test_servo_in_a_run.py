@@ -8,8 +8,6 @@ import pytest
 
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told
 
-# ruff: noqa: E501 - messages are as wide as they are
-
 SENSED = changed(SERVO, ("command", "sensor qd = tachometer { noise = 0.02 rad/s; }\n    sensor q = encoder { step = 1 deg; }\n    command"))  # fmt: skip
 
 
@@ -47,7 +45,9 @@ def test_a_parameter_that_a_run_removes_has_its_default(tmp_path: Path) -> None:
     runs = "run over like hold { servos { hinge { f_c = 0.02 N*m; } } }\nrun other like over { servos { hinge { remove f_c; } } }\n"
     for name, value in (("over", 0.02), ("other", 0.0)):
         found = experiment(tmp_path, ARM, soft, RUN, runs, select=[name])
-        assert found.parameters["hinge.servo.f_c"].value == value, "with what it was written over, the definition's goes"
+        assert found.parameters["hinge.servo.f_c"].value == value, (
+            "with what it was written over, the definition's goes"
+        )
 
 
 def test_a_sweep_may_choose_a_servo_without_its_sensor(tmp_path: Path) -> None:
@@ -59,7 +59,9 @@ def test_a_sweep_may_choose_a_servo_without_its_sensor(tmp_path: Path) -> None:
 
 def test_removing_what_is_not_there_is_told_once_the_definition_is_known(tmp_path: Path) -> None:
     run = "run other like hold { servos { hinge { remove qdd;  remove q;  remove q; } } }\n"
-    assert told(check(tmp_path, ARM, SENSED, RUN, run, select=["other"])) == """\
+    assert (
+        told(check(tmp_path, ARM, SENSED, RUN, run, select=["other"]))
+        == """\
 error[D058]: nothing named `qdd` to remove
   --> deck.ic:20:47
    |
@@ -78,11 +80,14 @@ error[D058]: nothing named `q` to remove
 
 2 errors
 """
+    )
 
 
 def test_a_model_has_no_definition_under_it_to_remove_from(tmp_path: Path) -> None:
     loads = "environment { d = joint_damping { damping = 1 N*m*s/rad; remove jont; } } record"
-    assert told(check(tmp_path, ARM, SERVO, changed(RUN, ("record = [q]", f"{loads} = [q]")))) == """\
+    assert (
+        told(check(tmp_path, ARM, SERVO, changed(RUN, ("record = [q]", f"{loads} = [q]"))))
+        == """\
 error[D058]: nothing named `jont` to remove
   --> deck.ic:16:69
    |
@@ -92,11 +97,14 @@ error[D058]: nothing named `jont` to remove
 
 1 error
 """
+    )
 
 
 def test_what_a_run_removed_and_the_model_needs_is_told_where_it_was_removed(tmp_path: Path) -> None:
     run = "run other like hold { servos { hinge { remove kp; } } }\n"
-    assert told(check(tmp_path, ARM, SERVO, RUN, run, select=["other"])) == """\
+    assert (
+        told(check(tmp_path, ARM, SERVO, RUN, run, select=["other"]))
+        == """\
 error[D075]: servo `drive` on joint `hinge` has no `kp`
   --> deck.ic:18:40
    |
@@ -107,12 +115,15 @@ error[D075]: servo `drive` on joint `hinge` has no `kp`
 
 1 error
 """
+    )
 
 
 def test_a_block_in_the_wrong_place_is_sent_to_where_its_name_stands(tmp_path: Path) -> None:
     damped = changed(RUN, ("duration", "environment { damp = joint_damping { damping = 1 N*m*s/rad; } } duration"))
     run = "run other like hold { damp { damping = 2 N*m*s/rad; }  hinge { kp = 0.2 V*s/rad; } }\n"
-    assert told(check(tmp_path, ARM, SERVO, damped, run, select=["other"])) == """\
+    assert (
+        told(check(tmp_path, ARM, SERVO, damped, run, select=["other"]))
+        == """\
 error[D109]: nothing named `damp` in run `other` to change
   --> deck.ic:18:23
    |
@@ -129,6 +140,7 @@ error[D109]: nothing named `hinge` in run `other` to change
 
 2 errors
 """
+    )
 
 
 @pytest.mark.parametrize(
@@ -140,7 +152,9 @@ def test_a_block_upon_a_name_that_takes_none_is_not_ignored(change: str, code: s
 
 
 def test_a_channel_under_another_word_of_the_model_is_told_with_that_word(tmp_path: Path) -> None:
-    assert told(check(tmp_path, ARM, SERVO, changed(RUN, ("[q]", "[servo.bristle]")))) == """\
+    assert (
+        told(check(tmp_path, ARM, SERVO, changed(RUN, ("[q]", "[servo.bristle]"))))
+        == """\
 error[D125]: no channel `servo.bristle`
   --> deck.ic:16:15
    |
@@ -150,11 +164,14 @@ error[D125]: no channel `servo.bristle`
 
 1 error
 """
+    )
 
 
 def test_a_share_with_a_unit_is_sent_to_the_parameter_that_has_it(tmp_path: Path) -> None:
     metric = "metric settle = settling_time { of = hinge.q; target = 1 rad; band = 0.2 deg; }\n    record = [q]"
-    assert told(check(tmp_path, ARM, SERVO, changed(RUN, ("record = [q]", metric)))) == """\
+    assert (
+        told(check(tmp_path, ARM, SERVO, changed(RUN, ("record = [q]", metric))))
+        == """\
 error[D061]: `band` of metric `settle` is a pure number, and this is in rad
   --> deck.ic:16:74
    |
@@ -165,6 +182,7 @@ error[D061]: `band` of metric `settle` is a pure number, and this is in rad
 
 1 error
 """
+    )
 
 
 def test_an_encoder_under_a_continuous_law(tmp_path: Path) -> None:

@@ -13,8 +13,6 @@ from met import models
 from met import run as engine
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told
 
-# ruff: noqa: E501 - messages are as wide as they are
-
 ANALOG = changed(RUN, ("servos = 1 kHz", "servos = continuous"))
 
 
@@ -26,7 +24,9 @@ def shown(folder: Path, *parts: str) -> str:
 def test_the_integral_of_a_law_that_is_continuous_is_in_its_figure(tmp_path: Path) -> None:
     """Of s^2 + 75 s + 8e6: two roots of size sqrt(8e6) = 2828 1/s."""
     stiff = changed(SERVO, ("ki = 1 V/rad", "ki = 16e3 V/rad"))
-    assert shown(tmp_path, ARM, stiff, ANALOG) == """\
+    assert (
+        shown(tmp_path, ARM, stiff, ANALOG)
+        == """\
 error[D104]: servo `drive` is unstable with modified_euler at this rate of the dynamics
   --> deck.ic:14:24
    |
@@ -34,6 +34,7 @@ error[D104]: servo `drive` is unstable with modified_euler at this rate of the d
    |                        ^^^^^ h * lambda = 2.83; the slowest rate that fits is 2000 Hz
    = help: h * lambda must stay below 2; lambda is the servo's fastest rate constant, on any arm
 """
+    )
     assert "D104" not in shown(tmp_path, ARM, stiff, RUN), "of a law that ticks, the step does not see its gains"
 
 
@@ -52,12 +53,16 @@ def test_so_is_that_of_a_cascades_rate_loop(tmp_path: Path) -> None:
     assert said.startswith("error[D104]") and "h * lambda = 2.12; " in said
 
 
-FILTERED = changed(SERVO, ("command", "sensor qd = tachometer { filter = butterworth;  cutoff = CUTOFF; }\n    command"))
+FILTERED = changed(
+    SERVO, ("command", "sensor qd = tachometer { filter = butterworth;  cutoff = CUTOFF; }\n    command")
+)
 
 
 def test_the_filter_of_a_sensor_is_held_to_the_step(tmp_path: Path) -> None:
     fast = changed(FILTERED, ("CUTOFF", "700 Hz"))
-    assert shown(tmp_path, ARM, fast, RUN) == """\
+    assert (
+        shown(tmp_path, ARM, fast, RUN)
+        == """\
 error[D104]: sensor `qd` of servo `drive` is unstable with modified_euler at this rate of the dynamics
   --> deck.ic:15:24
    |
@@ -65,8 +70,11 @@ error[D104]: sensor `qd` of servo `drive` is unstable with modified_euler at thi
    |                        ^^^^^ h * lambda = 4.4; the slowest rate that fits is 3000 Hz
    = help: h * lambda must stay below 2; lambda is the rate constant of the sensor's filter, 2 pi cutoff
 """
+    )
     slower = changed(FILTERED, ("CUTOFF", "100 Hz"))
-    assert shown(tmp_path, ARM, slower, RUN) == """\
+    assert (
+        shown(tmp_path, ARM, slower, RUN)
+        == """\
 warning[D105]: sensor `qd` of servo `drive` is fast for the dynamics' step: h * lambda = 0.628
   --> deck.ic:15:24
    |
@@ -74,6 +82,7 @@ warning[D105]: sensor `qd` of servo `drive` is fast for the dynamics' step: h * 
    |                        ^^^^^ h = 0.001 s
    = help: stable below 2 with modified_euler, true to the motion below 0.5: the slowest rate that fits is 2000 Hz
 """
+    )
 
 
 @pytest.mark.parametrize(("sensor", "said"), [
@@ -116,7 +125,9 @@ run hold {
 
 
 def test_a_gear_that_a_step_makes_swing_up_is_told(tmp_path: Path) -> None:
-    assert shown(tmp_path, GEAR.replace("HEAVY", "1e6")) == """\
+    assert (
+        shown(tmp_path, GEAR.replace("HEAVY", "1e6"))
+        == """\
 warning[D249]: the gear of servo `drive` swings, and this step of modified_euler makes that grow: by e in every 0.543 s
   --> deck.ic:15:24
    |
@@ -127,6 +138,7 @@ warning[D249]: the gear of servo `drive` swings, and this step of modified_euler
    = help: or damp it: of x'' = -a x - b x', b is 0 1/s, and 2.9 1/s would do
    = help: reckoned with the joint held: a gear swings faster against a light one
 """
+    )
 
 
 @pytest.mark.parametrize(("integrator", "hz"), [
@@ -159,7 +171,9 @@ def test_what_helps_is_not_told(change: tuple[str, str], said: list[str], tmp_pa
 
 
 def test_the_worst_case_of_a_sweep_is_told(tmp_path: Path) -> None:
-    sweep = "sweep gears of hold { vary drive.stiffness = [1000, 2000] N*m/rad;  vary drive.damping = [0, 5] N*m*s/rad; }\n"
+    sweep = (
+        "sweep gears of hold { vary drive.stiffness = [1000, 2000] N*m/rad;  vary drive.damping = [0, 5] N*m*s/rad; }\n"
+    )
     (told,) = check(tmp_path, GEAR.replace("HEAVY", "1e6"), sweep, select=["gears"]).diagnostics
     a = 2000.0 / (1e4 * 1e-5)
     every = 1.0 / (300.0 * float(growth(models.find("integrator", "modified_euler"), 1.0 / 300.0, a, 0.0)))
@@ -169,7 +183,9 @@ def test_the_worst_case_of_a_sweep_is_told(tmp_path: Path) -> None:
 def test_the_gain_of_a_rate_loop_brakes_the_swing_and_a_current_loop_may_swing(tmp_path: Path) -> None:
     held = changed(GEAR, ("torque(1 N*m)", "rate(1 rad/s)"), ("kp = 0 V", "kp = 1e3 V")).replace("HEAVY", "1")
     assert codes(tmp_path, held) == [], "b = Kt Kp/(R J_m) = 5 1/s"
-    loop = changed(CASCADE, ("ki_current = 100 V", "ki_current = 5000 V"), ("resistance = 1 ohm", "resistance = 0.01 ohm"))
+    loop = changed(
+        CASCADE, ("ki_current = 100 V", "ki_current = 5000 V"), ("resistance = 1 ohm", "resistance = 0.01 ohm")
+    )
     fast, told = check(tmp_path, ARM, loop, RUN).diagnostics
     assert fast.code == "D105" and told.code == "D249"
     assert told.message.startswith("the current loop of servo `drive` swings, and this step of modified_euler")

@@ -15,8 +15,6 @@ from tests.ic.small_decks import ARM as SWING
 from tests.ic.small_decks import RUN as HOLD
 from tests.ic.small_decks import SERVO, changed, check, told
 
-# ruff: noqa: E501 - messages are as wide as they are
-
 
 def said(compiled: Compiled) -> str:
     """What is said of a deck, without the counting line."""
@@ -38,7 +36,9 @@ def test_a_bare_value_is_shown_the_kind_of_command_that_its_servo_takes(
 
     monkeypatch.setattr(models, "find", of_positions)
     servo = changed(SERVO, ("rate(0.1 rad/s)", "0.1 rad"))
-    assert said(check(tmp_path, SWING, servo, HOLD)) == """\
+    assert (
+        said(check(tmp_path, SWING, servo, HOLD))
+        == """\
 error[D151]: a command is its kind and one value or course in time
  --> deck.ic:9:15
   |
@@ -46,13 +46,16 @@ error[D151]: a command is its kind and one value or course in time
   |               ^^^^^^^
   = help: rigid_gearbox takes position(...): `position(30 deg)` or `position(step(to = ...))`
 """
+    )
     sliding = changed(SWING, ("revolute", "prismatic"))
     assert "`position(0.1 m)` or " in said(check(tmp_path, sliding, changed(servo, ("100", "100 rad/m")), HOLD))
 
 
 def test_a_ratio_of_a_definition_that_turns_some_joints_and_slides_another(tmp_path: Path) -> None:
     run = changed(RUN, ("lift = slide", "lift = drive { command = rate(0.1 m/s); }"))
-    assert said(check(tmp_path, ARM, SERVO, run)) == """\
+    assert (
+        said(check(tmp_path, ARM, SERVO, run))
+        == """\
 error[D060]: `ratio` of servo `drive` on joint `lift` is in rad/m, and this is a bare number
   --> deck.ic:11:13
    |
@@ -60,6 +63,7 @@ error[D060]: `ratio` of servo `drive` on joint `lift` is in rad/m, and this is a
    |             ^^^
    = help: joint `lift` slides, and others of servo `drive` turn: give its servo a ratio of its own, `lift = drive { ratio = 100 rad/m; }`
 """
+    )
 
 
 def test_taking_that_remedy_leaves_no_mistake(tmp_path: Path) -> None:
@@ -77,16 +81,20 @@ def test_an_inherited_ratio_belongs_into_the_definition_that_slides(tmp_path: Pa
 def test_a_ratio_of_a_screw_on_joints_that_turn(tmp_path: Path) -> None:
     servo = changed(SERVO, ("ratio = 100", "ratio = 100 rad/m"))
     assert helps(check(tmp_path, ARM, servo, changed(SLIDE, ("ratio = 1 cycle/cm; ", "")), RUN)) == [
-        ("joint `hinge` turns, and others of servo `drive` slide: give its servo a ratio of its own, "
-         "`hinge = drive { ratio = ...; }`",)
+        (
+            "joint `hinge` turns, and others of servo `drive` slide: give its servo a ratio of its own, "
+            "`hinge = drive { ratio = ...; }`",
+        )
     ]
 
 
 def test_a_command_of_joints_that_move_otherwise(tmp_path: Path) -> None:
     run = changed(RUN, ("lift = slide", "lift = drive { ratio = 100 rad/m; }"))
     assert helps(check(tmp_path, ARM, SERVO, run)) == [
-        ("joint `lift` slides, and others of servo `drive` turn: give its servo a command of its own, "
-         "`lift = drive { command = rate(...); }`",)
+        (
+            "joint `lift` slides, and others of servo `drive` turn: give its servo a command of its own, "
+            "`lift = drive { command = rate(...); }`",
+        )
     ]
 
 
@@ -100,7 +108,9 @@ def test_what_is_wrong_on_every_joint_has_the_usual_remedy(tmp_path: Path) -> No
 
 def test_a_normal_distribution_that_leaves_the_range_of_its_parameter(tmp_path: Path) -> None:
     sweep = "default sweep spread of hold { sample lhs(20) { drive.tau_max = normal(0.02, 0.03) N*m; } }\n"
-    assert said(check(tmp_path, SWING, SERVO, HOLD, sweep)) == """\
+    assert (
+        said(check(tmp_path, SWING, SERVO, HOLD, sweep))
+        == """\
 error[D077]: `tau_max` of servo `drive` must be above 0 N*m; case #8 breaks it, and 4 more
   --> deck.ic:18:49
    |
@@ -109,6 +119,7 @@ error[D077]: `tau_max` of servo `drive` must be above 0 N*m; case #8 breaks it, 
    = help: case #8: drive.tau_max = -0.00740745 N*m
    = help: a normal distribution has no bounds: `truncated(mean, deviation, from, to) N*m` has two
 """
+    )
     cut = changed(sweep, ("normal(0.02, 0.03)", "truncated(0.02, 0.03, 0.001, 0.1)"))
     assert said(check(tmp_path, SWING, SERVO, HOLD, cut)) == "\n"
 
@@ -127,7 +138,9 @@ def test_values_of_another_distribution_or_of_a_list_keep_the_usual_remedy(tmp_p
 
 
 def test_a_channel_that_is_like_none_of_its_joint_has_them_listed(tmp_path: Path) -> None:
-    assert said(check(tmp_path, SWING, SERVO, changed(HOLD, ("[q]", "[hinge.pos]")))) == """\
+    assert (
+        said(check(tmp_path, SWING, SERVO, changed(HOLD, ("[q]", "[hinge.pos]"))))
+        == """\
 error[D125]: no channel `hinge.pos`
   --> deck.ic:16:15
    |
@@ -135,13 +148,16 @@ error[D125]: no channel `hinge.pos`
    |               ^^^^^^^^^
    = help: channels of `hinge`: hinge.q, hinge.qd, hinge.qdd, hinge.tau, hinge.tau_load, hinge.J_eff, hinge.b, hinge.mode, hinge.reaction, hinge.servo.command, hinge.servo.voltage, hinge.servo.integral, hinge.servo.motor_rate, hinge.servo.motor_torque
 """
+    )
     near = check(tmp_path, SWING, SERVO, changed(HOLD, ("[q]", "[hinge.servo.volts]")))
     assert near.diagnostics[0].help[0] == "did you mean `hinge.servo.voltage`?"
 
 
 def test_stops_of_a_joint(tmp_path: Path) -> None:
     arm = changed(SWING, ("axis = z; }", "axis = z; limit = [-1, 1] rad; }"))
-    assert said(check(tmp_path, arm, SERVO, HOLD)) == """\
+    assert (
+        said(check(tmp_path, arm, SERVO, HOLD))
+        == """\
 error[D141]: joint `hinge` has no `limit`
  --> deck.ic:3:66
   |
@@ -150,10 +166,13 @@ error[D141]: joint `hinge` has no `limit`
   = help: a joint has no stops in this version; a metric with `require` tells where it goes beyond
   = help: it has: parent, child, at, rpy, axis, dh
 """
+    )
 
 
 def test_a_model_of_ones_own_that_is_not_installed(tmp_path: Path) -> None:
-    assert said(check(tmp_path, SWING, changed(SERVO, ("rigid_gearbox", "my_pd")), HOLD)) == """\
+    assert (
+        said(check(tmp_path, SWING, changed(SERVO, ("rigid_gearbox", "my_pd")), HOLD))
+        == """\
 error[D140]: no servo model `my_pd`
  --> deck.ic:6:13
   |
@@ -162,3 +181,4 @@ error[D140]: no servo model `my_pd`
   = help: servo models: cascade, compliant_gearbox, ideal, locked, passive, rigid_gearbox
   = help: a model of your own is known once its package is installed, `pip install -e FOLDER`; `met new` writes such a package
 """
+    )

@@ -15,8 +15,6 @@ from met.plan.channel import channels
 from met.substitution import BEDS
 from tests.ic.small_decks import changed, check, experiment, told
 
-# ruff: noqa: E501 - messages are as wide as they are
-
 ARM = """\
 arm chain {
     link a { mass = 2 kg; shape = rod(length = 1 m, along = x); }
@@ -91,7 +89,11 @@ def test_bed_and_law_of_a_joint_and_the_place_that_wrote_them(tmp_path: Path) ->
 
 
 def test_bed_and_law_that_are_left_out_are_the_defaults(tmp_path: Path) -> None:
-    for block in ("{}", "{ bed = emulated; law = velocity_tracking; }", "{ bed { i_max = 3 A; } law { gain = 30 %; } }"):
+    for block in (
+        "{}",
+        "{ bed = emulated; law = velocity_tracking; }",
+        "{ bed { i_max = 3 A; } law { gain = 30 %; } }",
+    ):
         hybrid = compiled(tmp_path, f"run hybrid like base_run {{ substitute one {block} }}")
         (use,) = hybrid.structure.substitutions
         assert replace(use, place=None) == Substitution("one", "emulated", "velocity_tracking")
@@ -148,7 +150,9 @@ def test_channels_of_a_joint_on_a_bed_tick_with_its_servo(tmp_path: Path) -> Non
     more = changed(HYBRID, ("torque_balance(", "velocity_tracking("))
     hybrid = compiled(tmp_path, more.replace("    }\n}", "    }\n    record = [one.bed.shaft_rate, law.rate]; }"))
     assert [recorded.channels for recorded in hybrid.structure.record] == [("one.bed.shaft_rate",), ("one.law.rate",)]
-    found = {path: channel for path, channel in channels(hybrid.structure).items() if ".bed." in path or ".law." in path}
+    found = {
+        path: channel for path, channel in channels(hybrid.structure).items() if ".bed." in path or ".law." in path
+    }
     assert {path: channel.unit for path, channel in found.items()} == {
         **{f"one.bed.{memory.name}": memory.unit for memory in BEDS[0].memory},
         "one.bed.drive_voltage": "V", "one.bed.load_current": "A", "one.law.torque": "N*m", "one.law.rate": "rad/s",
@@ -190,7 +194,9 @@ def test_what_a_sweep_varies_of_a_servo_its_bed_follows_unless_it_has_its_own(tm
 
 
 def test_a_sweep_varies_the_motor_on_the_bed_alone(tmp_path: Path) -> None:
-    more = HYBRID + """\
+    more = (
+        HYBRID
+        + """\
 sweep s of hybrid {
     vary one.bed.kt      = [0.04, 0.05] N*m/A;
     vary one.bed.inertia = [1, 2] kg*mm^2;
@@ -199,6 +205,7 @@ sweep s of hybrid {
     exclude when one.bed.kt < one.servo.kt and one.law.band > 0.15 rad/s;
 }
 """
+    )
     swept = compiled(tmp_path, more, "s")
     assert swept.cases.count == 16 - 4
     assert swept.parameters["one.servo.kt"].value == 0.05 and swept.parameters["one.servo.j_m"].value == 1e-4
@@ -221,7 +228,9 @@ def test_explain_tells_what_was_written_and_what_is_the_servos(tmp_path: Path) -
 
 
 def test_no_joint_of_this_name(tmp_path: Path) -> None:
-    assert shown(tmp_path, "substitute onne {}") == """\
+    assert (
+        shown(tmp_path, "substitute onne {}")
+        == """\
 error[D144]: no joint `onne` in arm `chain`
  --> deck.ic:1:24
   |
@@ -230,6 +239,7 @@ error[D144]: no joint `onne` in arm `chain`
   = help: did you mean `one`?
   = help: joints: one, two, three, free
 """
+    )
 
 
 def test_nothing_is_said_of_the_channels_of_a_joint_that_is_not_there(tmp_path: Path) -> None:
@@ -239,7 +249,9 @@ def test_nothing_is_said_of_the_channels_of_a_joint_that_is_not_there(tmp_path: 
 
 
 def test_a_fixed_joint(tmp_path: Path) -> None:
-    assert shown(tmp_path, "substitute mount {}") == """\
+    assert (
+        shown(tmp_path, "substitute mount {}")
+        == """\
 error[D145]: joint `mount` is fixed, so it has no motor
  --> deck.ic:1:24
   |
@@ -248,10 +260,13 @@ error[D145]: joint `mount` is fixed, so it has no motor
  ::: deck.ic:12:5  fixed here
   = help: leave it out, or make the joint revolute or prismatic
 """
+    )
 
 
 def test_a_joint_without_a_servo(tmp_path: Path) -> None:
-    assert shown(tmp_path, "substitute free {}") == """\
+    assert (
+        shown(tmp_path, "substitute free {}")
+        == """\
 error[D175]: joint `free` has no servo, so it has no motor that a bed could take the place of
  --> deck.ic:1:24
   |
@@ -260,10 +275,13 @@ error[D175]: joint `free` has no servo, so it has no motor that a bed could take
   = help: give it one: `servos { free = SERVO; }`
   = help: joints whose servos have a motor: one, two
 """
+    )
 
 
 def test_a_servo_without_a_motor(tmp_path: Path) -> None:
-    assert shown(tmp_path, "substitute three {}") == """\
+    assert (
+        shown(tmp_path, "substitute three {}")
+        == """\
 error[D176]: servo `follow` (ideal) of joint `three` has no motor that a bed could take the place of
  --> deck.ic:1:24
   |
@@ -272,10 +290,13 @@ error[D176]: servo `follow` (ideal) of joint `three` has no motor that a bed cou
  ::: deck.ic:24:40  its servo
   = help: servo models that have a motor: rigid_gearbox
 """
+    )
 
 
 def test_two_laws_in_one_run(tmp_path: Path) -> None:
-    assert shown(tmp_path, "substitute one { law = bare; }  substitute two { law = torque_balance(band = 1 rad/s); }") == """\
+    assert (
+        shown(tmp_path, "substitute one { law = bare; }  substitute two { law = torque_balance(band = 1 rad/s); }")
+        == """\
 error[D177]: joint `two` has the law `torque_balance`, and joint `one` has `bare`
  --> deck.ic:1:79
   |
@@ -285,10 +306,13 @@ error[D177]: joint `two` has the law `torque_balance`, and joint `one` has `bare
   = help: all substituted joints of a run are solved together, by one law: write the same for each
   = help: or substitute them in two runs
 """
+    )
 
 
 def test_servos_that_do_not_tick_together(tmp_path: Path) -> None:
-    assert shown(tmp_path, "servos { two { rate = 500 Hz; } }  substitute one {}  substitute two {}") == """\
+    assert (
+        shown(tmp_path, "servos { two { rate = 500 Hz; } }  substitute one {}  substitute two {}")
+        == """\
 error[D178]: the servo of joint `two` ticks at 500 Hz, and that of joint `one`, whose motor is on a bed too, at 1000 Hz
  --> deck.ic:1:78
   |
@@ -298,10 +322,13 @@ error[D178]: the servo of joint `two` ticks at 500 Hz, and that of joint `one`, 
   = help: all substituted joints of a run are solved together: give their servos the same `rate`
   = help: or substitute them in two runs
 """
+    )
 
 
 def test_one_joint_and_a_block(tmp_path: Path) -> None:
-    assert shown(tmp_path, "substitute one two {}") == """\
+    assert (
+        shown(tmp_path, "substitute one two {}")
+        == """\
 error[D179]: `substitute` takes the name of one joint, and a block
  --> deck.ic:1:39
   |
@@ -309,11 +336,14 @@ error[D179]: `substitute` takes the name of one joint, and a block
   |                                       ^^^
   = help: write `substitute JOINT { bed = BED(...);  law = LAW(...); }`
 """
+    )
     assert "D179" in shown(tmp_path, "substitute one = emulated;")
 
 
 def test_no_joint_and_no_block(tmp_path: Path) -> None:
-    assert shown(tmp_path, "substitute { bed = emulated; }") == """\
+    assert (
+        shown(tmp_path, "substitute { bed = emulated; }")
+        == """\
 error[D109]: nothing named `substitute` in run `it` to change
  --> deck.ic:1:24
   |
@@ -321,7 +351,10 @@ error[D109]: nothing named `substitute` in run `it` to change
   |                        ^^^^^^^^^^
   = help: `substitute JOINT { ... }`, in a run, puts a joint's motor on a bed
 """
-    assert shown(tmp_path, "substitute one;") == """\
+    )
+    assert (
+        shown(tmp_path, "substitute one;")
+        == """\
 error[D110]: `substitute` in a run
  --> deck.ic:1:24
   |
@@ -329,10 +362,13 @@ error[D110]: `substitute` in a run
   |                        ^^^^^^^^^^
   = help: `substitute JOINT { ... }`, in a run, puts a joint's motor on a bed
 """
+    )
 
 
 def test_the_block_of_a_joint_that_is_not_substituted(tmp_path: Path) -> None:
-    assert shown(tmp_path, "one { law = bare; }") == """\
+    assert (
+        shown(tmp_path, "one { law = bare; }")
+        == """\
 error[D109]: nothing named `one` in run `it` to change
  --> deck.ic:1:24
   |
@@ -340,10 +376,13 @@ error[D109]: nothing named `one` in run `it` to change
   |                        ^^^
   = help: `substitute one { ... }` would put this joint's motor on a bed
 """
+    )
 
 
 def test_unknown_models(tmp_path: Path) -> None:
-    assert shown(tmp_path, "substitute one { bed = emulatd; law = bar; }") == """\
+    assert (
+        shown(tmp_path, "substitute one { bed = emulatd; law = bar; }")
+        == """\
 error[D140]: no bed model `emulatd`
  --> deck.ic:1:47
   |
@@ -360,10 +399,13 @@ error[D140]: no law model `bar`
   = help: did you mean `bare`?
   = help: law models: bare, measured_acceleration, torque_balance, torque_balance_observer, velocity_tracking
 """
+    )
 
 
 def test_unknown_keys(tmp_path: Path) -> None:
-    assert shown(tmp_path, "substitute one { bedd = emulated; law = bare(band = 1 rad/s); }") == """\
+    assert (
+        shown(tmp_path, "substitute one { bedd = emulated; law = bare(band = 1 rad/s); }")
+        == """\
 error[D141]: `substitute one` has no `bedd`
  --> deck.ic:1:41
   |
@@ -379,10 +421,13 @@ error[D141]: law `bare` of joint `one` has no `band`
   |                                                                     ^^^^
   = help: it has: none
 """
+    )
 
 
 def test_an_unknown_parameter_a_wrong_unit_and_a_number_out_of_range(tmp_path: Path) -> None:
-    assert shown(tmp_path, "substitute one { bed = emulated(ktt = 3, kt = 1 N*m, i_max = -3 A); }") == """\
+    assert (
+        shown(tmp_path, "substitute one { bed = emulated(ktt = 3, kt = 1 N*m, i_max = -3 A); }")
+        == """\
 error[D141]: bed `emulated` of joint `one` has no `ktt`
  --> deck.ic:1:56
   |
@@ -405,10 +450,13 @@ error[D077]: `i_max` of bed `emulated` of joint `one` must be above 0 A
   |                                                                                     ^^^^ this is -3 A
   = help: write a number above 0 A (limit of the load's amplifier)
 """
+    )
 
 
 def test_a_word_of_faults_that_there_is_not(tmp_path: Path) -> None:
-    assert shown(tmp_path, "substitute one { bed = emulated(faults = typicl); }") == """\
+    assert (
+        shown(tmp_path, "substitute one { bed = emulated(faults = typicl); }")
+        == """\
 error[D076]: `faults` of bed `emulated` of joint `one` cannot be `typicl`
  --> deck.ic:1:65
   |
@@ -417,10 +465,13 @@ error[D076]: `faults` of bed `emulated` of joint `one` cannot be `typicl`
   = help: did you mean `typical`?
   = help: one of: none, typical
 """
+    )
 
 
 def test_a_value_without_a_name(tmp_path: Path) -> None:
-    assert shown(tmp_path, "substitute one { law = torque_balance(0.5); }") == """\
+    assert (
+        shown(tmp_path, "substitute one { law = torque_balance(0.5); }")
+        == """\
 error[D153]: `torque_balance` takes its values by name
  --> deck.ic:1:62
   |
@@ -428,10 +479,13 @@ error[D153]: `torque_balance` takes its values by name
   |                                                              ^^^
   = help: write `torque_balance(band = ...)`
 """
+    )
 
 
 def test_a_number_that_must_be_whole(tmp_path: Path, whole_delay: None) -> None:
-    assert shown(tmp_path, "substitute one { bed = emulated(delay = 1.5); }") == """\
+    assert (
+        shown(tmp_path, "substitute one { bed = emulated(delay = 1.5); }")
+        == """\
 error[D077]: `delay` of bed `emulated` of joint `one` must be whole and at least 0 and at most 3
  --> deck.ic:1:64
   |
@@ -439,6 +493,7 @@ error[D077]: `delay` of bed `emulated` of joint `one` must be whole and at least
   |                                                                ^^^ this is 1.5
   = help: write a whole number of at least 0 and at most 3 (ticks)
 """
+    )
 
 
 @pytest.fixture
@@ -475,7 +530,9 @@ sweep s of a {
     vary one.bed.ktt = [1, 2];
 }
 """
-    assert said(tmp_path, more) == """\
+    assert (
+        said(tmp_path, more)
+        == """\
 error[D122]: `one.bed.faults` cannot vary
  --> deck.ic:3:10
   |
@@ -497,10 +554,13 @@ error[D128]: no parameter `one.bed.ktt` in this run
   |          ^^^^^^^^^^^
   = help: did you mean `one.bed.kt`?
 """
+    )
 
 
 def test_twice_in_a_run_and_its_base(tmp_path: Path) -> None:
-    assert said(tmp_path, "run a like base_run { substitute one {} } run b like a { substitute one {} }") == """\
+    assert (
+        said(tmp_path, "run a like base_run { substitute one {} } run b like a { substitute one {} }")
+        == """\
 error[D053]: substitute `one` is in run `a` already
  --> deck.ic:1:58
   |
@@ -510,19 +570,33 @@ error[D053]: substitute `one` is in run `a` already
   = help: leave out the word `substitute` to change it
   = help: `remove one;` first, to put another in its place
 """
+    )
 
 
 BELONGS = "  = help: `substitute JOINT { ... }`, in a run, puts a joint's motor on a bed\n"
 
 
-@pytest.mark.parametrize(("more", "first", "last"), [
-    ("substitute one {}", "error[D045]: no kind of definition `substitute`", "kinds: arm, servo, run, sweep"),
-    ("arm b like chain { substitute one {} }", "error[D082]: no `substitute` in an arm", "an arm holds links and joints"),
-    ("servo c like drive { substitute one {} }", "error[D141]: no `substitute` in servo `c`",
-     "it has: ratio, kp, ki, v_max, k_position, resistance, kt, tau_max, j_m, f_c, f_v, friction, f_s, rate_s, sigma_0, sigma_1, model, command, rate"),
-    ("sweep s of base_run { substitute one {} }", "error[D136]: no `substitute one` in a sweep",
-     "a sweep has: vary, zip, from, sample, repeat, exclude when, seed, seeds"),
-])
+@pytest.mark.parametrize(
+    ("more", "first", "last"),
+    [
+        ("substitute one {}", "error[D045]: no kind of definition `substitute`", "kinds: arm, servo, run, sweep"),
+        (
+            "arm b like chain { substitute one {} }",
+            "error[D082]: no `substitute` in an arm",
+            "an arm holds links and joints",
+        ),
+        (
+            "servo c like drive { substitute one {} }",
+            "error[D141]: no `substitute` in servo `c`",
+            "it has: ratio, kp, ki, v_max, k_position, resistance, kt, tau_max, j_m, f_c, f_v, friction, f_s, rate_s, sigma_0, sigma_1, model, command, rate",
+        ),
+        (
+            "sweep s of base_run { substitute one {} }",
+            "error[D136]: no `substitute one` in a sweep",
+            "a sweep has: vary, zip, from, sample, repeat, exclude when, seed, seeds",
+        ),
+    ],
+)
 def test_outside_of_a_run(more: str, first: str, last: str, tmp_path: Path) -> None:
     at = more.index("substitute")
     marked = "^" * len("substitute" if at == 0 else "substitute one")

@@ -40,7 +40,9 @@ def test_the_decks_that_the_next_tests_break_are_sound(tmp_path: Path) -> None:
 
 def test_an_unknown_key_of_a_definition_that_three_joints_use(tmp_path: Path) -> None:
     servo = changed(SERVO, ("ratio = 100;", "ratio = 100; kpp = 3;"))
-    assert shown(tmp_path, ARM, servo, SLIDE, RUN, SWEEP) == """\
+    assert (
+        shown(tmp_path, ARM, servo, SLIDE, RUN, SWEEP)
+        == """\
 error[D141]: servo `drive` has no `kpp`
   --> deck.ic:11:18
    |
@@ -48,7 +50,8 @@ error[D141]: servo `drive` has no `kpp`
    |                  ^^^
    = help: did you mean `kp`?
    = help: it has: ratio, kp, ki, v_max, k_position, resistance, kt, tau_max, j_m, f_c, f_v, friction, model, command, rate
-"""  # noqa: E501
+"""
+    )
 
 
 def test_two_unknown_keys_are_two_mistakes(tmp_path: Path) -> None:
@@ -58,7 +61,9 @@ def test_two_unknown_keys_are_two_mistakes(tmp_path: Path) -> None:
 
 def test_a_missing_parameter_of_a_definition_that_two_joints_use(tmp_path: Path) -> None:
     run = changed(RUN, ("lift = slide;", ""))
-    assert shown(tmp_path, ARM, changed(SERVO, ("v_max = 24 V;", "")), run) == """\
+    assert (
+        shown(tmp_path, ARM, changed(SERVO, ("v_max = 24 V;", "")), run)
+        == """\
 error[D075]: servo `drive` has no `v_max`
  --> deck.ic:9:1
   |
@@ -66,6 +71,7 @@ error[D075]: servo `drive` has no `v_max`
   | ^^^^^^^^^^^
   = help: write `v_max = ... V;` (largest voltage of the drive's amplifier)
 """
+    )
 
 
 def test_a_missing_parameter_is_told_of_the_base_and_not_of_what_is_like_it(tmp_path: Path) -> None:
@@ -94,7 +100,9 @@ def test_a_channel_that_is_none_of_a_run_and_of_its_sweep(tmp_path: Path) -> Non
 def test_of_one_rate_that_is_too_slow_for_several_servos_the_fastest_is_named(tmp_path: Path) -> None:
     stiff = changed(SLIDE, ("ratio", "kt = 0.1 N*m/A; ratio"))
     run = changed(RUN, ("dynamics = 1 kHz; servos = 1 kHz; record = 100 Hz", "dynamics = 10 Hz; servos = 10 Hz"))
-    assert shown(tmp_path, ARM, SERVO, stiff, run) == """\
+    assert (
+        shown(tmp_path, ARM, SERVO, stiff, run)
+        == """\
 error[D104]: servo `slide` is unstable with modified_euler at this rate of the dynamics
   --> deck.ic:19:24
    |
@@ -102,6 +110,7 @@ error[D104]: servo `slide` is unstable with modified_euler at this rate of the d
    |                        ^^^^^ h * lambda = 10; the slowest rate that fits is 60 Hz
    = help: h * lambda must stay below 2; lambda is the servo's fastest rate constant, on any arm
 """
+    )
 
 
 def test_a_duration_that_is_out_of_range_is_used_by_no_run_like_the_one_that_writes_it(tmp_path: Path) -> None:

@@ -14,8 +14,6 @@ from met.plan import file as plan_file
 from met.plan.keys import case_ids, structure_key
 from tests.ic import small_decks
 
-# ruff: noqa: E501 - messages are as wide as they are
-
 DECK = """\
 arm chain {
     link a { mass = 2 kg; shape = rod(length = 1 m, along = x); }
@@ -175,7 +173,9 @@ def test_what_is_wrong(told: Callable[..., str], body: str, message: str) -> Non
 
 def test_one_that_is_taken_over_and_not_recorded_any_more(told: Callable[..., str]) -> None:
     body = deck("one.qd = 1 rad/s;") + "run third like other { record = [q]; }\n"
-    assert told(body) == """\
+    assert (
+        told(body)
+        == """\
 error[D237]: no signal or metric `one.qd` here that could differ
   --> deck.ic:16:18
    |
@@ -186,6 +186,7 @@ error[D237]: no signal or metric `one.qd` here that could differ
 
 1 error
 """
+    )
 
 
 @pytest.mark.parametrize(("sweep", "message"), [

@@ -20,7 +20,6 @@ from tests.ic.small_decks import ARM, RUN, changed, check, experiment, told
 
 DEGREES = parse_unit("deg")  # rounded once, which numpy's radians are not
 
-# ruff: noqa: E501 - messages are as wide as they are
 
 def parameters(made: Experiment) -> dict[str, Any]:
     head = "hinge.servo.command."
@@ -51,7 +50,9 @@ def test_the_files_name_may_stand_alone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("written", ["other", '"other"'])
 def test_another_column_is_taken_by_its_name(tmp_path: Path, written: str) -> None:
-    found = parameters(read(tmp_path, MOVES, f'trajectory(file = "moves.csv", column = {written}, interpolation = cubic)'))
+    found = parameters(
+        read(tmp_path, MOVES, f'trajectory(file = "moves.csv", column = {written}, interpolation = cubic)')
+    )
     assert found["values"] == (1.0, 2.0, -0.3) and found["interpolation"] == "cubic"
 
 
@@ -102,7 +103,9 @@ def test_the_file_is_kept_whole_and_the_plan_runs_without_it(tmp_path: Path) -> 
     (tmp_path / "moves.csv").unlink()
     again = plan_file.read(tmp_path / "plan.json")
     assert again == plan
-    np.testing.assert_array_equal(engine.run(again.experiments[0]).signals["q"], engine.run(plan.experiments[0]).signals["q"])
+    np.testing.assert_array_equal(
+        engine.run(again.experiments[0]).signals["q"], engine.run(plan.experiments[0]).signals["q"]
+    )
 
 
 def test_the_values_come_from_the_column(tmp_path: Path) -> None:
@@ -140,8 +143,12 @@ def test_a_servo_is_asked_for_the_curve_of_each_case_at_every_tick(tmp_path: Pat
 
 def test_a_sweep_may_move_the_beginning_and_nothing_of_the_file(tmp_path: Path) -> None:
     (tmp_path / "moves.csv").write_text(MOVES)
-    sweep = "sweep several of hold { vary hinge.servo.command.values = [1, 2] rad; vary drive.command.begin = [0, 1] s; }\n"
-    assert told(check(tmp_path, ARM, servo(), RUN, sweep, select=["several"])) == """\
+    sweep = (
+        "sweep several of hold { vary hinge.servo.command.values = [1, 2] rad; vary drive.command.begin = [0, 1] s; }\n"
+    )
+    assert (
+        told(check(tmp_path, ARM, servo(), RUN, sweep, select=["several"]))
+        == """\
 error[D122]: `hinge.servo.command.values` cannot vary
   --> deck.ic:18:30
    |
@@ -151,3 +158,4 @@ error[D122]: `hinge.servo.command.values` cannot vary
 
 1 error
 """
+    )

@@ -10,8 +10,6 @@ from met.diagnostic import Problem
 from met.plan import file as plan_file
 from tests.ic.small_decks import ARM, RUN, changed, check, codes, told
 
-# ruff: noqa: E501 - messages are as wide as they are
-
 IDEAL = "servo drive { model = ideal; bandwidth = 2 1/s; command = position(0 rad); }\n"
 PUSHED = changed(RUN, ("duration", "environment { push = wrench { link = bar; force = [1, 0, 0] N; }; }\n    duration"))
 
@@ -22,7 +20,9 @@ def shown(folder: Path, *parts: str) -> str:
 
 
 def test_a_bandwidth_of_zero_never_moves_the_joint(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, changed(IDEAL, ("2 1/s", "0 1/s")), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, changed(IDEAL, ("2 1/s", "0 1/s")), RUN)
+        == """\
 error[D077]: `bandwidth` of servo `drive` must be above 0 1/s under a position command
  --> deck.ic:5:42
   |
@@ -30,11 +30,14 @@ error[D077]: `bandwidth` of servo `drive` must be above 0 1/s under a position c
   |                                          ^^^^^ this is 0 1/s
   = help: write a number above 0 1/s (how fast an error dies away, used under a rate or position command)
 """
+    )
 
 
 def test_a_bandwidth_of_zero_in_a_sweep_names_the_case(tmp_path: Path) -> None:
     sweep = "sweep widths of hold { vary drive.bandwidth = [1, 0] 1/s; }\n"
-    assert shown(tmp_path, ARM, changed(IDEAL, ("position(0 rad)", "rate(1 rad/s)")), RUN, sweep) == """\
+    assert (
+        shown(tmp_path, ARM, changed(IDEAL, ("position(0 rad)", "rate(1 rad/s)")), RUN, sweep)
+        == """\
 error[D077]: `bandwidth` of servo `drive` must be above 0 1/s under a rate command; case #1 breaks it
   --> deck.ic:13:29
    |
@@ -43,6 +46,7 @@ error[D077]: `bandwidth` of servo `drive` must be above 0 1/s under a rate comma
    = help: case #1: drive.bandwidth = 0 1/s
    = help: write a number above 0 1/s (how fast an error dies away, used under a rate or position command)
 """
+    )
 
 
 def test_under_an_acceleration_command_a_bandwidth_of_zero_is_as_good_as_any(tmp_path: Path) -> None:
@@ -72,7 +76,9 @@ def test_a_wrench_that_can_never_act_is_told(tmp_path: Path, written: str, line:
 
 
 def test_the_place_of_a_wrench_that_never_acts_is_what_says_so(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, IDEAL, changed(PUSHED, ("force = [1, 0, 0] N", "force = [1, 0, 0] N; from = 5 s"))) == """\
+    assert (
+        shown(tmp_path, ARM, IDEAL, changed(PUSHED, ("force = [1, 0, 0] N", "force = [1, 0, 0] N; from = 5 s")))
+        == """\
 warning[D168]: environment `push` never acts: it would begin at 5 s, and the run ends at 1 s
   --> deck.ic:10:75
    |
@@ -80,6 +86,7 @@ warning[D168]: environment `push` never acts: it would begin at 5 s, and the run
    |                                                                           ^^^
    = help: change that, or leave it out
 """
+    )
 
 
 def test_a_wrench_that_acts_or_that_a_sweep_varies_is_none(tmp_path: Path) -> None:
@@ -91,7 +98,9 @@ def test_a_wrench_that_acts_or_that_a_sweep_varies_is_none(tmp_path: Path) -> No
 
 def test_a_position_command_that_begins_elsewhere_than_its_joint(tmp_path: Path) -> None:
     run = changed(RUN, ("duration", "initial { hinge.q = 10 deg; }\n    duration"))
-    assert shown(tmp_path, ARM, changed(IDEAL, ("0 rad", "0.5 rad")), run) == """\
+    assert (
+        shown(tmp_path, ARM, changed(IDEAL, ("0 rad", "0.5 rad")), run)
+        == """\
 warning[D169]: the command of joint `hinge` begins at 0.5 rad, and the joint at 0.174533 rad: it jumps
  --> deck.ic:5:68
   |
@@ -100,6 +109,7 @@ warning[D169]: the command of joint `hinge` begins at 0.5 rad, and the joint at 
  ::: deck.ic:10:25  the joint begins here
   = help: write `hinge.q = 0.5 rad;` in `initial`, or begin the command elsewhere
 """
+    )
 
 
 def test_what_to_write_is_in_the_unit_that_the_deck_wrote(tmp_path: Path) -> None:
@@ -117,19 +127,24 @@ def test_what_to_write_is_in_the_unit_that_the_deck_wrote(tmp_path: Path) -> Non
     ("step(to = 1 rad, at = 0.5 s)", False),
     ("5e-10 rad", False),
 ])  # fmt: skip
-def test_a_course_jumps_where_its_value_at_the_start_is_not_the_joints(tmp_path: Path, course: str, jumps: bool) -> None:
+def test_a_course_jumps_where_its_value_at_the_start_is_not_the_joints(
+    tmp_path: Path, course: str, jumps: bool
+) -> None:
     assert codes(tmp_path, ARM, changed(IDEAL, ("0 rad", course)), RUN) == ["D169"] * jumps
 
 
-@pytest.mark.parametrize(("asked", "begins", "jumps"), [
-    ("30 deg", "0.523599 rad", False),  # six digits, as they are printed
-    ("0.3 deg", "0.1 deg + 0.2 deg", False),
-    ("720 deg", "2 cycle", False),
-    ("12.5664 rad", "2 cycle", False),
-    ("30 deg", "0.52361 rad", True),
-    ("1.00002 rad", "1 rad", True),
-    ("2e-9 rad", "0 rad", True),
-])
+@pytest.mark.parametrize(
+    ("asked", "begins", "jumps"),
+    [
+        ("30 deg", "0.523599 rad", False),  # six digits, as they are printed
+        ("0.3 deg", "0.1 deg + 0.2 deg", False),
+        ("720 deg", "2 cycle", False),
+        ("12.5664 rad", "2 cycle", False),
+        ("30 deg", "0.52361 rad", True),
+        ("1.00002 rad", "1 rad", True),
+        ("2e-9 rad", "0 rad", True),
+    ],
+)
 def test_what_is_the_same_place_to_rounding_is_no_jump(tmp_path: Path, asked: str, begins: str, jumps: bool) -> None:
     run = changed(RUN, ("duration", f"initial {{ hinge.q = {begins}; }}\n    duration"))
     assert codes(tmp_path, ARM, changed(IDEAL, ("0 rad", asked)), run) == ["D169"] * jumps
@@ -138,8 +153,10 @@ def test_what_is_the_same_place_to_rounding_is_no_jump(tmp_path: Path, asked: st
 def test_of_what_a_sweep_varies_and_of_a_real_servo_nothing_is_said(tmp_path: Path) -> None:
     sweep = "sweep starts of hold { vary initial.hinge.q = [0.1, 0.2] rad; }\n"
     assert codes(tmp_path, ARM, IDEAL, RUN, sweep, select=["starts"]) == []
-    gearbox = ("servo drive { model = rigid_gearbox; ratio = 100; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm;"
-               " kt = 0.05 N*m/A; tau_max = 1 N*m; j_m = 1e-4 kg*m^2; k_position = 5 1/s; command = position(1 rad); }\n")
+    gearbox = (
+        "servo drive { model = rigid_gearbox; ratio = 100; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm;"
+        " kt = 0.05 N*m/A; tau_max = 1 N*m; j_m = 1e-4 kg*m^2; k_position = 5 1/s; command = position(1 rad); }\n"
+    )
     assert codes(tmp_path, ARM, gearbox, RUN) == []
 
 

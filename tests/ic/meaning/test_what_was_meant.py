@@ -6,14 +6,18 @@ from pathlib import Path
 
 from tests.ic.small_decks import ARM, RUN, changed, check, told
 
-# ruff: noqa: E501 - messages are as wide as they are
-
 IDEAL = "servo drive { model = ideal; bandwidth = 2 1/s; command = position(0 rad); }\n"
-ARMS = changed(ARM, ("axis = z; }", """axis = z; }
+ARMS = changed(
+    ARM,
+    (
+        "axis = z; }",
+        """axis = z; }
     link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }
     link end { mass = 1 kg; shape = sphere(radius = 1 cm); }
     joint wrist revolute { parent = bar; child = end; axis = z; }
-    joint glue  fixed    { parent = bar; child = tip; }"""))
+    joint glue  fixed    { parent = bar; child = tip; }""",
+    ),
+)
 
 
 def shown(folder: Path, *parts: str) -> str:
@@ -22,7 +26,9 @@ def shown(folder: Path, *parts: str) -> str:
 
 
 def test_a_wrong_unit_of_a_vector_is_told_once(tmp_path: Path) -> None:
-    assert shown(tmp_path, changed(ARM, ("axis = z;", "axis = z; at = [1, 2, 3] s;")), IDEAL, RUN) == """\
+    assert (
+        shown(tmp_path, changed(ARM, ("axis = z;", "axis = z; at = [1, 2, 3] s;")), IDEAL, RUN)
+        == """\
 error[D061]: `at` of joint `hinge` is in m, and this is in s
  --> deck.ic:3:71
   |
@@ -30,10 +36,13 @@ error[D061]: `at` of joint `hinge` is in m, and this is in s
   |                                                                       ^^^^^^^^^
   = help: write it in m, km, cm, mm or um
 """
+    )
 
 
 def test_a_course_without_a_kind_of_command(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, changed(IDEAL, ("position(0 rad)", 'trajectory("f.csv")')), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, changed(IDEAL, ("position(0 rad)", 'trajectory("f.csv")')), RUN)
+        == """\
 error[D152]: `trajectory` is a course in time, and a command is of a kind
  --> deck.ic:5:59
   |
@@ -42,10 +51,13 @@ error[D152]: `trajectory` is a course in time, and a command is of a kind
   = help: write `position(trajectory(...))`
   = help: ideal takes rate(...), position(...), acceleration(...)
 """
+    )
 
 
 def test_a_course_of_named_values_without_a_kind_of_command(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARM, changed(IDEAL, ("position(0 rad)", "trapezoid(to = 1 rad)")), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, changed(IDEAL, ("position(0 rad)", "trapezoid(to = 1 rad)")), RUN)
+        == """\
 error[D152]: `trapezoid` is a course in time, and a command is of a kind
  --> deck.ic:5:59
   |
@@ -54,11 +66,14 @@ error[D152]: `trapezoid` is a course in time, and a command is of a kind
   = help: write `position(trapezoid(...))`
   = help: ideal takes rate(...), position(...), acceleration(...)
 """
+    )
 
 
 def test_a_rate_in_degrees(tmp_path: Path) -> None:
     course = "trapezoid(to = 1 rad, max_rate = 60 deg, max_acceleration = 1 rad/s^2)"
-    assert shown(tmp_path, ARM, changed(IDEAL, ("0 rad", course)), RUN) == """\
+    assert (
+        shown(tmp_path, ARM, changed(IDEAL, ("0 rad", course)), RUN)
+        == """\
 error[D061]: `max_rate` of `trapezoid` is in rad/s, and this is in rad
  --> deck.ic:5:101
   |
@@ -66,10 +81,13 @@ error[D061]: `max_rate` of `trapezoid` is in rad/s, and this is in rad
   |                                            ^^^^^^
   = help: write it in rad/s, deg/s or rpm
 """
+    )
 
 
 def test_a_jacobian_of_a_joint_that_does_not_carry_the_link(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARMS, IDEAL, changed(RUN, ("[q]", "[links.tip.jacobian.linear.wrist.z]"))) == """\
+    assert (
+        shown(tmp_path, ARMS, IDEAL, changed(RUN, ("[q]", "[links.tip.jacobian.linear.wrist.z]")))
+        == """\
 error[D125]: no channel `links.tip.jacobian.linear.wrist.z`
   --> deck.ic:15:15
    |
@@ -77,10 +95,13 @@ error[D125]: no channel `links.tip.jacobian.linear.wrist.z`
    |               ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
    = help: joint `wrist` does not carry link `tip`, so it does not move it
 """
+    )
 
 
 def test_a_reaction_of_a_fixed_joint(tmp_path: Path) -> None:
-    assert shown(tmp_path, ARMS, IDEAL, changed(RUN, ("[q]", "[glue.reaction]"))) == """\
+    assert (
+        shown(tmp_path, ARMS, IDEAL, changed(RUN, ("[q]", "[glue.reaction]")))
+        == """\
 error[D125]: no channel `glue.reaction`
   --> deck.ic:15:15
    |
@@ -88,13 +109,19 @@ error[D125]: no channel `glue.reaction`
    |               ^^^^^^^^^^^^^
    = help: joint `glue` is fixed: its two links move as one body, and nothing is computed between them; what they take shows in the reaction of the moving joint that carries them
 """
+    )
 
 
 def test_uses_of_a_macro_that_was_refused_are_silent(tmp_path: Path) -> None:
     macros = "#define BAR(NAME, m) link NAME { mass = m; shape = rod(length = 1 m, along = x); }\n#define s(X) 3 X\n"
-    arm = changed(ARM, ("link bar { mass = 2 kg; shape = rod(length = 1 m, along = x); }", "BAR(bar,\n        2 kg)"),
-                  ("axis = z;", "axis = z; at = [0 m, s(m), 0 m];"))
-    assert shown(tmp_path, macros, arm, IDEAL, RUN) == """\
+    arm = changed(
+        ARM,
+        ("link bar { mass = 2 kg; shape = rod(length = 1 m, along = x); }", "BAR(bar,\n        2 kg)"),
+        ("axis = z;", "axis = z; at = [0 m, s(m), 0 m];"),
+    )
+    assert (
+        shown(tmp_path, macros, arm, IDEAL, RUN)
+        == """\
 error[D011]: a macro's parameter cannot be called `m`: in its body that is the unit metre
  --> deck.ic:1:19
   |
@@ -110,6 +137,7 @@ error[D011]: a macro cannot be called `s`: that is the unit second
   |         ^
   = help: it would replace the unit in every quantity after it: `2 s` would lose its unit
 """
+    )
 
 
 def test_a_name_that_was_refused_may_be_defined_soundly_after(tmp_path: Path) -> None:

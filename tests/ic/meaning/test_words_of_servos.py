@@ -13,7 +13,9 @@ CURVED = changed(SERVO, ("j_m", "friction = stribeck;  f_c = 0.01 N*m;  f_s = 0.
 
 def test_a_parameter_of_another_word_is_told_with_the_words_that_have_it(tmp_path: Path) -> None:
     coulomb = changed(CURVED, ("friction = stribeck", "friction = coulomb"))
-    assert told(check(tmp_path, ARM, coulomb, RUN)).split("\n\n")[0] == """\
+    assert (
+        told(check(tmp_path, ARM, coulomb, RUN)).split("\n\n")[0]
+        == """\
 error[D141]: servo `drive` has no `f_s` with `friction = coulomb`
  --> deck.ic:8:60
   |
@@ -21,6 +23,7 @@ error[D141]: servo `drive` has no `f_s` with `friction = coulomb`
   |                                                            ^^^
  ::: deck.ic:8:33  chosen here
   = help: it is there with `friction = stribeck;` or `friction = lugre;`"""
+    )
     assert codes(tmp_path, ARM, changed(CURVED, ("friction = stribeck;", "")), RUN) == ["D141", "D141"]
 
 
@@ -79,7 +82,9 @@ def test_the_gains_of_a_continuous_law_count_for_its_stability(tmp_path: Path) -
 def test_a_wrong_word_is_told_once_and_nothing_of_what_depends_on_it(used: bool, tmp_path: Path) -> None:
     wrong = changed(CURVED, ("friction = stribeck", "friction = stribek"))
     servos = wrong if used else wrong.replace("servo drive", "servo other") + SERVO
-    assert told(check(tmp_path, ARM, servos, RUN)) == f"""\
+    assert (
+        told(check(tmp_path, ARM, servos, RUN))
+        == f"""\
 error[D076]: `friction` of servo `{"drive" if used else "other"}` cannot be `stribek`
  --> deck.ic:8:33
   |
@@ -90,10 +95,13 @@ error[D076]: `friction` of servo `{"drive" if used else "other"}` cannot be `str
 
 1 error
 """
+    )
 
 
 def test_a_word_in_quotes_is_told_once(tmp_path: Path) -> None:
-    assert told(check(tmp_path, ARM, changed(CURVED, ("= stribeck", '= "stribeck"')), RUN)) == """\
+    assert (
+        told(check(tmp_path, ARM, changed(CURVED, ("= stribeck", '= "stribeck"')), RUN))
+        == """\
 error[D076]: `friction` of servo `drive` is a word, without quotes
  --> deck.ic:8:33
   |
@@ -103,12 +111,15 @@ error[D076]: `friction` of servo `drive` is a word, without quotes
 
 1 error
 """
+    )
 
 
 def test_a_ratio_whose_square_is_nothing_is_infinitely_fast(tmp_path: Path) -> None:
     elastic = "compliant_gearbox; stiffness = 9 N*m/rad; damping = 1 N*m*s/rad"
     geared = changed(SERVO, ("rigid_gearbox", elastic), ("100", "1e-200"))
-    assert told(check(tmp_path, ARM, geared, RUN)) == """\
+    assert (
+        told(check(tmp_path, ARM, geared, RUN))
+        == """\
 error[D104]: servo `drive` is unstable with modified_euler at this rate of the dynamics
   --> deck.ic:14:24
    |
@@ -118,3 +129,4 @@ error[D104]: servo `drive` is unstable with modified_euler at this rate of the d
 
 1 error
 """
+    )

@@ -92,7 +92,9 @@ def test_what_is_too_large_is_told_where_it_becomes_so(desk: Desk, title: str) -
 
 
 def test_many_includes_are_told_at_the_one_that_is_too_many(desk: Desk) -> None:
-    assert desk.told("\n" + '#include "b.ic"\n' * 2_001, (), {"b.ic": ""}) == """\
+    assert (
+        desk.told("\n" + '#include "b.ic"\n' * 2_001, (), {"b.ic": ""})
+        == """\
 error[D018]: more than 2000 files are included
     --> a.ic:2002:10
      |
@@ -101,6 +103,7 @@ error[D018]: more than 2000 files are included
 
 1 error
 """
+    )
 
 
 def test_after_thirty_errors_the_rest_is_not_read(desk: Desk) -> None:

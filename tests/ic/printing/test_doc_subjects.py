@@ -62,12 +62,16 @@ def test_every_word_of_values_and_sweeps_is_said(subject: str, capsys: pytest.Ca
     told = {each["name"]: each for each in json.loads(printed(capsys, subject, "--format", "json"))}
     assert set(WORDS[subject]) <= set(told) <= {*WORDS[subject], *CONSTANTS}
     lines = printed(capsys, subject).splitlines()
-    assert all(any(line.split() == [*each["written"].split(), *each["doc"].split()] for line in lines)
-               for each in told.values())
+    assert all(
+        any(line.split() == [*each["written"].split(), *each["doc"].split()] for line in lines)
+        for each in told.values()
+    )
 
 
 def test_distributions_are_shown_with_what_they_take(capsys: pytest.CaptureFixture[str]) -> None:
-    assert printed(capsys, "distributions") == """\
+    assert (
+        printed(capsys, "distributions")
+        == """\
 distributions: what a parameter of a sample is drawn from
 
 In a deck: sample lhs(200) { PATH = uniform(0.09, 0.11) N*m/A; }
@@ -79,6 +83,7 @@ In a deck: sample lhs(200) { PATH = uniform(0.09, 0.11) N*m/A; }
 
 The unit behind the brackets is for all numbers inside. Values are rounded to 12 digits in it.
 """
+    )
 
 
 ENTRY = """\
@@ -113,7 +118,9 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_code_is_explained_by_its_entry_on_the_page(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert printed(capsys, "d060") == """\
+    assert (
+        printed(capsys, "d060")
+        == """\
 D060: a unit is needed
 
 A number where a dimension belongs.
@@ -122,24 +129,31 @@ A number where a dimension belongs.
 
     error[D060]: no
 """
+    )
     assert printed(capsys, "D061") == printed(capsys, "d61") == "D061: another\n"
 
 
 def test_a_code_without_an_entry_or_a_page_is_told(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert complained(capsys, "D062") == """\
+    assert (
+        complained(capsys, "D062")
+        == """\
 error[D171]: no message has the code `D062`, or none that needs an entry
  = help: did you mean `D061`?
  = help: a code is printed with its message, as in `error[D060]`
 
 1 error
 """
+    )
     page.unlink()
-    assert complained(capsys, "D060") == """\
+    assert (
+        complained(capsys, "D060")
+        == """\
 error[D171]: the page that explains `D060` is not installed with MET
  = help: the entry of every code is in docs/diagnostics.md of a checkout
 
 1 error
 """
+    )
 
 
 def test_a_code_that_no_deck_brings_about_is_explained_by_its_row(capsys: pytest.CaptureFixture[str]) -> None:
@@ -148,12 +162,15 @@ def test_a_code_that_no_deck_brings_about_is_explained_by_its_row(capsys: pytest
 
 @pytest.mark.parametrize(("words", "whole"), [(("channels", "q"), "channels"), (("ideal", "servo"), "servo ideal")])
 def test_a_word_too_many_is_told(words: tuple[str, str], whole: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert complained(capsys, *words) == f"""\
+    assert (
+        complained(capsys, *words)
+        == f"""\
 error[D171]: `{words[0]}` takes no second word
  = help: `met doc {whole}` says it all
 
 1 error
 """
+    )
 
 
 def test_the_page_of_this_checkout_is_found(capsys: pytest.CaptureFixture[str]) -> None:

@@ -24,26 +24,31 @@ def deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def explained(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, object]:
     """What is said of one path, as JSON: path and value, and the line where it is written."""
     assert cli.main(["explain", *words, "--format", "json"]) == 0
-    return {each["path"]: (each["value"], each["unit"], (each["place"] or {}).get("line"))
-            for each in json.loads(capsys.readouterr().out)}
+    return {
+        each["path"]: (each["value"], each["unit"], (each["place"] or {}).get("line"))
+        for each in json.loads(capsys.readouterr().out)
+    }
 
 
-@pytest.mark.parametrize(("path", "value", "unit", "line"), [
-    ("links.bar.shape.length", 1.0, "m", 2),
-    ("links.bar.shape.along", "x", "", 2),
-    ("arm", "swing", "", 12),
-    ("duration", 1.0, "s", 15),
-    ("rates.dynamics", 1000.0, "Hz", 14),
-    ("rates.base", 1000.0, "Hz", None),
-    ("hinge.servo.rate", 1000.0, "Hz", None),
-    ("hinge.servo.model", "rigid_gearbox", "", 6),
-    ("hinge.parent", "base", "", 3),
-    ("servos.hinge", "drive", "", 13),
-    ("environment.velocity_products", "on", "", None),
-    ("integrator", "modified_euler", "", None),
-    ("record", "q", "", 16),
-    ("seed", 0.0, "1", None),
-])
+@pytest.mark.parametrize(
+    ("path", "value", "unit", "line"),
+    [
+        ("links.bar.shape.length", 1.0, "m", 2),
+        ("links.bar.shape.along", "x", "", 2),
+        ("arm", "swing", "", 12),
+        ("duration", 1.0, "s", 15),
+        ("rates.dynamics", 1000.0, "Hz", 14),
+        ("rates.base", 1000.0, "Hz", None),
+        ("hinge.servo.rate", 1000.0, "Hz", None),
+        ("hinge.servo.model", "rigid_gearbox", "", 6),
+        ("hinge.parent", "base", "", 3),
+        ("servos.hinge", "drive", "", 13),
+        ("environment.velocity_products", "on", "", None),
+        ("integrator", "modified_euler", "", None),
+        ("record", "q", "", 16),
+        ("seed", 0.0, "1", None),
+    ],
+)
 def test_a_setting_of_a_run_can_be_asked_for(
     path: str, value: object, unit: str, line: int | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -61,11 +66,7 @@ def test_a_metric_is_written_where_its_model_and_its_channel_are(capsys: pytest.
 def test_explain_shows_a_setting_as_it_shows_a_parameter(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["explain", "a.ic", "duration"]) == 0
     assert capsys.readouterr().out == (
-        "duration = 1 s\n"
-        "  --> a.ic:15:16\n"
-        "   |\n"
-        "15 |     duration = 1 s;\n"
-        "   |                ^^^ written here\n"
+        "duration = 1 s\n  --> a.ic:15:16\n   |\n15 |     duration = 1 s;\n   |                ^^^ written here\n"
     )
     assert cli.main(["explain", "a.ic", "integrator"]) == 0
     assert capsys.readouterr().out == "integrator = modified_euler\n  the default\n"
@@ -96,9 +97,7 @@ error[D170]: `{name}` is a run or a sweep, and no parameter
 
 
 @pytest.mark.parametrize("name", ["swing", "drive"])
-def test_the_name_of_an_arm_or_a_servo_stands_for_what_it_writes(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_name_of_an_arm_or_a_servo_stands_for_what_it_writes(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["explain", "a.ic", name]) == 0
     assert len(capsys.readouterr().out.splitlines()) > 10
 
@@ -142,7 +141,10 @@ def test_the_base_is_explained_of_a_deck_and_of_a_plan(capsys: pytest.CaptureFix
         assert explained(capsys, file, "base")["base"][0] == "prescribed"
         found = explained(capsys, file, "base.x")
         assert {path: value for path, (value, _, _) in found.items()} == {
-            "base.x.amplitude": 0.01, "base.x.frequency": 2.0, "base.x.offset": 0.0, "base.x.phase": 0.0,
+            "base.x.amplitude": 0.01,
+            "base.x.frequency": 2.0,
+            "base.x.offset": 0.0,
+            "base.x.phase": 0.0,
             "base.x.model": "sine",
         }
     assert explained(capsys, "a.ic", "base")["base"][0] == "fixed"

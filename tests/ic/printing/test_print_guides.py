@@ -17,7 +17,8 @@ def test_a_plan_shows_guides_with_their_joints_and_paths(tmp_path: Path) -> None
     compiled = check(tmp_path, DECK)
     assert compiled.plan is not None, told(compiled)
     text = "\n".join(print_plan(compiled.plan))
-    assert """\
+    assert (
+        """\
 Guides: each commands the joints that follow it
   tip   resolved_rate  link = two, point = [1, 0, 0] m, guides = xy, max_damping = 0.1 m, threshold = 0.2 m, gain = 1 1/s, length = 1 m, loop = closed, jacobian = arm
         low            max_rate = inf rad/s
@@ -27,32 +28,46 @@ Guides: each commands the joints that follow it
   move  together       begin = 0 s
         out            to = 0.01 m, max_rate = 0.01 m/s, max_acceleration = 0.01 m/s^2
 
-""" in text  # noqa: E501 - as it is printed
+"""
+        in text
+    )
     assert re.search(r"^  guide tip of low, high +500 Hz  every 2 ticks +501 ticks$", text, re.MULTILINE)
     assert "follow (ideal): rate, tip\n" in text
 
 
 EXPLAINED = [
-    ("guides.tip.gain", """\
+    (
+        "guides.tip.gain",
+        """\
 guides.tip.gain = 1 1/s
   rate per error of the path (resolved_rate)
   the default
-"""),
-    ("tip.high.max_rate", """\
+""",
+    ),
+    (
+        "tip.high.max_rate",
+        """\
 guides.tip.high.max_rate = inf rad/s
   rate that is not exceeded (resolved_rate)
   the default
-"""),
-    ("guides.tip.y.over", """\
+""",
+    ),
+    (
+        "guides.tip.y.over",
+        """\
 guides.tip.y.over = 1 s
   how long the ramp lasts (ramp)
   --> deck.ic:16:86
    |
-"""),
-    ("guides.tip.rate", """\
+""",
+    ),
+    (
+        "guides.tip.rate",
+        """\
 guides.tip.rate = 500 Hz
   computed: 2 base ticks a tick
-"""),
+""",
+    ),
 ]
 
 

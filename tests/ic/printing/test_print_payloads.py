@@ -34,12 +34,15 @@ def test_plan_shows_what_is_carried_grappled_and_released(tmp_path: Path) -> Non
     assert shown(tmp_path, "many")[2] == "  box      5 to 10 kg  hand  3 to 4 s             8 s"
 
 
-@pytest.mark.parametrize(("path", "found"), [
-    ("payloads.box.grapple", ["payloads.box.grapple"]),
-    ("box.grapple", ["payloads.box.grapple"]),
-    ("payloads.tool.on", ["payloads.tool.on"]),
-    ("box.velocity", ["payloads.box.velocity.x", "payloads.box.velocity.y", "payloads.box.velocity.z"]),
-])
+@pytest.mark.parametrize(
+    ("path", "found"),
+    [
+        ("payloads.box.grapple", ["payloads.box.grapple"]),
+        ("box.grapple", ["payloads.box.grapple"]),
+        ("payloads.tool.on", ["payloads.tool.on"]),
+        ("box.velocity", ["payloads.box.velocity.x", "payloads.box.velocity.y", "payloads.box.velocity.z"]),
+    ],
+)
 def test_explain_knows_payloads_by_their_names(tmp_path: Path, path: str, found: list[str]) -> None:
     (tmp_path / "deck.ic").write_text(DECK, encoding="utf-8")
     experiment = with_settings(ic.compile(tmp_path / "deck.ic").experiments[0])

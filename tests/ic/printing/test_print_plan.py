@@ -523,7 +523,9 @@ run r { arm = a; rates { dynamics = 1 kHz; } duration = 1 s; record = [q]; }
 sweep s of r { vary hinge.dh.a = [0.4, 0.6] m; }
 """)
     deck = str(tmp_path / "d.ic")
-    assert printed(capsys, "explain", deck, "hinge.dh.a", "--run", "s") == f"""\
+    assert (
+        printed(capsys, "explain", deck, "hinge.dh.a", "--run", "s")
+        == f"""\
 hinge.dh.a = 0.4 to 0.6 m, varies with the case
  --> {deck}:7:21
   |
@@ -532,6 +534,7 @@ hinge.dh.a = 0.4 to 0.6 m, varies with the case
  ::: {deck}:1:5  span = 0.5 m
  ::: {deck}:4:73  overrides `span`
 """
+    )
     assert complained(capsys, "explain", deck, "hinge.servo", "--run", "r") == (
         "error[D170]: no parameter `hinge.servo` in `r`\n"
         " = help: joint `hinge` has no servo here: it is free\n"
@@ -566,7 +569,8 @@ def test_doc_says_what_denavit_hartenberg_numbers_are(capsys: pytest.CaptureFixt
 def test_a_base_that_moves_is_told(tmp_path: Path) -> None:
     (tmp_path / "deck.ic").write_text(free_flyers.ARM + free_flyers.RUN, encoding="utf-8")
     said = "\n".join(print_plan(ic.compile(tmp_path / "deck.ic")))
-    assert """
+    assert (
+        """
   joint        moves             at             rpy              link   mass   servo
   base         free                                                     40 kg
   └─ shoulder  revolute about z  [0.5, 0, 0] m  [20, 30, 0] deg  upper  10 kg  passive
@@ -577,7 +581,9 @@ Base: moves freely, at the start with
   rpy       [10, 20, 30] deg
   velocity  [0.1, -0.2, 0.3] m/s
   rate      [40, 20, -60] deg/s
-""" in said
+"""
+        in said
+    )
 
 
 def test_a_sweep_of_one_case_shows_the_vectors_that_follow_from_what_varies(

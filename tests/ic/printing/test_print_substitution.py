@@ -10,7 +10,11 @@ import pytest
 from met import cli
 from tests.ic.small_decks import ARM, RUN, SERVO
 
-DECK = ARM + SERVO + RUN + """\
+DECK = (
+    ARM
+    + SERVO
+    + RUN
+    + """\
 default run hybrid like hold {
     substitute hinge {
         bed = emulated(faults = typical, kt = 0.06 N*m/A);
@@ -19,6 +23,7 @@ default run hybrid like hold {
 }
 sweep motors of hybrid { vary hinge.bed.inertia = [1e-4, 2e-4] kg*m^2;  vary hinge.law.band = [0.4, 0.5] rad/s; }
 """
+)
 
 
 @pytest.fixture(autouse=True)

@@ -65,11 +65,15 @@ def test_the_imported_deck_has_the_plan_of_the_file_bit_for_bit(tmp_path: Path) 
     path, deck = tmp_path / "random.urdf", tmp_path / "imported.ic"
     for seed in SEEDS:
         path.write_text(random_urdf(seed), encoding="utf-8")
-        deck.write_text(imported(str(path)) + "run fall_of_file { arm = random; environment { gravity = [0, 0, -9.81] m/s^2; }"
-                        " rates { dynamics = 1 kHz; } duration = 1 ms; record = []; }\n", encoding="utf-8")
+        deck.write_text(
+            imported(str(path)) + "run fall_of_file { arm = random; environment { gravity = [0, 0, -9.81] m/s^2; }"
+            " rates { dynamics = 1 kHz; } duration = 1 ms; record = []; }\n",
+            encoding="utf-8",
+        )
         ours, theirs = made_from(path, tmp_path), ic.compile(deck, select=["fall_of_file"]).experiments[0]
-        assert {path: np.float64(value).tobytes() for path, value in values(ours).items() if isinstance(value, float)} == {
-            path: np.float64(value).tobytes() for path, value in values(theirs).items() if isinstance(value, float)}
+        assert {
+            path: np.float64(value).tobytes() for path, value in values(ours).items() if isinstance(value, float)
+        } == {path: np.float64(value).tobytes() for path, value in values(theirs).items() if isinstance(value, float)}
         assert values(ours) == values(theirs) and bare(ours) == bare(theirs), f"{seed=}"
 
 
@@ -79,21 +83,34 @@ def test_an_inertia_in_turned_axes_is_that_of_the_body(tmp_path: Path) -> None:
     assert bar.inertial is not None
     xx, yy, zz, xy, xz, yz = moments(bar.inertial).values
     R = np.array(rotation(*rpy))
-    np.testing.assert_allclose([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], R @ np.diag([0.1, 0.2, 0.2]) @ R.T, atol=1e-16)
+    np.testing.assert_allclose(
+        [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], R @ np.diag([0.1, 0.2, 0.2]) @ R.T, atol=1e-16
+    )
 
 
-@pytest.mark.parametrize(("written", "axis"), [
-    ('<axis xyz="0 0 1"/>', (0.0, 0.0, 1.0)), ('<axis xyz="0 -1 0"/>', (0.0, -1.0, 0.0)),
-    ('<axis xyz="0 3 4"/>', (0.0, 0.6, 0.8)), ("", (1.0, 0.0, 0.0)), ('<axis rpy="0 0.0 -0" xyz="0 2 0"/>', (0.0, 1.0, 0.0)),
-])
-def test_an_axis_is_made_a_unit_vector_and_is_x_by_itself(written: str, axis: tuple[float, ...], tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("written", "axis"),
+    [
+        ('<axis xyz="0 0 1"/>', (0.0, 0.0, 1.0)),
+        ('<axis xyz="0 -1 0"/>', (0.0, -1.0, 0.0)),
+        ('<axis xyz="0 3 4"/>', (0.0, 0.6, 0.8)),
+        ("", (1.0, 0.0, 0.0)),
+        ('<axis rpy="0 0.0 -0" xyz="0 2 0"/>', (0.0, 1.0, 0.0)),
+    ],
+)
+def test_an_axis_is_made_a_unit_vector_and_is_x_by_itself(
+    written: str, axis: tuple[float, ...], tmp_path: Path
+) -> None:
     found = made(tmp_path, changed(TWO, ('<axis xyz="0 0 1"/>', written)))
     assert [found.parameters[f"hinge.axis.{letter}"].value for letter in "xyz"] == pytest.approx(axis, rel=1e-15)
 
 
 def test_what_a_fixed_joint_says_of_an_axis_does_not_count(tmp_path: Path) -> None:
-    tool = ('</robot>', '<link name="tool"/><joint name="mount" type="fixed"><parent link="bar"/><child link="tool"/>'
-            '<axis xyz="0 0 0"/></joint></robot>')
+    tool = (
+        "</robot>",
+        '<link name="tool"/><joint name="mount" type="fixed"><parent link="bar"/><child link="tool"/>'
+        '<axis xyz="0 0 0"/></joint></robot>',
+    )
     found = made(tmp_path, changed(TWO, tool))
     assert found.parameters["links.tool.mass"].value == 0.0
     assert found.parameters["links.tool.inertia.xx"].value == 0.0
@@ -101,12 +118,20 @@ def test_what_a_fixed_joint_says_of_an_axis_does_not_count(tmp_path: Path) -> No
 
 
 def test_a_file_is_read_with_either_quotes_any_lines_and_comments(tmp_path: Path) -> None:
-    other = TWO.replace('value="2"', "value\n =\n'2'").replace("<link name=\"bar\">", "<!-- <link name='no'/> --><link\tname='bar'>")
-    assert values(made(tmp_path, other.replace("\n", "\r\n"))) == values(made(tmp_path, "\ufeff" + TWO)) == values(made(tmp_path))
+    other = TWO.replace('value="2"', "value\n =\n'2'").replace(
+        '<link name="bar">', "<!-- <link name='no'/> --><link\tname='bar'>"
+    )
+    assert (
+        values(made(tmp_path, other.replace("\n", "\r\n")))
+        == values(made(tmp_path, "\ufeff" + TWO))
+        == values(made(tmp_path))
+    )
 
 
 def test_numbers_are_placed_where_they_stand(tmp_path: Path) -> None:
-    robot = changed(TWO, ('      <mass value="2"/>', '      <!-- äöü 漢字 --> <mass kg=""\n\tvalue =  "2"/>'.replace(' kg=""', "")))
+    robot = changed(
+        TWO, ('      <mass value="2"/>', '      <!-- äöü 漢字 --> <mass kg=""\n\tvalue =  "2"/>'.replace(' kg=""', ""))
+    )
     place = made(tmp_path, robot).parameters["links.bar.mass"].origin.place
     assert place is not None
     assert (Path(place.file).name, place.line, place.column, place.length) == ("two.urdf", 7, 12, 1)
@@ -116,19 +141,27 @@ def test_numbers_are_placed_where_they_stand(tmp_path: Path) -> None:
 
 
 def test_the_arms_block_overrides_adds_and_removes_as_on_any_base(tmp_path: Path) -> None:
-    deck = changed(DECK, ("{ }", """{
+    deck = changed(
+        DECK,
+        (
+            "{ }",
+            """{
         bar { mass = 3 kg;  remove inertia;  inertia = [1, 1, 1] kg*m^2; }
         hinge { axis = -y; }
         link tip { mass = 0.5 kg;  shape = sphere(radius = 1 cm); }
         joint wrist revolute { parent = bar;  child = tip;  at = [1, 0, 0] m;  axis = x; }
-    }"""))
+    }""",
+        ),
+    )
     found = made(tmp_path, deck=deck)
     assert [joint.name for joint in found.structure.joints] == ["hinge", "wrist"]
     assert found.parameters["links.bar.mass"].value == 3.0
     assert [each.line for each in found.parameters["links.bar.mass"].origin.overrides] == [6]
     assert found.parameters["hinge.axis.y"].value == -1.0
     assert found.parameters["links.bar.com.x"].value == 0.5
-    without = changed(DECK, ("{ }", "{ remove hinge;  joint slide prismatic { parent = base;  child = bar;  axis = z; } }"))
+    without = changed(
+        DECK, ("{ }", "{ remove hinge;  joint slide prismatic { parent = base;  child = bar;  axis = z; } }")
+    )
     assert [joint.name for joint in made(tmp_path, deck=without).structure.joints] == ["slide"]
 
 
@@ -152,9 +185,14 @@ def check_file(folder: Path, deck: str) -> Path:
 
 def test_a_joint_that_follows_another_moves_by_itself_once_its_mimic_is_removed(tmp_path: Path) -> None:
     robot = changed(TWO, ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><mimic joint="other"/>'))
-    assert made(tmp_path, robot, changed(DECK, ("{ }", "{ hinge { remove mimic; } }"))).structure.moving[0].name == "hinge"
+    assert (
+        made(tmp_path, robot, changed(DECK, ("{ }", "{ hinge { remove mimic; } }"))).structure.moving[0].name == "hinge"
+    )
     fixed = "{ remove hinge;  joint hinge fixed { parent = base;  child = bar; }  link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }  joint turn revolute { parent = bar; child = tip; axis = z; } }"
-    assert [joint.kind for joint in made(tmp_path, robot, changed(DECK, ("{ }", fixed))).structure.joints] == ["fixed", "revolute"]
+    assert [joint.kind for joint in made(tmp_path, robot, changed(DECK, ("{ }", fixed))).structure.joints] == [
+        "fixed",
+        "revolute",
+    ]
 
 
 @pytest.mark.parametrize("kind", ["floating", "planar", "spherical"])
@@ -189,7 +227,9 @@ def test_explain_shows_the_files_line(tmp_path: Path) -> None:
 def test_explain_prints_what_a_deck_overrides_of_the_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     check_file(tmp_path, changed(DECK, ("{ }", "{ bar { mass = 3 kg; } }")))
     assert cli.main(["explain", str(tmp_path / "deck.ic"), "links.bar.mass"]) == 0
-    assert capsys.readouterr().out.replace(f"{tmp_path}/", "") == """\
+    assert (
+        capsys.readouterr().out.replace(f"{tmp_path}/", "")
+        == """\
 links.bar.mass = 3 kg
  --> deck.ic:1:46
   |
@@ -197,6 +237,7 @@ links.bar.mass = 3 kg
   |                                              ^^^^ written here
  ::: two.urdf:6:20  overrides `2`
 """
+    )
 
 
 def test_a_file_is_looked_for_beside_the_deck_and_then_where_i_says(tmp_path: Path) -> None:
@@ -234,7 +275,9 @@ RICH = """\
 
 def test_what_is_not_taken_over_and_what_is_called_otherwise_is_told_once_each(tmp_path: Path) -> None:
     deck = DECK.replace("arm two from", "#define NOT_TWICE\narm two from")
-    assert said(tmp_path, RICH, deck) == """\
+    assert (
+        said(tmp_path, RICH, deck)
+        == """\
 warning[D210]: not all that `two.urdf` says is in this arm
  --> deck.ic:2:19
   |
@@ -255,6 +298,7 @@ warning[D211]: 2 names of `two.urdf` are another in decks
  ::: two.urdf:11:16  joint `base` is `base_joint`
   = help: a deck's names are letters, digits and `_`, each once
 """
+    )
 
 
 # Names

@@ -130,9 +130,13 @@ def test_the_deck_is_laid_out_as_met_fmt_would(capsys: pytest.CaptureFixture[str
     assert cli.main(["fmt", "--check", "arm.ic"]) == 0
 
 
-def test_a_joint_that_follows_another_is_refused_until_one_says_what_it_does(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_joint_that_follows_another_is_refused_until_one_says_what_it_does(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert cli.main(["import", "arm.urdf", "-o", "arm.ic"]) == 2
-    assert capsys.readouterr().err == """\
+    assert (
+        capsys.readouterr().err
+        == """\
 error[D213]: joint `finger` follows `roll`, which is not in this version
   --> arm.urdf:23:64
    |
@@ -142,20 +146,25 @@ error[D213]: joint `finger` follows `roll`, which is not in this version
 
 1 error
 """
+    )
     assert not Path("arm.ic").exists()
 
 
 def test_a_joint_that_is_let_go_and_moves_nothing_is_refused() -> None:
     with pytest.raises(Problem) as problem:
         imported("arm.urdf", "free")
-    assert refused(problem.value).startswith("error[D217]: joint `finger` moves nothing that has mass\n  --> arm.urdf:22:16\n")
+    assert refused(problem.value).startswith(
+        "error[D217]: joint `finger` moves nothing that has mass\n  --> arm.urdf:22:16\n"
+    )
 
 
 def test_a_robot_that_is_no_arm_is_told_with_what_a_deck_could_do() -> None:
     Path("two.urdf").write_text(changed(TWO, ('izz="0.2"', 'izz="0.9"')), encoding="utf-8")
     with pytest.raises(Problem) as problem:
         imported("two.urdf")
-    assert refused(problem.value) == """\
+    assert (
+        refused(problem.value)
+        == """\
 error[D087]: the inertia of link `bar` is no body's
  --> two.urdf:7:7
   |
@@ -165,17 +174,21 @@ error[D087]: the inertia of link `bar` is no body's
   = help: products have the sign of -sum(m x y)
   = help: write a deck with `arm NAME from urdf("FILE") { ... }`: its block can change what the file says
 """
+    )
 
 
 def test_a_file_that_is_there_is_left_alone_unless_forced(capsys: pytest.CaptureFixture[str]) -> None:
     Path("arm.ic").write_text("mine", encoding="utf-8")
     assert cli.main(["import", "arm.urdf", "-o", "arm.ic", "--mimic", "fixed"]) == 2
-    assert capsys.readouterr().err == """\
+    assert (
+        capsys.readouterr().err
+        == """\
 error[D216]: `arm.ic` is there already
  = help: --force writes over it, -o names another
 
 1 error
 """
+    )
     assert Path("arm.ic").read_text(encoding="utf-8") == "mine"
     assert cli.main(["import", "arm.urdf", "-o", "arm.ic", "--mimic", "fixed", "--force", "-q"]) == 0
     assert capsys.readouterr() == ("", "")
@@ -200,12 +213,15 @@ def test_neither_the_file_that_is_read_nor_a_folder_is_written_over(
 
 def test_no_such_file(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["import", "leg.urdf"]) == 2
-    assert capsys.readouterr().err == """\
+    assert (
+        capsys.readouterr().err
+        == """\
 error[D001]: cannot read `leg.urdf`: No such file or directory
  = help: look at the name, and at who may read the file
 
 1 error
 """
+    )
 
 
 def test_comments_hold_whatever_a_file_says() -> None:

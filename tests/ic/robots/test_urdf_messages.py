@@ -21,55 +21,82 @@ def no_robot(what: str, text: str | bytes, *, says: str) -> None:
     MISTAKES.append((what, text, says))
 
 
-mistake("a link without a mass", ('      <mass value="2"/>\n', ""), says="""\
+mistake(
+    "a link without a mass",
+    ('      <mass value="2"/>\n', ""),
+    says="""\
 error[D205]: this `<inertial>` has no `<mass>`
  --> two.urdf:4:5
   |
 4 |     <inertial>
   |     ^^^^^^^^^
   = help: write `<mass value="..."/>`
-""")
-mistake("a number with a unit", ('value="2"', 'value="2 kg"'), says="""\
+""",
+)
+mistake(
+    "a number with a unit",
+    ('value="2"', 'value="2 kg"'),
+    says="""\
 error[D206]: `kg` is not a number
  --> two.urdf:6:20
   |
 6 |       <mass value="2 kg"/>
   |                    ^^^^
   = help: a number is finite, and written as 12.5 or -1e-3, without a unit
-""")
-mistake("a number that is none", ('value="2"', 'value="nan"'), says="""\
+""",
+)
+mistake(
+    "a number that is none",
+    ('value="2"', 'value="nan"'),
+    says="""\
 error[D206]: `nan` is not a number
  --> two.urdf:6:20
   |
 6 |       <mass value="nan"/>
   |                    ^^^
   = help: a number is finite, and written as 12.5 or -1e-3, without a unit
-""")
-mistake("a number too large", ('value="2"', 'value="1e999"'), says="""\
+""",
+)
+mistake(
+    "a number too large",
+    ('value="2"', 'value="1e999"'),
+    says="""\
 error[D206]: `1e999` is not a number
  --> two.urdf:6:20
   |
 6 |       <mass value="1e999"/>
   |                    ^^^^^
   = help: a number is finite, and written as 12.5 or -1e-3, without a unit
-""")
-mistake("two numbers for three", ('"0.5 0 0"', '"0.5 0"'), says="""\
+""",
+)
+mistake(
+    "two numbers for three",
+    ('"0.5 0 0"', '"0.5 0"'),
+    says="""\
 error[D206]: 3 numbers are needed in `xyz` of `<origin>`, not 2
  --> two.urdf:5:20
   |
 5 |       <origin xyz="0.5 0" rpy="0 0 0"/>
   |                    ^^^^^
   = help: spaces part the numbers
-""")
-mistake("a mass below zero", ('value="2"', 'value="-2"'), says="""\
+""",
+)
+mistake(
+    "a mass below zero",
+    ('value="2"', 'value="-2"'),
+    says="""\
 error[D077]: `mass` of link `bar` must be at least 0 kg
  --> two.urdf:6:20
   |
 6 |       <mass value="-2"/>
   |                    ^^ this is -2 kg
   = help: write a number of at least 0 kg (mass of the link)
-""")
-mistake("an inertia without mass", ('value="2"', 'value="0"'), says="""\
+""",
+)
+mistake(
+    "an inertia without mass",
+    ('value="2"', 'value="0"'),
+    says="""\
 error[D087]: the inertia of link `bar` is no body's
  --> two.urdf:7:7
   |
@@ -77,16 +104,24 @@ error[D087]: the inertia of link `bar` is no body's
   |       ^^^^^^^^ the link has no mass, and so no inertia
   = help: leave `inertia` out, or write the link's mass
   = help: in the arm's block: `bar { remove inertia; }`
-""")
-mistake("a moment left out", ('ixx="0.1" ', ""), says="""\
+""",
+)
+mistake(
+    "a moment left out",
+    ('ixx="0.1" ', ""),
+    says="""\
 error[D205]: this `<inertia>` has no `ixx`
  --> two.urdf:7:7
   |
 7 |       <inertia iyy="0.2" izz="0.2" ixy="0" ixz="0" iyz="0"/>
   |       ^^^^^^^^
   = help: write `<inertia ixx="..."/>`
-""")
-mistake("an inertia of no body", ('izz="0.2"', 'izz="0.9"'), says="""\
+""",
+)
+mistake(
+    "an inertia of no body",
+    ('izz="0.2"', 'izz="0.9"'),
+    says="""\
 error[D087]: the inertia of link `bar` is no body's
  --> two.urdf:7:7
   |
@@ -95,24 +130,36 @@ error[D087]: the inertia of link `bar` is no body's
   = help: inertia is about the centre of mass, in link axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2
   = help: products have the sign of -sum(m x y)
   = help: in the arm's block: `bar { inertia = [...] kg*m^2; }`
-""")
-mistake("an attribute that says where", ('rpy="0 0 0"', 'quat="1 0 0 0"'), says="""\
+""",
+)
+mistake(
+    "an attribute that says where",
+    ('rpy="0 0 0"', 'quat="1 0 0 0"'),
+    says="""\
 error[D208]: `<origin>` has no attribute `quat`
  --> two.urdf:5:29
   |
 5 |       <origin xyz="0.5 0 0" quat="1 0 0 0"/>
   |                             ^^^^
   = help: it has `xyz`, `rpy`
-""")
-mistake("numbers with commas", ('xyz="0.5 0 0"', 'xyz="0.5, 0, 0"'), says="""\
+""",
+)
+mistake(
+    "numbers with commas",
+    ('xyz="0.5 0 0"', 'xyz="0.5, 0, 0"'),
+    says="""\
 error[D206]: `0.5,` is not a number
  --> two.urdf:5:20
   |
 5 |       <origin xyz="0.5, 0, 0" rpy="0 0 0"/>
   |                    ^^^^^^^^^
   = help: spaces part the numbers, not commas
-""")
-mistake("an attribute misspelt", ('rpy="0 0 0"', 'rpz="0 0 1"'), says="""\
+""",
+)
+mistake(
+    "an attribute misspelt",
+    ('rpy="0 0 0"', 'rpz="0 0 1"'),
+    says="""\
 error[D208]: `<origin>` has no attribute `rpz`
  --> two.urdf:5:29
   |
@@ -120,8 +167,12 @@ error[D208]: `<origin>` has no attribute `rpz`
   |                             ^^^
   = help: did you mean `rpy`?
   = help: it has `xyz`, `rpy`
-""")
-mistake("a child that is not there", ('<child link="bar"/>', '<child link="bra"/>'), says="""\
+""",
+)
+mistake(
+    "a child that is not there",
+    ('<child link="bar"/>', '<child link="bra"/>'),
+    says="""\
 error[D207]: no link `bra` in this file
   --> two.urdf:12:18
    |
@@ -130,24 +181,36 @@ error[D207]: no link `bra` in this file
   ::: two.urdf:10:16  joint `hinge`
    = help: did you mean `bar`?
    = help: links: bar, ground
-""")
-mistake("a joint without a child", ('    <child link="bar"/>\n', ""), says="""\
+""",
+)
+mistake(
+    "a joint without a child",
+    ('    <child link="bar"/>\n', ""),
+    says="""\
 error[D205]: this `<joint>` has no `<child>`
   --> two.urdf:10:3
    |
 10 |   <joint name="hinge" type="revolute">
    |   ^^^^^^
    = help: write `<child link="..."/>`
-""")
-mistake("a joint without a type", (' type="revolute"', ""), says="""\
+""",
+)
+mistake(
+    "a joint without a type",
+    (' type="revolute"', ""),
+    says="""\
 error[D205]: this `<joint>` has no `type`
   --> two.urdf:10:3
    |
 10 |   <joint name="hinge">
    |   ^^^^^^
    = help: write `<joint name="..." type="revolute">`
-""")
-mistake("a type that is none", ("revolute", "revolut"), says="""\
+""",
+)
+mistake(
+    "a type that is none",
+    ("revolute", "revolut"),
+    says="""\
 error[D090]: no kind of joint `revolut`
   --> two.urdf:10:29
    |
@@ -155,8 +218,12 @@ error[D090]: no kind of joint `revolut`
    |                             ^^^^^^^
    = help: did you mean `revolute`?
    = help: write `joint hinge revolute { ... }`, or prismatic, or fixed
-""")
-mistake("a planar joint", ("revolute", "planar"), says="""\
+""",
+)
+mistake(
+    "a planar joint",
+    ("revolute", "planar"),
+    says="""\
 error[D212]: joint `hinge` is planar, and joints are revolute, prismatic or fixed
   --> two.urdf:10:29
    |
@@ -164,8 +231,12 @@ error[D212]: joint `hinge` is planar, and joints are revolute, prismatic or fixe
    |                             ^^^^^^
    = help: two prismatic joints and a revolute one do the same, with links of `mass = 0 kg` between them
    = help: in the arm's block, `remove hinge;` makes room for them
-""")
-mistake("a floating joint", ("revolute", "floating"), says="""\
+""",
+)
+mistake(
+    "a floating joint",
+    ("revolute", "floating"),
+    says="""\
 error[D212]: joint `hinge` is floating, and joints are revolute, prismatic or fixed
   --> two.urdf:10:29
    |
@@ -173,8 +244,12 @@ error[D212]: joint `hinge` is floating, and joints are revolute, prismatic or fi
    |                             ^^^^^^^^
    = help: three prismatic and three revolute joints do the same, with links of `mass = 0 kg` between them
    = help: in the arm's block, `remove hinge;` makes room for them
-""")
-mistake("a joint that follows another", ('<axis xyz="0 0 1"/>', '<mimic joint="other" multiplier="-1"/>'), says="""\
+""",
+)
+mistake(
+    "a joint that follows another",
+    ('<axis xyz="0 0 1"/>', '<mimic joint="other" multiplier="-1"/>'),
+    says="""\
 error[D213]: joint `hinge` follows `other`, which is not in this version
   --> two.urdf:13:19
    |
@@ -182,24 +257,36 @@ error[D213]: joint `hinge` follows `other`, which is not in this version
    |                   ^^^^^
    = help: in the arm's block, `hinge { remove mimic; }` lets it move by itself
    = help: `remove hinge;  joint hinge fixed { ... }` holds it where it is at q = 0
-""")
-mistake("an axis without direction", ("0 0 1", "0 0 0"), says="""\
+""",
+)
+mistake(
+    "an axis without direction",
+    ("0 0 1", "0 0 0"),
+    says="""\
 error[D097]: the axis of joint `hinge` has no direction
   --> two.urdf:13:16
    |
 13 |     <axis xyz="0 0 0"/>
    |                ^^^^^
    = help: write numbers of ordinary size, not all of them zero
-""")
-mistake("negative damping", ('    <axis xyz="0 0 1"/>\n', '    <dynamics damping="-1"/>\n'), says="""\
+""",
+)
+mistake(
+    "negative damping",
+    ('    <axis xyz="0 0 1"/>\n', '    <dynamics damping="-1"/>\n'),
+    says="""\
 error[D206]: `damping` is below 0
   --> two.urdf:13:24
    |
 13 |     <dynamics damping="-1"/>
    |                        ^^
    = help: write 0, or a number above it
-""")
-mistake("two links of one name", ('<link name="ground"/>', '<link name="ground"/>\n  <link name="bar"/>'), says="""\
+""",
+)
+mistake(
+    "two links of one name",
+    ('<link name="ground"/>', '<link name="ground"/>\n  <link name="bar"/>'),
+    says="""\
 error[D204]: link `bar` is there twice
  --> two.urdf:4:15
   |
@@ -207,8 +294,12 @@ error[D204]: link `bar` is there twice
   |               ^^^ again
  ::: two.urdf:3:15  first
   = help: give one of the two another name
-""")
-mistake("two masses", ('<mass value="2"/>', '<mass value="2"/>\n      <mass value="1"/>'), says="""\
+""",
+)
+mistake(
+    "two masses",
+    ('<mass value="2"/>', '<mass value="2"/>\n      <mass value="1"/>'),
+    says="""\
 error[D204]: `<mass>` is there twice in this `<inertial>`
  --> two.urdf:7:7
   |
@@ -216,8 +307,12 @@ error[D204]: `<mass>` is there twice in this `<inertial>`
   |       ^^^^^ again
  ::: two.urdf:6:7  first
   = help: remove one of the two
-""")
-mistake("two bases", ('<link name="ground"/>', '<link name="ground"/>\n  <link name="other"/>'), says="""\
+""",
+)
+mistake(
+    "two bases",
+    ('<link name="ground"/>', '<link name="ground"/>\n  <link name="other"/>'),
+    says="""\
 error[D209]: 2 links of this robot hang on no other, and an arm has one base
  --> two.urdf:2:15
   |
@@ -225,8 +320,12 @@ error[D209]: 2 links of this robot hang on no other, and an arm has one base
   |               ^^^^^^ ground
  ::: two.urdf:3:15  other
   = help: join them by a `<joint type="fixed">`, or take one of the robots out of the file
-""")
-mistake("two parents", ("  <joint", '  <joint name="first" type="fixed"> <parent link="ground"/> <child link="bar"/> </joint>\n  <joint'), says="""\
+""",
+)
+mistake(
+    "two parents",
+    ("  <joint", '  <joint name="first" type="fixed"> <parent link="ground"/> <child link="bar"/> </joint>\n  <joint'),
+    says="""\
 error[D098]: link `bar` has two parents
   --> two.urdf:11:16
    |
@@ -234,8 +333,12 @@ error[D098]: link `bar` has two parents
    |                ^^^^^ `base`
   ::: two.urdf:10:16  `base`, by joint `first`
    = help: a closed chain is not in this version; a branch is a parent with two children
-""")
-mistake("a loop without a base", ("  <joint", '  <joint name="back" type="fixed"> <parent link="bar"/> <child link="ground"/> </joint>\n  <joint'), says="""\
+""",
+)
+mistake(
+    "a loop without a base",
+    ("  <joint", '  <joint name="back" type="fixed"> <parent link="bar"/> <child link="ground"/> </joint>\n  <joint'),
+    says="""\
 error[D209]: every link of this robot hangs on another: none is its base
   --> two.urdf:10:16
    |
@@ -243,8 +346,15 @@ error[D209]: every link of this robot hangs on another: none is its base
    |                ^^^^
   ::: two.urdf:11:16  joint `hinge`
    = help: one of the joints closes a loop; a closed chain is not in this version
-""")
-mistake("a loop beside the arm", ("</robot>", '  <link name="a"/>\n  <link name="b"/>\n  <joint name="ab" type="fixed"> <parent link="a"/> <child link="b"/> </joint>\n  <joint name="ba" type="fixed"> <parent link="b"/> <child link="a"/> </joint>\n</robot>'), says="""\
+""",
+)
+mistake(
+    "a loop beside the arm",
+    (
+        "</robot>",
+        '  <link name="a"/>\n  <link name="b"/>\n  <joint name="ab" type="fixed"> <parent link="a"/> <child link="b"/> </joint>\n  <joint name="ba" type="fixed"> <parent link="b"/> <child link="a"/> </joint>\n</robot>',
+    ),
+    says="""\
 error[D086]: these joints make a loop, which hangs on no base: a -> b -> a
   --> two.urdf:18:16
    |
@@ -252,8 +362,15 @@ error[D086]: these joints make a loop, which hangs on no base: a -> b -> a
    |                ^^ joint `ba` closes it
   ::: two.urdf:17:16  joint `ab`
    = help: one of them should have `parent = base;`
-""")
-mistake("no mass to move", ('    <inertial>\n      <origin xyz="0.5 0 0" rpy="0 0 0"/>\n      <mass value="2"/>\n      <inertia ixx="0.1" iyy="0.2" izz="0.2" ixy="0" ixz="0" iyz="0"/>\n    </inertial>\n', ""), says="""\
+""",
+)
+mistake(
+    "no mass to move",
+    (
+        '    <inertial>\n      <origin xyz="0.5 0 0" rpy="0 0 0"/>\n      <mass value="2"/>\n      <inertia ixx="0.1" iyy="0.2" izz="0.2" ixy="0" ixz="0" iyz="0"/>\n    </inertial>\n',
+        "",
+    ),
+    says="""\
 error[D217]: joint `hinge` moves nothing that has mass
  --> two.urdf:5:16
   |
@@ -261,40 +378,63 @@ error[D217]: joint `hinge` moves nothing that has mass
   |                ^^^^^
   = help: write the mass of link `bar`, or of one that it carries
   = help: or make the joint fixed
-""")
-mistake("xacro", ('<robot name="two">', '<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro">\n  <xacro:property name="mass" value="2"/>'), says="""\
+""",
+)
+mistake(
+    "xacro",
+    (
+        '<robot name="two">',
+        '<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro">\n  <xacro:property name="mass" value="2"/>',
+    ),
+    says="""\
 error[D203]: `<xacro:property>` is not URDF
  --> two.urdf:2:3
   |
 2 |   <xacro:property name="mass" value="2"/>
   |   ^^^^^^^^^^^^^^^
   = help: this is xacro, from which a URDF file is made: run `xacro FILE > robot.urdf` and take that
-""")
-mistake("what xacro would fill in", ('value="2"', 'value="${mass}"'), says="""\
+""",
+)
+mistake(
+    "what xacro would fill in",
+    ('value="2"', 'value="${mass}"'),
+    says="""\
 error[D203]: `${mass}` is to be filled in
  --> two.urdf:6:20
   |
 6 |       <mass value="${mass}"/>
   |                    ^^^^^^^
   = help: this is xacro, from which a URDF file is made: run `xacro FILE > robot.urdf` and take that
-""")
-mistake("a name that xacro would make", ('"hinge"', '"${prefix}hinge"'), says="""\
+""",
+)
+mistake(
+    "a name that xacro would make",
+    ('"hinge"', '"${prefix}hinge"'),
+    says="""\
 error[D203]: `${prefix}hinge` is to be filled in
   --> two.urdf:10:16
    |
 10 |   <joint name="${prefix}hinge" type="revolute">
    |                ^^^^^^^^^^^^^^
    = help: this is xacro, from which a URDF file is made: run `xacro FILE > robot.urdf` and take that
-""")
-mistake("a document type", ("<robot", '<?xml version="1.0"?>\n<!DOCTYPE robot [ <!ENTITY lol "lol"> ]>\n<robot'), says="""\
+""",
+)
+mistake(
+    "a document type",
+    ("<robot", '<?xml version="1.0"?>\n<!DOCTYPE robot [ <!ENTITY lol "lol"> ]>\n<robot'),
+    says="""\
 error[D201]: a document type and entities are not read
  --> two.urdf:2:1
   |
 2 | <!DOCTYPE robot [ <!ENTITY lol "lol"> ]>
   | ^^^^^^^^^
   = help: URDF needs neither: write the values out
-""")
-mistake("a tag that closes another", ("</link>", "</lnk>"), says="""\
+""",
+)
+mistake(
+    "a tag that closes another",
+    ("</link>", "</lnk>"),
+    says="""\
 error[D200]: `two.urdf` is no XML: mismatched tag
  --> two.urdf:9:5
   |
@@ -302,8 +442,12 @@ error[D200]: `two.urdf` is no XML: mismatched tag
   |     ^
  ::: two.urdf:3:3  opened here
   = help: `link` is open here: it is to be closed first
-""")
-mistake("a file that ends too soon", ('</robot>\n', ""), says="""\
+""",
+)
+mistake(
+    "a file that ends too soon",
+    ("</robot>\n", ""),
+    says="""\
 error[D200]: `two.urdf` is no XML: no element found
   --> two.urdf:14:11
    |
@@ -311,79 +455,116 @@ error[D200]: `two.urdf` is no XML: no element found
    |           ^
   ::: two.urdf:1:1  opened here
    = help: the file ends inside `robot`: its end is missing
-""")
-mistake("a declaration that comes late", ("<robot", '<!-- two -->\n<?xml version="1.0"?>\n<robot'), says="""\
+""",
+)
+mistake(
+    "a declaration that comes late",
+    ("<robot", '<!-- two -->\n<?xml version="1.0"?>\n<robot'),
+    says="""\
 error[D200]: `two.urdf` is no XML: XML or text declaration not at start of entity
  --> two.urdf:2:1
   |
 2 | <?xml version="1.0"?>
   | ^
   = help: `<?xml ... ?>` stands at the very beginning of a file, with nothing before it, or not at all
-""")
-mistake("an entity", ('name="bar"', 'name="&bar;"'), says="""\
+""",
+)
+mistake(
+    "an entity",
+    ('name="bar"', 'name="&bar;"'),
+    says="""\
 error[D200]: `two.urdf` is no XML: undefined entity
  --> two.urdf:3:3
   |
 3 |   <link name="&bar;">
   |   ^
   = help: five have a meaning: &lt; &gt; &amp; &quot; &apos;
-""")
-no_robot("an empty file", '', says="""\
+""",
+)
+no_robot(
+    "an empty file",
+    "",
+    says="""\
 error[D200]: `two.urdf` is no XML: no element found
  --> two.urdf:1:1
   |
 1 |
   | ^
   = help: the file is empty
-""")
-no_robot("text", 'hello\n', says="""\
+""",
+)
+no_robot(
+    "text",
+    "hello\n",
+    says="""\
 error[D200]: `two.urdf` is no XML: syntax error
  --> two.urdf:1:1
   |
 1 | hello
   | ^
   = help: a URDF file is XML, `<robot> ... </robot>`: is this the right file?
-""")
-no_robot("another format", '<sdf version="1.7"/>\n', says="""\
+""",
+)
+no_robot(
+    "another format",
+    '<sdf version="1.7"/>\n',
+    says="""\
 error[D203]: `<sdf>` is not URDF: this is SDF
  --> two.urdf:1:1
   |
 1 | <sdf version="1.7"/>
   | ^^^^
   = help: a URDF file is `<robot name="..."> ... </robot>`
-""")
-no_robot("an empty robot", '<robot name="none"/>\n', says="""\
+""",
+)
+no_robot(
+    "an empty robot",
+    '<robot name="none"/>\n',
+    says="""\
 error[D209]: this robot is empty: it has no links
  --> two.urdf:1:1
   |
 1 | <robot name="none"/>
   | ^^^^^^
   = help: an arm has a joint at least
-""")
-no_robot("one body", '<robot name="one"> <link name="all"/> </robot>\n', says="""\
+""",
+)
+no_robot(
+    "one body",
+    '<robot name="one"> <link name="all"/> </robot>\n',
+    says="""\
 error[D209]: this robot has no joints: it is one body
  --> two.urdf:1:1
   |
 1 | <robot name="one"> <link name="all"/> </robot>
   | ^^^^^^
   = help: an arm has a joint at least
-""")
-no_robot("bytes", b'<robot name="\xff"/>\n', says="""\
+""",
+)
+no_robot(
+    "bytes",
+    b'<robot name="\xff"/>\n',
+    says="""\
 error[D002]: `two.urdf` is not UTF-8: byte 0xff
  --> two.urdf:1:14
   |
 1 | <robot name="�"/>
   |              ^
   = help: save the file as UTF-8
-""")
-no_robot("a program", b'\x7fELF\x00\x00', says="""\
+""",
+)
+no_robot(
+    "a program",
+    b"\x7fELF\x00\x00",
+    says="""\
 error[D002]: `two.urdf` is not text: it holds the byte 0x7f
  --> two.urdf:1:1
   |
 1 | �ELF��
   | ^
   = help: is this an archive or a program? A URDF file is plain text in UTF-8
-""")
+""",
+)
 
 
 @pytest.mark.parametrize(("text", "remedy"), [
@@ -413,7 +594,10 @@ def naming(what: str, line: str, *, says: str) -> None:
     NAMING.append((what, line, says))
 
 
-naming("a file that is not there", 'arm two from urdf("tow.urdf") { }', says="""\
+naming(
+    "a file that is not there",
+    'arm two from urdf("tow.urdf") { }',
+    says="""\
 error[D215]: cannot find "tow.urdf"
  --> deck.ic:1:19
   |
@@ -421,128 +605,192 @@ error[D215]: cannot find "tow.urdf"
   |                   ^^^^^^^^^^
   = help: did you mean `two.urdf`?
   = help: looked in `DIR`, the standard library
-""")
-naming("a file of no name", 'arm two from urdf("") { }', says="""\
+""",
+)
+naming(
+    "a file of no name",
+    'arm two from urdf("") { }',
+    says="""\
 error[D215]: cannot find ""
  --> deck.ic:1:19
   |
 1 | arm two from urdf("") { }
   |                   ^^
   = help: looked in `DIR`, the standard library
-""")
-naming("no quotes", 'arm two from urdf(two) { }', says="""\
+""",
+)
+naming(
+    "no quotes",
+    "arm two from urdf(two) { }",
+    says="""\
 error[D214]: `urdf` takes the name of one file, in quotes
  --> deck.ic:1:14
   |
 1 | arm two from urdf(two) { }
   |              ^^^^^^^^^
   = help: write `arm NAME from urdf("FILE") { ... }`
-""")
-naming("two files", 'arm two from urdf("two.urdf", "two.urdf") { }', says="""\
+""",
+)
+naming(
+    "two files",
+    'arm two from urdf("two.urdf", "two.urdf") { }',
+    says="""\
 error[D214]: `urdf` takes the name of one file, in quotes
  --> deck.ic:1:14
   |
 1 | arm two from urdf("two.urdf", "two.urdf") { }
   |              ^^^^^^^^^^^^^^^^^^^^^^^^^^^^
   = help: write `arm NAME from urdf("FILE") { ... }`
-""")
-naming("a named argument", 'arm two from urdf(file = "two.urdf") { }', says="""\
+""",
+)
+naming(
+    "a named argument",
+    'arm two from urdf(file = "two.urdf") { }',
+    says="""\
 error[D214]: `urdf` takes the name of one file, in quotes
  --> deck.ic:1:14
   |
 1 | arm two from urdf(file = "two.urdf") { }
   |              ^^^^^^^^^^^^^^^^^^^^^^^
   = help: write `arm NAME from urdf("FILE") { ... }`
-""")
-naming("nothing in the brackets", 'arm two from urdf() { }', says="""\
+""",
+)
+naming(
+    "nothing in the brackets",
+    "arm two from urdf() { }",
+    says="""\
 error[D214]: `urdf` takes the name of one file, in quotes
  --> deck.ic:1:14
   |
 1 | arm two from urdf() { }
   |              ^^^^^^
   = help: write `arm NAME from urdf("FILE") { ... }`
-""")
-naming("another format", 'arm two from sdf("two.urdf") { }', says="""\
+""",
+)
+naming(
+    "another format",
+    'arm two from sdf("two.urdf") { }',
+    says="""\
 error[D214]: no arm is made from `sdf`
  --> deck.ic:1:14
   |
 1 | arm two from sdf("two.urdf") { }
   |              ^^^
   = help: an arm is made from: urdf
-""")
-naming("a file without its format", 'arm two from "two.urdf" { }', says="""\
+""",
+)
+naming(
+    "a file without its format",
+    'arm two from "two.urdf" { }',
+    says="""\
 error[D020]: a file is named by what it is
  --> deck.ic:1:14
   |
 1 | arm two from "two.urdf" { }
   |              ^^^^^^^^^^
   = help: write `from urdf("two.urdf")`
-""")
-naming("a file without quotes", 'arm two from two.urdf { }', says="""\
+""",
+)
+naming(
+    "a file without quotes",
+    "arm two from two.urdf { }",
+    says="""\
 error[D020]: the name of a file stands in quotes
  --> deck.ic:1:14
   |
 1 | arm two from two.urdf { }
   |              ^^^^^^^^
   = help: write `from urdf("two.urdf")`
-""")
-naming("a path without quotes", 'arm two from ../my_arms/two-link.urdf;', says="""\
+""",
+)
+naming(
+    "a path without quotes",
+    "arm two from ../my_arms/two-link.urdf;",
+    says="""\
 error[D020]: the name of a file stands in quotes
  --> deck.ic:1:14
   |
 1 | arm two from ../my_arms/two-link.urdf;
   |              ^^^^^^^^^^^^^^^^^^^^^^^^
   = help: write `from urdf("../my_arms/two-link.urdf")`
-""")
-naming("a file without brackets and quotes", 'arm two from urdf robots/two.urdf { }', says="""\
+""",
+)
+naming(
+    "a file without brackets and quotes",
+    "arm two from urdf robots/two.urdf { }",
+    says="""\
 error[D020]: the name of a file stands in quotes
  --> deck.ic:1:19
   |
 1 | arm two from urdf robots/two.urdf { }
   |                   ^^^^^^^^^^^^^^^
   = help: write `from urdf("robots/two.urdf")`
-""")
-naming("no block", 'arm two from urdf("two.urdf")', says="""\
+""",
+)
+naming(
+    "no block",
+    'arm two from urdf("two.urdf")',
+    says="""\
 error[D020]: expected `{` or `;`, found `run`
  --> deck.ic:2:1
   |
 2 | run fall { arm = two;  rates { dynamics = 1 kHz; }  duration = 10 ms;  record = [q]; }
   | ^^^
   = help: a block holds what differs from the file; `;` stands for none
-""")
-naming("a unit", 'arm two from urdf("two.urdf") m { }', says="""\
+""",
+)
+naming(
+    "a unit",
+    'arm two from urdf("two.urdf") m { }',
+    says="""\
 error[D020]: expected `{` or `;`, found `m`
  --> deck.ic:1:31
   |
 1 | arm two from urdf("two.urdf") m { }
   |                               ^
   = help: a block holds what differs from the file; `;` stands for none
-""")
-naming("two bases", 'arm two like one from urdf("two.urdf") { }', says="""\
+""",
+)
+naming(
+    "two bases",
+    'arm two like one from urdf("two.urdf") { }',
+    says="""\
 error[D032]: `like` and `from` both name a base
  --> deck.ic:1:18
   |
 1 | arm two like one from urdf("two.urdf") { }
   |                  ^^^^
   = help: there is one base only
-""")
-naming("two bases the other way", 'arm two from urdf("two.urdf") like one { }', says="""\
+""",
+)
+naming(
+    "two bases the other way",
+    'arm two from urdf("two.urdf") like one { }',
+    says="""\
 error[D032]: `from` and `like` both name a base
  --> deck.ic:1:31
   |
 1 | arm two from urdf("two.urdf") like one { }
   |                               ^^^^
   = help: there is one base only
-""")
-naming("a servo", 'servo two from urdf("two.urdf") { }', says="""\
+""",
+)
+naming(
+    "a servo",
+    'servo two from urdf("two.urdf") { }',
+    says="""\
 error[D214]: a servo is not made from a file
  --> deck.ic:1:16
   |
 1 | servo two from urdf("two.urdf") { }
   |                ^^^^
   = help: `from urdf(...)` makes an arm
-""")
-naming("a link that is there", 'arm two from urdf("two.urdf") { link bar { mass = 1 kg; } }', says="""\
+""",
+)
+naming(
+    "a link that is there",
+    'arm two from urdf("two.urdf") { link bar { mass = 1 kg; } }',
+    says="""\
 error[D053]: link `bar` is in `two` already
  --> deck.ic:1:33
   |
@@ -551,8 +799,12 @@ error[D053]: link `bar` is in `two` already
  ::: two.urdf:3:15  here
   = help: leave out the word `link` to change it
   = help: `remove bar;` first, to put another in its place
-""")
-naming("a link that is not", 'arm two from urdf("two.urdf") { bra { mass = 1 kg; } }', says="""\
+""",
+)
+naming(
+    "a link that is not",
+    'arm two from urdf("two.urdf") { bra { mass = 1 kg; } }',
+    says="""\
 error[D083]: nothing named `bra` to change in this arm
  --> deck.ic:1:33
   |
@@ -560,8 +812,12 @@ error[D083]: nothing named `bra` to change in this arm
   |                                 ^^^
   = help: did you mean `bar`?
   = help: `link bra { ... }` or `joint bra revolute { ... }` would add one
-""")
-naming("the root by its own name", 'arm two from urdf("two.urdf") { hinge { parent = ground; } }', says="""\
+""",
+)
+naming(
+    "the root by its own name",
+    'arm two from urdf("two.urdf") { hinge { parent = ground; } }',
+    says="""\
 error[D094]: no link `ground` in this arm
  --> deck.ic:1:50
   |
@@ -569,7 +825,8 @@ error[D094]: no link `ground` in this arm
   |                                                  ^^^^^^
   = help: `ground` is the root of its robot: write `base`
   = help: links: base, bar
-""")
+""",
+)
 
 
 @pytest.mark.parametrize(("line", "says"), [each[1:] for each in NAMING], ids=[each[0] for each in NAMING])

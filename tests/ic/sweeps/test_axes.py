@@ -48,11 +48,22 @@ def test_the_first_axis_is_the_outermost(tmp_path: Path) -> None:
 
 
 def test_a_zip_is_one_axis_where_it_is_written(tmp_path: Path) -> None:
-    run = swept(tmp_path, "vary drive.kp = [1, 2] V*s/rad;"
-                          "zip { drive.ki = [3, 4] V/rad; links.bar.mass = [5, 6] kg; }"
-                          "vary drive.ratio = [7, 8];")
-    assert rows(run) == [(1, 3, 5, 7), (1, 3, 5, 8), (1, 4, 6, 7), (1, 4, 6, 8),
-                         (2, 3, 5, 7), (2, 3, 5, 8), (2, 4, 6, 7), (2, 4, 6, 8)]
+    run = swept(
+        tmp_path,
+        "vary drive.kp = [1, 2] V*s/rad;"
+        "zip { drive.ki = [3, 4] V/rad; links.bar.mass = [5, 6] kg; }"
+        "vary drive.ratio = [7, 8];",
+    )
+    assert rows(run) == [
+        (1, 3, 5, 7),
+        (1, 3, 5, 8),
+        (1, 4, 6, 7),
+        (1, 4, 6, 8),
+        (2, 3, 5, 7),
+        (2, 3, 5, 8),
+        (2, 4, 6, 7),
+        (2, 4, 6, 8),
+    ]
 
 
 def test_coordinates_are_si_and_remember_the_decks_unit(tmp_path: Path) -> None:
@@ -146,72 +157,75 @@ def test_a_definition_and_one_of_its_joints_on_one_parameter_is_an_error(tmp_pat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("body", "code"), [
-    ("", "D126"),
-    ("vary drive.kp = 1 V*s/rad;", "D126"),
-    ("vary drive.kp = [] V*s/rad;", "D126"),
-    ("vary drive.kp = [1, 2];", "D060"),
-    ("vary drive.kp = [1, 2] V;", "D061"),
-    ("vary drive.kp = [1 V*s/rad, 2 V];", "D063"),
-    ("vary drive.kp = [1, 1] V*s/rad;", "D133"),
-    ("vary drive.kp = [-1, 1] V*s/rad;", "D077"),
-    ("vary drive.kq = [1, 2] V*s/rad;", "D128"),
-    ("vary links.bar.mas = [1, 2] kg;", "D128"),
-    ("vary links.bar.com = [1, 2] m;", "D122"),
-    ("vary record = [1, 2];", "D122"),
-    ("vary seed = [1, 2];", "D122"),
-    ("vary hinge.servo.model = [1, 2];", "D143"),
-    ("vary integrator = [1, 2];", "D143"),
-    ("vary integrator = rk4;", "D126"),
-    ("vary integrator = [rk4, rk4];", "D133"),
-    ("vary integrator = [];", "D126"),
-    ("zip { integrator = [rk4, midpoint]; drive.kp = [1] V*s/rad; }", "D135"),
-    ("vary duration = 3 s;", "D126"),
-    ("zip { drive.kp = [1, 2] V*s/rad; drive.ki = [1] V/rad; }", "D135"),
-    ("zip { }", "D126"),
-    ("vary drive.kp = [1, 2] V*s/rad; vary drive.kp = [1, 2] V*s/rad;", "D040"),
-    ("vary drive.kp = (1 .. 2 by 0.3) V*s/rad;", "D220"),
-    ("vary drive.kp = (1 .. 2) V*s/rad;", "D220"),
-    ("vary drive.kp = (1 .. 2 by 0) V*s/rad;", "D072"),
-    ("vary drive.kp = (1 .. 2 by -1) V*s/rad;", "D072"),
-    ("vary drive.kp = (1 .. 2 by 1e-9) V*s/rad;", "D072"),
-    ("vary drive.kp = 1 .. 2 by 1 V*s/rad;", "D063"),
-    ("repeat 1; vary drive.kp = [1, 2] V*s/rad;", "D113"),
-    ("repeat 5; repeat 5;", "D040"),
-    ("repeat = 5;", "D136"),
-    ("repeat 5; vary drive.kp = [1, 2] V*s/rad;", "D230"),
-    ("seeds = independent; vary drive.kp = [1, 2] V*s/rad;", "D230"),
-    ("seeds = other; vary drive.kp = [1, 2] V*s/rad;", "D221"),
-    ("sample { drive.kp = uniform(1, 2) V*s/rad; }", "D136"),
-    ("sample many(3) { drive.kp = uniform(1, 2) V*s/rad; }", "D224"),
-    ("sample lhs { drive.kp = uniform(1, 2) V*s/rad; }", "D136"),
-    ("sample lhs(3);", "D224"),
-    ("sample lhs(3, 4) { drive.kp = uniform(1, 2) V*s/rad; }", "D224"),
-    ("sample lhs(3) { }", "D224"),
-    ("sample lhs(3) { vary drive.kp = uniform(1, 2) V*s/rad; }", "D224"),
-    ("sample lhs(3.5) { drive.kp = uniform(1, 2) V*s/rad; }", "D113"),
-    ("sample lhs(3) { drive.kp = [1, 2] V*s/rad; }", "D225"),
-    ("sample lhs(3) { drive.kp = gaussian(1, 2) V*s/rad; }", "D225"),
-    ("sample lhs(3) { drive.kp = uniform(1) V*s/rad; }", "D225"),
-    ("sample lhs(3) { drive.kp = uniform(2, 1) V*s/rad; }", "D225"),
-    ("sample lhs(3) { drive.kp = normal(2, 0) V*s/rad; }", "D225"),
-    ("sample lhs(3) { drive.kp = loguniform(-1, 1) V*s/rad; }", "D225"),
-    ("sample lhs(3) { drive.kp = uniform(1, 2) V; }", "D061"),
-    ("sample lhs(3) { drive.kp = uniform(1, 2); }", "D060"),
-    ("sample lhs(3) { drive.kp = uniform(1 V*s/rad, 2 V); }", "D063"),
-    ("sample lhs(3) { drive.kp = normal(0.1, 1) V*s/rad; }", "D077"),
-    ("sample sobol(3) { drive.kp = uniform(1, 2) V*s/rad; }", "D228"),
-    ('from "cases.csv";', "D190"),
-    ("from cases;", "D222"),
-    ("require settle < 1 s;", "D136"),
-    ("vary links.bar.inertia.xx = [0.2, 0.3] kg*m^2;", "D137"),
-    ("duration = 3 s; vary drive.kp = [1, 2] V*s/rad;", "D136"),
-    ("vary drive.kp = linspace(1, 2, 10000) V*s/rad; vary drive.ki = linspace(1, 2, 10000) V/rad;", "D134"),
-    ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kp > 0 V*s/rad;", "D139"),
-    ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kp > 1.5;", "D063"),
-    ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kq > 1 V*s/rad;", "D065"),
-    ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kp;", "D130"),
-])
+@pytest.mark.parametrize(
+    ("body", "code"),
+    [
+        ("", "D126"),
+        ("vary drive.kp = 1 V*s/rad;", "D126"),
+        ("vary drive.kp = [] V*s/rad;", "D126"),
+        ("vary drive.kp = [1, 2];", "D060"),
+        ("vary drive.kp = [1, 2] V;", "D061"),
+        ("vary drive.kp = [1 V*s/rad, 2 V];", "D063"),
+        ("vary drive.kp = [1, 1] V*s/rad;", "D133"),
+        ("vary drive.kp = [-1, 1] V*s/rad;", "D077"),
+        ("vary drive.kq = [1, 2] V*s/rad;", "D128"),
+        ("vary links.bar.mas = [1, 2] kg;", "D128"),
+        ("vary links.bar.com = [1, 2] m;", "D122"),
+        ("vary record = [1, 2];", "D122"),
+        ("vary seed = [1, 2];", "D122"),
+        ("vary hinge.servo.model = [1, 2];", "D143"),
+        ("vary integrator = [1, 2];", "D143"),
+        ("vary integrator = rk4;", "D126"),
+        ("vary integrator = [rk4, rk4];", "D133"),
+        ("vary integrator = [];", "D126"),
+        ("zip { integrator = [rk4, midpoint]; drive.kp = [1] V*s/rad; }", "D135"),
+        ("vary duration = 3 s;", "D126"),
+        ("zip { drive.kp = [1, 2] V*s/rad; drive.ki = [1] V/rad; }", "D135"),
+        ("zip { }", "D126"),
+        ("vary drive.kp = [1, 2] V*s/rad; vary drive.kp = [1, 2] V*s/rad;", "D040"),
+        ("vary drive.kp = (1 .. 2 by 0.3) V*s/rad;", "D220"),
+        ("vary drive.kp = (1 .. 2) V*s/rad;", "D220"),
+        ("vary drive.kp = (1 .. 2 by 0) V*s/rad;", "D072"),
+        ("vary drive.kp = (1 .. 2 by -1) V*s/rad;", "D072"),
+        ("vary drive.kp = (1 .. 2 by 1e-9) V*s/rad;", "D072"),
+        ("vary drive.kp = 1 .. 2 by 1 V*s/rad;", "D063"),
+        ("repeat 1; vary drive.kp = [1, 2] V*s/rad;", "D113"),
+        ("repeat 5; repeat 5;", "D040"),
+        ("repeat = 5;", "D136"),
+        ("repeat 5; vary drive.kp = [1, 2] V*s/rad;", "D230"),
+        ("seeds = independent; vary drive.kp = [1, 2] V*s/rad;", "D230"),
+        ("seeds = other; vary drive.kp = [1, 2] V*s/rad;", "D221"),
+        ("sample { drive.kp = uniform(1, 2) V*s/rad; }", "D136"),
+        ("sample many(3) { drive.kp = uniform(1, 2) V*s/rad; }", "D224"),
+        ("sample lhs { drive.kp = uniform(1, 2) V*s/rad; }", "D136"),
+        ("sample lhs(3);", "D224"),
+        ("sample lhs(3, 4) { drive.kp = uniform(1, 2) V*s/rad; }", "D224"),
+        ("sample lhs(3) { }", "D224"),
+        ("sample lhs(3) { vary drive.kp = uniform(1, 2) V*s/rad; }", "D224"),
+        ("sample lhs(3.5) { drive.kp = uniform(1, 2) V*s/rad; }", "D113"),
+        ("sample lhs(3) { drive.kp = [1, 2] V*s/rad; }", "D225"),
+        ("sample lhs(3) { drive.kp = gaussian(1, 2) V*s/rad; }", "D225"),
+        ("sample lhs(3) { drive.kp = uniform(1) V*s/rad; }", "D225"),
+        ("sample lhs(3) { drive.kp = uniform(2, 1) V*s/rad; }", "D225"),
+        ("sample lhs(3) { drive.kp = normal(2, 0) V*s/rad; }", "D225"),
+        ("sample lhs(3) { drive.kp = loguniform(-1, 1) V*s/rad; }", "D225"),
+        ("sample lhs(3) { drive.kp = uniform(1, 2) V; }", "D061"),
+        ("sample lhs(3) { drive.kp = uniform(1, 2); }", "D060"),
+        ("sample lhs(3) { drive.kp = uniform(1 V*s/rad, 2 V); }", "D063"),
+        ("sample lhs(3) { drive.kp = normal(0.1, 1) V*s/rad; }", "D077"),
+        ("sample sobol(3) { drive.kp = uniform(1, 2) V*s/rad; }", "D228"),
+        ('from "cases.csv";', "D190"),
+        ("from cases;", "D222"),
+        ("require settle < 1 s;", "D136"),
+        ("vary links.bar.inertia.xx = [0.2, 0.3] kg*m^2;", "D137"),
+        ("duration = 3 s; vary drive.kp = [1, 2] V*s/rad;", "D136"),
+        ("vary drive.kp = linspace(1, 2, 10000) V*s/rad; vary drive.ki = linspace(1, 2, 10000) V/rad;", "D134"),
+        ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kp > 0 V*s/rad;", "D139"),
+        ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kp > 1.5;", "D063"),
+        ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kq > 1 V*s/rad;", "D065"),
+        ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kp;", "D130"),
+    ],
+)
 def test_a_sweep_that_cannot_be_is_told(tmp_path: Path, body: str, code: str) -> None:
     assert swept_codes(tmp_path, body) == [code]
 
@@ -278,8 +292,10 @@ def test_a_sweep_has_a_seed_of_its_own(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_cases_of_a_sweep_that_is_too_large_are_all_counted(tmp_path: Path) -> None:
-    axes = "".join(f"vary {path} = linspace(1, 2, 10000) {unit}; " for path, unit in (
-        ("drive.kp", "V*s/rad"), ("drive.ki", "V/rad"), ("drive.ratio", "")))
+    axes = "".join(
+        f"vary {path} = linspace(1, 2, 10000) {unit}; "
+        for path, unit in (("drive.kp", "V*s/rad"), ("drive.ki", "V/rad"), ("drive.ratio", ""))
+    )
     compiled = check(tmp_path, ARM, SERVO, RUN, f"sweep all of hold {{ {axes}}}\n", select="all")
     assert [each.message for each in compiled.diagnostics] == ["sweep `all` has 1000000000000 cases"]
 

@@ -36,12 +36,15 @@ def values(run: Experiment, path: str) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("axis", "component", "swept_over"), [
-    ("[1, 0, 1]", "x", [0, 0.5, 2]),
-    ("[3, 0, 4]", "x", [3, 0.6]),  # the components are those that the deck writes, not those of the unit vector
-    ("[3, 0, 4]", "y", [-1, 0]),
-    ("z", "x", [0, 1]),
-])
+@pytest.mark.parametrize(
+    ("axis", "component", "swept_over"),
+    [
+        ("[1, 0, 1]", "x", [0, 0.5, 2]),
+        ("[3, 0, 4]", "x", [3, 0.6]),  # the components are those that the deck writes, not those of the unit vector
+        ("[3, 0, 4]", "y", [-1, 0]),
+        ("z", "x", [0, 1]),
+    ],
+)
 def test_a_swept_axis_is_that_of_the_deck_with_the_component_written(
     tmp_path: Path, axis: str, component: str, swept_over: list[float]
 ) -> None:
@@ -57,7 +60,8 @@ def test_a_swept_axis_is_that_of_the_deck_with_the_component_written(
             # one rounding more or less in the length and in the division
             expected = plain.parameters[f"wrist.axis.{part}"].value
             assert np.broadcast_to(values(run, f"wrist.axis.{part}"), len(swept_over))[case] == pytest.approx(
-                expected, rel=4e-16, abs=0.0)
+                expected, rel=4e-16, abs=0.0
+            )
         # the two programs round differently, for one has the axis as constants: 1e-16 a step, 200 steps
         assert signals[case] == pytest.approx(simulate(plain).signals["q"][0], rel=1e-11, abs=1e-12)
 
@@ -115,8 +119,13 @@ def test_an_exclusion_by_a_definition_whose_joints_differ_is_an_error(tmp_path: 
         run = swept(tmp_path, body.replace("drive.kp", path))
         assert run.cases.coordinates[0].values.tolist() == left
     # a value that all joints share is one value, whatever else of the servo varies
-    assert swept(tmp_path, "vary wrist.servo.kp = [1, 2] V*s/rad; vary drive.ki = [1, 2] V/rad;"
-                           "exclude when drive.ki > 1.5 V/rad;").cases.count == 2
+    assert (
+        swept(
+            tmp_path,
+            "vary wrist.servo.kp = [1, 2] V*s/rad; vary drive.ki = [1, 2] V/rad;exclude when drive.ki > 1.5 V/rad;",
+        ).cases.count
+        == 2
+    )
 
 
 def test_an_exclusion_may_ask_for_a_shapes_size(tmp_path: Path) -> None:
@@ -134,8 +143,9 @@ def test_what_begins_paths_of_its_own_names_no_joint_arm_or_servo(tmp_path: Path
 
 @pytest.mark.parametrize("word", ["links", "initial", "environment", "metrics", "rates"])
 def test_links_lets_and_runs_may_be_called_like_what_begins_paths(tmp_path: Path, word: str) -> None:
-    arm = f"let {word} = 1 m;\n" + changed(ARM, ("link bar", f"link {word}"), ("child = bar", f"child = {word}"),
-                                          ("length = 1 m", f"length = {word}"))
+    arm = f"let {word} = 1 m;\n" + changed(
+        ARM, ("link bar", f"link {word}"), ("child = bar", f"child = {word}"), ("length = 1 m", f"length = {word}")
+    )
     sweep = f"sweep it of {word} {{ vary {word} = [1, 2] m; vary links.{word}.mass = [3, 4] kg; }}"
     run = experiment(tmp_path, arm, SERVO, changed(RUN, ("hold", word)), sweep, select=["it"])
     assert [coordinate.path for coordinate in run.cases.coordinates] == [word, f"links.{word}.mass"]

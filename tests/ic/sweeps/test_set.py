@@ -28,9 +28,7 @@ WHOLE = changed(
     ("arm = swing;", f"arm = swing; environment {{ {PUSH} }}"),
     ("duration", "metric top = settling_time { of = hinge.qd; target = 1 rad/s; band = 2 %; }\n    duration"),
 )
-ON_BED = changed(
-    RUN, ("duration", "substitute hinge { bed = emulated(faults = typical); law = bare; } duration")
-)
+ON_BED = changed(RUN, ("duration", "substitute hinge { bed = emulated(faults = typical); law = bare; } duration"))
 GAINS = "sweep it of hold { vary drive.ki = [1, 2] V/rad; }\n"
 
 
@@ -105,9 +103,7 @@ def test_beds_laws_and_the_seed_of_noise_are_set_too(setting: str, old: str, new
      "slow = 0.2 rad/s;\nlet times_of = [0, 2] s"),
     (["hinge.servo.command=rate(slow)", "hinge.servo=brisk"], "run tabulated", "run unused {} run tabulated"),
 ])  # fmt: skip
-def test_it_holds_for_all_runs_that_are_asked_for(
-    settings: list[str], old: str, new: str, tmp_path: Path
-) -> None:
+def test_it_holds_for_all_runs_that_are_asked_for(settings: list[str], old: str, new: str, tmp_path: Path) -> None:
     text = ARM + SERVO + OTHERS + RUN + "run tabulated like hold { servos { hinge = tabled; } }\n"
     text += "run ideally like hold { servos { hinge = plain; } }\n"
     if old.startswith("slow"):

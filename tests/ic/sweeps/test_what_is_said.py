@@ -131,8 +131,10 @@ def test_a_value_that_becomes_infinite_in_one_case_is_told_without_a_unit(tmp_pa
 
 def test_a_requirement_of_a_channel_is_told_of_metrics(tmp_path: Path) -> None:
     (one,) = said(tmp_path, "run judged like hold { require hinge.qd < 1 rad/s; }\n")
-    assert one == ("D132 [hinge.qd] no metric `hinge.qd` | metrics of this run: none | a metric of a channel is "
-                   "`metric NAME = max { of = hinge.qd; }`, and `require NAME < ...;`")
+    assert one == (
+        "D132 [hinge.qd] no metric `hinge.qd` | metrics of this run: none | a metric of a channel is "
+        "`metric NAME = max { of = hinge.qd; }`, and `require NAME < ...;`"
+    )
 
 
 # Tables
@@ -167,8 +169,10 @@ def test_runs_that_differ_in_their_program_alone_make_a_sum(tmp_path: Path) -> N
 
 def test_the_same_run_under_another_name_is_told(tmp_path: Path) -> None:
     (one,) = said(tmp_path, "run same like hold { }\n", "sweep both = hold + same;")
-    assert one == ("D227 [same] case #0 of `same` is in `hold` too | exclude it in one of the two: each case stands in "
-                   "the table once | `met cases DECK same` prints it")
+    assert one == (
+        "D227 [same] case #0 of `same` is in `hold` too | exclude it in one of the two: each case stands in "
+        "the table once | `met cases DECK same` prints it"
+    )
 
 
 def test_a_sum_of_what_is_wrong_says_no_more(tmp_path: Path) -> None:
@@ -182,8 +186,10 @@ COUNT = "#ifndef COUNT\n#define COUNT 1\n#endif\nrun counted like hold { duratio
 
 
 def test_a_macro_may_bring_exclusions_of_its_own(tmp_path: Path) -> None:
-    body = ("vary macro COUNT = [1, 2]; vary links.bar.mass = [1, 2, 3, 4] kg; exclude when links.bar.mass < 1.5 kg;\n"
-            "#if COUNT > 1\nexclude when links.bar.mass == 2 kg;\nexclude when links.bar.mass > 3.5 kg;\n#endif\n")
+    body = (
+        "vary macro COUNT = [1, 2]; vary links.bar.mass = [1, 2, 3, 4] kg; exclude when links.bar.mass < 1.5 kg;\n"
+        "#if COUNT > 1\nexclude when links.bar.mass == 2 kg;\nexclude when links.bar.mass > 3.5 kg;\n#endif\n"
+    )
     compiled = check(tmp_path, ARM, SERVO, RUN, COUNT, f"sweep it of counted {{ {body} }}\n", select=["it"])
     assert compiled.plan is not None, told(compiled)
     masses = [group.cases.coordinates[0].values.tolist() for group in compiled.plan.experiments]
@@ -201,8 +207,10 @@ def test_what_is_chosen_must_not_depend_on_a_macro(tmp_path: Path) -> None:
 def test_a_macro_in_a_condition_is_its_name_alone(tmp_path: Path) -> None:
     body = "vary macro COUNT = [1, 2]; exclude when macro COUNT > 1;"
     (one,) = said(tmp_path, COUNT, f"sweep it of counted {{ {body} }}\n")
-    assert one == ("D136 [exclude when macro] a condition names a macro by its name alone | leave out the word "
-                   "`macro`: the macro's value is put in as text")
+    assert one == (
+        "D136 [exclude when macro] a condition names a macro by its name alone | leave out the word "
+        "`macro`: the macro's value is put in as text"
+    )
 
 
 def test_a_stability_that_hardly_varies_is_said_once(tmp_path: Path) -> None:

@@ -85,11 +85,22 @@ class _Program:
         if how < 0.4:
             return f"{rng.choice(OUTER)}({self.pieces(words, depth + 1)})"
         if how < 0.46:
-            return f"{rng.choice(['CAT', 'PASTE'])}({rng.choice(['FA', 'F', '', name])}, " \
-                   f"{rng.choice(['_', 'A', '', 'A_'])})"
+            return (
+                f"{rng.choice(['CAT', 'PASTE'])}({rng.choice(['FA', 'F', '', name])}, "
+                f"{rng.choice(['_', 'A', '', 'A_'])})"
+            )
         if how < 0.5:
             return f"REST({self.piece(words, depth + 1)}, {self.pieces(words, depth + 1)})"
         call = f"({', '.join(self.pieces(words, depth + 1) for _ in range(self.takes[name]))})"
-        later = (f"{name} ", f"{name} EMPTY() ", f"{name} NO ", f"DEFER({name}) ", f"{name}_ EMPTY() () ",
-                 f"{name}_() ", f"ID({name}) ", f"DEFER({name}_)() ", f"{name}_ NO () ")
+        later = (
+            f"{name} ",
+            f"{name} EMPTY() ",
+            f"{name} NO ",
+            f"DEFER({name}) ",
+            f"{name}_ EMPTY() () ",
+            f"{name}_() ",
+            f"ID({name}) ",
+            f"DEFER({name}_)() ",
+            f"{name}_ NO () ",
+        )
         return rng.choice(later) + (call if rng.random() < 0.9 else "")

@@ -38,7 +38,9 @@ def test_a_missing_file_names_each_folder_once_and_says_which_is_not_there(
     desk: Desk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MET_DECK_PATH", os.pathsep.join(["nowhere", "library", "library"]))
-    assert desk.told("#include <x.ic>", ["library"]) == """\
+    assert (
+        desk.told("#include <x.ic>", ["library"])
+        == """\
 error[D005]: cannot find <x.ic>
  --> a.ic:1:10
   |
@@ -48,6 +50,7 @@ error[D005]: cannot find <x.ic>
 
 1 error
 """
+    )
 
 
 def test_a_link_that_leads_nowhere_is_told_as_one(desk: Desk) -> None:
@@ -55,7 +58,9 @@ def test_a_link_that_leads_nowhere_is_told_as_one(desk: Desk) -> None:
     (desk.directory / "sub" / "x.ic").symlink_to("gone.ic")
     (desk.directory / "sub" / "y.ic").symlink_to("y.ic")
     told = desk.told('#include "b.ic"', (), {"sub/b.ic": "", "b.ic": '#include "sub/x.ic"\n#include "sub/y.ic"\n'})
-    assert told == """\
+    assert (
+        told
+        == """\
 error[D005]: cannot find "sub/x.ic"
  --> b.ic:1:10
   |
@@ -76,6 +81,7 @@ error[D005]: cannot find "sub/y.ic"
 
 2 errors
 """
+    )
 
 
 def test_the_search_for_what_was_meant_ends_in_a_folder_of_many_files(
@@ -136,7 +142,9 @@ def test_a_file_with_the_name_of_a_library_file_is_not_taken_for_it(desk: Desk) 
 
 def test_a_name_in_any_script_is_a_name(desk: Desk) -> None:
     told = desk.told('#include "\u00fcn\u00ef\u8155.ic"\n#include "\u00fcni.ic"\n', (), {"\u00fcn\u00ef\u8155.ic": ""})
-    assert told == """\
+    assert (
+        told
+        == """\
 error[D005]: cannot find "\u00fcni.ic"
  --> a.ic:2:10
   |
@@ -147,10 +155,13 @@ error[D005]: cannot find "\u00fcni.ic"
 
 1 error
 """
+    )
 
 
 def test_a_name_with_a_line_break_is_shown_on_one_line_and_never_proposed(desk: Desk) -> None:
-    assert desk.told('#include "."', (), {"b\nc.ic": "", "d.ic": ""}) == """\
+    assert (
+        desk.told('#include "."', (), {"b\nc.ic": "", "d.ic": ""})
+        == """\
 error[D001]: `.` is a directory, not a deck
  --> a.ic:1:10
   |
@@ -160,6 +171,7 @@ error[D001]: `.` is a directory, not a deck
 
 1 error
 """
+    )
     assert "b" not in desk.told('#include "bc.ic"').replace("bc.ic", "").split("help:", 1)[1].split("looked")[0]
 
 
@@ -168,12 +180,15 @@ def test_a_name_that_is_not_utf_8_is_refused(desk: Desk, capsys: pytest.CaptureF
     (desk.directory / name).write_text("#include <two_link.ic>\n")
     for words in (["check", name], ["plan", name, "-o", "plan.json"]):
         assert cli.main(words) == 2
-        assert capsys.readouterr().err == """\
+        assert (
+            capsys.readouterr().err
+            == """\
 error[D001]: cannot read `\ufffd.ic`: its name is not UTF-8
  = help: give it, or the folder it lies in, another name: plans and archives hold it as text
 
 1 error
 """
+        )
     assert not Path("plan.json").exists()
 
 
@@ -182,7 +197,9 @@ error[D001]: cannot read `\ufffd.ic`: its name is not UTF-8
 
 def test_what_is_wrong_with_an_included_file_is_told_once_and_with_the_includes_that_led_there(desk: Desk) -> None:
     others: dict[str, str | bytes] = {"b.ic": '\n#include "c.ic"\n#include "c.ic"\n', "c.ic": b"let x = 1;\ny \x00;"}
-    assert desk.told('#include "b.ic"\n', (), others) == """\
+    assert (
+        desk.told('#include "b.ic"\n', (), others)
+        == """\
 error[D002]: `c.ic` is not text: it holds the byte 0x00
  --> c.ic:2:3
   |
@@ -194,11 +211,14 @@ error[D002]: `c.ic` is not text: it holds the byte 0x00
 
 1 error
 """
+    )
 
 
 def test_a_folder_as_an_include_says_which_decks_are_in_it(desk: Desk) -> None:
     others: dict[str, str | bytes] = {"sub/b.ic": "", "sub/c.ic": "", "empty.ic/x": ""}
-    assert desk.told('#include "sub"\n#include "empty.ic"\n', (), others) == """\
+    assert (
+        desk.told('#include "sub"\n#include "empty.ic"\n', (), others)
+        == """\
 error[D001]: `sub` is a directory, not a deck
  --> a.ic:1:10
   |
@@ -215,11 +235,14 @@ error[D001]: `empty.ic` is a directory, not a deck
 
 2 errors
 """
+    )
 
 
 def test_a_pipe_and_a_device_are_not_read(desk: Desk) -> None:
     os.mkfifo(desk.directory / "pipe.ic")
-    assert desk.told('#include "pipe.ic"\n#include "/dev/zero"\n') == """\
+    assert (
+        desk.told('#include "pipe.ic"\n#include "/dev/zero"\n')
+        == """\
 error[D001]: `pipe.ic` is not a regular file
  --> a.ic:1:10
   |
@@ -236,6 +259,7 @@ error[D001]: `/dev/zero` is not a regular file
 
 2 errors
 """
+    )
 
 
 def test_a_file_that_may_not_be_read_says_so(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -249,7 +273,9 @@ def test_a_file_that_may_not_be_read_says_so(desk: Desk, monkeypatch: pytest.Mon
     desk.write("", "secret.ic")
     monkeypatch.setattr("os.path.exists", lambda path: os.path.lexists(path))
     monkeypatch.setattr(os, "stat", stat)
-    assert desk.told('#include "secret.ic"\n') == """\
+    assert (
+        desk.told('#include "secret.ic"\n')
+        == """\
 error[D001]: cannot read `secret.ic`: Permission denied
  --> a.ic:1:10
   |
@@ -259,10 +285,13 @@ error[D001]: cannot read `secret.ic`: Permission denied
 
 1 error
 """
+    )
 
 
 def test_a_large_file_is_refused_at_its_include(desk: Desk) -> None:
-    assert desk.told('\n#include "large.ic"\n', (), {"large.ic": "a" * (2 << 20) + "b"}) == """\
+    assert (
+        desk.told('\n#include "large.ic"\n', (), {"large.ic": "a" * (2 << 20) + "b"})
+        == """\
 error[D018]: `large.ic` has 2.0 MiB; a deck's file has at most 2
  --> a.ic:2:10
   |
@@ -272,6 +301,7 @@ error[D018]: `large.ic` has 2.0 MiB; a deck's file has at most 2
 
 1 error
 """
+    )
 
 
 def test_a_file_that_does_not_say_its_size_is_not_cut() -> None:
@@ -284,7 +314,9 @@ def test_a_file_that_does_not_say_its_size_is_not_cut() -> None:
 def test_a_circle_through_a_link_is_a_circle(desk: Desk) -> None:
     desk.write('#include "c.ic"\n', "b.ic")
     (desk.directory / "c.ic").symlink_to("b.ic")
-    assert desk.told('#include "b.ic"\n') == """\
+    assert (
+        desk.told('#include "b.ic"\n')
+        == """\
 error[D006]: circular include: b.ic -> c.ic
  --> b.ic:1:10
   |
@@ -295,12 +327,15 @@ error[D006]: circular include: b.ic -> c.ic
 
 1 error
 """
+    )
 
 
 def test_includes_that_go_too_deep_are_told_at_the_one_that_is_too_deep(desk: Desk) -> None:
     others = {f"b{i}.ic": f'#include "b{i + 1}.ic"\n' for i in range(60)}
     told = desk.told('#include "b0.ic"\n', (), others)
-    assert told == """\
+    assert (
+        told
+        == """\
 error[D006]: includes go deeper than 50 files
  --> b49.ic:1:10
   |
@@ -318,6 +353,7 @@ error[D006]: includes go deeper than 50 files
 
 1 error
 """
+    )
 
 
 # what a plan keeps

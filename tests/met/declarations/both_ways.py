@@ -243,8 +243,9 @@ def rotation(numbers: Numbers, name: str) -> Matrix:
     x, y, z = v
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     R = np.eye(3) + 2.0 * w * across + 2.0 * across @ across
-    return tuple(tuple(numbers.number(f"{name}[{i}][{j}]", lambda i=i, j=j: R[i, j]) for j in range(3))
-                 for i in range(3))  # type: ignore[return-value]  # three rows of three
+    return tuple(
+        tuple(numbers.number(f"{name}[{i}][{j}]", lambda i=i, j=j: R[i, j]) for j in range(3)) for i in range(3)
+    )  # type: ignore[return-value]  # three rows of three
 
 
 def _servo(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]]:
@@ -348,9 +349,7 @@ class Answers:
         return given if isinstance(given, bool) else self._numbers.number(name, lambda: given)
 
 
-def _asking(
-    use: Use, experiment: Experiment, ask: Callable[[Numbers, Any], Any]
-) -> Callable[[Numbers], Any]:
+def _asking(use: Use, experiment: Experiment, ask: Callable[[Numbers, Any], Any]) -> Callable[[Numbers], Any]:
     """A call of a function that asks a world: its answer, and what was asked. The arm is anywhere, and moves."""
     machine = Machine(experiment)
     tree = machine.tree(lambda path: math.nan)  # no case varies it

@@ -1,5 +1,5 @@
-"""What a deck need not write has the declared default, and writing that changes nothing; what it must write is missed.
-"""
+"""What a deck need not write has the declared default, and writing that changes nothing; what it must write is
+missed."""
 
 from __future__ import annotations
 
@@ -38,8 +38,11 @@ def found_at(deck: Experiment, use: Use, parameter: Parameter) -> tuple[object, 
 @pytest.mark.parametrize(("kind", "name"), WITH_PARAMETERS)
 def test_what_a_deck_leaves_out_has_its_default(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for use in uses(kind, name):
-        left_out = [parameter for parameter in defaulted(use, use.parameters())
-                    if parameter.name not in use.words and not (use.file and parameter.shape == "text")]
+        left_out = [
+            parameter
+            for parameter in defaulted(use, use.parameters())
+            if parameter.name not in use.words and not (use.file and parameter.shape == "text")
+        ]
         deck = experiment(tmp_path, use.put(tmp_path).deck(without=[p.name for p in left_out]), select=["it"])
         for parameter in left_out:
             if parameter.shape == "text" or parameter.name == models.FAULTS:
@@ -106,7 +109,7 @@ def test_what_must_be_written_and_is_misspelt_is_told_once(kind: models.Kind, na
             key, deck = use.key(parameter), use.put(tmp_path).deck()
             written = f"{key} = {use.text(parameter, use.values[parameter.name])}"
             assert deck.count(f" {written}") + deck.count(f"({written}") == 1, written
-            misspelt = deck.replace(written, f"{key}{key[-1]}{written[len(key):]}")
+            misspelt = deck.replace(written, f"{key}{key[-1]}{written[len(key) :]}")
             (found,) = errors(check(tmp_path, misspelt, select=["it"]))
             assert found.code == "D141" and found.message == f"{use.label} has no `{key}{key[-1]}`"
             assert found.help[0] == f"did you mean `{key}`?"

@@ -74,7 +74,7 @@ def test_a_row_says_all_that_is_declared_of_a_parameter(
     lines = printed(capsys, kind, name).split("\n\nParameters\n")
     rows = [GAP.split(line.strip()) for line in lines[1].split("\n\n")[0].splitlines()] if len(lines) > 1 else []
     assert rows[:1] in ([["name", "unit", "default", "range", "meaning"]], []) and bool(rows) == bool(parameters)
-    assert rows[1:][:len(parameters)] == [cells(parameter) for parameter in parameters]
+    assert rows[1:][: len(parameters)] == [cells(parameter) for parameter in parameters]
 
 
 @pytest.mark.parametrize(("kind", "name"), EVERY)
@@ -101,7 +101,7 @@ def test_the_page_of_docs_says_the_same(kind: models.Kind, name: str) -> None:
     declared = models.written(models.find(kind, name))
     names = "|".join(dict.fromkeys(re.escape(parameter.name) for parameter in declared)) or "-"
     rows = [line for line in section[1].splitlines() if re.match(rf"\| `({names})` \|", line)]
-    for parameter, row in zip(declared, rows[:len(declared)], strict=True):
+    for parameter, row in zip(declared, rows[: len(declared)], strict=True):
         shown = re.split(r"(?<!\\)\|", row.strip("| "))
         plain = [re.sub(r"\\(.)", r"\1", cell).strip() for cell in shown]
         assert [cell for cell in plain if cell] == [f"`{parameter.name}`", *cells(parameter)[1:]]

@@ -53,7 +53,7 @@ def refused(folder: Path, use: Use, parameter: Parameter, deck: str, written: st
     assert words in message and message.endswith(ends), (words, message)
     assert at is not None
     line = found.sources[at.place.file].splitlines()[at.place.line - 1]
-    assert line[at.place.column - 1:][:at.place.length] == written, (line, written)
+    assert line[at.place.column - 1 :][: at.place.length] == written, (line, written)
 
 
 @pytest.mark.parametrize(("kind", "name"), EVERY)
@@ -192,7 +192,9 @@ def test_what_is_said_of_each_kind_of_bound(
     number = next(n for n, line in enumerate(deck.splitlines(), 1) if "probe" in line)
     line = deck.splitlines()[number - 1]
     before = line.index(bad, line.index(f" {name} = ") + len(name) + 3)
-    assert told(check(tmp_path, deck, select=["it"])) == f"""\
+    assert (
+        told(check(tmp_path, deck, select=["it"]))
+        == f"""\
 error[D077]: `{name}` of environment `used` must be {must}
   --> deck.ic:{number}:{before + 1}
    |
@@ -202,6 +204,7 @@ error[D077]: `{name}` of environment `used` must be {must}
 
 1 error
 """
+    )
 
 
 @pytest.mark.parametrize(
@@ -236,6 +239,4 @@ def test_a_parameter_of_a_plan_that_is_no_number_in_a_case_is_told(tmp_path: Pat
     column = replace(column, values=np.array([1.0, math.nan, 3.0]))
     with pytest.raises(Damaged) as raised:
         plan_check.check([replace(deck, cases=replace(deck.cases, coordinates=(column,)))])
-    assert str(raised.value) == (
-        "experiments[0].parameters.environment.used.force.x: it is not finite; in case #1"
-    )
+    assert str(raised.value) == ("experiments[0].parameters.environment.used.force.x: it is not finite; in case #1")

@@ -26,9 +26,7 @@ def one_sine(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(("kind", "name"), EVERY)
-def test_a_models_functions_give_the_same_recorded_as_with_floats(
-    kind: models.Kind, name: str, tmp_path: Path
-) -> None:
+def test_a_models_functions_give_the_same_recorded_as_with_floats(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for use in uses(kind, name):
         deck = experiment(tmp_path, use.put(tmp_path).deck(), select=["it"])
         calls = both_ways.calls(use, deck)

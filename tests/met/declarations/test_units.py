@@ -63,7 +63,7 @@ def others(unit: str) -> list[str]:
     found = [name for name in units_of(parse_unit(unit or "1").dimension) if name != unit]
     for match in re.finditer(r"[A-Za-z]+", unit):
         alike = units_of(UNITS[match[0]].measure.dimension)
-        found += [unit[:match.start()] + name + unit[match.end():] for name in alike if name != match[0]]
+        found += [unit[: match.start()] + name + unit[match.end() :] for name in alike if name != match[0]]
     return list(dict.fromkeys(found))
 
 
@@ -86,7 +86,7 @@ def refused(folder: Path, use: Use, texts: Mapping[str, str], code: str) -> dict
         assert each.message.startswith(f"`{name}` of {use.owner(use.parameter(name))} is "), each.message
         assert each.help and each.at is not None
         line = found.sources[each.at.place.file].splitlines()[each.at.place.line - 1]
-        shown = line[each.at.place.column - 1:][:each.at.place.length]
+        shown = line[each.at.place.column - 1 :][: each.at.place.length]
         assert shown in texts[name] and shown.strip("[]"), (shown, texts[name])
     return by_name
 
@@ -126,9 +126,7 @@ def test_a_bare_number_is_refused_where_there_is_a_dimension(
 
 @pytest.mark.parametrize("joint", JOINTS)
 @pytest.mark.parametrize(("kind", "name"), WITH_NUMBERS)
-def test_a_number_of_another_dimension_is_refused(
-    kind: models.Kind, name: str, joint: str, tmp_path: Path
-) -> None:
+def test_a_number_of_another_dimension_is_refused(kind: models.Kind, name: str, joint: str, tmp_path: Path) -> None:
     for use, new in every_use(kind, name, joint):
         numbers = numbers_of(use, new)
         said = refused(tmp_path, use, {each: written(v, ODD) for each, (_, v) in numbers.items()}, "D061")

@@ -36,8 +36,17 @@ def program_of(arm: RandomArm) -> Program:
 
         q, qd, tau, qdd, mode, rotor = (some(f"{name}.", arm.n) for name in VECTORS)
         wrenches = {name: (some(f"{name}.n", 3), some(f"{name}.f", 3)) for name in arm.wrenches}
-        ours = solve(tree, q, qd, tau=tau, qdd=qdd, mode=[m > 0.5 for m in mode], rotor=rotor,
-                     gravity=some("gravity.", 3), wrenches=wrenches)
+        ours = solve(
+            tree,
+            q,
+            qd,
+            tau=tau,
+            qdd=qdd,
+            mode=[m > 0.5 for m in mode],
+            rotor=rotor,
+            gravity=some("gravity.", 3),
+            wrenches=wrenches,
+        )
         felt = effective_inertia(tree, ours)
         results = [*ours.qdd, *ours.tau, *(J for J, _ in felt), *(b for _, b in felt)]
         for moment, force in reactions(tree, ours):
@@ -59,34 +68,52 @@ def states_of(arm: RandomArm) -> list[RandomArm]:
     result = []
     for case in range(CASES):
         share = (1.1, -0.1)[case] if case < 2 else random.random()
-        result.append(replace(
-            arm, q=numbers(2.0), qd=numbers(1.5), tau=numbers(10.0), qdd=numbers(3.0), gravity=numbers(6.0, 3),
-            mode=tuple(bool(x) for x in random.random(arm.n) < share),
-            rotor=tuple((10.0 ** random.uniform(-2, 2, arm.n) * (random.random(arm.n) < 0.5)).tolist()),
-            wrenches={name: (numbers(2.0, 3), numbers(5.0, 3)) for name in arm.wrenches},
-        ))
+        result.append(
+            replace(
+                arm,
+                q=numbers(2.0),
+                qd=numbers(1.5),
+                tau=numbers(10.0),
+                qdd=numbers(3.0),
+                gravity=numbers(6.0, 3),
+                mode=tuple(bool(x) for x in random.random(arm.n) < share),
+                rotor=tuple((10.0 ** random.uniform(-2, 2, arm.n) * (random.random(arm.n) < 0.5)).tolist()),
+                wrenches={name: (numbers(2.0, 3), numbers(5.0, 3)) for name in arm.wrenches},
+            )
+        )
     return result
 
 
-@pytest.mark.parametrize("joints", [
-    1, 4, 7, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3, 5, 6, 9, 12, 15, 18, 21, 24, 27, 30)),
-])
+@pytest.mark.parametrize(
+    "joints",
+    [
+        1,
+        4,
+        7,
+        *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3, 5, 6, 9, 12, 15, 18, 21, 24, 27, 30)),
+    ],
+)
 def test_machine_code_agrees_with_pinocchio_and_linear_algebra_in_every_mode(joints: int) -> None:
     arm = random_tree(2000 + joints, joints)
     states = states_of(arm)
-    inputs = [[float(x) for name in VECTORS for x in getattr(s, name)] + [*s.gravity] + [
-        x for wrench in s.wrenches.values() for part in wrench for x in part] for s in states]
+    inputs = [
+        [float(x) for name in VECTORS for x in getattr(s, name)]
+        + [*s.gravity]
+        + [x for wrench in s.wrenches.values() for part in wrench for x in part]
+        for s in states
+    ]
     _, found = kernel.compile(program_of(arm)).run(np.array(inputs), 0)
     forward, inverse, borne, felt, bias = (
-        Worst(f"{joints} joints compiled: {what}") for what in ("qdd", "tau", "reactions", "J_eff", "b"))
+        Worst(f"{joints} joints compiled: {what}") for what in ("qdd", "tau", "reactions", "J_eff", "b")
+    )
     for case, (state, row) in enumerate(zip(states, found, strict=True)):
-        qdd, tau, J, b = row[:4 * joints].reshape(4, joints)
+        qdd, tau, J, b = row[: 4 * joints].reshape(4, joints)
         theirs = pinocchio(state)
         where = f"case {case}"
         forward.see(relative(qdd, theirs.accelerations(state.q, state.qd, tau, state.wrenches)), where)
         inverse.see(relative(tau, theirs.torques(state.q, state.qd, qdd, state.wrenches)), where)
         expected = [np.concatenate(pair) for pair in theirs.reactions(state.q, state.qd, qdd, state.wrenches)]
-        for i, reaction in enumerate(row[4 * joints:].reshape(joints, 6)):
+        for i, reaction in enumerate(row[4 * joints :].reshape(joints, 6)):
             borne.see(relative(reaction, expected[i]), f"{where}, joint {i}")
         mode = np.array(state.mode)
         assert (tau[mode] == np.array(state.tau)[mode]).all() and (qdd[~mode] == np.array(state.qdd)[~mode]).all()

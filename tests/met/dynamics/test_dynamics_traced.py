@@ -47,8 +47,17 @@ class Recorder:
 
 def everything(tree: Tree, arm: RandomArm, mode: Any) -> list[Real]:
     """All that the package computes, in one list."""
-    ours = solve(tree, arm.q, arm.qd, tau=arm.tau, qdd=arm.qdd, mode=mode, rotor=arm.rotor, gravity=arm.gravity,
-                 wrenches=arm.wrenches)
+    ours = solve(
+        tree,
+        arm.q,
+        arm.qd,
+        tau=arm.tau,
+        qdd=arm.qdd,
+        mode=mode,
+        rotor=arm.rotor,
+        gravity=arm.gravity,
+        wrenches=arm.wrenches,
+    )
     result: list[Real] = [*ours.qdd, *ours.tau, *ours.tau_load, *ours.D]
     for pair in effective_inertia(tree, ours):
         result.extend(pair)
@@ -62,8 +71,9 @@ def everything(tree: Tree, arm: RandomArm, mode: Any) -> list[Real]:
 
 
 def recorded_state(arm: RandomArm, record: Recorder) -> RandomArm:
-    return replace(arm, **{name: record.many(name, getattr(arm, name))
-                           for name in ("q", "qd", "tau", "qdd", "rotor", "gravity")})
+    return replace(
+        arm, **{name: record.many(name, getattr(arm, name)) for name in ("q", "qd", "tau", "qdd", "rotor", "gravity")}
+    )
 
 
 def recorded_bodies(bodies: Sequence[Body], record: Recorder) -> list[Body]:
@@ -123,9 +133,16 @@ def test_numpys_numbers_take_the_traced_path(seed: int) -> None:
     record = Recorder()
     traced = Tree.build(recorded_bodies(arm.bodies, record))
     parts = ("at", "rpy", "axis", "com", "inertia")
-    plain = Tree.build([replace(body, mass=np.float64(body.mass),
-                                **{part: tuple(map(np.float64, getattr(body, part))) for part in parts})
-                        for body in arm.bodies])
+    plain = Tree.build(
+        [
+            replace(
+                body,
+                mass=np.float64(body.mass),
+                **{part: tuple(map(np.float64, getattr(body, part))) for part in parts},
+            )
+            for body in arm.bodies
+        ]
+    )
     numbers: list[tuple[Real, Real]] = []
     for ours, theirs in zip(traced.joints, plain.joints, strict=True):
         for part in ("swing", "offset", "twist", "zero"):
@@ -176,9 +193,20 @@ def inertia(rng: np.random.Generator) -> tuple[float, ...]:
 def arm_of(places: Sequence[tuple[int, Sequence[float], float]]) -> list[Body]:
     """Revolute joints about z, each placed by (parent, at, turn about x), links of no symmetry at all."""
     rng = np.random.default_rng(1)
-    return [Body(f"link{i}", f"joint{i}", "revolute", parent, at=tuple(map(float, at)), rpy=(turn, 0.0, 0.0),
-                 mass=float(rng.uniform(1, 4)), com=tuple(map(float, rng.standard_normal(3) * 0.1)),
-                 inertia=inertia(rng)) for i, (parent, at, turn) in enumerate(places)]
+    return [
+        Body(
+            f"link{i}",
+            f"joint{i}",
+            "revolute",
+            parent,
+            at=tuple(map(float, at)),
+            rpy=(turn, 0.0, 0.0),
+            mass=float(rng.uniform(1, 4)),
+            com=tuple(map(float, rng.standard_normal(3) * 0.1)),
+            inertia=inertia(rng),
+        )
+        for i, (parent, at, turn) in enumerate(places)
+    ]
 
 
 def planar_two_link() -> list[Body]:
@@ -188,15 +216,28 @@ def planar_two_link() -> list[Body]:
 def panda_like() -> list[Body]:
     """Franka Emika's Panda by its Denavit-Hartenberg table, matter invented."""
     r = math.pi / 2
-    return arm_of([(-1, (0, 0, 0.333), 0.0), (0, (0, 0, 0), -r), (1, (0, -0.316, 0), r), (2, (0.0825, 0, 0), r),
-                   (3, (-0.0825, 0.384, 0), -r), (4, (0, 0, 0), r), (5, (0.088, 0, 0), r)])
+    return arm_of(
+        [
+            (-1, (0, 0, 0.333), 0.0),
+            (0, (0, 0, 0), -r),
+            (1, (0, -0.316, 0), r),
+            (2, (0.0825, 0, 0), r),
+            (3, (-0.0825, 0.384, 0), -r),
+            (4, (0, 0, 0), r),
+            (5, (0.088, 0, 0), r),
+        ]
+    )
 
 
 def tree_of_thirty() -> list[Body]:
     """A trunk of six joints with four limbs of six."""
     r = math.pi / 2
-    return arm_of([(i - 1 if i < 6 or i % 6 else 5, (0.3, 0, 0.1) if i % 2 else (0, 0.2, 0), r if i % 2 else -r)
-                   for i in range(30)])
+    return arm_of(
+        [
+            (i - 1 if i < 6 or i % 6 else 5, (0.3, 0, 0.1) if i % 2 else (0, 0.2, 0), r if i % 2 else -r)
+            for i in range(30)
+        ]
+    )
 
 
 def operations(bodies: Sequence[Body], *, mixed: bool = False, felt: bool = False) -> int:
@@ -208,8 +249,16 @@ def operations(bodies: Sequence[Body], *, mixed: bool = False, felt: bool = Fals
     n = len(bodies)
     q, qd, tau, qdd, rotor, mode = (record.many(x, (0.0,) * n) for x in ("q", "qd", "tau", "qdd", "rotor", "mode"))
     tree = Tree.build(bodies)
-    ours = solve(tree, q, qd, tau=tau, qdd=qdd if mixed else None, mode=[m > 0.5 for m in mode] if mixed else True,
-                 rotor=rotor if mixed else None, gravity=(0.0, 0.0, -9.81))
+    ours = solve(
+        tree,
+        q,
+        qd,
+        tau=tau,
+        qdd=qdd if mixed else None,
+        mode=[m > 0.5 for m in mode] if mixed else True,
+        rotor=rotor if mixed else None,
+        gravity=(0.0, 0.0, -9.81),
+    )
     outputs = [*ours.qdd, *(ours.tau if mixed else ())]
     if felt:
         outputs.extend(x for pair in effective_inertia(tree, ours) for x in pair)
@@ -220,15 +269,18 @@ def operations(bodies: Sequence[Body], *, mixed: bool = False, felt: bool = Fals
 
 # Counts at the first issue and a few for rounding up: more is a loss of speed. design.md's best hand-made recursion
 # ran at some 1200 to 1500 operations for seven joints.
-@pytest.mark.parametrize(("arm", "mixed", "felt", "at_most"), [
-    (planar_two_link, False, False, 60),
-    (planar_two_link, True, False, 105),
-    (panda_like, False, False, 1110),
-    (panda_like, True, False, 1400),
-    (panda_like, True, True, 1930),
-    (tree_of_thirty, False, False, 6100),
-    (tree_of_thirty, True, False, 7560),
-])
+@pytest.mark.parametrize(
+    ("arm", "mixed", "felt", "at_most"),
+    [
+        (planar_two_link, False, False, 60),
+        (planar_two_link, True, False, 105),
+        (panda_like, False, False, 1110),
+        (panda_like, True, False, 1400),
+        (panda_like, True, True, 1930),
+        (tree_of_thirty, False, False, 6100),
+        (tree_of_thirty, True, False, 7560),
+    ],
+)
 def test_an_evaluation_costs_no_more_operations_than_it_did(
     arm: Callable[[], list[Body]], mixed: bool, felt: bool, at_most: int
 ) -> None:

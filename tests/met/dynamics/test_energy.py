@@ -63,8 +63,17 @@ def test_a_rotor_stores_energy_and_no_momentum() -> None:
 def test_energy_grows_by_the_power_of_torques_and_wrenches(seed: int) -> None:
     arm = random_tree(seed)
     tree = Tree.build(arm.bodies)
-    now = solve(tree, arm.q, arm.qd, tau=arm.tau, qdd=arm.qdd, mode=arm.mode, rotor=arm.rotor, gravity=arm.gravity,
-                wrenches=arm.wrenches)
+    now = solve(
+        tree,
+        arm.q,
+        arm.qd,
+        tau=arm.tau,
+        qdd=arm.qdd,
+        mode=arm.mode,
+        rotor=arm.rotor,
+        gravity=arm.gravity,
+        wrenches=arm.wrenches,
+    )
     motions = link_motions(tree, arm.q, arm.qd)
     power = float(np.dot(now.tau, arm.qd))
     for name, (moment, force) in arm.wrenches.items():
@@ -74,8 +83,9 @@ def test_energy_grows_by_the_power_of_torques_and_wrenches(seed: int) -> None:
 
     def total(t: float) -> float:
         q, qd, qdd = (np.array(x, float) for x in (arm.q, arm.qd, now.qdd))
-        there = energy(tree, tuple(q + t * qd + t * t / 2 * qdd), tuple(qd + t * qdd), rotor=arm.rotor,
-                       gravity=arm.gravity)
+        there = energy(
+            tree, tuple(q + t * qd + t * t / 2 * qdd), tuple(qd + t * qdd), rotor=arm.rotor, gravity=arm.gravity
+        )
         return float(there.kinetic + there.potential)
 
     # The derivative by differences of order four: h^4 against rounding of the energy over h.

@@ -37,8 +37,15 @@ def floated(arm: RandomArm) -> RandomArm:
     mass = float(random.uniform(1.0, 20.0))
     second = mass * spread @ spread.T
     J = np.trace(second) * np.eye(3) - second
-    own = Body("base", "", "fixed", -1, mass=mass, com=tuple(map(float, 0.3 * random.standard_normal(3))),
-               inertia=tuple(float(J[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))))
+    own = Body(
+        "base",
+        "",
+        "fixed",
+        -1,
+        mass=mass,
+        com=tuple(map(float, 0.3 * random.standard_normal(3))),
+        inertia=tuple(float(J[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))),
+    )
     wrenches = dict(arm.wrenches)
     if random.random() < 0.5:
         moment, force = (tuple(map(float, 4.0 * random.standard_normal(3))) for _ in range(2))
@@ -55,8 +62,14 @@ def flight(seed: int) -> Flight:
 
 def passed(arm: RandomArm, tree: Tree, base: Flight, mode: object = True, **changed: object) -> Solved:
     """One pass over a floating arm; words that `solve` takes replace its own."""
-    given = {"tau": arm.tau, "qdd": arm.qdd, "rotor": arm.rotor, "wrenches": arm.wrenches,
-             "gravity": vector(base.R.T @ np.array(arm.gravity)), "base_rate": vector(base.w)}
+    given = {
+        "tau": arm.tau,
+        "qdd": arm.qdd,
+        "rotor": arm.rotor,
+        "wrenches": arm.wrenches,
+        "gravity": vector(base.R.T @ np.array(arm.gravity)),
+        "base_rate": vector(base.w),
+    }
     return solve(tree, arm.q, arm.qd, mode=mode, **{**given, **changed})
 
 
@@ -105,8 +118,9 @@ def test_energy_and_momentum_agree_with_pinocchios_free_flyer() -> None:
     kinetic, potential, momentum = (Worst(f"free base: {what}") for what in ("kinetic", "potential", "momentum"))
     for arm, tree, base in fleet():
         theirs = FloatingPinocchio(arm.bodies, arm.gravity, arm.rotor)
-        ours = energy(tree, arm.q, arm.qd, gravity=arm.gravity, base=pose(base),
-                      base_velocity=(vector(base.w), vector(base.v)))
+        ours = energy(
+            tree, arm.q, arm.qd, gravity=arm.gravity, base=pose(base), base_velocity=(vector(base.w), vector(base.v))
+        )
         expected = theirs.energy(base, arm.q, arm.qd)
         kinetic.see(abs(ours.kinetic - expected[0]) / expected[0], f"seed {arm.seed}")
         weights = sum(body.mass for body in arm.bodies) * np.linalg.norm(arm.gravity)
@@ -156,13 +170,19 @@ def test_inertia_and_torque_felt_agree_with_linear_algebra_in_every_mode() -> No
     held, yielding, bias = (Worst(f"free base: {what}") for what in ("J_eff, held", "J_eff, yielding", "b"))
     for seed in range(60):
         arm = floated(random_tree(seed))
-        tree, (position, rpy, push, spin) = Tree.build(arm.bodies, free=True), np.random.default_rng(seed).normal(
-            size=(4, 3))
+        tree, (position, rpy, push, spin) = (
+            Tree.build(arm.bodies, free=True),
+            np.random.default_rng(seed).normal(size=(4, 3)),
+        )
         at, rate = (tuple(map(float, (*x, *y[::-1]))) for x, y in ((position, rpy), (push, spin)))
         bearing = stand()
         platform = dense.DenseArm(bearing).links(at, rate, (0.0,) * 6)[-1]
-        base = Flight(np.array(platform.R, float), np.array(platform.p, float),
-                      np.array(platform.R.T @ platform.w, float), np.array(platform.R.T @ platform.v, float))
+        base = Flight(
+            np.array(platform.R, float),
+            np.array(platform.p, float),
+            np.array(platform.R.T @ platform.w, float),
+            np.array(platform.R.T @ platform.v, float),
+        )
         bodies = [*bearing, *(replace(body, parent=body.parent + 6) for body in arm.bodies)]
         rotor = np.array((0.0,) * 6 + arm.rotor)
         on_stand = dense.DenseArm(bodies, arm.gravity, rotor, arm.wrenches)
@@ -201,25 +221,38 @@ def test_a_free_body_turns_as_euler_says() -> None:
     com = np.array([0.1, -0.2, 0.3])
     body = Body("base", "", "fixed", -1, mass=5.0, com=vector(com), inertia=(2.0, 3.0, 4.0, 0.0, 0.0, 0.0))
     w, force = np.array([1.0, 2.0, -3.0]), np.array([4.0, 5.0, 6.0])
-    found = solve(Tree.build([body], free=True), (), (), base_rate=vector(w),
-                  wrenches={"base": (vector(ZERO), vector(force))})
+    found = solve(
+        Tree.build([body], free=True), (), (), base_rate=vector(w), wrenches={"base": (vector(ZERO), vector(force))}
+    )
     wd = np.linalg.solve(J, np.cross(-com, force) - np.cross(w, J @ w))
     a = force / 5.0 - np.cross(wd, com) - np.cross(w, np.cross(w, com))
     np.testing.assert_allclose(np.concatenate(found.base_acceleration), np.concatenate([wd, a]), rtol=1e-14)
     assert not found.base_singular
 
 
-HINGED = Body("arm", "hinge", "revolute", -1, at=(0.2, 0.1, 0.0), rpy=(0.3, 0.4, 0.5), mass=2.0, com=(0.5, 0.0, 0.0),
-              inertia=(0.1, 0.2, 0.3, 0.0, 0.0, 0.0))
+HINGED = Body(
+    "arm",
+    "hinge",
+    "revolute",
+    -1,
+    at=(0.2, 0.1, 0.0),
+    rpy=(0.3, 0.4, 0.5),
+    mass=2.0,
+    com=(0.5, 0.0, 0.0),
+    inertia=(0.1, 0.2, 0.3, 0.0, 0.0, 0.0),
+)
 
 
-@pytest.mark.parametrize(("base", "mode", "singular"), [
-    (Body("base", "", "fixed", -1), True, True),
-    (Body("base", "", "fixed", -1), False, False),
-    (Body("base", "", "fixed", -1, mass=3.0), True, True),
-    (Body("base", "", "fixed", -1, mass=3.0, com=(1.0, 2.0, 0.0)), True, False),
-    (Body("base", "", "fixed", -1, mass=3.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)), True, False),
-])
+@pytest.mark.parametrize(
+    ("base", "mode", "singular"),
+    [
+        (Body("base", "", "fixed", -1), True, True),
+        (Body("base", "", "fixed", -1), False, False),
+        (Body("base", "", "fixed", -1, mass=3.0), True, True),
+        (Body("base", "", "fixed", -1, mass=3.0, com=(1.0, 2.0, 0.0)), True, False),
+        (Body("base", "", "fixed", -1, mass=3.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)), True, False),
+    ],
+)
 def test_a_base_without_inertia_about_the_joint_is_singular(base: Body, mode: bool, singular: bool) -> None:
     # Without matter it turns with the joint for nothing, and so it does with a point on the joint's axis.
     at = (0.0, 0.0, 0.0) if base.mass and base.com == (0.0, 0.0, 0.0) else HINGED.at
@@ -246,12 +279,31 @@ def test_a_recorded_state_gives_the_plain_results_in_every_mode(seed: int) -> No
         return tuple(graph.input(f"{name}.{i}") for i in range(len(numbers)))
 
     def everything(arm: RandomArm, w: tuple, v: tuple, place: Pose, mode: object) -> list:
-        ours = solve(tree, arm.q, arm.qd, tau=arm.tau, qdd=arm.qdd, mode=mode, rotor=arm.rotor, gravity=arm.gravity,
-                     wrenches=arm.wrenches, base_rate=w)
+        ours = solve(
+            tree,
+            arm.q,
+            arm.qd,
+            tau=arm.tau,
+            qdd=arm.qdd,
+            mode=mode,
+            rotor=arm.rotor,
+            gravity=arm.gravity,
+            wrenches=arm.wrenches,
+            base_rate=w,
+        )
         now = energy(tree, arm.q, arm.qd, rotor=arm.rotor, gravity=arm.gravity, base=place, base_velocity=(w, v))
         felt = [x for pair in effective_inertia(tree, ours) for x in pair]
-        return [*ours.qdd, *ours.tau, *ours.base_acceleration[0], *ours.base_acceleration[1], *felt, now.kinetic,
-                now.potential, *now.linear, *now.angular]
+        return [
+            *ours.qdd,
+            *ours.tau,
+            *ours.base_acceleration[0],
+            *ours.base_acceleration[1],
+            *felt,
+            now.kinetic,
+            now.potential,
+            *now.linear,
+            *now.angular,
+        ]
 
     state = replace(arm, **{name: recorded(name, getattr(arm, name)) for name in ("q", "qd", "tau", "qdd", "rotor")})
     w, v, place = recorded("w", vector(base.w)), recorded("v", vector(base.v)), pose(base)
@@ -270,9 +322,14 @@ def test_a_base_whose_every_number_is_a_cases_moves_the_same() -> None:
     worst = Worst("free base of numpy's numbers")
     for arm, tree, base in fleet()[:20]:
         parts = ("at", "rpy", "axis", "com", "inertia")
-        varied = [replace(body, mass=np.float64(body.mass),
-                          **{part: tuple(map(np.float64, getattr(body, part))) for part in parts})
-                  for body in arm.bodies]
+        varied = [
+            replace(
+                body,
+                mass=np.float64(body.mass),
+                **{part: tuple(map(np.float64, getattr(body, part))) for part in parts},
+            )
+            for body in arm.bodies
+        ]
         kept: dict[str, float] = {}
 
         def keep(name: str, value: float, kept: dict[str, float] = kept) -> float:
@@ -282,6 +339,8 @@ def test_a_base_whose_every_number_is_a_cases_moves_the_same() -> None:
         traced = Tree.build(varied, free=True)
         assert traced.each(keep) == traced
         assert any(name.startswith("tree.floating.") for name in kept)
-        worst.see(relative(whole(passed(arm, traced, base, arm.mode)), whole(passed(arm, tree, base, arm.mode))),
-                  f"seed {arm.seed}")
+        worst.see(
+            relative(whole(passed(arm, traced, base, arm.mode)), whole(passed(arm, tree, base, arm.mode))),
+            f"seed {arm.seed}",
+        )
     worst.below(1e-10)  # other frames round otherwise

@@ -117,16 +117,23 @@ def test_a_base_that_moves_is_six_more_joints_in_acceleration_mode() -> None:
         platform = DenseArm(bearing).links(at, rate, push)[-1]
         bodies = [*bearing, *(replace(body, parent=body.parent + 6) for body in arm.bodies)]
         none = (0.0,) * 6
-        added = replace(arm, q=at + arm.q, qd=rate + arm.qd, qdd=push + arm.qdd, tau=none + arm.tau,
-                        rotor=none + arm.rotor)
+        added = replace(
+            arm, q=at + arm.q, qd=rate + arm.qd, qdd=push + arm.qdd, tau=none + arm.tau, rotor=none + arm.rotor
+        )
         standing = Tree.build(bodies)
         carried = passed(added, (False,) * 6 + arm.mode, standing)
 
         def own(vector: np.ndarray, R: np.ndarray = platform.R) -> tuple[float, ...]:
             return tuple(map(float, R.T @ vector))
 
-        ours = passed(arm, arm.mode, tree, gravity=own(np.array(arm.gravity)), base_rate=own(platform.w),
-                      base_acceleration=(own(platform.wd), own(platform.a)))
+        ours = passed(
+            arm,
+            arm.mode,
+            tree,
+            gravity=own(np.array(arm.gravity)),
+            base_rate=own(platform.w),
+            base_acceleration=(own(platform.wd), own(platform.a)),
+        )
         motion.see(relative(ours.qdd, carried.qdd[6:]), f"seed {arm.seed}")
         torques.see(relative(ours.tau, carried.tau[6:]), f"seed {arm.seed}")
         for i, (now, then) in enumerate(zip(reactions(tree, ours), reactions(standing, carried)[6:], strict=True)):
@@ -141,10 +148,25 @@ def test_planar_two_link_arm_obeys_lagrange(q2: float) -> None:
     rods = Rods()
     inertia = tuple(m * length**2 / 12.0 for m, length in ((rods.mass_1, rods.length_1), (rods.mass_2, rods.length_2)))
     bodies = [
-        Body("upper", "one", "revolute", -1, mass=rods.mass_1, com=(rods.length_1 / 2, 0.0, 0.0),
-             inertia=(0.0, inertia[0], inertia[0], 0.0, 0.0, 0.0)),
-        Body("lower", "two", "revolute", 0, at=(rods.length_1, 0.0, 0.0), mass=rods.mass_2,
-             com=(rods.length_2 / 2, 0.0, 0.0), inertia=(0.0, inertia[1], inertia[1], 0.0, 0.0, 0.0)),
+        Body(
+            "upper",
+            "one",
+            "revolute",
+            -1,
+            mass=rods.mass_1,
+            com=(rods.length_1 / 2, 0.0, 0.0),
+            inertia=(0.0, inertia[0], inertia[0], 0.0, 0.0, 0.0),
+        ),
+        Body(
+            "lower",
+            "two",
+            "revolute",
+            0,
+            at=(rods.length_1, 0.0, 0.0),
+            mass=rods.mass_2,
+            com=(rods.length_2 / 2, 0.0, 0.0),
+            inertia=(0.0, inertia[1], inertia[1], 0.0, 0.0, 0.0),
+        ),
     ]
     qd, tau, rotor = np.array([0.8, -1.3]), np.array([5.0, -2.0]), np.array([157.26, 157.26])
     expected = np.linalg.solve(mass_matrix(rods, q2) + np.diag(rotor), tau - velocity_torque(rods, q2, qd))

@@ -133,7 +133,7 @@ def test_the_jump_of_the_rates_agrees_with_linear_algebra_in_every_mode(free: bo
             ours = struck(arm, tree, met, mode)[0]
             expected = predicted(M, J, inertia, dV, np.array((True,) * 6 * free + mode))
             size = np.max(np.abs(expected), initial=1e-3)
-            joints.see(np.max(np.abs(np.array(ours.qdd) - expected[6 * free:])) / size, f"seed {seed}")
+            joints.see(np.max(np.abs(np.array(ours.qdd) - expected[6 * free :])) / size, f"seed {seed}")
             if free:
                 twist = platform(met.base)[1] @ expected[:6]
                 bases.see(np.max(np.abs(np.concatenate(ours.base_acceleration) - twist)) / size, f"seed {seed}")
@@ -175,12 +175,27 @@ def test_a_payload_on_a_link_is_a_body_of_the_tree() -> None:
             rng = np.random.default_rng(seed)
             at, rpy = vector(rng.normal(size=3)), vector(rng.normal(size=3))
             number = [body.name for body in arm.bodies].index(met.link)
-            whole = Tree.build([*arm.bodies, replace(met.body, parent=number, at=at, rpy=rpy)],
-                               [body.joint for body in arm.bodies if body.kind != "fixed"], free=free)
+            whole = Tree.build(
+                [*arm.bodies, replace(met.body, parent=number, at=at, rpy=rpy)],
+                [body.joint for body in arm.bodies if body.kind != "fixed"],
+                free=free,
+            )
             bare = Tree.build(arm.bodies, free=free)
             more = loaded(bare, met.link, in_tree(bare, met.link, met.rigid, Pose(rotation_rpy(*rpy), at)))
-            one, other = (solve(tree, arm.q, arm.qd, tau=arm.tau, qdd=arm.qdd, mode=arm.mode, rotor=arm.rotor,
-                                gravity=arm.gravity, base_rate=met.base_velocity[0]) for tree in (more, whole))
+            one, other = (
+                solve(
+                    tree,
+                    arm.q,
+                    arm.qd,
+                    tau=arm.tau,
+                    qdd=arm.qdd,
+                    mode=arm.mode,
+                    rotor=arm.rotor,
+                    gravity=arm.gravity,
+                    base_rate=met.base_velocity[0],
+                )
+                for tree in (more, whole)
+            )
             motion.see(relative((*one.qdd, *one.tau), (*other.qdd, *other.tau)), f"seed {seed}")
             felt.see(relative(effective_inertia(more, one), effective_inertia(whole, other)), f"seed {seed}")
             for a, b in zip(reactions(more, one), reactions(whole, other), strict=True):
@@ -205,8 +220,9 @@ def test_two_free_bodies_that_meet_go_on_as_one() -> None:
     w = -mu * d * v / (I_1 + I_2 + mu * d * d)
     at_centre = m_2 * v / (m_1 + m_2)
     np.testing.assert_allclose(found.base_acceleration[0], (0.0, 0.0, w), rtol=0, atol=1e-15)
-    np.testing.assert_allclose(found.base_acceleration[1], (at_centre + w * m_2 / (m_1 + m_2) * d, 0.0, 0.0),
-                               rtol=0, atol=2e-15)
+    np.testing.assert_allclose(
+        found.base_acceleration[1], (at_centre + w * m_2 / (m_1 + m_2) * d, 0.0, 0.0), rtol=0, atol=2e-15
+    )
     V = found.base_acceleration[1][0]
     left = 0.5 * (m_1 * V**2 + m_2 * (V - w * d) ** 2 + (I_1 + I_2) * w**2)
     lost = 0.5 * mu * v * v * (1.0 - mu * d * d / (I_1 + I_2 + mu * d * d))
@@ -231,6 +247,7 @@ def test_a_body_in_flight_changes_its_momentum_by_the_wrench_alone() -> None:
 
 def test_a_payload_on_the_ground_is_nothing_to_the_arm() -> None:
     arm = random_tree(3)
-    tree = Tree.build([*arm.bodies, Body("floor", "", "fixed", -1)],
-                      [body.joint for body in arm.bodies if body.kind != "fixed"])
+    tree = Tree.build(
+        [*arm.bodies, Body("floor", "", "fixed", -1)], [body.joint for body in arm.bodies if body.kind != "fixed"]
+    )
     assert loaded(tree, "floor", Rigid(5.0, (1.0, 0.0, 0.0), (1.0,) * 6)) is tree

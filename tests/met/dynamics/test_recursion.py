@@ -119,8 +119,10 @@ def test_reactions_agree_with_pinocchio_in_the_links_own_frames() -> None:
 
 
 def test_a_joint_with_nothing_outboard_is_singular_in_torque_mode_only() -> None:
-    bodies = [Body("arm", "shoulder", "revolute", -1, mass=2.0, com=(0.5, 0.0, 0.0), inertia=(0.1, 0.1, 0.1, 0, 0, 0)),
-              Body("nothing", "wrist", "revolute", 0, at=(1.0, 0.0, 0.0), rpy=(0.3, 0.2, 0.1))]
+    bodies = [
+        Body("arm", "shoulder", "revolute", -1, mass=2.0, com=(0.5, 0.0, 0.0), inertia=(0.1, 0.1, 0.1, 0, 0, 0)),
+        Body("nothing", "wrist", "revolute", 0, at=(1.0, 0.0, 0.0), rpy=(0.3, 0.2, 0.1)),
+    ]
     tree = Tree.build(bodies)
 
     def singular(mode: tuple[bool, bool], rotor: tuple[float, float] = (0.0, 0.0)) -> tuple[bool, ...]:
@@ -133,9 +135,11 @@ def test_a_joint_with_nothing_outboard_is_singular_in_torque_mode_only() -> None
 
 def test_inertia_that_lies_on_the_axis_is_none_to_the_joint() -> None:
     # The wrist's only load is a mass point on the axes of both wrist joints: nothing to turn.
-    bodies = [Body("arm", "shoulder", "revolute", -1, mass=2.0, com=(0.5, 0.0, 0.0), inertia=(0.1, 0.1, 0.1, 0, 0, 0)),
-              Body("yoke", "roll", "revolute", 0, at=(1.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0)),
-              Body("point", "pitch", "revolute", 1, axis=(0.0, 1.0, 0.0), mass=3.0)]
+    bodies = [
+        Body("arm", "shoulder", "revolute", -1, mass=2.0, com=(0.5, 0.0, 0.0), inertia=(0.1, 0.1, 0.1, 0, 0, 0)),
+        Body("yoke", "roll", "revolute", 0, at=(1.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0)),
+        Body("point", "pitch", "revolute", 1, axis=(0.0, 1.0, 0.0), mass=3.0),
+    ]
     tree = Tree.build(bodies)
     for mode, expected in (((True, True, False), (False, True, False)), ((True, False, True), (False, False, True))):
         ours = solve(tree, (0.1, 0.2, 0.7), (0.3, 0.4, 0.5), tau=(1.0, 0.0, 0.0), mode=mode)

@@ -54,21 +54,31 @@ def test_small_angles_about_each_axis_are_a_damped_oscillator(tmp_path: Path, ax
 def test_it_turns_a_body_from_anywhere_to_where_it_is_wanted(tmp_path: Path) -> None:
     limited = "rpy = [20, 30, -50] deg; limit = [0.5, 0.6, 0.7] N*m; damping = [3, 4, 5] N*m*s/rad"
     far = ("[0.0001, -0.0002, 0.0003] rad", "[100, -40, 150] deg")
-    text = changed(DECK, far, ("duration = 5 s", "duration = 60 s"), ("damping = [2, 12, 1] N*m*s/rad; ", ""),
-                   ("axes = link", limited))
+    text = changed(
+        DECK,
+        far,
+        ("duration = 5 s", "duration = 60 s"),
+        ("damping = [2, 12, 1] N*m*s/rad; ", ""),
+        ("axes = link", limited),
+    )
     run = engine.run(experiment(tmp_path, text))
     R = np.array(rotation_rpy(*np.radians([20.0, 30.0, -50.0])), float)
     w, x, y, z = run.signals["links.base.orientation"][0, -1]
-    found = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                      [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                      [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+    found = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
     np.testing.assert_allclose(found, R, rtol=0, atol=1e-5)
 
 
 def moment(R: np.ndarray, rate: tuple[float, ...], **given: object) -> np.ndarray:
     """What it asks of a link with this orientation, world axes."""
     world = SimpleNamespace(
-        orientation=lambda link: tuple(map(tuple, R)), rate=lambda link: rate,
+        orientation=lambda link: tuple(map(tuple, R)),
+        rate=lambda link: rate,
         to_world=lambda link, vector: tuple(map(float, R @ np.array(vector, float))),
     )
     p = {parameter.name: parameter.default for parameter in ENVIRONMENT.parameters} | given
@@ -90,8 +100,14 @@ def test_the_moment_is_along_the_axis_of_the_error(angle: float, axes: str) -> N
 def test_damping_and_limit_are_along_the_links_axes_or_the_worlds() -> None:
     R = np.array(rotation_rpy(0.0, 0.0, math.pi / 2), float)
     for axes, expected in (("link", (-2.0, -0.5, 0.0)), ("world", (-1.0, -0.8, 0.0))):
-        found = moment(R, (1.0, 0.5, 0.0), rpy=(0.0, 0.0, math.pi / 2), damping=(1.0, 2.0, 3.0),
-                       limit=(math.inf, 0.8 if axes == "world" else math.inf, 1.0), axes=axes)
+        found = moment(
+            R,
+            (1.0, 0.5, 0.0),
+            rpy=(0.0, 0.0, math.pi / 2),
+            damping=(1.0, 2.0, 3.0),
+            limit=(math.inf, 0.8 if axes == "world" else math.inf, 1.0),
+            axes=axes,
+        )
         np.testing.assert_allclose(found, expected, atol=1e-15)
 
 
@@ -102,7 +118,9 @@ def test_a_rate_that_is_no_number_is_not_hidden_by_the_limit() -> None:
 
 def test_one_that_holds_nothing_is_told(tmp_path: Path) -> None:
     text = changed(DECK, ("stiffness = [8,9,10] N*m/rad; damping = [2, 12, 1] N*m*s/rad; ", ""))
-    assert told(check(tmp_path, text)) == """\
+    assert (
+        told(check(tmp_path, text))
+        == """\
 warning[D168]: environment `h` never acts: it has neither stiffness nor damping
  --> deck.ic:8:19
   |
@@ -112,13 +130,19 @@ warning[D168]: environment `h` never acts: it has neither stiffness nor damping
 
 1 warning
 """
+    )
 
 
 def test_one_on_a_base_that_does_not_yield_is_told(tmp_path: Path) -> None:
-    told_of = DECK[DECK.index("        base.rpy"):DECK.index("    environment")]
-    text = changed(DECK, ("base = free;", "base = prescribed { yaw = sine(amplitude = 1 deg, frequency = 1 Hz); };"),
-                   (told_of, "    }\n"))
-    assert told(check(tmp_path, text)) == """\
+    told_of = DECK[DECK.index("        base.rpy") : DECK.index("    environment")]
+    text = changed(
+        DECK,
+        ("base = free;", "base = prescribed { yaw = sine(amplitude = 1 deg, frequency = 1 Hz); };"),
+        (told_of, "    }\n"),
+    )
+    assert (
+        told(check(tmp_path, text))
+        == """\
 warning[D256]: environment `h` changes nothing: link `base` moves as it is told
  --> deck.ic:6:19
   |
@@ -128,11 +152,14 @@ warning[D256]: environment `h` changes nothing: link `base` moves as it is told
 
 1 warning
 """
+    )
 
 
 def test_one_on_a_base_that_is_no_link_is_told_where_it_stands(tmp_path: Path) -> None:
     held = changed(RUN, ("duration", "environment { h = attitude_hold { stiffness = [1, 1, 1] N*m/rad; } }  duration"))
-    assert told(check(tmp_path, ARM, SERVO, held)) == """\
+    assert (
+        told(check(tmp_path, ARM, SERVO, held))
+        == """\
 error[D159]: no link `base` in arm `swing`
   --> deck.ic:15:19
    |
@@ -143,3 +170,4 @@ error[D159]: no link `base` in arm `swing`
 
 1 error
 """
+    )

@@ -90,7 +90,9 @@ def test_what_is_told_its_acceleration_has_no_brake(tmp_path: Path) -> None:
 
 def test_a_joint_whose_motor_is_on_a_bed_has_no_brake(tmp_path: Path) -> None:
     run = changed(RUN, ("servos { }", "servos { hinge = drive; }"), ("duration", "substitute hinge { }  duration"))
-    assert told(check(tmp_path, ARM, SERVO, run)) == """\
+    assert (
+        told(check(tmp_path, ARM, SERVO, run))
+        == """\
 error[D244]: `hold` puts friction on joint `hinge`, whose motor is on a bed
   --> deck.ic:15:9
    |
@@ -101,3 +103,4 @@ error[D244]: `hold` puts friction on joint `hinge`, whose motor is on a bed
 
 1 error
 """
+    )

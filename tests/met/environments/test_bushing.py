@@ -67,8 +67,13 @@ def test_it_is_the_springs_of_its_axes_and_takes_energy_by_its_damping_alone() -
     other = world._link("two").R @ np.array(rotation_rpy(*p.to_rpy))
     own = world._link("one").R @ np.array(rotation_rpy(*p.rpy))
     apart = np.subtract(world.position("one", p.at), world.position("two", p.to_at))
-    seen = np.subtract(world.velocity("one", p.at), np.add(world._link("two").v, np.cross(
-        world._link("two").w, np.subtract(world.position("one", p.at), world._link("two").p))))
+    seen = np.subtract(
+        world.velocity("one", p.at),
+        np.add(
+            world._link("two").v,
+            np.cross(world._link("two").w, np.subtract(world.position("one", p.at), world._link("two").p)),
+        ),
+    )
     spin = np.subtract(world._link("one").w, world._link("two").w)
     one, two = loads(p, world).forces
     force = -other @ (np.array(p.stiffness) * (other.T @ apart) + np.array(p.damping) * (other.T @ seen))

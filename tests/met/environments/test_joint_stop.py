@@ -137,7 +137,9 @@ def test_the_units_are_those_of_its_joint(tmp_path: Path) -> None:
 
 
 def test_ends_that_are_the_wrong_way_round_are_told(tmp_path: Path) -> None:
-    assert told(check(tmp_path, changed(SLIDER, ("lower = -0.1 m", "lower = 0.2 m")))) == """\
+    assert (
+        told(check(tmp_path, changed(SLIDER, ("lower = -0.1 m", "lower = 0.2 m"))))
+        == """\
 error[D241]: `lower` of environment `end` must be less than `upper`
  --> deck.ic:8:51
   |
@@ -146,7 +148,8 @@ error[D241]: `lower` of environment `end` must be less than `upper`
   = help: swap them, or leave one out (position of the lower end; none unless written)
 
 1 error
-"""  # noqa: E501 - as it is said
+"""
+    )
     sweep = "sweep some of it { vary environment.end.upper = [0.1, -0.2] m; }"
     compiled = check(tmp_path, SLIDER, sweep, select=["some"])
     assert [d.message for d in compiled.diagnostics] == [

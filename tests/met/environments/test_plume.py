@@ -54,7 +54,12 @@ def test_a_small_plate_takes_the_momentum_that_the_gas_leaves_on_it(
     x /= np.linalg.norm(x)
     link = Link(np.column_stack([x, np.cross(N, x), N]), nozzle + far * u)
     force, moment = felt(
-        link, nozzle=tuple(nozzle), axis=tuple(3.0 * axis), sigma_n=sigma, sigma_t=sigma, share=0.9,
+        link,
+        nozzle=tuple(nozzle),
+        axis=tuple(3.0 * axis),
+        sigma_n=sigma,
+        sigma_t=sigma,
+        share=0.9,
     )
     q = (EXPONENT + 2.0) * 0.9 * THRUST / (4.0 * math.pi) * math.cos(theta) ** EXPONENT / far**2
     expected = 2.0 * q * AREA * math.cos(beta) * reflected(u, N, sigma)
@@ -111,8 +116,9 @@ def test_the_force_on_a_rectangle_goes_to_the_closed_form_as_cells_get_smaller()
     middle, which Hottel gave in closed form."""
     a, b, far = 1.6, 1.0, 1.2
     X, Y = a / 2 / far, b / 2 / far
-    quarter = (X / math.hypot(1, X) * math.atan(Y / math.hypot(1, X))
-               + Y / math.hypot(1, Y) * math.atan(X / math.hypot(1, Y))) / (2 * math.pi)
+    quarter = (
+        X / math.hypot(1, X) * math.atan(Y / math.hypot(1, X)) + Y / math.hypot(1, Y) * math.atan(X / math.hypot(1, Y))
+    ) / (2 * math.pi)
     exact = 2.0 * (2.0 * THRUST / (4.0 * math.pi)) * math.pi * 4.0 * quarter
     errors = [abs(before(a, b, far, cells, exponent=0.0)[2] / exact - 1.0) for cells in (2, 4, 6, 8)]
     print(errors)
@@ -133,15 +139,30 @@ def test_a_plate_right_before_the_nozzle_takes_its_momentum_with_few_cells(expon
 @pytest.mark.slow
 def test_on_a_plate_beside_the_plume_few_cells_come_near_many() -> None:
     """In general position, and where the plume goes along the plate."""
-    for nozzle, axis in (((0.2, -0.1), (0.3, -0.4, -1.0)), ((-1.0, 0.0), (1.0, 0.0, -0.2)),
-                         ((0.0, 0.2), (1.0, 0.5, -0.2)), ((2.0, 1.0), (-1.0, 0.2, -1.0))):
+    for nozzle, axis in (
+        ((0.2, -0.1), (0.3, -0.4, -1.0)),
+        ((-1.0, 0.0), (1.0, 0.0, -0.2)),
+        ((0.0, 0.2), (1.0, 0.5, -0.2)),
+        ((2.0, 1.0), (-1.0, 0.2, -1.0)),
+    ):
         along = np.array(axis) / np.linalg.norm(axis)
         for far in (1e-3, 0.02, 0.1, 0.3, 1.0, 3.0):
             for exponent in (2.0, 6.0, 12.0, 30.0):
-                values = {**STEADY, "width": 1.0, "height": 0.6, "exponent": exponent, "sigma_n": 0.8,
-                          "sides": "both", "closest": 1e-6}
-                few, many = (np.array(on_plate(given(ENVIRONMENT, **{**values, "cells": cells}), (*nozzle, far),
-                                               tuple(along)), float) for cells in (6.0, 40.0))
+                values = {
+                    **STEADY,
+                    "width": 1.0,
+                    "height": 0.6,
+                    "exponent": exponent,
+                    "sigma_n": 0.8,
+                    "sides": "both",
+                    "closest": 1e-6,
+                }
+                few, many = (
+                    np.array(
+                        on_plate(given(ENVIRONMENT, **{**values, "cells": cells}), (*nozzle, far), tuple(along)), float
+                    )
+                    for cells in (6.0, 40.0)
+                )
                 for one, other in zip(few, many, strict=True):
                     assert np.linalg.norm(one - other) < 0.02 * np.linalg.norm(other), (nozzle, axis, far, exponent)
 
@@ -155,8 +176,15 @@ def left_out(plates: int) -> np.ndarray:
     for _ in range(plates):
         exponent, (a, b), far = rng.uniform(1.5, 30.0), rng.uniform(0.2, 3.0, 2), 10 ** rng.uniform(-2.5, 0.7)
         axis = rng.normal(size=3)
-        values = {**STEADY, "width": a, "height": b, "exponent": exponent, "sigma_n": 0.8, "sides": "both",
-                  "closest": 1e-6}
+        values = {
+            **STEADY,
+            "width": a,
+            "height": b,
+            "exponent": exponent,
+            "sigma_n": 0.8,
+            "sides": "both",
+            "closest": 1e-6,
+        }
         nozzle = (0.7 * a * rng.normal(), 0.7 * b * rng.normal(), far)
         *few, many = (
             np.array(on_plate(given(ENVIRONMENT, **{**values, "cells": cells}), nozzle,
@@ -173,8 +201,11 @@ def test_on_plates_in_general_position_what_few_cells_leave_out_is_little_of_the
 @pytest.mark.slow
 def test_what_few_cells_leave_out_of_a_thousand_plates_is_what_the_page_says() -> None:
     page = " ".join((Path(__file__).parents[3] / "docs" / "environments.md").read_text(encoding="utf-8").split())
-    (said,) = re.findall(r"Of 1,000 plates in general position, .* the worst is off by (\S+) % .* with 4 cells, "
-                         r"(\S+) % with 6 and (\S+) % with 8; nine of ten within some (\S+), (\S+) and (\S+) %\.", page)
+    (said,) = re.findall(
+        r"Of 1,000 plates in general position, .* the worst is off by (\S+) % .* with 4 cells, "
+        r"(\S+) % with 6 and (\S+) % with 8; nine of ten within some (\S+), (\S+) and (\S+) %\.",
+        page,
+    )
     found = left_out(1000)
     figures = [*found.max(axis=0), *np.quantile(found, 0.9, axis=0)]
     assert [f"{100.0 * each:.1g}" for each in figures] == list(said)
@@ -311,7 +342,9 @@ def test_a_direction_that_is_none_and_cells_that_vary_are_told(tmp_path: Path) -
     text = DECK.replace("axis = [-1, 0, 0]", "axis = [0, 0, 0]")
     assert [d.code for d in check(tmp_path, text).diagnostics] == ["D240"]
     sweep = "sweep some of it { vary environment.jet.cells = [2, 4]; }"
-    assert told(check(tmp_path, DECK, sweep, select=["some"])) == """\
+    assert (
+        told(check(tmp_path, DECK, sweep, select=["some"]))
+        == """\
 error[D122]: `environment.jet.cells` cannot vary
   --> deck.ic:15:25
    |
@@ -321,6 +354,7 @@ error[D122]: `environment.jet.cells` cannot vary
 
 1 error
 """
+    )
 
 
 def test_a_plume_that_never_fires_is_told(tmp_path: Path) -> None:
@@ -359,7 +393,9 @@ def test_the_times_of_a_file_are_the_switches_of_a_deck(tmp_path: Path) -> None:
 
 
 def test_a_files_name_in_the_place_of_the_switches_is_sent_to_where_it_stands(tmp_path: Path) -> None:
-    assert told(check(tmp_path, FILED.replace("[0.2, 0.4] s", '"fire.csv"'))) == """\
+    assert (
+        told(check(tmp_path, FILED.replace("[0.2, 0.4] s", '"fire.csv"')))
+        == """\
 error[D064]: `switches` of environment `jet` is a list of numbers, not text
  --> deck.ic:9:62
   |
@@ -369,5 +405,6 @@ error[D064]: `switches` of environment `jet` is a list of numbers, not text
 
 1 error
 """
+    )
     (tmp_path / "fire.csv").write_text("times [s]\n1\n", encoding="utf-8")
     assert "column `times`" in told(check(tmp_path, FILED.replace("switches = [0.2, 0.4] s", 'file = "fire.csv"')))

@@ -120,7 +120,9 @@ def test_a_rope_lets_the_slider_go_at_the_rate_that_it_reached(tmp_path: Path) -
 
 
 def test_a_link_that_is_not_there_and_one_that_is_both_ends_are_told(tmp_path: Path) -> None:
-    assert told(check(tmp_path, changed(RAIL, ("to_point = [-1, 0, 0] m", "to = blok")))) == """\
+    assert (
+        told(check(tmp_path, changed(RAIL, ("to_point = [-1, 0, 0] m", "to = blok"))))
+        == """\
 error[D159]: no link `blok` in arm `rail`
  --> deck.ic:8:44
   |
@@ -132,13 +134,16 @@ error[D159]: no link `blok` in arm `rail`
 
 1 error
 """
+    )
     both = changed(RAIL, ("link = block; to_point", "link = block; to = block; to_point"))
     assert [d.code for d in check(tmp_path, both).diagnostics] == ["D168"]
 
 
 def test_a_link_called_world_is_not_the_ground(tmp_path: Path) -> None:
     text = RAIL.replace("block", "world").replace("length = 1 m; damping = 4 N*s/m;", "")
-    assert told(check(tmp_path, text)) == """\
+    assert (
+        told(check(tmp_path, text))
+        == """\
 error[D159]: `world` is the ground here, and a link of arm `rail`
  --> deck.ic:8:32
   |
@@ -148,6 +153,7 @@ error[D159]: `world` is the ground here, and a link of arm `rail`
 
 1 error
 """
+    )
 
 
 def test_ends_and_numbers_vary_with_the_case(tmp_path: Path) -> None:

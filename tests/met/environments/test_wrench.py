@@ -70,7 +70,7 @@ run it {{
     environment {{ hang = wrench {{ link = bar; force = [2, 5, 3] N; moment = [7, 8, 4] N*m; point = [1, 0, 0] m; axes = {axes}; }} }}
     rates {{ dynamics = 10 Hz; }}  duration = 0.1 s;  record = [tau];
 }}
-"""  # noqa: E501 - a deck is as wide as it is
+"""
     found = engine.run(experiment(tmp_path, ARM, run)).signals["tau"][0, :, 0]
     assert found == pytest.approx([tau, tau], rel=1e-14)  # some roundings of sine, cosine and products
 
@@ -146,7 +146,9 @@ sweep some of it {
 
 
 def test_a_link_that_is_not_there_is_told(tmp_path: Path) -> None:
-    assert told(check(tmp_path, changed(SLIDER, ("link = block", "link = bloc")))) == """\
+    assert (
+        told(check(tmp_path, changed(SLIDER, ("link = block", "link = bloc"))))
+        == """\
 error[D159]: no link `bloc` in arm `rail`
  --> deck.ic:7:42
   |
@@ -157,10 +159,13 @@ error[D159]: no link `bloc` in arm `rail`
 
 1 error
 """
+    )
 
 
 def test_axes_are_the_worlds_or_the_links(tmp_path: Path) -> None:
-    assert told(check(tmp_path, changed(SLIDER, ("from = 0.2 s", "axes = wold")))) == """\
+    assert (
+        told(check(tmp_path, changed(SLIDER, ("from = 0.2 s", "axes = wold"))))
+        == """\
 error[D076]: `axes` of environment `push` cannot be `wold`
  --> deck.ic:7:77
   |
@@ -171,3 +176,4 @@ error[D076]: `axes` of environment `push` cannot be `wold`
 
 1 error
 """
+    )

@@ -22,7 +22,7 @@ run it {
     environment { push = wrench_table { link = block; times = [0.2, 0.4, 0.7] s; force_x = [0, 6, -3] N; begin = 0.1 s; } }
     integrator = modified_euler;  rates { dynamics = 100 Hz; record = 100 Hz; }  duration = 1 s;  record = [q, qd, qdd];
 }
-"""  # noqa: E501 - a deck is as wide as it is
+"""
 
 
 @pytest.mark.parametrize("axes", ["world", "link"])
@@ -82,7 +82,9 @@ def test_a_column_of_another_dimension_is_not_proposed(tmp_path: Path) -> None:
 
 def test_what_is_wrong_with_a_file_is_told_in_it(tmp_path: Path) -> None:
     (tmp_path / "loads.csv").write_text("time [s], force_X [N]\n0, 1\n", encoding="utf-8")
-    assert told(check(tmp_path, FROM_FILE)) == """\
+    assert (
+        told(check(tmp_path, FROM_FILE))
+        == """\
 error[D243]: environment `push` has no use for column `force_X`
  --> loads.csv:1:11
   |
@@ -95,6 +97,7 @@ error[D243]: environment `push` has no use for column `force_X`
 
 1 error
 """
+    )
     for text, code in (
         ("force_x [N]\n1\n", "D192"), ("time [s], force_x [m]\n0, 1\n", "D193"), ("time [s], force_x [N]\n", "D196"),
         ("time [s], force_x [N]\n1, 1\n0, 2\n", "D195"), ("time [s], force_x [N]\n0, x\n", "D194"),
@@ -106,7 +109,9 @@ error[D243]: environment `push` has no use for column `force_X`
 def test_lists_and_a_file_are_too_much(tmp_path: Path) -> None:
     (tmp_path / "loads.csv").write_text("time [s], force_x [N]\n0, 1\n", encoding="utf-8")
     text = changed(SLIDER, ("times = [0.2, 0.4, 0.7] s; force_x = [0, 6, -3] N;", 'file = "loads.csv"; times = [1] s;'))
-    assert told(check(tmp_path, text)) == """\
+    assert (
+        told(check(tmp_path, text))
+        == """\
 error[D242]: `times` of environment `push` stands in the file
  --> deck.ic:7:75
   |
@@ -117,10 +122,13 @@ error[D242]: `times` of environment `push` stands in the file
 
 1 error
 """
+    )
 
 
 def test_lists_that_do_not_match_are_told(tmp_path: Path) -> None:
-    assert told(check(tmp_path, changed(SLIDER, ("[0, 6, -3] N", "[0, 6] N")))) == """\
+    assert (
+        told(check(tmp_path, changed(SLIDER, ("[0, 6, -3] N", "[0, 6] N"))))
+        == """\
 error[D154]: `force_x` of environment `push` has 2 numbers, and `times` 3
  --> deck.ic:7:92
   |
@@ -130,7 +138,8 @@ error[D154]: `force_x` of environment `push` has 2 numbers, and `times` 3
   = help: they go together, one to one
 
 1 error
-"""  # noqa: E501 - as it is said
+"""
+    )
     assert codes(tmp_path, changed(SLIDER, ("[0.2, 0.4, 0.7] s", "[0.2, 0.7, 0.4] s"))) == ["D156"]
     assert codes(tmp_path, changed(SLIDER, ("force_x = [0, 6, -3] N; ", ""))) == ["D168"]
     assert codes(tmp_path, changed(SLIDER, ("times = [0.2, 0.4, 0.7] s; ", ""))) == ["D075"]

@@ -24,9 +24,19 @@ POINT = (0.1, -0.2, 0.05)
 HZ = 100.0
 
 
-def chain(seed: int, count: int, more: str, *, base: str = "", sliding: int = -1, initial: str = "",
-          command: str = "rate", rates: str = "dynamics = 200 Hz; servos = 100 Hz; record = 100 Hz;",
-          bandwidth: float = 40.0, duration: str = "0.5 s") -> str:
+def chain(
+    seed: int,
+    count: int,
+    more: str,
+    *,
+    base: str = "",
+    sliding: int = -1,
+    initial: str = "",
+    command: str = "rate",
+    rates: str = "dynamics = 200 Hz; servos = 100 Hz; record = 100 Hz;",
+    bandwidth: float = 40.0,
+    duration: str = "0.5 s",
+) -> str:
     """A chain of so many joints in general position, one of them prismatic, all following the guide `tip`."""
     pick = random.Random(seed)
 
@@ -37,10 +47,14 @@ def chain(seed: int, count: int, more: str, *, base: str = "", sliding: int = -1
     for i in range(count):
         kind = "prismatic" if i == sliding else "revolute"
         inertia = ", ".join(f"{pick.uniform(0.1, 0.2):.4f}" for _ in range(3))
-        arm.append(f"    link link{i} {{ mass = {pick.uniform(1, 4):.4f} kg; com = {vector(0.2, 'm')};"
-                   f" inertia = [{inertia}] kg*m^2; }}")
-        arm.append(f"    joint j{i} {kind} {{ parent = {f'link{i - 1}' if i else 'base'}; child = link{i};"
-                   f" axis = {vector(1, '')}; at = {vector(0.5, 'm')}; rpy = {vector(1, 'rad')}; }}")
+        arm.append(
+            f"    link link{i} {{ mass = {pick.uniform(1, 4):.4f} kg; com = {vector(0.2, 'm')};"
+            f" inertia = [{inertia}] kg*m^2; }}"
+        )
+        arm.append(
+            f"    joint j{i} {kind} {{ parent = {f'link{i - 1}' if i else 'base'}; child = link{i};"
+            f" axis = {vector(1, '')}; at = {vector(0.5, 'm')}; rpy = {vector(1, 'rad')}; }}"
+        )
         servos.append(f"j{i} = follow;")
         begins.append(f"j{i}.q = {pick.uniform(-1, 1):.4f} {'m' if i == sliding else 'rad'};")
     return "\n".join([
@@ -69,8 +83,14 @@ def wanted(t: float, names: tuple[str, ...] = tuple(PATH)) -> tuple[Array, Array
         w = 2 * np.pi * hz
         return amplitude * np.sin(w * t), amplitude * w * np.cos(w * t)
 
-    known = {"x": (0.09 * t, 0.09), "y": wave(0.05, 0.5), "z": (-0.06 * t, -0.06), "roll": (20 * deg * t, 20 * deg),
-             "pitch": wave(10 * deg, 0.4), "yaw": (-15 * deg * t, -15 * deg)}
+    known = {
+        "x": (0.09 * t, 0.09),
+        "y": wave(0.05, 0.5),
+        "z": (-0.06 * t, -0.06),
+        "roll": (20 * deg * t, 20 * deg),
+        "pitch": wave(10 * deg, 0.4),
+        "yaw": (-15 * deg * t, -15 * deg),
+    }
     x, y, z, (roll, rolls), (pitch, pitches), (yaw, yaws) = (known[n] if n in names else (0.0, 0.0) for n in PATH)
     R = pin.rpy.rpyToMatrix(roll, pitch, yaw)
     # Rz(yaw) Ry(pitch) Rx(roll): each axis turned by what stands left of it
@@ -84,16 +104,22 @@ class Oracle:
     def __init__(self, experiment: Experiment) -> None:
         self.tree = pinocchio(experiment)
         self.link = experiment.structure.links[-1].name
-        self.frame = self.tree.model.addFrame(pin.Frame(
-            "guided", self.tree.joint_of[-1], self.tree.placed[-1] * pin.SE3(np.eye(3), np.array(POINT)),
-            pin.FrameType.OP_FRAME))
+        self.frame = self.tree.model.addFrame(
+            pin.Frame(
+                "guided",
+                self.tree.joint_of[-1],
+                self.tree.placed[-1] * pin.SE3(np.eye(3), np.array(POINT)),
+                pin.FrameType.OP_FRAME,
+            )
+        )
         self.data = self.tree.model.createData()
 
     def at(self, q: Array) -> tuple[Array, Array, Array]:
         """R and p of the guided frame, and its Jacobian, linear over angular, world axes."""
         theirs = self.tree.vector(q)
         J = pin.computeFrameJacobian(
-            self.tree.model, self.data, theirs, self.frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+            self.tree.model, self.data, theirs, self.frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
         pin.framesForwardKinematics(self.tree.model, self.data, theirs)
         pose = self.data.oMf[self.frame]
         return pose.rotation.copy(), pose.translation.copy(), J[:, self.tree.at]

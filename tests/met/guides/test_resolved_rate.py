@@ -18,8 +18,15 @@ LAW = f"{path()} max_damping = 0.4 m; threshold = 0.6 m; gain = 3 1/s; length = 
 LENGTH, GAIN, DAMPING, THRESHOLD = 0.7, 3.0, 0.4, 0.6
 
 
-def law(oracle: Oracle, q: np.ndarray, t: float, begun: tuple[np.ndarray, np.ndarray], rows: list[int],
-        shown: float, slides: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def law(
+    oracle: Oracle,
+    q: np.ndarray,
+    t: float,
+    begun: tuple[np.ndarray, np.ndarray],
+    rows: list[int],
+    shown: float,
+    slides: int,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The rates that the law gives at q, the path's error and J; shown: lambda."""
     R, p, J = oracle.at(q)
     far, turn, v, w = wanted(t, tuple(name for i, name in enumerate(PATH) if i in rows))
@@ -34,9 +41,16 @@ def law(oracle: Oracle, q: np.ndarray, t: float, begun: tuple[np.ndarray, np.nda
 
 
 @pytest.mark.oracle
-@pytest.mark.parametrize(("guides", "rows"), [
-    ("pose", [0, 1, 2, 3, 4, 5]), ("position", [0, 1, 2]), ("xy", [0, 1]), ("xz", [0, 2]), ("yz", [1, 2]),
-])
+@pytest.mark.parametrize(
+    ("guides", "rows"),
+    [
+        ("pose", [0, 1, 2, 3, 4, 5]),
+        ("position", [0, 1, 2]),
+        ("xy", [0, 1]),
+        ("xz", [0, 2]),
+        ("yz", [1, 2]),
+    ],
+)
 @pytest.mark.parametrize(("count", "sliding"), [(6, -1), (7, -1), (7, 2)])
 def test_every_tick_is_the_damped_least_squares(
     guides: str, rows: list[int], count: int, sliding: int, tmp_path: Path
@@ -165,8 +179,15 @@ def test_a_base_that_is_moved_is_made_up_for(tmp_path: Path) -> None:
     errors = []
     for hz in (200, 400, 800):
         # without a gain only what the base does is told to the joints; a stiff servo, so that the period's is left
-        text = chain(3, 7, "max_damping = 0 m; threshold = 0 m; gain = 0 1/s;", base=base, command="position",
-                     bandwidth=300.0, rates=f"dynamics = 1600 Hz; servos = {hz} Hz; record = 50 Hz;")
+        text = chain(
+            3,
+            7,
+            "max_damping = 0 m; threshold = 0 m; gain = 0 1/s;",
+            base=base,
+            command="position",
+            bandwidth=300.0,
+            rates=f"dynamics = 1600 Hz; servos = {hz} Hz; record = 50 Hz;",
+        )
         run = engine.run(experiment(tmp_path, text))
         errors.append(run.signals["guides.tip.error"][0].max())
         assert np.ptp(run.signals["q"][0], axis=0).max() > 0.05
@@ -185,8 +206,16 @@ def test_the_generalized_jacobian_knows_what_a_free_base_does(initial: str, tmp_
     link = "    link base { mass = 30 kg; com = [0.1, 0, -0.2] m; inertia = [3, 4, 5, 0.1, 0.2, -0.3] kg*m^2; }\n"
     errors = {}
     for jacobian in ("arm", "generalized"):
-        deck = chain(3, 7, f"{text}{jacobian};", base=FLYING, initial=initial, bandwidth=400.0, duration="1 s",
-                     rates="dynamics = 2 kHz; servos = 200 Hz; record = 100 Hz;")
+        deck = chain(
+            3,
+            7,
+            f"{text}{jacobian};",
+            base=FLYING,
+            initial=initial,
+            bandwidth=400.0,
+            duration="1 s",
+            rates="dynamics = 2 kHz; servos = 200 Hz; record = 100 Hz;",
+        )
         run = engine.run(experiment(tmp_path, deck.replace("arm chain {\n", "arm chain {\n" + link)))
         errors[jacobian] = run.signals["guides.tip.error"][0].max()
     # what is left is the first instants', in which the joints come to their rates, and the period's
@@ -199,10 +228,11 @@ def test_the_generalized_jacobian_knows_the_payloads_that_are_held_for_a_time(tm
     """Held for good, released as the run ends, grappled as it begins: one motion, and so one course of the error."""
     text = f"{path()} max_damping = 0 m; threshold = 0 m; gain = 3 1/s; jacobian = generalized;"
     body = "payload box { mass = 15 kg; shape = sphere(radius = 0.2 m); on = link6; at = [0.1, -0.2, 0.05] m;"
-    deck = chain(3, 7, text, base=FLYING, bandwidth=400.0,
-                 rates="dynamics = 2 kHz; servos = 200 Hz; record = 100 Hz;").replace(
-        "arm chain {\n", "arm chain {\n    link base { mass = 30 kg; inertia = [3, 4, 5] kg*m^2; }\n").replace(
-        "record = [", "record = [payloads.box.position, ")
+    deck = (
+        chain(3, 7, text, base=FLYING, bandwidth=400.0, rates="dynamics = 2 kHz; servos = 200 Hz; record = 100 Hz;")
+        .replace("arm chain {\n", "arm chain {\n    link base { mass = 30 kg; inertia = [3, 4, 5] kg*m^2; }\n")
+        .replace("record = [", "record = [payloads.box.position, ")
+    )
 
     def carried(more: str) -> engine.Run:
         return engine.run(experiment(tmp_path, deck.replace("    guide tip", f"    {body} {more} }}\n    guide tip")))
@@ -212,12 +242,15 @@ def test_the_generalized_jacobian_knows_the_payloads_that_are_held_for_a_time(tm
     grappled = carried(f"grapple = 0 s; position = [{at}] m;")
     for found, rows in ((released, -1), (grappled, None)):
         for name in ("q", "guides.tip.error", "guides.tip.turn_error"):
-            np.testing.assert_allclose(found.signals[name][0, :rows], wanted.signals[name][0, :rows], rtol=0, atol=1e-9,
-                                       err_msg=name)
+            np.testing.assert_allclose(
+                found.signals[name][0, :rows], wanted.signals[name][0, :rows], rtol=0, atol=1e-9, err_msg=name
+            )
 
 
 @pytest.mark.slow
 def test_the_generalized_jacobian_of_a_base_that_is_held_is_the_arms(tmp_path: Path) -> None:
-    one, other = (engine.run(experiment(tmp_path, chain(3, 7, f"{LAW} jacobian = {word};"))).signals["q"].tobytes()
-                  for word in ("arm", "generalized"))
+    one, other = (
+        engine.run(experiment(tmp_path, chain(3, 7, f"{LAW} jacobian = {word};"))).signals["q"].tobytes()
+        for word in ("arm", "generalized")
+    )
     assert one == other

@@ -70,6 +70,7 @@ def test_a_damped_spring_with_both_roots_alike_is_stable_as_physics_says(model: 
 
     def after(x: float) -> float:
         """What is left of q + qd after 4000 steps."""
+
         def slope(c: float, y: Motion) -> Slope:
             return Slope(y.qd, (-2.0 * x * y.qd[0] - x * x * y.q[0],))
 
@@ -146,7 +147,9 @@ run hold {{
 def test_a_servo_beyond_the_limit_is_an_error_that_names_integrator_and_rate(tmp_path: Path, model: Integrator) -> None:
     text = ARM + FAST.format(w=1000 * model.real_limit * 1.001, integrator=model.name)
     lambda_ = 1.001 * model.real_limit
-    assert told(check(tmp_path, text)) == f"""\
+    assert (
+        told(check(tmp_path, text))
+        == f"""\
 error[D104]: servo `quick` is unstable with {model.name} at this rate of the dynamics
  --> deck.ic:8:24
   |
@@ -156,6 +159,7 @@ error[D104]: servo `quick` is unstable with {model.name} at this rate of the dyn
 
 1 error
 """
+    )
 
 
 @EACH

@@ -95,20 +95,28 @@ def without_end(slope: Ask, h: Real, y: Motion, k1: Slope) -> Motion:
 def test_the_number_of_slopes_is_the_same_at_all_times(run, advance) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(Problem) as problem:
         run(advance)
-    assert said(problem.value) == """\
+    assert (
+        said(problem.value)
+        == """\
 error[E214]: integrator `own`: `advance` asks for more slopes at one time than at another
  = help: ask for the same number, at most 100, whatever the step's length is, and whether it is known
  = help: keep nothing from call to call: `advance` is called once for each slope that it asks for, and more
 
 1 error
 """
+    )
 
 
-@pytest.mark.parametrize(("gives", "what"), [
-    (lambda slope, h, y, k1: None, "a NoneType, not a Motion"),
-    (lambda slope, h, y, k1: Motion(y.q, (), y.x),
-     "a Motion of 1 positions, 0 rates and 0 other states; the arm has 1 positions, 1 rates and 0 other states"),
-])
+@pytest.mark.parametrize(
+    ("gives", "what"),
+    [
+        (lambda slope, h, y, k1: None, "a NoneType, not a Motion"),
+        (
+            lambda slope, h, y, k1: Motion(y.q, (), y.x),
+            "a Motion of 1 positions, 0 rates and 0 other states; the arm has 1 positions, 1 rates and 0 other states",
+        ),
+    ],
+)
 def test_what_is_no_state_of_the_arm_is_refused(run, gives, what) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(Problem) as problem:
         run(gives)
@@ -134,12 +142,15 @@ def sharing_wrongly(slope: Ask, h: Real, y: Motion, k1: Slope) -> Motion:
     return ahead(y, h, slope("half", y))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("advance", "raised", "line"), [
-    (keeping, "ValueError: two graphs meet in one operation", "mean(before, k1)"),
-    (asking_wrongly, "TypeError: slope(c, y) was given a tuple, not a Motion", "slope(1.0, y.q)"),
-    (sharing_wrongly, "TypeError: slope(c, y) was given a str for the share of the step", 'slope("half", y)'),
-    (partial(by_weight, None), "ValueError: no weight", "raise ValueError"),
-])
+@pytest.mark.parametrize(
+    ("advance", "raised", "line"),
+    [
+        (keeping, "ValueError: two graphs meet in one operation", "mean(before, k1)"),
+        (asking_wrongly, "TypeError: slope(c, y) was given a tuple, not a Motion", "slope(1.0, y.q)"),
+        (sharing_wrongly, "TypeError: slope(c, y) was given a str for the share of the step", 'slope("half", y)'),
+        (partial(by_weight, None), "ValueError: no weight", "raise ValueError"),
+    ],
+)
 def test_what_an_integrator_raises_is_said_at_its_own_line(run, advance, raised, line) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(Problem) as problem:
         run(advance)

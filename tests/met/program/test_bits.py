@@ -79,8 +79,10 @@ def test_cases_of_one_block_have_events_of_their_own(swung: Swung) -> None:
     assert swung.ticks // swung.experiment.structure.schedule.dynamics == 400
     assert (per_step.max(axis=1) > per_step.min(axis=1)).sum() >= 10, "steps that only some of the lanes split"
     assert (splits[-1] == 0.0).any() and (splits[-1] > 5.0).any()
-    print(f"{len(swung.experiment.structure.joints)} joints: splits of the first block's cases {splits[-1].tolist()}, "
-          f"at most {per_step.max():g} in a step")
+    print(
+        f"{len(swung.experiment.structure.joints)} joints: splits of the first block's cases {splits[-1].tolist()}, "
+        f"at most {per_step.max():g} in a step"
+    )
     assert ((per_step.max(axis=1) == 2.0) & (per_step.min(axis=1) == 0.0)).any(), "split twice in some, not in others"
 
 

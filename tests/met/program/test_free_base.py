@@ -53,8 +53,12 @@ def test_momentum_and_energy_are_kept_to_the_integrators_order(tmp_path: Path, i
     lost = []
     for hz in rates:
         run = flown(tmp_path, *at_rate(hz, integrator))
-        whole = np.column_stack([run.signals[name][0].reshape(len(run.time), -1)
-                                 for name in ("energy.kinetic", "momentum.linear", "momentum.angular")])
+        whole = np.column_stack(
+            [
+                run.signals[name][0].reshape(len(run.time), -1)
+                for name in ("energy.kinetic", "momentum.linear", "momentum.angular")
+            ]
+        )
         lost.append(np.max(np.abs(whole - whole[0]), axis=0) / np.max(np.abs(whole), axis=0))
     found = np.log2(lost[0] / lost[1])
     print(f"{integrator}: orders {np.round(found, 2)}, lost {lost[1]}")
@@ -97,15 +101,24 @@ def test_a_symmetric_top_precesses_as_eulers_solution(tmp_path: Path) -> None:
     q, rate = run.signals["links.base.orientation"][0], run.signals["links.base.rate"][0]
     w = np.array([_turned_back(each, vector) for each, vector in zip(q, rate, strict=True)])
     angle = 0.5 * w[0, 2] * run.time
-    expected = np.column_stack([w[0, 0] * np.cos(angle) - w[0, 1] * np.sin(angle),
-                                w[0, 1] * np.cos(angle) + w[0, 0] * np.sin(angle), np.full(31, w[0, 2])])
+    expected = np.column_stack(
+        [
+            w[0, 0] * np.cos(angle) - w[0, 1] * np.sin(angle),
+            w[0, 1] * np.cos(angle) + w[0, 0] * np.sin(angle),
+            np.full(31, w[0, 2]),
+        ]
+    )
     np.testing.assert_allclose(w, expected, rtol=0, atol=1e-8)
 
 
 def test_a_free_base_falls_with_its_arm_in_gravity(tmp_path: Path) -> None:
     # in its own axes nothing is felt of it: joints at rest stay so, whatever way up
-    still = [("= 0.5 rad/s", "= 0 rad/s"), ("= -1 rad/s", "= 0 rad/s"), ("[40, 20, -60]", "[0, 0, 0]"),
-             ("environment {}", "environment { gravity = [1, -2, -9] m/s^2; }")]
+    still = [
+        ("= 0.5 rad/s", "= 0 rad/s"),
+        ("= -1 rad/s", "= 0 rad/s"),
+        ("[40, 20, -60]", "[0, 0, 0]"),
+        ("environment {}", "environment { gravity = [1, -2, -9] m/s^2; }"),
+    ]
     run = flown(tmp_path, *still)
     t = run.time[:, None]
     place = np.array([1.0, 2.0, 3.0]) + np.array([0.1, -0.2, 0.3]) * t + 0.5 * np.array([1.0, -2.0, -9.0]) * t * t
@@ -171,14 +184,18 @@ sweep some of tumbling {
         assert runs[1].signals[name].tobytes() == values.tobytes(), name
     inputs = {coordinate.path: float(coordinate.values[3]) for coordinate in found.cases.coordinates}
     rows, _ = execute(build(found), inputs, found.structure.schedule.ticks)
-    kernel = np.concatenate([runs[0].signals[each.name][3].reshape(len(rows), -1)
-                             for each in found.structure.record], axis=1)
+    kernel = np.concatenate(
+        [runs[0].signals[each.name][3].reshape(len(rows), -1) for each in found.structure.record], axis=1
+    )
     assert np.abs(kernel - rows).max() < 1e-10 * np.abs(rows).max()
 
 
 def test_a_base_without_inertia_fails_and_says_so(tmp_path: Path) -> None:
-    arm = changed(ARM, ("inertia = [5, 7, 9, 0.3, -0.4, 0.5] kg*m^2; com = [0.1, 0.05, -0.1] m;",
-                        "inertia = [0, 0, 0] kg*m^2;"), ("at = [0.5, 0, 0] m; rpy = [20, 30, 0] deg;", ""))
+    arm = changed(
+        ARM,
+        ("inertia = [5, 7, 9, 0.3, -0.4, 0.5] kg*m^2; com = [0.1, 0.05, -0.1] m;", "inertia = [0, 0, 0] kg*m^2;"),
+        ("at = [0.5, 0, 0] m; rpy = [20, 30, 0] deg;", ""),
+    )
     run = flown(tmp_path, arm=arm)
     assert run.status[0] == engine.FAILED
     assert run.cause[0].replace(str(tmp_path), "") == (
@@ -188,9 +205,14 @@ def test_a_base_without_inertia_fails_and_says_so(tmp_path: Path) -> None:
 
 
 def test_a_base_that_runs_away_fails_and_says_so(tmp_path: Path) -> None:
-    text = changed(SPINNING.format(inertia="[2, 3, 4]", integrator="modified_euler", rate=[1, 2, 3], hz=10),
-                   ("base = free;", "base = free; environment { push = wrench { link = base; force = [1e308, 0, 0] N; "
-                    "moment = [1e308, 0, 0] N*m; } }"))
+    text = changed(
+        SPINNING.format(inertia="[2, 3, 4]", integrator="modified_euler", rate=[1, 2, 3], hz=10),
+        (
+            "base = free;",
+            "base = free; environment { push = wrench { link = base; force = [1e308, 0, 0] N; "
+            "moment = [1e308, 0, 0] N*m; } }",
+        ),
+    )
     run = engine.run(experiment(tmp_path, text))
     assert run.status[0] == engine.FAILED
     assert run.cause[0].replace(str(tmp_path), "") == (
@@ -200,9 +222,15 @@ def test_a_base_that_runs_away_fails_and_says_so(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("integrator", "limit"), [
-    ("modified_euler", 0.199), ("midpoint", 0.199), ("semi_implicit_euler", 0.00254), ("rk4", 0.999),
-])
+@pytest.mark.parametrize(
+    ("integrator", "limit"),
+    [
+        ("modified_euler", 0.199),
+        ("midpoint", 0.199),
+        ("semi_implicit_euler", 0.00254),
+        ("rk4", 0.999),
+    ],
+)
 def test_below_the_spin_that_is_warned_of_a_turn_keeps_the_energy_to_a_hundredth(
     integrator: str, limit: float, tmp_path: Path
 ) -> None:
@@ -214,10 +242,14 @@ def test_below_the_spin_that_is_warned_of_a_turn_keeps_the_energy_to_a_hundredth
         turn = limit * share  # rad a step of 10 ms
         rates = (axes * turn * 100.0).T.tolist()
         worst = 0.0
-        for inertia, com in (("[1.5, 2, 3]", "[0, 0, 0]"), ("[1.5, 2, 3, 0.1, 0.2, -0.15]", "[0.1, 0.2, -0.3]"),
-                             ("[0.2, 2, 2.1]", "[0.5, 0, 0]")):
-            varied = " ".join(f"initial.base.rate.{axis} = {rate} rad/s;"
-                              for axis, rate in zip("xyz", rates, strict=True))
+        for inertia, com in (
+            ("[1.5, 2, 3]", "[0, 0, 0]"),
+            ("[1.5, 2, 3, 0.1, 0.2, -0.15]", "[0.1, 0.2, -0.3]"),
+            ("[0.2, 2, 2.1]", "[0.5, 0, 0]"),
+        ):
+            varied = " ".join(
+                f"initial.base.rate.{axis} = {rate} rad/s;" for axis, rate in zip("xyz", rates, strict=True)
+            )
             deck = f"""\
 arm a {{
     link base {{ mass = 10 kg; inertia = {inertia} kg*m^2; com = {com} m; }}
@@ -285,8 +317,13 @@ servo drive {
 }
 """
     driven = "base = free; servos { shoulder = drive; elbow = drive; } substitute shoulder {}"
-    text = changed(RUN, ("base     = free;", driven), ("record = 10 Hz;", "servos = 100 Hz; record = 10 Hz;"),
-                   ("shoulder.qd   = 0.5", "shoulder.qd   = 0.1"), ("elbow.qd      = -1", "elbow.qd      = 0.1"))
+    text = changed(
+        RUN,
+        ("base     = free;", driven),
+        ("record = 10 Hz;", "servos = 100 Hz; record = 10 Hz;"),
+        ("shoulder.qd   = 0.5", "shoulder.qd   = 0.1"),
+        ("elbow.qd      = -1", "elbow.qd      = 0.1"),
+    )
     found = experiment(tmp_path, ARM, servo, text)
     run = engine.run(found)
     assert run.cause == [""]
@@ -295,15 +332,26 @@ servo drive {
     ((margin,),) = margins(found)
     rotor = 100.0**2 * 1e-4
     assert margin.r == pytest.approx(run.signals["J_eff"][0, 0, 0] / rotor, rel=1e-9)
-    fixed = experiment(tmp_path, ARM, servo, changed(text, ("base = free;", "base = fixed;"), *(
-        (f"        base.{name}", f"//        base.{name}") for name in ("position", "rpy", "velocity", "rate"))))
+    fixed = experiment(
+        tmp_path,
+        ARM,
+        servo,
+        changed(
+            text,
+            ("base = free;", "base = fixed;"),
+            *((f"        base.{name}", f"//        base.{name}") for name in ("position", "rpy", "velocity", "rate")),
+        ),
+    )
     ((held,),) = margins(fixed)
     assert margin.r < held.r, "a base that yields is lighter"
 
 
 def test_the_base_is_no_body_where_it_is_fixed(tmp_path: Path) -> None:
-    text = changed(RUN, ("base     = free;", ""), *(
-        (f"        base.{name}", f"//        base.{name}") for name in ("position", "rpy", "velocity", "rate")))
+    text = changed(
+        RUN,
+        ("base     = free;", ""),
+        *((f"        base.{name}", f"//        base.{name}") for name in ("position", "rpy", "velocity", "rate")),
+    )
     bare = changed(text, ("links.base.position, links.base.orientation, links.base.velocity, links.base.rate,", ""))
     without = "".join(line for line in ARM.splitlines(True) if "link base" not in line)
     one, other = (engine.run(experiment(tmp_path, arm, bare)) for arm in (ARM, without))

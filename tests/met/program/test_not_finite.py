@@ -98,22 +98,25 @@ def changed(experiment: Experiment, case: int, path: str, value: float) -> Exper
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("path", "value", "joint", "why", "line"), [
-    # an input that is no number, wherever it is read first
-    ("swinging.f_c", np.nan, "shoulder", NO_NUMBER, 12),
-    ("swinging.kp", np.nan, "shoulder", NO_NUMBER, 12),
-    ("swinging.command.amplitude", np.nan, "shoulder", NO_NUMBER, 12),
-    ("initial.elbow.q", np.nan, "shoulder", NO_NUMBER, 12),
-    ("initial.wrist.qd", np.nan, "shoulder", NO_NUMBER, 12),
-    ("links.tip.mass", np.nan, "shoulder", NO_NUMBER, 12),
-    ("links.tip.mass", np.inf, "shoulder", NO_NUMBER, 12),
-    # squares of rates that overflow at once, and rates that grow from step to step until they do
-    ("initial.wrist.qd", 1e200, "shoulder", NO_NUMBER, 12),
-    ("swinging.f_v", 1e3, "shoulder", NO_NUMBER, 12),
-    # 0/0 in the motor, 1/0 in the recursion
-    ("swinging.resistance", 0.0, "shoulder", NO_NUMBER, 12),
-    ("links.tip.mass", 0.0, "wrist", NO_INERTIA, 14),
-])
+@pytest.mark.parametrize(
+    ("path", "value", "joint", "why", "line"),
+    [
+        # an input that is no number, wherever it is read first
+        ("swinging.f_c", np.nan, "shoulder", NO_NUMBER, 12),
+        ("swinging.kp", np.nan, "shoulder", NO_NUMBER, 12),
+        ("swinging.command.amplitude", np.nan, "shoulder", NO_NUMBER, 12),
+        ("initial.elbow.q", np.nan, "shoulder", NO_NUMBER, 12),
+        ("initial.wrist.qd", np.nan, "shoulder", NO_NUMBER, 12),
+        ("links.tip.mass", np.nan, "shoulder", NO_NUMBER, 12),
+        ("links.tip.mass", np.inf, "shoulder", NO_NUMBER, 12),
+        # squares of rates that overflow at once, and rates that grow from step to step until they do
+        ("initial.wrist.qd", 1e200, "shoulder", NO_NUMBER, 12),
+        ("swinging.f_v", 1e3, "shoulder", NO_NUMBER, 12),
+        # 0/0 in the motor, 1/0 in the recursion
+        ("swinging.resistance", 0.0, "shoulder", NO_NUMBER, 12),
+        ("links.tip.mass", 0.0, "wrist", NO_INERTIA, 14),
+    ],
+)
 def test_a_case_without_numbers_ends_with_its_cause_in_whatever_lane_and_no_neighbour_changes(
     swept: Swept, path: str, value: float, joint: str, why: str, line: int
 ) -> None:
@@ -163,7 +166,11 @@ def test_a_state_that_no_acceleration_depends_on_hides_nothing(tmp_path: Path, p
 def test_constants_that_overflow_say_nothing_while_a_program_is_made(tmp_path: Path) -> None:
     """They are folded as a kernel would compute them: infinity, and no warning of numpy's beside what MET prints."""
     path = tmp_path / "deck.ic"
-    path.write_text(DECK.replace("sine(amplitude = 0.5 rad/s, frequency = 2 Hz)", "trapezoid(to = 1e200 rad/s, "
-                                 "max_rate = 1e-200 rad/s^2, max_acceleration = 1e-300 rad/s^3)"))
+    path.write_text(
+        DECK.replace(
+            "sine(amplitude = 0.5 rad/s, frequency = 2 Hz)",
+            "trapezoid(to = 1e200 rad/s, max_rate = 1e-200 rad/s^2, max_acceleration = 1e-300 rad/s^3)",
+        )
+    )
     made = engine.run(engine.prepare(ic.compile(path, select=["swung"]).experiments[0]))
     assert made.status.tolist() == [0]

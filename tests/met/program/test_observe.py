@@ -113,9 +113,7 @@ class Arm:
         self.dense = dense.DenseArm(self.bodies, self.gravity)
         self.theirs = plan_tree.pinocchio(alone, gravity=self.gravity, rotor=self.rotor)
 
-    def expected(
-        self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, given: Sequence[str]
-    ) -> dict[str, np.ndarray]:
+    def expected(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, given: Sequence[str]) -> dict[str, np.ndarray]:
         """Every derived channel at one instant, by the variable's name. given: joints whose acceleration is told."""
         felt = qd if self.products else 0.0 * qd
         sticks = [rubs and rate == 0.0 and a == 0.0 for rubs, rate, a in zip(self.rubs, qd, qdd, strict=True)]
@@ -321,8 +319,11 @@ def test_nothing_is_computed_that_nobody_asks_for(tmp_path: Path) -> None:
         work = {section.name: [section.nodes[i][0] for i in section.order] for section in made.sections}
         return {name: sum(op not in ("cell", "const") for op in ops) for name, ops in work.items()}
 
-    plain, one, all_ = operations(DECK), operations(recording(DECK, "links.lamp.rate.z")), operations(
-        recording(DECK, *JOINTS))
+    plain, one, all_ = (
+        operations(DECK),
+        operations(recording(DECK, "links.lamp.rate.z")),
+        operations(recording(DECK, *JOINTS)),
+    )
     assert plain["record"] == 0 and "observe" not in plain
     assert 0 < one["record"] < 20 < all_["record"], (one, all_)
     rest = {name: count for name, count in plain.items() if name != "record"}

@@ -91,8 +91,11 @@ def test_a_metric_changes_no_bit_of_what_is_recorded_and_sees_it_without_a_jump(
 
 
 def test_rows_between_instants_hold_the_last_one(tmp_path: Path) -> None:
-    run = engine.run(experiment(tmp_path, changed(DECK, ("dynamics = 200 Hz;  record = 50 Hz",
-                                                         "dynamics = 100 Hz;  record = 200 Hz"))))
+    run = engine.run(
+        experiment(
+            tmp_path, changed(DECK, ("dynamics = 200 Hz;  record = 50 Hz", "dynamics = 100 Hz;  record = 200 Hz"))
+        )
+    )
     for name in TURNED:
         q = run.signals[name][0]
         assert (q[:-1:2] == q[1::2]).all() and jumps(q) == 0

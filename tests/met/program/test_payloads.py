@@ -17,12 +17,24 @@ from tests.ic.small_decks import changed, experiment
 from tests.met.program.free_flyers import ARM
 from tests.met.program.payload_decks import BOX, RUN
 
-STATE = ("q", "qd", "links.base.position", "links.base.orientation", "links.base.velocity", "links.base.rate",
-         "payloads.box.position", "payloads.box.orientation", "payloads.box.velocity", "payloads.box.rate")
+STATE = (
+    "q",
+    "qd",
+    "links.base.position",
+    "links.base.orientation",
+    "links.base.velocity",
+    "links.base.rate",
+    "payloads.box.position",
+    "payloads.box.orientation",
+    "payloads.box.velocity",
+    "payloads.box.rate",
+)
 KEPT = ("momentum.linear", "momentum.angular")
 EVERY = ("record = 10 Hz", "record = 100 Hz")
-FIXED = (("base     = free;", ""), *((f"        base.{name}", f"//        base.{name}")
-                                     for name in ("position", "rpy", "velocity", "rate")))
+FIXED = (
+    ("base     = free;", ""),
+    *((f"        base.{name}", f"//        base.{name}") for name in ("position", "rpy", "velocity", "rate")),
+)
 
 
 def flown(folder: Path, *changes: tuple[str, str], arm: str = ARM, more: str = "") -> Run:
@@ -130,8 +142,14 @@ def test_two_spheres_that_meet_lose_what_the_formula_says(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_while_it_is_held_it_moves_with_its_link(tmp_path: Path) -> None:
-    run = flown(tmp_path, EVERY, ("record   = [", "record   = [links.lower.position, links.lower.orientation, "
-                                  "links.lower.velocity, links.lower.rate, "))
+    run = flown(
+        tmp_path,
+        EVERY,
+        (
+            "record   = [",
+            "record   = [links.lower.position, links.lower.orientation, links.lower.velocity, links.lower.rate, ",
+        ),
+    )
     rows = slice(80, 150)
     p, v, w = (run.signals[f"links.lower.{name}"][0, rows] for name in ("position", "velocity", "rate"))
     r = run.signals["payloads.box.position"][0, rows] - p
@@ -142,9 +160,13 @@ def test_while_it_is_held_it_moves_with_its_link(tmp_path: Path) -> None:
     np.testing.assert_allclose(own, np.broadcast_to(own[0], own.shape), rtol=0, atol=1e-14)
 
 
-HELD = (("        grapple  = 0.8 s;\n", ""), ("        position = [2.6, 3, 3.4] m;\n", ""),
-        ("        attitude = [10, -20, 30] deg;\n", "        rpy = [10, -20, 30] deg;\n"),
-        ("        velocity = [0.3, -0.6, 0.2] m/s;\n", ""), ("        rate     = [-30, 20, 45] deg/s;\n", ""))
+HELD = (
+    ("        grapple  = 0.8 s;\n", ""),
+    ("        position = [2.6, 3, 3.4] m;\n", ""),
+    ("        attitude = [10, -20, 30] deg;\n", "        rpy = [10, -20, 30] deg;\n"),
+    ("        velocity = [0.3, -0.6, 0.2] m/s;\n", ""),
+    ("        rate     = [-30, 20, 45] deg/s;\n", ""),
+)
 MERGED = changed(
     ARM, ("    joint shoulder", "    link box { mass = 12 kg; com = [0.1, -0.05, 0.02] m; "
           "inertia = [0.8, 0.9, 1.1, 0.02, -0.03, 0.05] kg*m^2; }\n    joint shoulder"),
@@ -162,8 +184,16 @@ SAME = ("q", "qd", "qdd", "tau", "J_eff", "b", "reaction.moment", "reaction.forc
 @pytest.mark.parametrize("released", [True, False])
 def test_a_payload_that_is_held_is_a_link_behind_a_fixed_joint(tmp_path: Path, base: str, released: bool) -> None:
     still = () if base == "free" else FIXED
-    on_it = () if base == "free" else (("links.base.position, links.base.orientation, links.base.velocity, "
-                                        "links.base.rate,\n                ", ""),)
+    on_it = (
+        ()
+        if base == "free"
+        else (
+            (
+                "links.base.position, links.base.orientation, links.base.velocity, links.base.rate,\n                ",
+                "",
+            ),
+        )
+    )
     wanted = engine.run(experiment(tmp_path, MERGED, changed(BARE, *still, *on_it)))
     gone = () if released else (("        release  = 1.5 s;\n", ""),)
     found = flown(tmp_path, *HELD, *still, *on_it, *gone)
@@ -171,10 +201,15 @@ def test_a_payload_that_is_held_is_a_link_behind_a_fixed_joint(tmp_path: Path, b
     assert found.signals["payloads.box.carried"][0].tolist() == [1.0] * 15 + [float(not released)] * 6
     for name in SAME:
         size = np.max(np.abs(wanted.signals[name][0]))
-        np.testing.assert_allclose(found.signals[name][0, rows], wanted.signals[name][0, rows], rtol=0,
-                                   atol=1e-12 * size, err_msg=name)
-    np.testing.assert_allclose(found.signals["payloads.box.position"][0, rows],
-                               wanted.signals["links.box.position"][0, rows], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(
+            found.signals[name][0, rows], wanted.signals[name][0, rows], rtol=0, atol=1e-12 * size, err_msg=name
+        )
+    np.testing.assert_allclose(
+        found.signals["payloads.box.position"][0, rows],
+        wanted.signals["links.box.position"][0, rows],
+        rtol=0,
+        atol=1e-12,
+    )
     if released:
         assert np.max(np.abs(found.signals["qd"][0, -1] - wanted.signals["qd"][0, -1])) > 0.05
         kept = momentum(found)[:, 6]
@@ -183,9 +218,12 @@ def test_a_payload_that_is_held_is_a_link_behind_a_fixed_joint(tmp_path: Path, b
 
 @pytest.mark.slow
 def test_a_payload_falls_freely_until_it_is_grappled(tmp_path: Path) -> None:
-    falls = [("environment {}", "environment { gravity = [1, -2, -9] m/s^2; }"),
-             ("        com      = [0.1, -0.05, 0.02] m;\n", ""), ("grapple  = 0.8 s", "grapple  = 1.8 s"),
-             ("release  = 1.5 s", "release  = 1.9 s")]
+    falls = [
+        ("environment {}", "environment { gravity = [1, -2, -9] m/s^2; }"),
+        ("        com      = [0.1, -0.05, 0.02] m;\n", ""),
+        ("grapple  = 0.8 s", "grapple  = 1.8 s"),
+        ("release  = 1.5 s", "release  = 1.9 s"),
+    ]
     run = flown(tmp_path, *falls)
     t = run.time[:18, None]
     place = np.array([2.6, 3.0, 3.4]) + np.array([0.3, -0.6, 0.2]) * t + 0.5 * np.array([1.0, -2.0, -9.0]) * t * t
@@ -208,7 +246,7 @@ def test_a_wrench_on_a_payload_is_felt_wherever_it_is(tmp_path: Path) -> None:
     np.testing.assert_allclose(gained[:3], 2.0 * force, rtol=1e-9)
     # the integral over smooth stretches by Simpson's rule: free, held, free
     rate = moment + np.cross(point, force)
-    whole = sum(_simpson(rate[first:last + 1], 0.01) for first, last in ((0, 80), (80, 150), (150, 190)))
+    whole = sum(_simpson(rate[first : last + 1], 0.01) for first, last in ((0, 80), (80, 150), (150, 190)))
     whole = whole + _simpson(rate[190:], 0.01)
     np.testing.assert_allclose(gained[3:6], whole, rtol=1e-6)
 
@@ -217,13 +255,21 @@ def test_a_gradient_of_gravity_pulls_at_payloads_too(tmp_path: Path) -> None:
     # Hill's equations of a point that is let go beside the origin: drift along the flight, 4 periods of 200 s on a
     # small and heavy world
     orbit = "tide = gravity_gradient { radius = 6800 km; frame = orbital; };"
-    far = [("environment {}", f"environment {{ {orbit} }}"), ("grapple  = 0.8 s", "grapple = 900 s"),
-           ("        release  = 1.5 s;\n", ""), ("position = [2.6, 3, 3.4] m", "position = [0, 0, 0] m"),
-           ("velocity = [0.3, -0.6, 0.2] m/s", "velocity = [0, 0.1, 0.05] m/s"),
-           ("        com      = [0.1, -0.05, 0.02] m;\n", ""), ("duration = 2 s", "duration = 1000 s"),
-           ("rate     = [-30, 20, 45] deg/s", "rate = [0, 0, 0] deg/s"), ("record = 10 Hz", "record = 1 Hz"),
-           *FIXED, ("shoulder.qd   = 0.5", "shoulder.qd   = 0"), ("elbow.qd      = -1", "elbow.qd      = 0"),
-           ("links.base.position, links.base.orientation, links.base.velocity, links.base.rate,", "")]
+    far = [
+        ("environment {}", f"environment {{ {orbit} }}"),
+        ("grapple  = 0.8 s", "grapple = 900 s"),
+        ("        release  = 1.5 s;\n", ""),
+        ("position = [2.6, 3, 3.4] m", "position = [0, 0, 0] m"),
+        ("velocity = [0.3, -0.6, 0.2] m/s", "velocity = [0, 0.1, 0.05] m/s"),
+        ("        com      = [0.1, -0.05, 0.02] m;\n", ""),
+        ("duration = 2 s", "duration = 1000 s"),
+        ("rate     = [-30, 20, 45] deg/s", "rate = [0, 0, 0] deg/s"),
+        ("record = 10 Hz", "record = 1 Hz"),
+        *FIXED,
+        ("shoulder.qd   = 0.5", "shoulder.qd   = 0"),
+        ("elbow.qd      = -1", "elbow.qd      = 0"),
+        ("links.base.position, links.base.orientation, links.base.velocity, links.base.rate,", ""),
+    ]
     run = flown(tmp_path, *far, *at_rate(10, "rk4"))
     n = math.sqrt(3.986004418e14 / 6.8e6**3)
     t = run.time[:900]
@@ -306,8 +352,9 @@ def test_a_locked_joint_does_not_jump_and_momentum_is_kept_all_the_same(tmp_path
 def test_a_motor_behind_a_compliant_gear_does_not_jump_with_its_joint(tmp_path: Path) -> None:
     recorded = ("record   = [", "record   = [shoulder.servo.motor_rate, ")
     run, before = both(tmp_path, "shoulder = soft;", recorded, ("shoulder.qd   = 0.5", "shoulder.qd   = 0"))
-    np.testing.assert_allclose(run.signals["shoulder.servo.motor_rate"][0, 8],
-                               before.signals["shoulder.servo.motor_rate"][0, 8], rtol=1e-14)
+    np.testing.assert_allclose(
+        run.signals["shoulder.servo.motor_rate"][0, 8], before.signals["shoulder.servo.motor_rate"][0, 8], rtol=1e-14
+    )
     assert abs(run.signals["qd"][0, 8, 0] - before.signals["qd"][0, 8, 0]) > 0.1
 
 
@@ -315,11 +362,22 @@ def test_a_motor_behind_a_compliant_gear_does_not_jump_with_its_joint(tmp_path: 
 def test_a_rigid_gears_rotor_takes_its_share_of_the_blow(tmp_path: Path) -> None:
     # With the base fixed, and rotors as heavy as can be: what is nearly held does not jump.
     free, _ = both(tmp_path, "", *FIXED[1:], ("base = free;", ""))
-    held, before = both(tmp_path, "shoulder = drive; elbow = drive;", *FIXED[1:], ("base = free;", ""),
-                        ("shoulder.qd   = 0.5", "shoulder.qd   = 0"), ("elbow.qd      = -1", "elbow.qd      = 0"))
-    heavy, _ = both(tmp_path, "shoulder = drive { j_m = 1 kg*m^2; }; elbow = drive { j_m = 1 kg*m^2; };", *FIXED[1:],
-                    ("base = free;", ""), ("shoulder.qd   = 0.5", "shoulder.qd   = 0"),
-                    ("elbow.qd      = -1", "elbow.qd      = 0"))
+    held, before = both(
+        tmp_path,
+        "shoulder = drive; elbow = drive;",
+        *FIXED[1:],
+        ("base = free;", ""),
+        ("shoulder.qd   = 0.5", "shoulder.qd   = 0"),
+        ("elbow.qd      = -1", "elbow.qd      = 0"),
+    )
+    heavy, _ = both(
+        tmp_path,
+        "shoulder = drive { j_m = 1 kg*m^2; }; elbow = drive { j_m = 1 kg*m^2; };",
+        *FIXED[1:],
+        ("base = free;", ""),
+        ("shoulder.qd   = 0.5", "shoulder.qd   = 0"),
+        ("elbow.qd      = -1", "elbow.qd      = 0"),
+    )
     jumped = np.abs(held.signals["qd"][0, 8] - before.signals["qd"][0, 8])
     assert (jumped > 1e-2).all()
     assert (np.abs(heavy.signals["qd"][0, 8]) < 2e-3).all()
@@ -328,8 +386,11 @@ def test_a_rigid_gears_rotor_takes_its_share_of_the_blow(tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_a_motor_on_a_bed_turns_on_as_its_shaft_does(tmp_path: Path) -> None:
-    run, before = both(tmp_path, "shoulder = drive; } substitute shoulder { bed = emulated;",
-                       ("shoulder.qd   = 0.5", "shoulder.qd   = 0"))
+    run, before = both(
+        tmp_path,
+        "shoulder = drive; } substitute shoulder { bed = emulated;",
+        ("shoulder.qd   = 0.5", "shoulder.qd   = 0"),
+    )
     assert abs(run.signals["qd"][0, 8, 0] - before.signals["qd"][0, 8, 0]) < 1e-9
     assert abs(run.signals["qd"][0, 8, 1] - before.signals["qd"][0, 8, 1]) > 0.1
     assert run.signals["J_eff"][0, 8, 0] > 1.2 * before.signals["J_eff"][0, 8, 0], "and feels what is held now"
@@ -337,13 +398,25 @@ def test_a_motor_on_a_bed_turns_on_as_its_shaft_does(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_two_payloads_that_are_grappled_at_once_are_one_impact(tmp_path: Path) -> None:
-    other = changed(BOX, ("payload box", "payload other"), ("on       = lower", "on       = upper"),
-                    ("position = [2.6, 3, 3.4] m", "position = [1, 1, 3] m"), ("mass     = 12 kg", "mass     = 7 kg"),
-                    ("release  = 1.5 s", "release  = 1.3 s"))
+    other = changed(
+        BOX,
+        ("payload box", "payload other"),
+        ("on       = lower", "on       = upper"),
+        ("position = [2.6, 3, 3.4] m", "position = [1, 1, 3] m"),
+        ("mass     = 12 kg", "mass     = 7 kg"),
+        ("release  = 1.5 s", "release  = 1.3 s"),
+    )
     two = (BOX, BOX + other)
-    run, before = (flown(tmp_path, two, EVERY, *more)
-                   for more in ((), (("grapple  = 0.8 s", "grapple  = 0.9 s"), ("payload other {\n        mass     = 7"
-                                     " kg;", "payload other {\n        mass     = 7.0 kg;"))))
+    run, before = (
+        flown(tmp_path, two, EVERY, *more)
+        for more in (
+            (),
+            (
+                ("grapple  = 0.8 s", "grapple  = 0.9 s"),
+                ("payload other {\n        mass     = 7 kg;", "payload other {\n        mass     = 7.0 kg;"),
+            ),
+        )
+    )
     np.testing.assert_allclose(momentum(run)[79, :6], momentum(before)[79, :6], rtol=0, atol=1e-13)
     whole = momentum(run)[:, :6]
     assert np.max(np.abs(whole[80] - whole[79])) < 1e-4 * np.max(np.abs(whole))
@@ -355,9 +428,16 @@ def test_two_payloads_that_are_grappled_at_once_are_one_impact(tmp_path: Path) -
 @pytest.mark.slow
 @pytest.mark.parametrize("link", ["base", "lower"])
 def test_on_a_base_that_is_told_its_way_a_payload_goes_along_and_off_with_its_speed(tmp_path: Path, link: str) -> None:
-    told = (("base     = free;", "base = prescribed { x = sine(amplitude = 0.1 m, frequency = 0.5 Hz); "
-             "yaw = sine(amplitude = 0.2 rad, frequency = 0.3 Hz); };"), *FIXED[1:],
-            ("on       = lower", f"on = {link}"), EVERY)
+    told = (
+        (
+            "base     = free;",
+            "base = prescribed { x = sine(amplitude = 0.1 m, frequency = 0.5 Hz); "
+            "yaw = sine(amplitude = 0.2 rad, frequency = 0.3 Hz); };",
+        ),
+        *FIXED[1:],
+        ("on       = lower", f"on = {link}"),
+        EVERY,
+    )
     run = flown(tmp_path, *told)
     later = flown(tmp_path, *told, ("release  = 1.5 s", "release = 1.7 s"))
     for name in STATE:
@@ -370,8 +450,12 @@ def test_on_a_base_that_is_told_its_way_a_payload_goes_along_and_off_with_its_sp
 
 
 def test_a_payload_on_the_ground_stays_there(tmp_path: Path) -> None:
-    run = flown(tmp_path, *FIXED, ("on       = lower", "on = base"),
-                ("links.base.position, links.base.orientation, links.base.velocity, links.base.rate,", ""))
+    run = flown(
+        tmp_path,
+        *FIXED,
+        ("on       = lower", "on = base"),
+        ("links.base.position, links.base.orientation, links.base.velocity, links.base.rate,", ""),
+    )
     place = run.signals["payloads.box.position"][0]
     np.testing.assert_allclose(place[8:], np.broadcast_to(place[8], place[8:].shape), rtol=0, atol=1e-15)
     assert not run.signals["payloads.box.velocity"][0, 8:].any()
@@ -403,8 +487,14 @@ def test_cases_that_are_grappled_at_other_times_leave_each_other_alone(tmp_path:
     for name in STATE:
         np.testing.assert_allclose(run.signals[name][0], single.signals[name][0], rtol=0, atol=1e-12)
     assert run.signals["payloads.box.carried"].sum(axis=1).tolist() == [7.0, 0.0, 0.0, 1.0]
-    second = changed(RUN, ("mass     = 12", "mass     = 20"), ("[0.8, 0.9, 1.1,", "[1, 0.9, 1.1,"),
-                    ("[2.6, 3, 3.4]", "[2, 3, 3.4]"), ("0.8 s", "0.83 s"), ("1.5 s", "0.9 s"))
+    second = changed(
+        RUN,
+        ("mass     = 12", "mass     = 20"),
+        ("[0.8, 0.9, 1.1,", "[1, 0.9, 1.1,"),
+        ("[2.6, 3, 3.4]", "[2, 3, 3.4]"),
+        ("0.8 s", "0.83 s"),
+        ("1.5 s", "0.9 s"),
+    )
     other = engine.run(experiment(tmp_path, ARM, second))
     for name in STATE:
         np.testing.assert_allclose(run.signals[name][1], other.signals[name][0], rtol=0, atol=1e-12)
@@ -415,8 +505,9 @@ def test_plain_numbers_give_the_kernels_results(tmp_path: Path) -> None:
     found = experiment(tmp_path, ARM, changed(RUN, ("duration = 2 s", "duration = 1.6 s")))
     plain, _ = execute(build(found), {}, found.structure.schedule.ticks)
     kernel = engine.run(found)
-    ours = np.concatenate([kernel.signals[each.name][0].reshape(len(kernel.time), -1)
-                           for each in found.structure.record], axis=1)
+    ours = np.concatenate(
+        [kernel.signals[each.name][0].reshape(len(kernel.time), -1) for each in found.structure.record], axis=1
+    )
     np.testing.assert_allclose(plain, ours, rtol=0, atol=1e-10)
 
 

@@ -43,8 +43,13 @@ run shaken {
 def course(t: mpmath.mpf) -> tuple[mpmath.matrix, mpmath.matrix]:
     """Position and orientation of the deck's base, by mpmath; up to 2 s the trapezoid is in its first two parts."""
     mp, deg = mpmath, mpmath.pi / 180
-    p = mp.matrix([0.2 * mp.sin(2 * mp.pi * 0.8 * t + 20 * deg),
-                   mp.mpf("0.1") * mp.sin(2 * mp.pi * t * (mp.mpf("0.5") + mp.mpf("0.075") * t)), mp.mpf("1.5")])
+    p = mp.matrix(
+        [
+            0.2 * mp.sin(2 * mp.pi * 0.8 * t + 20 * deg),
+            mp.mpf("0.1") * mp.sin(2 * mp.pi * t * (mp.mpf("0.5") + mp.mpf("0.075") * t)),
+            mp.mpf("1.5"),
+        ]
+    )
     roll = 30 * deg * mp.sin(2 * mp.pi * mp.mpf("0.5") * t)
     pitch = mp.mpf("0.4") * mp.sin(2 * mp.pi * mp.mpf("0.7") * t) + 10 * deg
     rises = mp.mpf(61) / 50
@@ -73,8 +78,9 @@ def motion(t: float) -> tuple[np.ndarray, ...]:
         W = first * now[1].T
         Wd = second * now[1].T + first * first.T
         w, wd = ([x[2, 1], x[0, 2], x[1, 0]] for x in (W, Wd))
-        return tuple(np.array(x.tolist() if hasattr(x, "tolist") else x, float).squeeze()
-                     for x in (now[1], now[0], w, v, wd, a))
+        return tuple(
+            np.array(x.tolist() if hasattr(x, "tolist") else x, float).squeeze() for x in (now[1], now[0], w, v, wd, a)
+        )
 
 
 @pytest.mark.oracle
@@ -121,19 +127,24 @@ sweep some of shaken {
         assert runs[1].signals[name].tobytes() == values.tobytes(), name
     inputs = {coordinate.path: float(coordinate.values[1]) for coordinate in found.cases.coordinates}
     rows, _ = execute(build(found), inputs, found.structure.schedule.ticks)
-    kernel = np.concatenate([runs[0].signals[each.name][1].reshape(len(rows), -1)
-                             for each in found.structure.record], axis=1)
+    kernel = np.concatenate(
+        [runs[0].signals[each.name][1].reshape(len(rows), -1) for each in found.structure.record], axis=1
+    )
     assert np.abs(kernel - rows).max() < 1e-11 * np.abs(rows).max()
     np.testing.assert_allclose(runs[0].signals["links.base.position"][:, 0, 2], [0.0, 1.0, 2.0])
 
 
 def test_a_base_of_constants_is_a_fixed_one_that_stands_elsewhere(tmp_path: Path) -> None:
     elsewhere = "prescribed { x = 2 m; y = -1 m; yaw = 90 deg; }"
-    still = RUN[RUN.index("prescribed {"):RUN.index("initial ")]
+    still = RUN[RUN.index("prescribed {") : RUN.index("initial ")]
     off = ("gravity = [1, -2, -9]", "velocity_products = off; gravity = [1, -2, -9]")
     text = changed(RUN, (still, f"{elsewhere};\n    "), off)
-    ground = changed(text, (f"base     = {elsewhere};", ""), ("gravity = [1, -2, -9]", "gravity = [-2, -1, -9]"),
-                     ("force = [3, 2, 1]", "force = [2, -3, 1]"))
+    ground = changed(
+        text,
+        (f"base     = {elsewhere};", ""),
+        ("gravity = [1, -2, -9]", "gravity = [-2, -1, -9]"),
+        ("force = [3, 2, 1]", "force = [2, -3, 1]"),
+    )
     one, other = (engine.run(experiment(tmp_path, ARM, each)).signals for each in (text, ground))
     for name in ("q", "qd", "qdd"):
         np.testing.assert_allclose(one[name], other[name], rtol=0, atol=1e-12)

@@ -280,8 +280,12 @@ def test_a_grapple_is_no_acceleration_and_a_payload_has_sensors_wherever_it_is(t
         f"{'cutoff = 10 Hz; ' * (kind == 'accelerometer')} }}\n"
         for kind in ("accelerometer", "gyroscope") for name in ("box", "lower")
     )  # fmt: skip
-    text = changed(GRAPPLING, ("environment {}", "environment {}\n" + sensors), ("energy,", "sensors, energy,"),
-                   ("dynamics = 100 Hz; record = 10 Hz", "dynamics = 200 Hz; servos = 200 Hz; record = 200 Hz"))
+    text = changed(
+        GRAPPLING,
+        ("environment {}", "environment {}\n" + sensors),
+        ("energy,", "sensors, energy,"),
+        ("dynamics = 100 Hz; record = 10 Hz", "dynamics = 200 Hz; servos = 200 Hz; record = 200 Hz"),
+    )
     run = engine.run(experiment(tmp_path, FLYER, text))
     carried = run.signals["payloads.box.carried"][0].ravel() == 1.0
     assert carried.any() and not carried[0] and not carried[-1]

@@ -139,8 +139,11 @@ def test_unloaded_it_falls_into_its_gears(tmp_path: Path) -> None:
 def test_on_a_base_that_moves_the_joints_do_not(tmp_path: Path, integrator: str) -> None:
     """The base floats or swings; what its motion asks of the joints is in the balance."""
     for base in ("free;", "prescribed { x = sine(amplitude = 0.1 m, frequency = 2 Hz, phase = 90 deg); }"):
-        deck = (ARM + run_of("panda", BEGINS)).replace("{more}", SPRING).replace(
-            "gravity = [0, 0, -9.81] m/s^2;", "gravity = [0, 0, -1] m/s^2;")
+        deck = (
+            (ARM + run_of("panda", BEGINS))
+            .replace("{more}", SPRING)
+            .replace("gravity = [0, 0, -9.81] m/s^2;", "gravity = [0, 0, -1] m/s^2;")
+        )
         deck = deck.replace("duration", f"base = {base}  integrator = {integrator};  duration", 1)
         body = "link base { mass = 50 kg; inertia = [4, 5, 6] kg*m^2; }"
         deck = deck.replace("run still", f"arm floats like panda {{ {body} }}\nrun still")
@@ -163,14 +166,17 @@ def test_joints_that_cannot_be_balanced_move_and_are_reckoned_with(tmp_path: Pat
 def test_what_holds_a_joint_that_is_not_balanced_is_reckoned_with(by: str, level: float, tmp_path: Path) -> None:
     """A forearm of 4.9 N m that friction or a brake holds is carried; one that it does not hold falls, dragged."""
     brake = f"hold = brake {{ joint = elbow; torque = {level} N*m; }}" if by == "brake" else ""
-    deck = """\
+    deck = (
+        """\
 arm bars {
     link upper { mass = 3 kg; shape = rod(length = 0.7 m, along = x); }
     link fore  { mass = 2 kg; shape = rod(length = 0.5 m, along = x); }
     joint shoulder revolute { parent = base;  child = upper; axis = y; }
     joint elbow    revolute { parent = upper; child = fore;  axis = y; at = [0.7, 0, 0] m; }
 }
-""" + ARM.split("\n", 1)[1] + f"""
+"""
+        + ARM.split("\n", 1)[1]
+        + f"""
 servo limp {{ model = passive; friction = {level if by == "friction" else 0.0} N*m; }}
 run still {{
     arm = bars;  servos {{ shoulder = soft; elbow = limp; }}  initial {{ {BEGINS} }}
@@ -178,6 +184,7 @@ run still {{
     rates {{ dynamics = 4 kHz; servos = 1 kHz; record = 1 kHz; }}  duration = 0.01 s;  record = [q, qdd, tau];
 }}
 """
+    )
     run = engine.run(experiment(tmp_path, deck))
     qdd, tau = run.signals["qdd"][0, 0], run.signals["tau"][0, 0]
     assert abs(qdd[0]) < 1e-9, "the shoulder begins balanced"

@@ -126,7 +126,9 @@ def test_the_stability_figure_is_the_bandwidths(tmp_path: Path) -> None:
 def test_a_rate_or_position_needs_a_bandwidth(tmp_path: Path) -> None:
     for command, place in (("rate(0.5 rad/s)", "rate(0.5 rad/s)"), ("position(1 rad)", "position(1 rad)")):
         text = changed(RUN, (" bandwidth = 20 s^-1;", ""), ("rate(0.5 rad/s)", command))
-        assert told(check(tmp_path, ARM, text)) == f"""\
+        assert (
+            told(check(tmp_path, ARM, text))
+            == f"""\
 error[D160]: servo `follow` needs `bandwidth` under a {place.partition("(")[0]} command
  --> deck.ic:5:41
   |
@@ -136,11 +138,14 @@ error[D160]: servo `follow` needs `bandwidth` under a {place.partition("(")[0]} 
 
 1 error
 """
+        )
 
 
 def test_a_servo_that_takes_no_acceleration_says_so(tmp_path: Path) -> None:
     gearbox = changed(SERVO, ("rate(0.1 rad/s)", "acceleration(1 rad/s^2)"))
-    assert told(check(tmp_path, ARM, gearbox, small_decks.RUN)) == """\
+    assert (
+        told(check(tmp_path, ARM, gearbox, small_decks.RUN))
+        == """\
 error[D152]: the model `rigid_gearbox` takes no command `acceleration`
  --> deck.ic:9:15
   |
@@ -150,11 +155,14 @@ error[D152]: the model `rigid_gearbox` takes no command `acceleration`
 
 1 error
 """
+    )
 
 
 def test_an_acceleration_in_another_unit_is_told(tmp_path: Path) -> None:
     text = changed(RUN, ("rate(0.5 rad/s)", "acceleration(0.5 rad/s)"))
-    assert told(check(tmp_path, ARM, text)) == """\
+    assert (
+        told(check(tmp_path, ARM, text))
+        == """\
 error[D061]: the command of servo `follow` is in rad/s^2, and this is in rad/s
  --> deck.ic:5:75
   |
@@ -164,3 +172,4 @@ error[D061]: the command of servo `follow` is in rad/s^2, and this is in rad/s
 
 1 error
 """
+    )

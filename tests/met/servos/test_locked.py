@@ -78,7 +78,9 @@ MOVING = changed(RUN, ("turn.qd = 1 rad/s", "raise.qd = 0.1 rad/s"))
 
 
 def test_a_locked_joint_that_begins_with_a_rate_is_an_error(tmp_path: Path) -> None:
-    assert told(check(tmp_path, TREE, MOVING)) == """\
+    assert (
+        told(check(tmp_path, TREE, MOVING))
+        == """\
 error[D119]: joint `raise` begins with a rate, and servo `lock` (locked) needs it at rest
   --> deck.ic:16:45
    |
@@ -89,11 +91,14 @@ error[D119]: joint `raise` begins with a rate, and servo `lock` (locked) needs i
 
 1 error
 """
+    )
 
 
 def test_so_it_is_in_a_case_of_a_sweep(tmp_path: Path) -> None:
     sweep = "sweep some of it { vary initial.push.qd = [0, 20, 30] cm/s; }\n"
-    assert told(check(tmp_path, TREE, RUN, sweep, select=["some"])) == """\
+    assert (
+        told(check(tmp_path, TREE, RUN, sweep, select=["some"]))
+        == """\
 error[D119]: joint `push` begins with a rate, and servo `lock` (locked) needs it at rest; case #1 breaks it, and 1 more
   --> deck.ic:21:25
    |
@@ -105,6 +110,7 @@ error[D119]: joint `push` begins with a rate, and servo `lock` (locked) needs it
 
 1 error
 """
+    )
 
 
 def test_a_joint_that_is_free_from_the_start_may_move(tmp_path: Path) -> None:
@@ -134,7 +140,9 @@ def test_a_plan_by_hand_is_held_to_it_too(tmp_path: Path, sweep: str, said: str)
 
 def test_a_rate_has_no_meaning_for_a_servo_without_a_computer(tmp_path: Path) -> None:
     text = changed(RUN, ("model = locked;", "model = locked; rate = 1 kHz;"))
-    assert told(check(tmp_path, TREE, text)) == """\
+    assert (
+        told(check(tmp_path, TREE, text))
+        == """\
 error[D150]: the model `locked` has no computer that ticks, so no rate
   --> deck.ic:13:30
    |
@@ -144,6 +152,7 @@ error[D150]: the model `locked` has no computer that ticks, so no rate
 
 1 error
 """
+    )
 
 
 def test_a_servo_without_a_computer_has_no_rate_to_explain_and_needs_none(tmp_path: Path) -> None:

@@ -138,7 +138,7 @@ def questions(ticks: int, seed: int) -> np.ndarray:
     parts = []
     for rate, noise, repeat in ((0.0, 0.0, 0.0), (-31.25, 2.0**53 - 1.0, 7.0)):
         held = np.column_stack([rng.normal(0.0, 12.0, ticks // 2), rng.normal(0.0, 1.5, ticks // 2)])
-        held = np.repeat(held, rng.integers(1, 40, ticks // 2), axis=0)[:ticks // 2]
+        held = np.repeat(held, rng.integers(1, 40, ticks // 2), axis=0)[: ticks // 2]
         held[rng.random(ticks // 2) < 0.1] = 0.0
         parts += [[len(held), rate, noise, repeat], held.ravel()]
     return np.concatenate(parts)
@@ -148,10 +148,10 @@ def stepped(plant: Plant, question: np.ndarray) -> np.ndarray:
     """What run_plant.c answers, by the plant in this process."""
     rows, at = [], 0
     while at < len(question):
-        ticks, *begin = question[at:at + 4].tolist()
+        ticks, *begin = question[at : at + 4].tolist()
         rows.append((plant.start(*begin), plant.shaft_rate, plant.shaft_angle))
         at += 4
-        for voltage, current in question[at:at + 2 * int(ticks)].reshape(-1, 2).tolist():
+        for voltage, current in question[at : at + 2 * int(ticks)].reshape(-1, 2).tolist():
             rows.append((plant.tick(voltage, current), plant.shaft_rate, plant.shaft_angle))
         at += 2 * int(ticks)
     return np.array(rows)

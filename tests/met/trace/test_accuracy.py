@@ -78,8 +78,13 @@ def one_number(name):
         ranges = ((SMALLEST, TINY, 30000), (TINY, LARGEST, 70000), (0.5, 2.0, 80000), (0.999, 1.001, 20000))
         extra = [with_neighbours(np.exp2(np.arange(-1074.0, 1023.0))), [LARGEST]]
     elif name == "tanh":
-        ranges = ((SMALLEST, 1e-9, 10000), (1e-9, 0.05, 40000), (0.05, 2.0, 110000), (2.0, 30.0, 30000),
-                  (30.0, LARGEST, 10000))
+        ranges = (
+            (SMALLEST, 1e-9, 10000),
+            (1e-9, 0.05, 40000),
+            (0.05, 2.0, 110000),
+            (2.0, 30.0, 30000),
+            (30.0, LARGEST, 10000),
+        )
         extra = [[22.0, -22.0, LARGEST]]
     elif name == "sqrt":
         ranges = ((SMALLEST, TINY, 50000), (TINY, LARGEST, 150000))
@@ -98,10 +103,21 @@ def one_number(name):
 # a unit off. tan: a quotient of two that are 0.8 off. atan2: a quotient, then two sums. tanh: 1 off in e^x - 1 twice.
 # asin, acos: a leg that is 0.8 off goes into atan2.
 @pytest.mark.oracle
-@pytest.mark.parametrize(("name", "limit"), [
-    ("sin", 1.6), ("cos", 1.6), ("tan", 2.4), ("exp", 1.0), ("log", 1.0), ("tanh", 2.7), ("sqrt", 0.501),
-    ("atan", 2.0), ("asin", 2.6), ("acos", 2.6),
-])
+@pytest.mark.parametrize(
+    ("name", "limit"),
+    [
+        ("sin", 1.6),
+        ("cos", 1.6),
+        ("tan", 2.4),
+        ("exp", 1.0),
+        ("log", 1.0),
+        ("tanh", 2.7),
+        ("sqrt", 0.501),
+        ("atan", 2.0),
+        ("asin", 2.6),
+        ("acos", 2.6),
+    ],
+)
 def test_functions_are_right_to_a_few_units_over_all_they_take(name, limit):
     x = one_number(name)
     assert len(x) >= 200_000
@@ -118,11 +134,21 @@ def test_sines_of_angles_too_far_out_lose_places_as_the_page_says(name):
 
 
 @pytest.mark.oracle
-@pytest.mark.parametrize(("size_y", "size_x"), [
-    ((1e-6, 1e6), (1e-6, 1e6)), ((1e-300, 1e300), (1e-300, 1e300)), ((SMALLEST, TINY), (SMALLEST, TINY)),
-    ((1e300, LARGEST), (1e300, LARGEST)), ((SMALLEST, 1e-310), (1.0, 1e10)), ((1e-160, 1e-140), (1e140, 1e160)),
-    ((0.4, 0.42), (1.0, 1.0)), ((2.4, 2.42), (1.0, 1.0)), ((0.99, 1.01), (1.0, 1.0)), ((2.0**499, 2.0**501),) * 2,
-])
+@pytest.mark.parametrize(
+    ("size_y", "size_x"),
+    [
+        ((1e-6, 1e6), (1e-6, 1e6)),
+        ((1e-300, 1e300), (1e-300, 1e300)),
+        ((SMALLEST, TINY), (SMALLEST, TINY)),
+        ((1e300, LARGEST), (1e300, LARGEST)),
+        ((SMALLEST, 1e-310), (1.0, 1e10)),
+        ((1e-160, 1e-140), (1e140, 1e160)),
+        ((0.4, 0.42), (1.0, 1.0)),
+        ((2.4, 2.42), (1.0, 1.0)),
+        ((0.99, 1.01), (1.0, 1.0)),
+        ((2.0**499, 2.0**501),) * 2,
+    ],
+)
 def test_atan2_is_right_in_every_quadrant_and_at_every_size(size_y, size_x):
     rng = np.random.default_rng(4)
     assert greatest_error("atan2", spread(rng, *size_y, 25000), spread(rng, *size_x, 25000)) < 2.0
@@ -132,22 +158,69 @@ NAN, INF = math.nan, math.inf
 EDGES = {
     "sin": [(0.0, 0.0), (SMALLEST, SMALLEST), (2.0**48, 0.12949601773888192), (INF, NAN), (-INF, NAN)],
     "cos": [(0.0, 1.0), (SMALLEST, 1.0), (-(2.0**48), 0.9915799420065793), (INF, NAN), (-INF, NAN)],
-    "tan": [(0.0, 0.0), (-SMALLEST, -SMALLEST), (2.0**48, 0.13059564060647638), (np.nextafter(2.0**48, INF), NAN),
-            (LARGEST, NAN), (INF, NAN), (-INF, NAN)],
+    "tan": [
+        (0.0, 0.0),
+        (-SMALLEST, -SMALLEST),
+        (2.0**48, 0.13059564060647638),
+        (np.nextafter(2.0**48, INF), NAN),
+        (LARGEST, NAN),
+        (INF, NAN),
+        (-INF, NAN),
+    ],
     # ln(2^1024) and ln(2^-1075) lie between the two numbers of each pair
-    "exp": [(0.0, 1.0), (-SMALLEST, 1.0), (709.782712893384, 1.797693134862273e308), (709.7827128933841, INF),
-            (-745.1332191019411, SMALLEST), (-745.1332191019412, 0.0), (LARGEST, INF), (-LARGEST, 0.0), (INF, INF),
-            (-INF, 0.0)],
-    "log": [(0.0, -INF), (-0.0, -INF), (SMALLEST, -744.4400719213812), (1.0, 0.0), (LARGEST, 709.782712893384),
-            (INF, INF), (-SMALLEST, NAN), (-1.0, NAN), (-INF, NAN)],
+    "exp": [
+        (0.0, 1.0),
+        (-SMALLEST, 1.0),
+        (709.782712893384, 1.797693134862273e308),
+        (709.7827128933841, INF),
+        (-745.1332191019411, SMALLEST),
+        (-745.1332191019412, 0.0),
+        (LARGEST, INF),
+        (-LARGEST, 0.0),
+        (INF, INF),
+        (-INF, 0.0),
+    ],
+    "log": [
+        (0.0, -INF),
+        (-0.0, -INF),
+        (SMALLEST, -744.4400719213812),
+        (1.0, 0.0),
+        (LARGEST, 709.782712893384),
+        (INF, INF),
+        (-SMALLEST, NAN),
+        (-1.0, NAN),
+        (-INF, NAN),
+    ],
     "tanh": [(0.0, 0.0), (SMALLEST, SMALLEST), (22.0, 1.0), (-LARGEST, -1.0), (INF, 1.0), (-INF, -1.0)],
     "sqrt": [(0.0, 0.0), (SMALLEST, 2.0**-537), (INF, INF), (-SMALLEST, NAN), (-INF, NAN)],
-    "atan": [(0.0, 0.0), (-0.0, -0.0), (-SMALLEST, -SMALLEST), (1.0, math.pi / 4), (LARGEST, math.pi / 2),
-             (INF, math.pi / 2), (-INF, -math.pi / 2)],
-    "asin": [(0.0, 0.0), (-0.0, -0.0), (SMALLEST, SMALLEST), (1.0, math.pi / 2), (-1.0, -math.pi / 2),
-             (np.nextafter(1.0, 2.0), NAN), (-LARGEST, NAN), (INF, NAN)],
-    "acos": [(0.0, math.pi / 2), (SMALLEST, math.pi / 2), (1.0, 0.0), (-1.0, math.pi), (np.nextafter(1.0, 2.0), NAN),
-             (-LARGEST, NAN), (-INF, NAN)],
+    "atan": [
+        (0.0, 0.0),
+        (-0.0, -0.0),
+        (-SMALLEST, -SMALLEST),
+        (1.0, math.pi / 4),
+        (LARGEST, math.pi / 2),
+        (INF, math.pi / 2),
+        (-INF, -math.pi / 2),
+    ],
+    "asin": [
+        (0.0, 0.0),
+        (-0.0, -0.0),
+        (SMALLEST, SMALLEST),
+        (1.0, math.pi / 2),
+        (-1.0, -math.pi / 2),
+        (np.nextafter(1.0, 2.0), NAN),
+        (-LARGEST, NAN),
+        (INF, NAN),
+    ],
+    "acos": [
+        (0.0, math.pi / 2),
+        (SMALLEST, math.pi / 2),
+        (1.0, 0.0),
+        (-1.0, math.pi),
+        (np.nextafter(1.0, 2.0), NAN),
+        (-LARGEST, NAN),
+        (-INF, NAN),
+    ],
 }
 
 

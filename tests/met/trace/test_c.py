@@ -198,7 +198,7 @@ def test_control_and_memory_are_the_programs(tmp_path: Path) -> None:
             t.record(column, value)
 
     def end(t: Tape) -> None:
-        t.output("it's */ \"n\"", t.read("n"))
+        t.output('it\'s */ "n"', t.read("n"))
         t.output("it_s_*/_'n'", t.read("left"))
 
     program = Program(
@@ -226,10 +226,13 @@ def test_the_text_is_the_same_each_time_and_asks_for_no_library(tmp_path: Path) 
 
 
 @pytest.mark.compiler
-@pytest.mark.parametrize(("words", "message"), [
-    (("gcc", "-ffast-math"), "build without -ffast-math, for a processor that computes doubles as doubles"),
-    (("gcc", "-mfma", "-std=gnu11"), "build with -std=c11 and -ffp-contract=off"),
-])
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("gcc", "-ffast-math"), "build without -ffast-math, for a processor that computes doubles as doubles"),
+        (("gcc", "-mfma", "-std=gnu11"), "build with -std=c11 and -ffp-contract=off"),
+    ],
+)
 def test_a_build_that_would_change_bits_is_refused(tmp_path: Path, words: tuple[str, ...], message: str) -> None:
     need("gcc")
     (tmp_path / "program.c").write_text(emit(record(table(operations))).text, encoding="utf-8")

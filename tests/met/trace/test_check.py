@@ -28,7 +28,7 @@ def recording() -> Recording:
 
 
 def with_node(i: int, node: tuple[Any, ...]) -> Callable[[Section], Section]:
-    return lambda section: replace(section, nodes=(*section.nodes[:i], node, *section.nodes[i + 1:]))
+    return lambda section: replace(section, nodes=(*section.nodes[:i], node, *section.nodes[i + 1 :]))
 
 
 def place(section: Section, op: str) -> int:

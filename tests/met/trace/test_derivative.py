@@ -50,18 +50,21 @@ def slopes(function: Callable[[Real], Real], x: np.ndarray) -> np.ndarray:
 
 # Of a polynomial of n terms on a stretch of length 1 the derivative may be n^2 times as wrong: some tens of units.
 @pytest.mark.oracle
-@pytest.mark.parametrize(("function", "exact", "where_", "size"), [
-    (sin, lambda x: mpmath.cos(x), ANGLES, lambda x: 1.0),
-    (cos, lambda x: -mpmath.sin(x), ANGLES, lambda x: 1.0),
-    (exp, lambda x: mpmath.exp(x), np.linspace(-20.0, 20.0, 400), np.exp),
-    (log, lambda x: 1 / x, POSITIVE, lambda x: 1.0 / x),
-    (tanh, lambda x: mpmath.sech(x) ** 2, np.linspace(-4.0, 4.0, 400), lambda x: 1.0),
-    (atan, lambda x: 1 / (1 + x * x), np.linspace(-9.0, 9.0, 401), lambda x: 1.0),
-    (asin, lambda x: 1 / mpmath.sqrt(1 - x * x), INNER, lambda x: 1.0 / (1.0 - x * x)),
-    (acos, lambda x: -1 / mpmath.sqrt(1 - x * x), INNER, lambda x: 1.0 / (1.0 - x * x)),
-    (tan, lambda x: mpmath.sec(x) ** 2, INNER, lambda x: 1.0 / np.cos(x) ** 2),
-    (sqrt, lambda x: 1 / (2 * mpmath.sqrt(x)), POSITIVE, lambda x: 0.5 / np.sqrt(x)),
-])
+@pytest.mark.parametrize(
+    ("function", "exact", "where_", "size"),
+    [
+        (sin, lambda x: mpmath.cos(x), ANGLES, lambda x: 1.0),
+        (cos, lambda x: -mpmath.sin(x), ANGLES, lambda x: 1.0),
+        (exp, lambda x: mpmath.exp(x), np.linspace(-20.0, 20.0, 400), np.exp),
+        (log, lambda x: 1 / x, POSITIVE, lambda x: 1.0 / x),
+        (tanh, lambda x: mpmath.sech(x) ** 2, np.linspace(-4.0, 4.0, 400), lambda x: 1.0),
+        (atan, lambda x: 1 / (1 + x * x), np.linspace(-9.0, 9.0, 401), lambda x: 1.0),
+        (asin, lambda x: 1 / mpmath.sqrt(1 - x * x), INNER, lambda x: 1.0 / (1.0 - x * x)),
+        (acos, lambda x: -1 / mpmath.sqrt(1 - x * x), INNER, lambda x: 1.0 / (1.0 - x * x)),
+        (tan, lambda x: mpmath.sec(x) ** 2, INNER, lambda x: 1.0 / np.cos(x) ** 2),
+        (sqrt, lambda x: 1 / (2 * mpmath.sqrt(x)), POSITIVE, lambda x: 0.5 / np.sqrt(x)),
+    ],
+)
 def test_functions_have_their_own_derivatives(
     function: Callable[[Real], Real], exact: Callable, where_: np.ndarray, size: Callable
 ) -> None:

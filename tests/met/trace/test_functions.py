@@ -27,10 +27,16 @@ def spread(rng, low, high, count=700):
 EDGES = [0.0, -0.0, 1.0, -1.0, 0.5, 2.5, -2.5, math.inf, -math.inf, math.nan, 5e-324, -5e-324, 1e308, 2.0**52 + 1.0]
 
 
-@pytest.mark.parametrize(("name", "expected"), [
-    ("floor", [0.0, 0.0, 1.0, -1.0, 0.0, 2.0, -3.0, math.inf, -math.inf, math.nan, 0.0, -1.0, 1e308, 2.0**52 + 1.0]),
-    ("rint", [0.0, 0.0, 1.0, -1.0, 0.0, 2.0, -2.0, math.inf, -math.inf, math.nan, 0.0, 0.0, 1e308, 2.0**52 + 1.0]),
-])
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        (
+            "floor",
+            [0.0, 0.0, 1.0, -1.0, 0.0, 2.0, -3.0, math.inf, -math.inf, math.nan, 0.0, -1.0, 1e308, 2.0**52 + 1.0],
+        ),
+        ("rint", [0.0, 0.0, 1.0, -1.0, 0.0, 2.0, -2.0, math.inf, -math.inf, math.nan, 0.0, 0.0, 1e308, 2.0**52 + 1.0]),
+    ],
+)
 def test_rounding_is_that_of_ieee_recorded_or_not(name, expected):
     function = getattr(trace, name)
     assert np.array_equal(recorded(function, np.array(EDGES)), expected, equal_nan=True)
@@ -49,8 +55,13 @@ def test_not_a_number_survives_minimum_and_maximum(function):
 
 
 def test_not_a_number_survives_clip_and_sign_and_gather():
-    for function in (lambda x: trace.clip(x, -2.0, 2.0), trace.sign, lambda x: trace.gather((1.0, 2.0), x), abs,
-                     lambda x: trace.fma(x, 0.5, 1.0)):
+    for function in (
+        lambda x: trace.clip(x, -2.0, 2.0),
+        trace.sign,
+        lambda x: trace.gather((1.0, 2.0), x),
+        abs,
+        lambda x: trace.fma(x, 0.5, 1.0),
+    ):
         assert np.array_equal(np.isnan(recorded(function, NAN)), [True, False, True])
         assert math.isnan(function(math.nan))
 
@@ -77,13 +88,21 @@ def test_fused_multiply_add_is_rounded_once():
 
     rng = np.random.default_rng(6)
     a, b = spread(rng, 1e-12, 1e12), spread(rng, 1e-12, 1e12)
-    c = np.where(rng.random(a.size) < 0.5, -a * b * (1.0 + rng.choice([0.0, 1e-16, 1e-10], a.size)),
-                 spread(rng, 1e-20, 1e20))
+    c = np.where(
+        rng.random(a.size) < 0.5, -a * b * (1.0 + rng.choice([0.0, 1e-16, 1e-10], a.size)), spread(rng, 1e-20, 1e20)
+    )
     exact = [float(Fraction(x) * Fraction(y) + Fraction(z)) for x, y, z in zip(a, b, c, strict=True)]
     assert recorded(trace.fma, a, b, c).tolist() == exact
     assert [trace.fma(*three) for three in zip(a.tolist(), b.tolist(), c.tolist(), strict=True)] == exact
-    edges = [(1e-200, 1e-200, 1e-320), (1e-308, 1e-10, -3e-318), (1e200, 1e200, -math.inf), (1e200, 1e200, -1e308),
-             (math.inf, 1.0, 2.0), (5e-324, 0.5, 5e-324), (0.0, -1.0, 0.0)]
+    edges = [
+        (1e-200, 1e-200, 1e-320),
+        (1e-308, 1e-10, -3e-318),
+        (1e200, 1e200, -math.inf),
+        (1e200, 1e200, -1e308),
+        (math.inf, 1.0, 2.0),
+        (5e-324, 0.5, 5e-324),
+        (0.0, -1.0, 0.0),
+    ]
     expected = [1e-320, 1e-318 - 3e-318, -math.inf, math.inf, math.inf, 1e-323, 0.0]
     assert recorded(trace.fma, *np.array(edges).T).tolist() == expected
     assert [trace.fma(*three) for three in edges] == expected
@@ -91,8 +110,16 @@ def test_fused_multiply_add_is_rounded_once():
 
 def test_plain_results_divide_as_ieee_does():
     with np.errstate(all="ignore"):
-        zeros = [trace.floor(0.5), trace.where(True, 0.0, 1.0), trace.sin(0.0), trace.clip(0.0, -1.0, 1.0),
-                 trace.gather((0.0,), 3.0), trace.atan2(0.0, 1.0), trace.fma(0.0, 1.0, 0.0), trace.maximum(0.0, -1.0)]
+        zeros = [
+            trace.floor(0.5),
+            trace.where(True, 0.0, 1.0),
+            trace.sin(0.0),
+            trace.clip(0.0, -1.0, 1.0),
+            trace.gather((0.0,), 3.0),
+            trace.atan2(0.0, 1.0),
+            trace.fma(0.0, 1.0, 0.0),
+            trace.maximum(0.0, -1.0),
+        ]
         assert all(math.isinf(1.0 / zero) for zero in zeros)
 
 
@@ -102,9 +129,19 @@ def test_conditions_combine_alike_recorded_and_plain():
             graph = Graph()
             x = graph.input("x")
             p, q = (x > 0.0 if a else x < 0.0), (x > 1.0 if b else x < 1.0)
-            outputs = [trace.where(t, 1.0, 0.0) for t in (
-                trace.both(p, q), trace.either(p, q), trace.not_(p), p ^ q, p == q, trace.all_of([p, q, True]),
-                trace.any_of([p, q, False]), trace.where(p, q, trace.not_(q)))]
+            outputs = [
+                trace.where(t, 1.0, 0.0)
+                for t in (
+                    trace.both(p, q),
+                    trace.either(p, q),
+                    trace.not_(p),
+                    p ^ q,
+                    p == q,
+                    trace.all_of([p, q, True]),
+                    trace.any_of([p, q, False]),
+                    trace.where(p, q, trace.not_(q)),
+                )
+            ]
             expected = [a and b, a or b, not a, a != b, a == b, a and b, a or b, b if a else not b]
             assert Formulas.of(graph, outputs).replay({"x": 2.0}) == [float(e) for e in expected]
             assert [trace.both(a, b), trace.either(a, b), trace.not_(a)] == expected[:3]

@@ -123,8 +123,14 @@ def some_formulas():
     graph = Graph()
     x, y = graph.input("x"), graph.input("y")
     sin(x + 3.0)  # dead
-    outputs = [sin(x) * y, where(x < y, math.inf, -x), trace.gather((1.0, math.nan, 0.1), y), 0.1 + 0.2, x,
-               where(x > 0.0, math.nan, 1e-310)]
+    outputs = [
+        sin(x) * y,
+        where(x < y, math.inf, -x),
+        trace.gather((1.0, math.nan, 0.1), y),
+        0.1 + 0.2,
+        x,
+        where(x > 0.0, math.nan, 1e-310),
+    ]
     return Formulas.of(graph, outputs)
 
 
@@ -195,18 +201,42 @@ def refused(graph, text, **names):
     return diagnostic
 
 
-@pytest.mark.parametrize("text", [
-    "1.0 if x > 0.0 else 2.0", "x > 0.0 and y > 0.0", "not x > 0.0", "bool(x)", "float(x)", "int(x)", "[1, 2][x]",
-    "range(x)", "math.sin(x)", "np.sin(x)", "round(x)", "min(x, y)", "x ** 0.5", "2.0 ** x", "x % 2.0",
-    "(x > 0.0) * y", "list(x)", "0.0 < x < 1.0", "trace.where(x, 1.0, 2.0)", "math.floor(x)", "complex(x)"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1.0 if x > 0.0 else 2.0",
+        "x > 0.0 and y > 0.0",
+        "not x > 0.0",
+        "bool(x)",
+        "float(x)",
+        "int(x)",
+        "[1, 2][x]",
+        "range(x)",
+        "math.sin(x)",
+        "np.sin(x)",
+        "round(x)",
+        "min(x, y)",
+        "x ** 0.5",
+        "2.0 ** x",
+        "x % 2.0",
+        "(x > 0.0) * y",
+        "list(x)",
+        "0.0 < x < 1.0",
+        "trace.where(x, 1.0, 2.0)",
+        "math.floor(x)",
+        "complex(x)",
+    ],
+)
 def test_what_only_a_run_knows_is_refused_at_the_models_line(graph, text):
     assert refused(graph, text).help
 
 
 def test_a_refusal_points_at_the_piece_of_the_line_and_names_the_remedy(tmp_path, graph):
     path = tmp_path / "servo.py"
-    path.write_text("import math\nfrom met.trace import Real\n\n\ndef torque(w: Real) -> Real:\n"
-                    "    if w > 0.0:\n        return 1.0\n    return 2.0 * math.tanh(w)\n")
+    path.write_text(
+        "import math\nfrom met.trace import Real\n\n\ndef torque(w: Real) -> Real:\n"
+        "    if w > 0.0:\n        return 1.0\n    return 2.0 * math.tanh(w)\n"
+    )
     space: dict = {}
     exec(compile(path.read_text(), str(path), "exec"), space)
     with pytest.raises(Problem) as caught:

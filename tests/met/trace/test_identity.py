@@ -57,10 +57,12 @@ def swinging(
         base_hz=8.0,
         start=(Run(Phase("start", start)),),
         tick=(
-            Unless0((
-                Every(divisor, (Call(Phase(phase, body)),)),
-                WhileAny("on", turns, (Run(Phase("again", again)),)),
-            )),
+            Unless0(
+                (
+                    Every(divisor, (Call(Phase(phase, body)),)),
+                    WhileAny("on", turns, (Run(Phase("again", again)),)),
+                )
+            ),
             Record(Phase("row", lambda tape: tape.record(0, tape.read(cell))), 2),
         ),
         end=(Run(Phase("end", end)),),

@@ -22,6 +22,7 @@ UNLIKELY = 1e-5
 
 def program(draw, inputs=("seed", "repeat", "gain"), columns=1):
     """One row a tick: `draw(tape)` gives its columns."""
+
     def row(t):
         for column, value in enumerate(draw(t)):
             t.record(column, value)
@@ -48,12 +49,14 @@ def test_a_channels_number_is_the_crc_32_of_its_name():
     for _ in range(2000):  # no two of a length that differ in up to four neighbouring bytes have one number
         name = bytearray(rng.integers(33, 127, 24).astype(np.uint8))
         other, place = bytearray(name), rng.integers(0, 21)
-        other[place:place + 4] = bytes(rng.integers(33, 127, 4).astype(np.uint8))
+        other[place : place + 4] = bytes(rng.integers(33, 127, 4).astype(np.uint8))
         assert other == name or channel_number(other.decode()) != channel_number(name.decode())
 
 
-@pytest.mark.parametrize(("seed", "repeat", "tick"), [
-    (0, 0, 0), (7, 3, 12), (2**32, 0, 2**32), (2**53, 2**32 - 1, 2**53), (2**53 - 1, 5, 2**53 - 1)])
+@pytest.mark.parametrize(
+    ("seed", "repeat", "tick"),
+    [(0, 0, 0), (7, 3, 12), (2**32, 0, 2**32), (2**53, 2**32 - 1, 2**53), (2**53 - 1, 5, 2**53 - 1)],
+)
 def test_a_draw_is_made_of_the_words_that_the_page_says(seed, repeat, tick):
     counter = (tick % 2**32, tick // 2**32, repeat, channel_number("elbow"))
     w = [int(PLAIN["philox"](*map(float, counter), float(seed % 2**32), float(seed // 2**32), n)) for n in range(4)]
@@ -76,15 +79,29 @@ def test_neither_end_of_the_interval_is_ever_drawn(monkeypatch):
         assert all(math.isfinite(x) and abs(x) < 8.7 for x in normal_pair(stream, 0.0))
 
 
-@pytest.mark.parametrize(("seed", "repeat", "tick"), [
-    (math.nan, 0.0, 0.0), (0.0, math.nan, 0.0), (0.0, 0.0, math.nan), (0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.5),
-    (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (math.inf, 0.0, 0.0), (0.0, 2.0**32, 0.0),
-    (0.0, 0.0, 2.0**64)])
+@pytest.mark.parametrize(
+    ("seed", "repeat", "tick"),
+    [
+        (math.nan, 0.0, 0.0),
+        (0.0, math.nan, 0.0),
+        (0.0, 0.0, math.nan),
+        (0.5, 0.0, 0.0),
+        (0.0, 0.5, 0.0),
+        (0.0, 0.0, 0.5),
+        (-1.0, 0.0, 0.0),
+        (0.0, -1.0, 0.0),
+        (0.0, 0.0, -1.0),
+        (math.inf, 0.0, 0.0),
+        (0.0, 2.0**32, 0.0),
+        (0.0, 0.0, 2.0**64),
+    ],
+)
 def test_what_is_no_place_of_a_draw_gives_no_number(seed, repeat, tick):
     def body(t):
         stream = Stream(t.input("seed"), t.input("repeat"), "x")
-        for name, value in zip("uvab", uniform_pair(stream, t.input("k")) + normal_pair(stream, t.input("k")),
-                               strict=True):
+        for name, value in zip(
+            "uvab", uniform_pair(stream, t.input("k")) + normal_pair(stream, t.input("k")), strict=True
+        ):
             t.output(name, value)
 
     one = Program(1.0, (), (), (Run(Phase("end", body)),), ("seed", "repeat", "k"), 0, ("u", "v", "a", "b"))
@@ -105,8 +122,10 @@ def test_machine_code_draws_what_plain_numbers_draw():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("lanes", "cpu", "level"), [
-    (2, None, 2), (4, "haswell", 2), (16, None, 3), (32, "haswell", 0), (8, "skylake-avx512", 1)])
+@pytest.mark.parametrize(
+    ("lanes", "cpu", "level"),
+    [(2, None, 2), (4, "haswell", 2), (16, None, 3), (32, "haswell", 0), (8, "skylake-avx512", 1)],
+)
 def test_draws_have_the_same_bits_whatever_they_are_compiled_for(lanes, cpu, level):
     from met.backends.llvm import machine as llvm
 
@@ -124,8 +143,12 @@ def test_draws_have_the_same_bits_whatever_they_are_compiled_for(lanes, cpu, lev
 
 
 def test_cases_that_differ_in_a_gain_feel_the_same_noise_and_repeats_another():
-    rows = drawn(lambda t: (normal(stream_of(t), t.tick), t.input("gain") * normal(stream_of(t), t.tick)),
-                 [(7.0, 0.0, 1.0), (7.0, 0.0, 2.0), (7.0, 1.0, 1.0), (8.0, 0.0, 1.0)], 100, columns=2)
+    rows = drawn(
+        lambda t: (normal(stream_of(t), t.tick), t.input("gain") * normal(stream_of(t), t.tick)),
+        [(7.0, 0.0, 1.0), (7.0, 0.0, 2.0), (7.0, 1.0, 1.0), (8.0, 0.0, 1.0)],
+        100,
+        columns=2,
+    )
     assert np.array_equal(rows[0, :, 0], rows[1, :, 0]) and np.array_equal(2.0 * rows[0, :, 1], rows[1, :, 1])
     for other in rows[2:]:
         assert not (other[:, 0] == rows[0, :, 0]).any()
@@ -133,8 +156,12 @@ def test_cases_that_differ_in_a_gain_feel_the_same_noise_and_repeats_another():
 
 def test_another_channel_or_another_order_changes_no_draw():
     alone = drawn(lambda t: [normal(stream_of(t), t.tick)], [(1.0, 2.0, 0.0)], 50)
-    among = drawn(lambda t: [normal(stream_of(t, name), t.tick) for name in ("zero", "tachometer", "last")],
-                  [(1.0, 2.0, 0.0)], 50, columns=3)
+    among = drawn(
+        lambda t: [normal(stream_of(t, name), t.tick) for name in ("zero", "tachometer", "last")],
+        [(1.0, 2.0, 0.0)],
+        50,
+        columns=3,
+    )
     assert np.array_equal(among[:, :, 1], alone[:, :, 0])
     for one, other in combinations(range(3), 2):
         assert not (among[:, :, one] == among[:, :, other]).any()
@@ -150,7 +177,11 @@ def test_a_draw_belongs_to_its_tick_however_the_run_gets_there():
     show = Phase("show", lambda t: t.output("x", t.read("x")))
     slower = Program(1.0, (), (Every(7, (Run(draw),)),), (Run(show),), ("seed", "repeat", "gain"), 0, ("x",))
     assert [kernel.compile(slower).run(np.array([[1.0, 2.0, 0.0]]), n)[1][0, 0] for n in (0, 6, 7, 59)] == [
-        every[0], every[0], every[7], every[56]]
+        every[0],
+        every[0],
+        every[7],
+        every[56],
+    ]
 
 
 # How draws are spread
@@ -194,8 +225,16 @@ def test_tails_hold_as_many_as_they_should_up_to_five_sigma(deviates):
     counts = np.zeros(4)
     total = 0
     for seed in range(8):
-        x = deviates if seed == 0 else drawn(
-            lambda t: normal_pair(stream_of(t), t.tick), [(float(seed), float(i), 0.0) for i in range(CASES)], TICKS, 2)
+        x = (
+            deviates
+            if seed == 0
+            else drawn(
+                lambda t: normal_pair(stream_of(t), t.tick),
+                [(float(seed), float(i), 0.0) for i in range(CASES)],
+                TICKS,
+                2,
+            )
+        )
         counts += [np.count_nonzero(np.abs(x) > limit) for limit in (2.0, 3.0, 4.0, 5.0)]
         total += x.size
     for limit, count in zip((2.0, 3.0, 4.0, 5.0), counts, strict=True):
@@ -240,8 +279,12 @@ def test_the_two_of_a_pair_and_neighbours_in_time_and_repeat_are_independent(dev
 
 def test_channels_and_seeds_are_independent_of_each_other():
     names = ("a", "b", "joint1.servo.tachometer", "joint2.servo.tachometer")
-    x = drawn(lambda t: [normal(stream_of(t, name), t.tick) for name in names],
-              [(seed, float(i), 0.0) for seed in (0.0, 1.0, 2.0**32, 2.0**53) for i in range(64)], TICKS, len(names))
+    x = drawn(
+        lambda t: [normal(stream_of(t, name), t.tick) for name in names],
+        [(seed, float(i), 0.0) for seed in (0.0, 1.0, 2.0**32, 2.0**53) for i in range(64)],
+        TICKS,
+        len(names),
+    )
     by_seed = x.reshape(4, 64, TICKS, len(names))
     for one, other in combinations(range(4), 2):
         assert independent(by_seed[:, :, :, one], by_seed[:, :, :, other])

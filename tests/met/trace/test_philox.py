@@ -63,8 +63,25 @@ def test_it_agrees_with_a_philox_that_agrees_with_numpys_at_64_bits():
 
 
 NAMES = ("c0", "c1", "c2", "c3", "k0", "k1")
-NO_WORDS = (math.nan, math.inf, -math.inf, -1.0, -0.5, 0.5, 2.0**32 - 0.5, 2.0**32, 2.0**33 + 1.0, 2.0**51 + 0.5,
-            2.0**52, 2.0**52 + 7.0, 2.0**53, 1e300, -1e300, 5e-324, -5e-324)
+NO_WORDS = (
+    math.nan,
+    math.inf,
+    -math.inf,
+    -1.0,
+    -0.5,
+    0.5,
+    2.0**32 - 0.5,
+    2.0**32,
+    2.0**33 + 1.0,
+    2.0**51 + 0.5,
+    2.0**52,
+    2.0**52 + 7.0,
+    2.0**53,
+    1e300,
+    -1e300,
+    5e-324,
+    -5e-324,
+)
 
 
 def operands():
@@ -73,7 +90,7 @@ def operands():
     x = rng.integers(0, 2**32, (60 + 6 * len(NO_WORDS), 6)).astype(np.float64)
     x[:30] = np.where(rng.random((30, 6)) < 0.5, x[:30], rng.choice([0.0, -0.0, 1.0, 2.0**31, 2.0**32 - 1.0], (30, 6)))
     for i in range(6):
-        x[60 + i * len(NO_WORDS):60 + (i + 1) * len(NO_WORDS), i] = NO_WORDS
+        x[60 + i * len(NO_WORDS) : 60 + (i + 1) * len(NO_WORDS), i] = NO_WORDS
     return x
 
 
@@ -85,8 +102,12 @@ def words_of(t):
 
 def expected():
     x = operands()
-    return np.array([[PLAIN["philox"](*row, n) for n in range(4)] +
-                     [PLAIN["philox"](row[0], 0.0, row[2], 7.0, 3.0, 0.0, 1)] for row in x.tolist()])
+    return np.array(
+        [
+            [PLAIN["philox"](*row, n) for n in range(4)] + [PLAIN["philox"](row[0], 0.0, row[2], 7.0, 3.0, 0.0, 1)]
+            for row in x.tolist()
+        ]
+    )
 
 
 @pytest.fixture(scope="module")

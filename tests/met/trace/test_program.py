@@ -71,9 +71,16 @@ def test_the_plain_run_divides_by_zero_as_ieee_does():
 
 
 def test_neighbouring_runs_are_one_section_and_pass_values_without_memory():
-    recording = record(program(run(lambda t: t.write("x", t.input("a") + 1.0),
-                                   lambda t: t.write("y", t.read("x") * t.read("y") + t.read("x"))),
-                               end=run(lambda t: t.output("y", t.read("y"))), outputs=("y",)))
+    recording = record(
+        program(
+            run(
+                lambda t: t.write("x", t.input("a") + 1.0),
+                lambda t: t.write("y", t.read("x") * t.read("y") + t.read("x")),
+            ),
+            end=run(lambda t: t.output("y", t.read("y"))),
+            outputs=("y",),
+        )
+    )
     assert len(recording.tick) == 1
     assert recording.cells == ("y",)
     assert ops(recording.sections[0]) == ["add", "fma"]
@@ -81,8 +88,12 @@ def test_neighbouring_runs_are_one_section_and_pass_values_without_memory():
 
 def test_a_called_phase_is_there_once_and_passes_values_through_memory():
     twice = Phase("twice", lambda t: t.write("n", t.read("n") + t.read("n")))
-    one = program((Run(COUNT), Call(twice), Run(COUNT), Every(2, (Call(twice), Run(COUNT))), Call(twice)),
-                  end=(Run(SHOW),), inputs=(), outputs=("n",))
+    one = program(
+        (Run(COUNT), Call(twice), Run(COUNT), Every(2, (Call(twice), Run(COUNT))), Call(twice)),
+        end=(Run(SHOW),),
+        inputs=(),
+        outputs=("n",),
+    )
     recording = record(one)
     assert [section.name for section in recording.sections].count("twice") == 1
     assert [execute(one, {}, k)[1]["n"] for k in range(2)] == [14.0, 62.0]
@@ -126,16 +137,19 @@ def test_masks_pass_through_memory():
     assert record(one).cells == ("m", "x")
 
 
-@pytest.mark.parametrize(("wrong", "message"), [
-    (lambda: program((Every(2, (Record(ROW, 4),)),), columns=1), "within another condition"),
-    (lambda: program((Record(ROW, 2), Record(ROW, 3)), columns=1), "one rate"),
-    (lambda: program((Record(ROW, 1),), columns=2), r"no phase records columns \[1\]"),
-    (lambda: program((), outputs=("x",)), r"no phase writes the outputs \['x'\]"),
-    (lambda: program((Record(ROW, 1),), start=(Record(ROW, 1),), columns=1), "rows belong to ticks"),
-    (lambda: program(run(lambda t: t.record(0, 1.0)), columns=1), "recorded in a tick phase"),
-    (lambda: program(run(lambda t: t.output("x", 1.0)), outputs=("x",)), "before the end"),
-    (lambda: program(run(lambda t: t.input("nothing"))), "no input 'nothing'"),
-])
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: program((Every(2, (Record(ROW, 4),)),), columns=1), "within another condition"),
+        (lambda: program((Record(ROW, 2), Record(ROW, 3)), columns=1), "one rate"),
+        (lambda: program((Record(ROW, 1),), columns=2), r"no phase records columns \[1\]"),
+        (lambda: program((), outputs=("x",)), r"no phase writes the outputs \['x'\]"),
+        (lambda: program((Record(ROW, 1),), start=(Record(ROW, 1),), columns=1), "rows belong to ticks"),
+        (lambda: program(run(lambda t: t.record(0, 1.0)), columns=1), "recorded in a tick phase"),
+        (lambda: program(run(lambda t: t.output("x", 1.0)), outputs=("x",)), "before the end"),
+        (lambda: program(run(lambda t: t.input("nothing"))), "no input 'nothing'"),
+    ],
+)
 def test_a_program_that_cannot_be_is_refused(wrong, message):
     with pytest.raises(ValueError, match=message):
         record(wrong())
@@ -169,8 +183,13 @@ def test_a_product_that_is_also_used_otherwise_is_not():
 
 
 def test_fused_signs_are_right():
-    for body, expected in ((lambda a, b, c: a * b - c, 2.0), (lambda a, b, c: c - a * b, -2.0),
-                           (lambda a, b, c: -(a * b) - c, -10.0), (lambda a, b, c: c + a * -b, -2.0)):
+    for body, expected in (
+        (lambda a, b, c: a * b - c, 2.0),
+        (lambda a, b, c: c - a * b, -2.0),
+        (lambda a, b, c: -(a * b) - c, -10.0),
+        (lambda a, b, c: c + a * -b, -2.0),
+    ):
+
         def make(t, body=body):
             t.output("x", body(t.input("a"), t.input("b"), t.input("c")))
 
@@ -178,6 +197,7 @@ def test_fused_signs_are_right():
         (section,) = record(one).sections
         assert ops(section) == ["fma"]
         from met.trace.graph import evaluate
+
         values = evaluate(section.nodes, section.order, lambda n: {"a": 2.0, "b": 3.0, "c": 4.0}[n[1]], arrays=False)
         ((_, ref),) = section.outputs
         assert (-values[ref >> 1] if ref & 1 else values[ref >> 1]) == expected
@@ -204,7 +224,7 @@ def test_pieces_hold_every_operation_once_and_pass_what_crosses():
         here = {i for _, i in piece.body}
         for _, i in piece.body:
             node = section.nodes[i]
-            for ref in node[1:1 + OPERANDS[node[0]]]:
+            for ref in node[1 : 1 + OPERANDS[node[0]]]:
                 if ref >> 1 in body_of and ref >> 1 not in here:
                     assert held[piece.kept[ref >> 1]] == ref >> 1
         held.update({slot: i for i, slot in piece.keep.items()})

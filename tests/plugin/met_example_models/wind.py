@@ -29,7 +29,11 @@ ENVIRONMENT = Environment(
         Parameter(name="point", unit="m", shape="vector", default=(0.0, 0.0, 0.0), doc="where it acts, link frame"),
         Parameter(name="area", unit="m^2", at_least=0.0, doc="drag coefficient times the area that the wind meets"),
         Parameter(
-            name="density", unit="kg/m^3", default=1.225, above=0.0, doc="density of the air",
+            name="density",
+            unit="kg/m^3",
+            default=1.225,
+            above=0.0,
+            doc="density of the air",
             source="ISO 2533:1975, standard atmosphere at sea level",
         ),
     ),
