@@ -201,6 +201,7 @@ def test_an_environment_that_someone_else_made_is_left_alone(checkout: Path) -> 
     assert (checkout / ".venv" / "mine").read_text() == "precious"
 
 
+@pytest.mark.slow
 def test_a_read_only_checkout_is_refused_in_one_line(checkout: Path) -> None:
     (checkout / "home").mkdir()
     checkout.chmod(0o555)

@@ -376,6 +376,7 @@ def renamed(experiment: Any, path: str, name: str) -> Any:
     )
 
 
+@pytest.mark.slow
 def test_runs_and_metrics_may_be_called_provenance(here: Path) -> None:
     from dataclasses import replace
 

@@ -284,6 +284,7 @@ def test_one_case_has_its_own_metrics_and_parameters(here: Path) -> None:
     assert mass == {"value": pytest.approx(20.1, rel=1e-15), "unit": "kg", "varies": True}
 
 
+@pytest.mark.slow
 def test_a_case_is_shown_of_the_experiments_that_have_it(here: Path) -> None:
     batch.run(plans.plan(plans.nominal(), plans.gains(4)), output="a.h5")
     with ArchiveFile("a.h5") as file:

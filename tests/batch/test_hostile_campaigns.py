@@ -129,6 +129,7 @@ def test_a_history_whose_worker_died_is_not_said_to_be_kept(here: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_what_was_begun_afresh_is_gone_on_with(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     short_tasks(monkeypatch)
     monkeypatch.setattr(resuming, "GUARDED_SECONDS", 0.0)
@@ -307,6 +308,7 @@ def test_jobs_find_their_archive_and_their_logs(here: Path, submitted: Path, mon
     assert sum(f"--output={here}/60%%j.h5.campaign/logs/%A.log" in each for each in told) == 1
 
 
+@pytest.mark.slow
 def test_a_share_counts_its_own_cases(submitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     begun = []
 
@@ -349,6 +351,7 @@ def test_signals_of_another_width_are_compared(here: Path, single: bool) -> None
     assert differences("a.h5", "b.h5") == ["#3 of gains: qd differs from 0.28 s on"]
 
 
+@pytest.mark.slow
 def test_the_commit_of_an_archive_is_mets_own(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = batch.run(plan(), output="a.h5").path.read_bytes()
     subprocess.run(["git", "init", "-q", "other"], check=True)
@@ -417,6 +420,7 @@ def test_a_case_is_drawn_whichever_structure_it_is_of(here: Path) -> None:
     assert cli.main(["plot", "a.h5", "--case", "#2"]) == 0
 
 
+@pytest.mark.slow
 def test_the_next_step_is_of_a_case_that_was_run(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     deck(here, DECK, "kinds")
     assert cli.main(["run", "a.ic", "kinds", "--case", "#2", "--histories", "none", "--no-picture"]) == 1

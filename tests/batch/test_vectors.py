@@ -198,6 +198,7 @@ def test_cases_of_a_vector_have_a_plot_a_component(sweep: ArchiveFile, figures: 
     assert all(len(ax.lines) == 3 for ax in axes)
 
 
+@pytest.mark.slow
 def test_many_cases_are_a_fan_of_each_component(files: dict[str, Path], figures: list[Any], tmp_path: Path) -> None:
     (tmp_path / "crane.ic").write_text(DECK.replace("[1, 2, 3] kg", "linspace(1, 3, 12) kg"))
     batch.run(ic.compile(tmp_path / "crane.ic", select=["masses"]), output=tmp_path / "a.h5")

@@ -143,6 +143,7 @@ class TestHowItEnds:
         assert (here / "a.h5").read_bytes() == before
         assert sorted(path.name for path in here.iterdir()) == ["a.h5", "a.h5.run.json"]
 
+    @pytest.mark.slow
     def test_an_archive_is_written_over_by_the_next(self, here: Path) -> None:
         batch.run(plans.plan(plans.gains(3)), output="a.h5")
         batch.run(plans.plan(plans.gains(4)), output="a.h5")
@@ -184,6 +185,7 @@ class TestHowItEnds:
         named = campaign.prepare(plans.plan(plans.nominal(), plans.gains()), experiments=["gains"])
         assert named.output == Path("two_link.gains.h5")
 
+    @pytest.mark.slow
     def test_the_default_name_is_the_same_from_python(self, here: Path) -> None:
         import ic
 

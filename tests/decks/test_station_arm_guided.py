@@ -70,6 +70,7 @@ def test_what_is_asked_stays_within_the_limits_and_no_error_is_hidden(case: tupl
     )
 
 
+@pytest.mark.slow
 def test_at_the_end_of_its_reach_the_error_is_what_cannot_be_reached_and_what_the_damping_costs() -> None:
     (made,) = ic.compile("station_arm.ic", select=["station_arm_stretch"]).experiments
     run = engine.run(made)
@@ -83,6 +84,7 @@ def test_at_the_end_of_its_reach_the_error_is_what_cannot_be_reached_and_what_th
     assert np.abs(np.diff(run.signals["servo.command"][0], axis=0) * 10.0).max() <= LIMIT * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 def test_a_line_through_the_singularity_that_asks_nothing_impossible_is_kept(tmp_path: Path) -> None:
     (tmp_path / "deck.ic").write_text("""#include <station_arm.ic>
 run straight like station_arm_line {

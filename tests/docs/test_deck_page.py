@@ -146,6 +146,7 @@ def test_the_sweeps_of_the_page_have_the_cases_and_structures_that_it_says(tmp_p
     assert [(len(each.structure.joints), each.cases.count) for each in sizes] == [(1, 3), (2, 3)]
 
 
+@pytest.mark.slow
 def test_what_the_page_builds_on_the_tutorial_runs(tmp_path: Path) -> None:
     (text,) = (text for where, _, text in FRAGMENTS if text.startswith("arm long_picker"))
     (tmp_path / "picker.ic").write_text(PICKER + text, encoding="utf-8")

@@ -248,6 +248,7 @@ BINARY = [
 ]
 
 
+@pytest.mark.slow
 def test_a_row_may_be_longer_than_a_threads_stack():
     """Threads have 512 KiB on some systems; of 32 lanes, 3,000 columns take 750 KiB."""
     columns = 3000

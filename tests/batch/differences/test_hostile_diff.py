@@ -106,6 +106,7 @@ def test_two_that_have_nothing_to_compare_are_not_identical(ran: Callable[..., P
     assert cli.main(["diff", str(a), str(b)]) == cli.NO
 
 
+@pytest.mark.slow
 def test_histories_of_other_cases_are_not_identical(two: Callable[..., tuple[Path, Path]]) -> None:
     def kept(*cases: int) -> str:
         batch.run(plans.plan(plans.gains(CASES)), output=f"kept{cases[0]}.h5", histories=[f"#{case}" for case in cases])
@@ -148,6 +149,7 @@ def test_a_tolerance_is_of_what_has_its_unit(ran: Callable[..., Path]) -> None:
         diff(a, b, tolerances(["q=2V"]))
 
 
+@pytest.mark.slow
 def test_of_one_joint_nothing_is_allowed(two: Callable[..., tuple[Path, Path]]) -> None:
     def plant(file: Any) -> None:
         file["q"][1, 3, 1] += 1e-3
@@ -338,6 +340,7 @@ def test_a_requirement_in_one_alone_is_a_difference(ran: Callable[..., Path]) ->
         )
 
 
+@pytest.mark.slow
 def test_the_exit_status_of_another_requirement_is_that_of_a_difference(
     ran: Callable[..., Path], capsys: pytest.CaptureFixture[str]
 ) -> None:

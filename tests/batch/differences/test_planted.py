@@ -41,6 +41,7 @@ def test_the_same_cases_in_another_order_are_identical(monkeypatch: pytest.Monke
     assert not found.experiments[0].worst and not found.experiments[0].ended
 
 
+@pytest.mark.slow
 def test_one_bit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def plant(run: Run, place: dict[int, int]) -> None:
         if 77 in place:

@@ -67,6 +67,7 @@ def test_the_deck_of_the_second_says_it(archives: Callable[..., tuple[Path, Path
     assert any(line.endswith("5e-06 SI, 200 times that") for line in lines)
 
 
+@pytest.mark.slow
 def test_of_one_joint_alone(archives: Callable[..., tuple[Path, Path]]) -> None:
     a, b = archives(elbow__q=2e-3)
     found = diff(a, b)
@@ -89,6 +90,7 @@ def test_the_command_line_has_its_way(archives: Callable[..., tuple[Path, Path]]
     assert counts(alone) == (CASES - 2, 0, 2) and told(alone)[-1] == "different; no tolerance was given"
 
 
+@pytest.mark.slow
 def test_of_programs(archives: Callable[..., tuple[Path, Path]]) -> None:
     found = batch.diff(*archives(elbow__q=2e-3, rel=1e-12), tolerances="tau=1 mN*m")
     [experiment] = json.loads(json.dumps(as_data(found)))["experiments"]
@@ -97,6 +99,7 @@ def test_of_programs(archives: Callable[..., tuple[Path, Path]]) -> None:
     assert q["tolerance"] == {"absolute": 0.0, "relative": 1e-12, "time": 0.0, "by_joint": {"elbow": 2e-3}}
 
 
+@pytest.mark.slow
 def test_a_metric_that_is_called_as_a_signal(tmp_path: Path) -> None:
     deck = tmp_path / "deck.ic"
     deck.write_text("""#include <two_link.ic>
@@ -111,6 +114,7 @@ run both like nominal {
     assert allowed["metrics.tau", True] == 2.0 and allowed["tau", False] == 3.0
 
 
+@pytest.mark.slow
 def test_a_deck_that_cannot_be_read_is_told(
     archives: Callable[..., tuple[Path, Path]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

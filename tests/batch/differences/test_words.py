@@ -41,6 +41,7 @@ def test_each_case_is_counted_by_the_worst_of_what_differs_in_it(
     assert found.how.tolist() == expected.tolist()
 
 
+@pytest.mark.slow
 def test_a_command_names_the_run_where_there_are_several(
     here: Path, engine: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -58,6 +58,7 @@ def test_every_topic_and_field_that_it_names_is_in_the_file(written: tuple[Mcap,
             assert field in read.of(topic)[0].data.DESCRIPTOR.fields_by_name
 
 
+@pytest.mark.slow
 def test_a_joint_has_one_colour_and_ghosts_are_faint(written: tuple[Mcap, dict[str, Any]]) -> None:
     plots = [panel["paths"] for name, panel in written[1]["configById"].items() if name.startswith("Plot!")]
     colours = [[path["color"] for path in paths] for paths in plots]

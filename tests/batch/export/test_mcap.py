@@ -83,6 +83,7 @@ def test_no_frame_jumps_between_the_two_quaternions_of_its_turn(pick: tuple[Arch
     assert (np.sum(turns[1:] * turns[:-1], axis=-1) > 0.0).all()
 
 
+@pytest.mark.slow
 def test_the_clock_is_the_simulated_time_from_zero_in_order(pick: tuple[ArchiveFile, Mcap]) -> None:
     _, read = pick
     assert [message.time for message in read.of("/tf")] == [20_000_000 * row for row in range(51)]
@@ -207,6 +208,7 @@ def test_several_cases_are_overlaid_the_first_solid_and_the_others_as_ghosts(
     assert "/case0/log" not in read.topics()
 
 
+@pytest.mark.slow
 def test_a_length_that_follows_from_what_is_varied_is_the_cases_own(reaches: tuple[ArchiveFile, Mcap]) -> None:
     _, read = reaches
     lengths = [read.entities(f"/case{case}/scene")[f"case{case}/boom"].cylinders[0].size.z for case in range(3)]
@@ -295,6 +297,7 @@ def test_a_case_that_failed_before_its_first_row_has_no_frames(here: Path, monke
     assert [message.time for message in read.of("/result")] == [0]
 
 
+@pytest.mark.slow
 def test_structures_of_one_sweep_have_fields_of_their_own(tmp_path: Path) -> None:
     read = Mcap(export(made(tmp_path, "links", CHAIN)).path)
     assert {"/case0/qd", "/case1/qd", "/case2/qd", "/case3/qd"} < read.topics()
@@ -319,11 +322,13 @@ def test_a_link_that_is_called_world_leaves_the_name_to_it(tmp_path: Path) -> No
     assert read.metadata[0][1]["base_frame"] == "base"
 
 
+@pytest.mark.slow
 def test_positions_may_be_recorded_joint_by_joint(tmp_path: Path, pick: tuple[ArchiveFile, Mcap]) -> None:
     read = Mcap(export(made(tmp_path, "apart")).path)
     assert [str(message.data) for message in read.of("/tf")] == [str(message.data) for message in pick[1].of("/tf")]
 
 
+@pytest.mark.slow
 def test_without_positions_there_is_no_arm_to_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made(tmp_path, "blind")
     monkeypatch.chdir(tmp_path)

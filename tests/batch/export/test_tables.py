@@ -86,6 +86,7 @@ def test_numbers_of_four_bytes_are_as_short_as_they_are(here: Path) -> None:
     assert max(len(text) for row in rows for text in row[1:]) < 16
 
 
+@pytest.mark.slow
 def test_a_structure_leaves_empty_what_only_another_has(tmp_path: Path) -> None:
     archive = made(tmp_path, "links", CHAIN)
     _, heads, rows = table(export(archive, tmp_path / "a.csv", table="histories").path)

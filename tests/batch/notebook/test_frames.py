@@ -121,6 +121,7 @@ def test_frames_are_where_q_is_taken(reaches: xarray.Dataset) -> None:
     assert 0 < abs(between - whole.isel(time=0)).max() < 0.05
 
 
+@pytest.mark.slow
 def test_of_one_case_of_several_and_of_those_that_are_selected(reaches: xarray.Dataset) -> None:
     whole = reaches.met.frames("tool")
     one = reaches.met.frames("tool", case="#2")
@@ -179,6 +180,7 @@ def test_an_arm_whose_joints_are_all_fixed(tmp_path: Path) -> None:
         assert (frames["position"].values == [1.0, 2.0, 3.0]).all()
 
 
+@pytest.mark.slow
 def test_what_cannot_be_placed(reaches: xarray.Dataset, tmp_path: Path) -> None:
     assert said(lambda: reaches.met.frames("tol")) == (
         "E385", "no link `tol` in `reaches`\n"

@@ -52,6 +52,7 @@ def test_a_product_unfolds_and_what_is_excluded_is_not_a_number(tuning: xarray.D
     assert volts["gearbox.kp"].attrs["units"] == "V*s/rad"
 
 
+@pytest.mark.slow
 def test_it_is_what_xarray_makes_of_the_axes(tuning: xarray.Dataset) -> None:
     axes = ["gearbox.kp", "gearbox.ki", "links.upper.mass"]
     plain = tuning[["volts"]].set_index(case=axes).unstack("case")["volts"]
@@ -143,6 +144,7 @@ def test_a_sum_of_sweeps_that_vary_different_things(tmp_path: Path) -> None:
         assert grid.sel({"integrator": "", "gearbox.kp": 0.03}).notnull()
 
 
+@pytest.mark.slow
 def test_a_single_run_has_no_dimensions(tmp_path: Path) -> None:
     with batch.open(made(tmp_path, ["brief"])) as data:
         assert data.met.grid("volts").dims == () and data.met.grid("qd").dims == ("time", "joint")

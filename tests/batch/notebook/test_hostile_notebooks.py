@@ -93,6 +93,7 @@ def test_a_block_is_in_one_unit(tmp_path: Path) -> None:
         tree.met.grid("end")
 
 
+@pytest.mark.slow
 def test_two_parameters_that_follow_from_a_third_share_its_dimension(tmp_path: Path) -> None:
     text = (
         BRIEF
@@ -108,6 +109,7 @@ def test_two_parameters_that_follow_from_a_third_share_its_dimension(tmp_path: P
         assert grid["gearbox.ki"].values.tolist() == [0.06, 0.09, 0.06, 0.09]
 
 
+@pytest.mark.slow
 def test_a_structure_of_which_one_repeat_is_left_is_at_that_repeat(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

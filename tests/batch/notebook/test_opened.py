@@ -160,6 +160,7 @@ class TestWhatWasRun:
             assert said(lambda: tree.met.parameters("#0"))[1].startswith("parameters are those of one case, and ")
             assert tree["ways.rk4"].met.plan.deck == tree.met.plan.deck
 
+    @pytest.mark.slow
     def test_the_deck_and_the_plan(self, data: xarray.Dataset) -> None:
         files = data.met.sources
         assert next(iter(files.values())) == TUNING and "<servos/rigid_gearbox.ic>" in files

@@ -47,6 +47,7 @@ def test_a_value_may_have_any_unit_and_the_rounding_of_who_types_it(tuning: xarr
     np.testing.assert_allclose(chosen["gearbox.kp"], 0.02, rtol=1e-15)
 
 
+@pytest.mark.slow
 def test_signals_are_cut_as_cases_are(tuning: xarray.Dataset) -> None:
     chosen = tuning.met.sel({"gearbox.kp": 0.02})
     assert chosen["recorded_case"].values.tolist() == [8] == chosen["qd"]["recorded_case"].values.tolist()
@@ -65,6 +66,7 @@ def test_several_values_ranges_and_names_hold_together(tuning: xarray.Dataset) -
     assert rows(tuning.met.sel({kp: 0.04, "links.upper.mass": 60})) == []  # excluded by the deck
 
 
+@pytest.mark.slow
 def test_a_metric_chooses_too_and_what_never_comes_is_beyond_every_range(gains: xarray.Dataset) -> None:
     np.testing.assert_allclose(gains["settle"][:3], [np.inf, 10 / 1.5, 5])
     assert rows(gains.met.sel(settle=slice(None, "6000 ms"))) == [2, 4, 5, 6]
@@ -125,6 +127,7 @@ class TestOfSeveral:
         assert {name: rows(node) for name, node in found.children.items()} == {"ways.rk4": [1], "ways.midpoint": [3]}
         assert found.attrs == ways.attrs
 
+    @pytest.mark.slow
     def test_a_position_is_in_one_structure(self, ways: xarray.DataTree) -> None:
         found = ways.met.sel(case="#2")
         assert list(found.children) == ["ways.midpoint"] and found["ways.midpoint"]["qd"].dims == ("time", "joint")

@@ -78,6 +78,7 @@ class TestSignals:
         words = [text.get_text() for text in figures[0].legends[0].get_texts()]
         assert words[-2:] == ["a.h5", "b.h5"]
 
+    @pytest.mark.slow
     def test_may_have_other_instants(self, here: Path, figures: list[Any]) -> None:
         archives.made(here / "a.h5", plans.nominal())
         other = plans.nominal()

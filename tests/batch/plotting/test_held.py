@@ -77,6 +77,7 @@ def test_a_requirement_of_a_joint_speaks_for_its_signal(ran: dict[str, ArchiveFi
     assert (found["q"].unit, found["qd"].unit) == ("rad", "rpm")
 
 
+@pytest.mark.slow
 def test_limits_are_those_of_requirements_stops_and_servos(ran: dict[str, ArchiveFile]) -> None:
     known, found = units(ran["slew"])
     assert known.experiment is not None

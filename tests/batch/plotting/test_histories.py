@@ -156,6 +156,7 @@ def test_a_fan_of_unlike_commands_leaves_them_a_panel(
     assert any("rate asked" in ax.get_title("left") for ax in axes)
 
 
+@pytest.mark.slow
 def test_many_cases_are_a_fan(here: Path, figures: list[Any]) -> None:
     with archive(40) as file:
         draw(file, "a.png", ["qd"])

@@ -121,6 +121,7 @@ class TestMapsOfADifference:
         plot("a.h5", names=["settle"], against="b.h5")
         assert (cells(shown(figures[0])[0], hatch=STRIPES), legend(figures[0])) == (0, ["not in both"])
 
+    @pytest.mark.slow
     def test_say_which_of_two_is_infinite(
         self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -73,12 +73,14 @@ class TestPoints:
         words = [text.get_text() for text in figures[0].legends[0].get_texts()]
         assert words == [*(f"links.lower.mass = {mass} g" for mass in (10000, 20000, 30000)), "limit"]
 
+    @pytest.mark.slow
     def test_of_many_values_of_another_parameter_have_a_colour_bar(self, here: Path, figures: list[Any]) -> None:
         made(masses=[10.0 + mass for mass in range(NAMED + 1)])
         plot("a.h5", over=["gearbox.kp"])
         assert [ax.get_ylabel() for ax in figures[0].axes] == ["settle  (s)", "volts  (V)", "links.lower.mass  (g)"]
         assert not figures[0].legends
 
+    @pytest.mark.slow
     def test_of_a_logarithmic_sweep_have_logarithmic_colours_with_round_numbers(
         self, here: Path, figures: list[Any]
     ) -> None:
@@ -138,6 +140,7 @@ class TestLogarithmicAxes:
 
 
 class TestMaps:
+    @pytest.mark.slow
     def test_are_drawn_where_two_parameters_make_a_grid(self, here: Path, figures: list[Any]) -> None:
         made()
         plot("a.h5")

@@ -248,6 +248,7 @@ class TestThePoints:
         compared = columns["choice:compared"]
         assert np.flatnonzero(compared.values == compared.words.index("only now")).tolist() == list(GONE)
 
+    @pytest.mark.slow
     def test_are_of_the_same_unit_or_not_compared(self, here: Path, engine: None) -> None:
         one = plans.gains(4)
         archives.made(here / "a.h5", one)
@@ -258,6 +259,7 @@ class TestThePoints:
         assert columns["metric:volts"].before is None and "change:metric:volts" not in columns
         assert columns["metric:settle"].before is not None
 
+    @pytest.mark.slow
     def test_of_a_grid_make_a_map_of_the_change(
         self, here: Path, engine: None, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -307,6 +309,7 @@ class TestTheSignals:
         assert mine.change.values[1][20:, 0] == pytest.approx(0.014) and not mine.change.values[1][:20].any()
         assert found.clocks[mine.change.clock].tolist() == found.clocks[mine.clock].tolist()
 
+    @pytest.mark.slow
     def test_of_another_rate_are_compared_at_common_instants(self, here: Path, engine: None) -> None:
         archives.made(here / "a.h5", archives_of(2))
         archives.made(here / "b.h5", archives_of(3))
@@ -386,6 +389,7 @@ class TestTheCommand:
         with pytest.raises(ValueError, match=r"^tolerances are for a comparison: against which archive\?$"):
             report("b.h5", tolerances="rel=1e-9")
 
+    @pytest.mark.slow
     def test_refuses_what_met_diff_refuses(
         self, planted: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
     ) -> None:

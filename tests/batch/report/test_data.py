@@ -260,6 +260,7 @@ class TestSignals:
             "No histories were kept. The commands of the table above run a case again, with its signals."
         )
 
+    @pytest.mark.slow
     def test_have_the_command_over_what_should_follow_it(self, tmp_path: Path) -> None:
         deck = "#include <two_link.ic>\nrun short like nominal { duration = 1 s; record += [servo.command]; }\n"
         batch.run(archives.compiled(tmp_path, "short", deck=deck), output=tmp_path / "a.h5")
@@ -288,6 +289,7 @@ class TestStructures:
         [integrator] = [row for row in section.parameters if row.path == "integrator" and row.value == "rk4"]
         assert integrator.among == ("ways.rk4",)
 
+    @pytest.mark.slow
     def test_parameters_name_the_line_that_wrote_them(self, tmp_path: Path) -> None:
         batch.run(archives.compiled(tmp_path, "ways"), output=tmp_path / "a.h5")
         [section] = gathered(tmp_path / "a.h5").sections

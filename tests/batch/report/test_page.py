@@ -87,6 +87,7 @@ def data_of(source: str) -> Iterator[Any]:
         yield json.loads(found[1])
 
 
+@pytest.mark.slow
 def test_every_element_is_closed_and_every_link_leads_somewhere(found: Report) -> None:
     parsed = Parsed(page(found))
     ids = [about["id"] for _, about in parsed.elements if "id" in about]
@@ -95,6 +96,7 @@ def test_every_element_is_closed_and_every_link_leads_somewhere(found: Report) -
     assert len(links) >= 6 and all(link is not None and link[1:] in ids for link in links)
 
 
+@pytest.mark.slow
 def test_nothing_is_fetched_and_all_else_is_forbidden(found: Report) -> None:
     source = page(found)
     parsed = Parsed(source)
@@ -124,12 +126,14 @@ def test_no_text_of_a_deck_is_markup(found: Report) -> None:
     assert "\u202e" not in source and "\x00" not in source
 
 
+@pytest.mark.slow
 def test_a_text_that_is_no_unicode_can_be_written(found: Report) -> None:
     source = page(replace(found, title="arm \udcff", archive="\ud800.h5"))
     source.encode("utf-8")
     assert "arm \\udcff" in source
 
 
+@pytest.mark.slow
 def test_the_same_archive_gives_the_same_bytes(here: Path, engine: None) -> None:
     path = archives.made(here / "a.h5", plans.gains(30))
     one, other = (report(path, here / name).read_bytes() for name in ("1.html", "2.html"))
@@ -142,6 +146,7 @@ def test_it_is_small_but_for_its_data(found: Report) -> None:
     assert len(source.encode()) - data < 300_000
 
 
+@pytest.mark.slow
 def test_it_reads_without_scripts(found: Report) -> None:
     words = " ".join(text for tag, text in Parsed(page(found)).texts if tag not in ("script", "style"))
     for said in ("0 of 12 cases meet every requirement", "settle < 10 s", "met run a.h5 gains --case '#2'",

@@ -60,6 +60,7 @@ def test_a_damaged_sidecar_costs_time_alone(archive: Path, undisturbed: bytes, t
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_an_archive_that_was_cut_short_is_made_again(archive: Path, undisturbed: bytes) -> None:
     go_on(archive)
     archive.write_bytes(undisturbed[: len(undisturbed) // 2])
@@ -67,6 +68,7 @@ def test_an_archive_that_was_cut_short_is_made_again(archive: Path, undisturbed:
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_the_archive_of_another_plan_stays_until_the_new_one_is_whole(archive: Path, undisturbed: bytes) -> None:
     other = plans.plan(plans.gains(7))
     go_on(archive, other)

@@ -21,6 +21,7 @@ from tests.batch.begun import CASES, OF_TASK, begin, flip, go_on, plan, refused
 # What is there is kept
 
 
+@pytest.mark.slow
 def test_only_what_is_missing_is_run(archive: Path, undisturbed: bytes) -> None:
     kept = begin(archive)
     rest, notes = go_on(archive)
@@ -35,6 +36,7 @@ def test_what_is_there_is_not_touched(archive: Path) -> None:
     assert kept.items() < begin(archive, after=1).items()
 
 
+@pytest.mark.slow
 def test_going_on_again_and_again(archive: Path, undisturbed: bytes) -> None:
     while whole.done(archive, CASES) < CASES:
         before = whole.done(archive, CASES)
@@ -55,6 +57,7 @@ def test_the_last_shards_alone_are_enough(archive: Path, undisturbed: bytes) -> 
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_shards_of_cases_that_overlap(archive: Path, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     begin(archive, after=1)
     shards = whole.folder_of(archive).shards

@@ -29,6 +29,7 @@ def another_constant(patch: pytest.MonkeyPatch) -> None:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_campaign_that_is_half_done_goes_on_after_a_cell_is_renamed(
     archive: Path, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -137,6 +137,7 @@ def test_a_sweep_is_the_one_that_the_deck_would_say(
         assert not any(setting.startswith(c.path) for each in found for c in each.cases.coordinates)
 
 
+@pytest.mark.slow
 def test_a_set_value_is_what_a_sweep_over_it_alone_has(tmp_path: Path) -> None:
     values = {
         "links.bar.mass": "3 kg", "links.bar.shape.length": "0.7 m", "links.bar.com.y": "0.1 m", "hinge.at.x": "1 m",

@@ -29,7 +29,7 @@ def bits(numbers: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("run", ["nominal", "hybrid"])
+@pytest.mark.parametrize("run", ["nominal", pytest.param("hybrid", marks=pytest.mark.slow)])
 def test_all_have_the_bits_of_the_default(name: str, run: str) -> None:
     recording, given = two_link(run)
     rows, outputs = backends.load(recording).run(given, 60)

@@ -157,6 +157,7 @@ def test_a_free_point_follows_clohessy_and_wiltshire(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.signals["links.body.position"][0], exact, rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_a_tumbling_body_does_the_same_seen_from_either_frame(tmp_path: Path) -> None:
     """Positions and orientations turned back by n t; the rates at t = 0 are less by the orbit's."""
     inertial = {"x_way.q": 0.3, "y_way.q": -0.2, "x_way.qd": 0.1, "y_way.qd": 0.5, "z_way.qd": 0.2, "a_turn.q": 0.4,
@@ -192,6 +193,7 @@ run it {
     np.testing.assert_allclose(found.signals["q"][0, :, 0], swing, rtol=0, atol=1e-11)  # q^3 of the sine: 1e-12 a swing
 
 
+@pytest.mark.slow
 def test_every_link_of_a_tree_feels_it_and_its_mass_varies(tmp_path: Path) -> None:
     run = """\
 run it {

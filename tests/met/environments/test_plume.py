@@ -194,6 +194,7 @@ def left_out(plates: int) -> np.ndarray:
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_on_plates_in_general_position_what_few_cells_leave_out_is_little_of_the_plumes_momentum() -> None:
     assert (left_out(40).max(axis=0) < (0.05, 0.006, 0.0045)).all()  # twice what was found
 

@@ -94,6 +94,7 @@ def test_a_steady_spin_is_exact_at_any_step(tmp_path: Path, integrator: str) -> 
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, rtol=0, atol=3e-16)
 
 
+@pytest.mark.slow
 def test_a_symmetric_top_precesses_as_eulers_solution(tmp_path: Path) -> None:
     # In body axes w turns about z at (Iz - Ix)/Ix wz; rk4 at 200 Hz is good to 1e-9 here.
     text = SPINNING.format(inertia="[2, 2, 3]", integrator="rk4", rate=[0.5, 1.0, 4.0], hz=200)
@@ -372,6 +373,7 @@ def test_a_fixed_joint_holds_the_bases_matter_as_well(tmp_path: Path) -> None:
         np.testing.assert_allclose(other.signals[name], one.signals[name], rtol=0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_the_program_reads_the_trees_numbers_where_the_bases_mass_varies(tmp_path: Path) -> None:
     sweep = "sweep some of tumbling { vary links.base.mass = [40, 80] kg; }"
     found = experiment(tmp_path, ARM, RUN, sweep, select=["some"])

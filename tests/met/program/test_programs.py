@@ -86,6 +86,7 @@ run swing like nominal {
 """
 
 
+@pytest.mark.slow
 def test_a_case_whose_friction_a_sweep_puts_to_zero_has_none(tmp_path: Path) -> None:
     plain = engine.run(compiled(tmp_path, REVERSING, "swing"))
     swept = "sweep levels of swing { vary swinging.f_c = [0.0205, 0, 0.01] N*m; }"

@@ -139,6 +139,7 @@ def test_at_rest_it_reads_gravity_along_its_axis_from_the_first_tick_on(tmp_path
         np.testing.assert_allclose(of(run, name), g, rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_in_free_fall_it_reads_nothing_on_any_body(tmp_path: Path) -> None:
     """A free base, its arm at rest on it, and a payload that flies beside."""
     still = [("= 0.5 rad/s", "= 0 rad/s"), ("= -1 rad/s", "= 0 rad/s"), ("[40, 20, -60]", "[0, 0, 0]"),

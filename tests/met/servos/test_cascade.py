@@ -56,6 +56,7 @@ def test_the_current_loop_answers_a_step_as_its_transfer_function_does(tmp_path:
     assert of(run, "servo.current")[-1] == pytest.approx(1.0, abs=1e-9) and np.ptp(of(run, "servo.current_cmd")) == 0.0
 
 
+@pytest.mark.slow
 def test_it_comes_to_where_it_is_told_and_follows_on_the_way(tmp_path: Path) -> None:
     run = ran(tmp_path)
     assert of(run, "q")[-1] == pytest.approx(1.0, abs=2e-4)

@@ -111,6 +111,7 @@ def test_it_breaks_away_where_the_gear_pulls_harder_than_friction(tmp_path: Path
     assert bool(of(run, "servo.motor_rate")[-1]) is moves
 
 
+@pytest.mark.slow
 def test_friction_at_the_joint_sticks_behind_a_motor_that_turns(tmp_path: Path) -> None:
     run = ran(tmp_path, ("stiffness = 500", "f_c_joint = 8 N*m;  stiffness = 500"))
     assert (of(run, "q") == 0.0).all() and (of(run, "servo.motor_rate") == 0.0).all(), "6 N m do not move 8"

@@ -42,6 +42,7 @@ def test_a_locked_joint_stays_and_takes_what_the_arm_puts_on_it(tmp_path: Path) 
     assert np.abs(found["tau"][0, :, RAISE]).min() > 1.0
 
 
+@pytest.mark.slow
 def test_once_released_the_joint_is_free(tmp_path: Path) -> None:
     """Released on a step: from there on it is the same run as one that begins in that pose."""
     released = changed(RUN, ("model = locked;", "model = locked; release = 0.2 s;"))
@@ -59,6 +60,7 @@ def test_once_released_the_joint_is_free(tmp_path: Path) -> None:
     assert np.abs(q[100:] - expected).max() < 1e-12 * np.abs(expected).max()  # rounding over 150 steps
 
 
+@pytest.mark.slow
 def test_a_release_between_two_steps_waits_for_the_next(tmp_path: Path) -> None:
     runs = [
         engine.run(experiment(tmp_path, TREE, changed(RUN, ("locked;", f"locked; release = {at} ms;")))).signals["q"]
