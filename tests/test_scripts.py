@@ -342,15 +342,16 @@ def test_scripts_test_adds_what_it_needs_and_ends_with_the_summary_of_pytest(che
         "@pytest.mark.slow\ndef test_skipped() -> None:\n    pytest.skip('no such tool')\n"
     )
     done = start(checkout, script="test")
-    last = done.stdout.splitlines()[-1]
-    assert "1 passed in" in last, done.stdout + done.stderr  # and not the slow one
+    summary, types = done.stdout.splitlines()[-2:]
+    assert "1 passed in" in summary, done.stdout + done.stderr  # and not the slow one
+    assert types.startswith("scripts/test: mypy ")
     stages = [line.split()[1] for line in done.stdout.splitlines() if line.startswith("scripts/test: ")]
-    assert stages[:3] == ["ruff", "mypy", "import-linter"]
+    assert stages[:3] == ["ruff", "layout", "import-linter"]
     assert done.returncode == ("FAILED" in done.stdout)
 
     everything = start(checkout, "--all", script="test")
     assert everything.returncode == 1
-    assert "1 failed, 1 passed" in everything.stdout.splitlines()[-1]
+    assert "1 failed, 1 passed" in everything.stdout.splitlines()[-2]
     assert "skipped, which is a failure with --all" in everything.stdout
 
     figures = start(checkout, "version", "--repeats", "1", "-o", str(checkout / "figures.json"), script="benchmark")
