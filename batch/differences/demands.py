@@ -45,8 +45,11 @@ def compare_requirements(a: Group, b: Group, matched: Cases, out: Experiment) ->
 
 def _met(group: Group, cases: np.ndarray) -> dict[str, np.ndarray]:
     """By requirement whether each of these cases meets it."""
+    texts = requirements.texts(group)
+    if not len(cases):
+        return {text: np.empty(0, bool) for text in texts}
     met = requirements.outcomes(group, cases) == 1
-    return {text: met[:, column] for column, text in enumerate(requirements.texts(group))} if met.shape[1] else {}
+    return {text: met[:, column] for column, text in enumerate(texts)} if met.shape[1] else {}
 
 
 def _unlike(one: requirements.Required | None, other: requirements.Required | None) -> bool:

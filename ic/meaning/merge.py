@@ -316,7 +316,7 @@ def as_meant(block: Block, keys: Iterable[str], kinds: Iterable[str]) -> Block:
         if item.kind and item.kind not in kinds:
             near = meant(item.kind, kinds)
             item = replace(item, kind=near) if near is not None else item
-        elif not item.kind and item.name not in keys:
+        elif not item.kind and item.name not in keys and "." not in item.name:
             near = meant(item.name, (*keys, *names))
             near = near if near in keys else None
             item = replace(item, name=near) if near is not None else item

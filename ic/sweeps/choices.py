@@ -121,19 +121,22 @@ def refuse_words(path: str, place: Place, values: Expression, names: Names) -> N
     word = word_in(values, names)
     if word is not None:
         helps = [A_RUN_FOR_EACH]
-        if isinstance(word, Name) and not _is_word(path.rpartition(".")[2]):
+        if isinstance(word, Name) and not _is_word(path):
             helps.append(f"where a number is meant, define it: `let {word.text} = ...;`")
         raise Problem(error("D122", f"`{path}` cannot vary over words", place_of(word), help=helps))
 
 
-def _is_word(name: str) -> bool:
-    """Whether the language or a model has a key of that name, and none whose value is a number."""
+def _is_word(path: str) -> bool:
+    """Whether a path ends with a key whose value is a word: of a shape, of the language, or of a model."""
+    *_, holder, name = ("", *path.split("."))
+    shaped = [p for shape in SHAPES.values() for p in shape.parameters] if holder == "shape" else []
     of_models = [p for kind in models.GROUPS for model in models.available(kind).values()
                  for p in models.written(model)]  # fmt: skip
-    of_shapes = [p for shape in SHAPES.values() for p in shape.parameters]
     of_blocks = [(each.name, each.varies == "number") for block in BLOCKS.values() for each in block.entries]
-    kinds = [*of_blocks, *((p.name, p.shape not in ("word", "words")) for p in (*of_models, *of_shapes))]
+    kinds = [*of_blocks, *((p.name, p.shape not in ("word", "words")) for p in of_models)]
     found = [number for each, number in kinds if each == name]
+    if holder == "shape":
+        found = [p.shape not in ("word", "words") for p in shaped if p.name == name]
     return bool(found) and not any(found)
 
 

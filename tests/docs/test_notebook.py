@@ -60,7 +60,7 @@ def texts(cell: Any) -> dict[str, str]:
 def said(notebook: Any) -> dict[str, dict[str, str]]:
     """All texts by cell, but for the key of the engine's code, which any change of the engine changes."""
     return {
-        cell.id: {kind: re.sub(r"(code_key: +)\w+", r"\1...", text) for kind, text in texts(cell).items()}
+        cell.id: {kind: re.sub(r"(code_key: +)[\w:]+", r"\1...", text) for kind, text in texts(cell).items()}
         for cell in codes(notebook)
     }
 

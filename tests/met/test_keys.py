@@ -46,7 +46,9 @@ def test_ids_and_keys_are_what_they_were() -> None:
 @pytest.mark.slow
 def test_another_process_finds_the_same_ids() -> None:
     """String hashes differ from process to process; ids must not."""
-    program = "from met import keys; from tests.met.test_keys import first_plan; print(*keys.case_ids(first_plan()))"
+    program = (
+        "from met.plan import keys; from tests.met.test_keys import first_plan; print(*keys.case_ids(first_plan()))"
+    )
     said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT)
     assert said.stdout.split() == CASE_IDS
 
