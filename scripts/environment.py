@@ -26,6 +26,8 @@ import sys
 from pathlib import Path
 
 VERSION = ".".join(map(str, sys.version_info[:3]))
+# The Python itself, where what started us is that of an environment: perhaps of ours, active in the caller's shell.
+PYTHON: str = getattr(sys, "_base_executable", sys.executable)
 # What each purpose installs, the smallest first: an environment made for one serves all before it.
 LOCKS = {"run": "requirements.lock", "test": "requirements-test.lock", "all": "requirements-all.lock"}
 ADDED = {"test": "what the tests need", "all": "what `scripts/test --all` needs"}
@@ -62,7 +64,7 @@ def main(root: Path, python: str, purpose: str) -> int:
         except BlockingIOError:
             say("another start is making the environment; waiting for it")
             fcntl.flock(turn, fcntl.LOCK_EX)
-        make(root, python, purpose)
+        make(root, PYTHON if sys.prefix != sys.base_prefix else python, purpose)
     return 0
 
 
@@ -92,7 +94,7 @@ def make(root: Path, python: str, purpose: str) -> None:
     clear(venv)
     marks.mkdir(parents=True)
     (marks / "made").write_text(f"{root}\n{python}\n")
-    step([sys.executable, "-I", "-m", "venv", str(venv)], marks / "log", "cannot make an environment")
+    step([PYTHON, "-I", "-m", "venv", str(venv)], marks / "log", "cannot make an environment")
     install(root, venv, purpose)
     step(
         pip(venv, "--no-index", "--no-deps", "--no-build-isolation", "--editable", str(root)),

@@ -284,6 +284,12 @@ def test_the_first_start_makes_the_environment_and_the_next_only_starts(checkout
         assert (third.returncode, third.stdout) == (0, first.stdout)
         anew = f"met: making the environment in .venv anew: the checkout was moved here from {checkout}"
         assert third.stderr.splitlines()[0] == anew
+        # A shell in which the environment is active offers its Python, which is about to be taken away.
+        with (moved / "requirements.lock").open("a") as lock:
+            lock.write("# changed\n")
+        fourth = start(moved, "--version", PATH=f"{moved / '.venv/bin'}:{os.environ['PATH']}", MET_PYTHON="")
+        assert (fourth.returncode, fourth.stdout) == (0, first.stdout), fourth.stderr
+        assert "anew: requirements.lock has changed" in fourth.stderr.splitlines()[0]
     finally:
         moved.rename(checkout)
 
