@@ -17,6 +17,13 @@ def pytest_configure() -> None:
     os.environ["MET_CHECK_RECORDINGS"] = "1"  # also of the processes that tests start
 
 
+def pytest_report_header() -> str:
+    """What machine code is made for, and which instruction sets this processor lacks, so that a log tells."""
+    from tests import instruction_sets  # not before what it imports may be
+
+    return instruction_sets.header()
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]

@@ -32,7 +32,7 @@ from hw.process import talk
 from hw.timing import Timing, timing
 from met.plan import Experiment, Plan
 from met.plan import file as plan_file
-from met.program.plant import bed_values, plant_c
+from met.program.plant import Plant, bed_values, plant_c
 from met.run import prepare
 
 TITLE = "a Panda at 1 kHz with its shoulder's motor on a bed, us and counts; no hard real time"
@@ -74,6 +74,23 @@ def _step(share: float) -> Callable[[], float]:
             times[e - 1] = clock() - begun
         gc.enable()
         return float(np.quantile(times, share)) * 1e-3
+
+    return measure
+
+
+def _plant() -> Callable[[], float]:
+    """us of a tick of the model of motor and shaft that an emulated bed computes, the call from Python included."""
+    plant = Plant(experiment(5.0), "joint2", period=0.001)
+    clock = time.perf_counter_ns
+
+    def measure() -> float:
+        plant.start(0.0)
+        times = np.zeros(20_000, dtype=np.int64)
+        for tick in range(len(times)):
+            begun = clock()
+            plant.tick(5.0, 0.3)
+            times[tick] = clock() - begun
+        return float(np.median(times)) * 1e-3
 
     return measure
 
@@ -149,6 +166,8 @@ BENCHMARKS: tuple[Benchmark, ...] = (
     Benchmark("bed.step.p50", "a step of the arm, from a sample to the next command", "us", partial(_step, 0.5),
               Target(5.0)),
     Benchmark("bed.step.p99", "the 99th percentile of 5000 steps", "us", partial(_step, 0.99), Target(60.0)),
+    Benchmark("bed.plant", "a tick of the motor's model on an emulated bed, called from Python", "us", _plant,
+              Target(3.0)),
     *_loop("terminal"),
     *_loop("socket"),
 )  # fmt: skip

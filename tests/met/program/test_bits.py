@@ -15,11 +15,11 @@ import pytest
 import ic
 from met import run as engine
 from met.backends.llvm import kernel
-from met.backends.llvm import machine as llvm
 from met.plan import Experiment
 from met.program import build
 from met.trace.recorder import record
 from met.trace.recording import Recording
+from tests.instruction_sets import ARM, RUNNABLE, WIDE
 from tests.oracles.friction_deck import friction_deck
 
 # No multiple of a block: the last one is part full.
@@ -93,12 +93,10 @@ def test_bits_do_not_depend_on_lanes(swung: Swung, lanes: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("cpu", ["haswell", "x86-64-v3", "skylake-avx512"])
+@pytest.mark.parametrize("cpu", RUNNABLE)
 def test_bits_do_not_depend_on_the_instruction_set(swung: Swung, cpu: str) -> None:
-    if cpu == "skylake-avx512" and llvm.machine().width < 8:
-        pytest.skip("this machine has no AVX-512")
     made = kernel.from_recording(swung.recording, 8, cpu)
-    assert made.machine.width == (8 if cpu == "skylake-avx512" else 4)
+    assert made.machine.width == (2 if ARM else 8 if cpu == WIDE else 4)
     assert swung.differences(*swung.run(made)) == 0
 
 

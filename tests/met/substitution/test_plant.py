@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 import pytest
@@ -215,15 +214,3 @@ def test_it_asks_for_no_library_but_the_compilers_own_arithmetic(
 def test_a_joint_whose_motor_is_its_own_has_no_plant(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"^joint 'elbow' is not substituted$"):
         Plant(experiment(tmp_path), "elbow")
-
-
-@pytest.mark.slow
-def test_a_tick_takes_no_longer_than_three_microseconds(tmp_path: Path) -> None:
-    plant = Plant(experiment(tmp_path), "shoulder", period=0.002)
-    plant.start(0.0)
-    times = []
-    for _ in range(20_000):
-        begun = perf_counter()
-        plant.tick(5.0, 0.3)
-        times.append(perf_counter() - begun)
-    assert np.median(times) < 3e-6

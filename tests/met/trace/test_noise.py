@@ -14,6 +14,7 @@ from met.backends.reference.plain import execute
 from met.trace.noise import Stream, channel_number, normal, normal_pair, uniform, uniform_pair
 from met.trace.primitives import PLAIN
 from met.trace.program import Every, Phase, Program, Record, Run
+from tests.instruction_sets import RUNNABLE
 
 # A generator without a flaw fails a comparison of statistics at this rate, and one of the five hundred below with a
 # chance of half a percent. Seeds are fixed: what passes once passes always.
@@ -124,14 +125,9 @@ def test_machine_code_draws_what_plain_numbers_draw():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("lanes", "cpu", "level"),
-    [(2, None, 2), (4, "haswell", 2), (16, None, 3), (32, "haswell", 0), (8, "skylake-avx512", 1)],
+    [(2, None, 2), (4, RUNNABLE[0], 2), (16, None, 3), (32, RUNNABLE[0], 0), (8, RUNNABLE[-1], 1)],
 )
 def test_draws_have_the_same_bits_whatever_they_are_compiled_for(lanes, cpu, level):
-    from met.backends.llvm import machine as llvm
-
-    if cpu == "skylake-avx512" and llvm.machine().width < 8:
-        cpu = "haswell"  # what this machine cannot run is compared between the two that it can
-
     def draw(t):
         return normal_pair(stream_of(t), t.tick)
 
