@@ -342,7 +342,8 @@ def test_without_a_network_it_is_refused_in_one_line(checkout: Path) -> None:
 @pytest.mark.slow
 def test_scripts_test_adds_what_it_needs_and_ends_with_the_summary_of_pytest(checkout: Path) -> None:
     (checkout / "tests").mkdir()
-    (checkout / "tests" / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text())
+    for name in ("conftest.py", "instruction_sets.py"):
+        shutil.copy(ROOT / "tests" / name, checkout / "tests")
     (checkout / "tests" / "test_it.py").write_text(
         "import pytest\n\n\ndef test_right() -> None:\n    assert 1 + 1 == 2\n\n\n"
         "@pytest.mark.slow\ndef test_skipped() -> None:\n    pytest.skip('no such tool')\n"
