@@ -116,6 +116,10 @@ class Prepared:
 
         return hashlib.sha256(emit(self.recording, 8).encode()).hexdigest()
 
+    def is_work(self, key: str) -> bool:
+        """Whether a key of all that a case gives, of this version of keys or the one before, is that of this work."""
+        return key == self.work_key or key == self.old_code_key
+
 
 KEY_VERSION = 2
 """Of code keys, which they begin with: of what they are made. Keys of before have no version."""

@@ -192,7 +192,7 @@ class Folder:
             number, of = told["number"], told["experiment"]
             if of >= len(experiments):
                 raise self._damaged(self.path / "campaign.json")
-            if told["code"] not in (experiments[of].work_key, experiments[of].old_code_key):
+            if not experiments[of].is_work(told["code"]):
                 raise Problem(_other_code(experiments[of].experiment.name, self.path, described))
             rows = self._rows(told, experiments[of].experiment.cases.count)
             out[number] = Section(number, of, experiments[of], rows, told["recorded"], told["single"], told["code"])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from met.frozen import frozen
 
-A_RUN_FOR_EACH = "write a run for each, and `sweep NAME = ONE + OTHER;`"
+A_RUN_FOR_EACH = "write a run for each, `like` the first, and `sweep NAME = ONE + OTHER;`"
 
 
 @frozen

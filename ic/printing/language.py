@@ -21,15 +21,15 @@ MARK = "<!-- table of {} -->"
 
 def print_block(block: Block) -> Iterator[str]:
     """The page of a block, for a terminal."""
-    yield f"{block.name}: {plain(block.doc)}"
+    yield f"{block.name}: {block.doc}"
     yield ""
     yield f"In a deck: {block.written}" + (f", in {_an(block.within)}" if block.within else "")
     yield ""
-    told = [(each.written, default(each), plain(each.doc)) for each in block.entries]
+    told = [(each.written, default(each), each.doc) for each in block.entries]
     yield from columns([("written", "default", "meaning"), *told])
     if block.free:
         yield ""
-        yield f"Also {plain(block.free)}."
+        yield f"Also {block.free}."
     numbers = [each for each in block.entries if each.parameter is not None]
     if numbers:
         yield ""
@@ -79,7 +79,7 @@ def type_of(entry: Entry) -> str:
 
 def default(entry: Entry) -> str:
     """What holds where an entry is left out, without the marks of Markdown."""
-    return plain(entry.default)
+    return entry.default
 
 
 def _bounds(wanted: Parameter | None) -> str:
@@ -102,11 +102,6 @@ def _varies(entry: Entry) -> str:
 
 def _an(name: str) -> str:
     return f"{'an' if name[0] in 'aeio' else 'a'} {name}"
-
-
-def plain(text: str) -> str:
-    """Without what points to another place of a page."""
-    return text.replace("; see below", "")
 
 
 def with_tables(text: str) -> str:

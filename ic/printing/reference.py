@@ -10,7 +10,7 @@ from typing import Any
 from ic.language import BLOCKS
 from ic.meaning import dh, shapes
 from ic.printing import subjects, sweeps
-from ic.printing.language import plain, type_of
+from ic.printing.language import type_of
 from ic.printing.models import HOW, KINDS, default, facts, how, rows, shown_of, unit_in_words, words_in
 from met import models
 
@@ -63,7 +63,7 @@ def _blocks() -> Iterator[str]:
         yield ""
         yield f"In a deck: `{block.written}`"
         yield ""
-        told = [(each.written, type_of(each) or "-", each.default, plain(each.doc)) for each in block.entries]
+        told = [(each.written, type_of(each) or "-", each.default, each.doc) for each in block.entries]
         yield from _table([("written", "type", "default", "meaning"), *told], whole=True)
         if block.free:
             yield ""

@@ -19,6 +19,7 @@ from ic.meaning.merge import Block
 from ic.meaning.names import Names
 from ic.meaning.resolve import Definition, Definitions
 from ic.meaning.shapes import SHAPES
+from ic.meaning.unvaried import A_RUN_FOR_EACH
 from ic.meaning.values import FUNCTIONS, Value, Values, evaluate, measure_of, place_of, spanned
 from met import models, units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
@@ -32,7 +33,6 @@ OF_RUN, OF_JOINT, OF_SERVO = choices(""), choices("JOINT"), choices("SERVO")
 SENSOR = "sensor"
 ONE_OF_TWO = tuple(f"{head}.{name}" for head in ("environment", "initial") for name in choices(head))
 """Paths of words that a sweep chooses from."""
-A_RUN_FOR_EACH = "write a run for each, `like` the first, and `sweep NAME = ONE + OTHER;`"
 
 
 @frozen
@@ -127,17 +127,18 @@ def refuse_words(path: str, place: Place, values: Expression, names: Names) -> N
 
 
 def _is_word(path: str) -> bool:
-    """Whether a path ends with a key whose value is a word: of a shape, of the language, or of a model."""
+    """Whether a path ends with a key whose value is always a word: of a shape, else of the language and of models."""
     *_, holder, name = ("", *path.split("."))
-    shaped = [p for shape in SHAPES.values() for p in shape.parameters] if holder == "shape" else []
-    of_models = [p for kind in models.GROUPS for model in models.available(kind).values()
-                 for p in models.written(model)]  # fmt: skip
-    of_blocks = [(each.name, each.varies == "number") for block in BLOCKS.values() for each in block.entries]
-    kinds = [*of_blocks, *((p.name, p.shape not in ("word", "words")) for p in of_models)]
-    found = [number for each, number in kinds if each == name]
     if holder == "shape":
-        found = [p.shape not in ("word", "words") for p in shaped if p.name == name]
-    return bool(found) and not any(found)
+        declared = [p for shape in SHAPES.values() for p in shape.parameters]
+        entries = []
+    else:
+        available = [model for kind in models.GROUPS for model in models.available(kind).values()]
+        declared = [p for model in available for p in models.written(model)]
+        entries = [each for block in BLOCKS.values() for each in block.entries]
+    are_words = [p.shape in ("word", "words") for p in declared if p.name == name]
+    are_words += [each.varies != "number" for each in entries if each.name == name]
+    return bool(are_words) and all(are_words)
 
 
 def path_place(entry: Setting) -> Place:

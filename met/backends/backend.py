@@ -87,6 +87,14 @@ class Kernel(Protocol):
         """A block of at most `lanes` cases to step by hand. inputs: [case, input]."""
 
 
+def checked_inputs(program: Program, inputs: np.ndarray) -> np.ndarray:
+    """The inputs of cases as a kernel takes them: [case, input], float64 in one piece. Raises ValueError."""
+    inputs = np.ascontiguousarray(inputs, dtype=np.float64)
+    if inputs.ndim != 2 or inputs.shape[1] != len(program.inputs):
+        raise ValueError(f"inputs of shape {inputs.shape} for a program with {len(program.inputs)} inputs")
+    return inputs
+
+
 class Backend(Protocol):
     """A back end.
 

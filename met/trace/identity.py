@@ -24,25 +24,27 @@ from met.trace.slicing import cells_behind, slice_roots
 
 def state_key(recording: Recording) -> str:
     """The key of what decides the program's state: 64 hexadecimal digits."""
-    program = recording.program
-    names = program.outputs if program.state_outputs is None else program.state_outputs
-    return _Writer(recording, {program.outputs.index(name): place for place, name in enumerate(names)}).key()
+    return _state_writer(recording).key()
 
 
 def result_keys(recording: Recording, results: Mapping[str, Collection[int] | str]) -> dict[str, str]:
     """The keys of results by name. A result is an output, by its name, or columns of a row, by their numbers."""
-    program = recording.program
-    names = program.outputs if program.state_outputs is None else program.state_outputs
-    state = _Writer(recording, {program.outputs.index(name): place for place, name in enumerate(names)})
+    state = _state_writer(recording)
     state.key()
     keys = {}
     for name, of in results.items():
         if isinstance(of, str):
-            writer = _Writer(recording, {program.outputs.index(of): 0}, state=state.cells)
+            writer = _Writer(recording, {recording.program.outputs.index(of): 0}, state=state.cells)
         else:
             writer = _Writer(recording, {}, {column: place for place, column in enumerate(of)}, state.cells)
         keys[name] = writer.key()
     return keys
+
+
+def _state_writer(recording: Recording) -> _Writer:
+    program = recording.program
+    names = program.outputs if program.state_outputs is None else program.state_outputs
+    return _Writer(recording, {program.outputs.index(name): place for place, name in enumerate(names)})
 
 
 class _Writer:

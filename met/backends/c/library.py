@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from met.backends.backend import checked_inputs
 from met.backends.c.emit import emit
 from met.trace.program import Program
 from met.trace.recording import Recording
@@ -58,9 +59,7 @@ class Library:
         progress: Callable[[int], None] | None = None,
     ) -> tuple[np.ndarray | None, np.ndarray]:
         program = self.program
-        inputs = np.asarray(inputs, dtype=np.float64)
-        if inputs.ndim != 2 or inputs.shape[1] != len(program.inputs):
-            raise ValueError(f"inputs of shape {inputs.shape} for a program with {len(program.inputs)} inputs")
+        inputs = checked_inputs(program, inputs)
         rows = np.empty((len(inputs), ticks // program.record_divisor + 1, program.columns)) if record else None
         outputs = np.empty((len(inputs), len(program.outputs)))
         block = Case(self, np.zeros((1, len(program.inputs))))

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from met import cache
+from met.backends.backend import checked_inputs
 from met.backends.llvm.emit import emit, numbered
 from met.backends.llvm.pieces import cut, operations
 from met.diagnostic import Problem, error
@@ -164,9 +165,7 @@ class Kernel:
         Returns rows [case, row, column], or None without `record`, and outputs [case, output].
         """
         program = self.program
-        inputs = np.ascontiguousarray(inputs, dtype=np.float64)
-        if inputs.ndim != 2 or inputs.shape[1] != len(program.inputs):
-            raise ValueError(f"inputs of shape {inputs.shape} for a program with {len(program.inputs)} inputs")
+        inputs = checked_inputs(program, inputs)
         if ticks < 0:
             raise ValueError(f"{ticks} ticks")
         cases = len(inputs)

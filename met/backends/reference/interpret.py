@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
+from met.backends.backend import checked_inputs
 from met.frozen import frozen
 from met.trace.graph import Node, evaluate
 from met.trace.program import Every, Program, Unless0
@@ -41,9 +42,7 @@ class Interpreter:
         progress: Callable[[int], None] | None = None,
     ) -> tuple[np.ndarray | None, np.ndarray]:
         program = self.program
-        inputs = np.asarray(inputs, dtype=np.float64)
-        if inputs.ndim != 2 or inputs.shape[1] != len(program.inputs):
-            raise ValueError(f"inputs of shape {inputs.shape} for a program with {len(program.inputs)} inputs")
+        inputs = checked_inputs(program, inputs)
         block = Cases(self.recording, inputs)
         rows = block.recorded(0, ticks)
         if progress is not None:

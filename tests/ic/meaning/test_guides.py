@@ -545,7 +545,7 @@ VARY = [
     (
         "guides.tip.rate = [100, 200] Hz",
         "cannot vary",
-        "it decides the program: write a run for each, and `sweep NAME = ONE + OTHER;`",
+        "it decides the program: write a run for each, `like` the first, and `sweep NAME = ONE + OTHER;`",
     ),
 ]
 

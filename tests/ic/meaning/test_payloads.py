@@ -467,7 +467,7 @@ error[D122]: `payloads.box.on` cannot vary
    |
 23 | sweep many of it { vary payloads.box.on = [1, 2]; }
    |                         ^^^^^^^^^^^^^^^
-   = help: it decides the program: write a run for each, and `sweep NAME = ONE + OTHER;`
+   = help: it decides the program: write a run for each, `like` the first, and `sweep NAME = ONE + OTHER;`
 
 1 error
 """,

@@ -351,7 +351,7 @@ error[D122]: `environment.jet.cells` cannot vary
    |
 15 | sweep some of it { vary environment.jet.cells = [2, 4]; }
    |                         ^^^^^^^^^^^^^^^^^^^^^
-   = help: it decides the program: write a run for each, and `sweep NAME = ONE + OTHER;`
+   = help: it decides the program: write a run for each, `like` the first, and `sweep NAME = ONE + OTHER;`
 
 1 error
 """
