@@ -19,7 +19,8 @@ from met.version import VERSION  # noqa: E402  (only once the checkout is on the
 
 # In the order in which a user needs them; the headings stand in the sidebar.
 PAGES = {
-    "Decks": ["deck", "robots", "servos", "environments", "models", "substitution", "reference", "diagnostics", "editors"],
+    "Decks": ["deck", "robots", "servos", "environments", "models", "substitution", "reference", "diagnostics",
+              "editors"],
     "Campaigns and results": ["cluster", "plots", "report", "diff", "export", "notebooks"],
     "A motor on a bed": ["bed", "protocol", "../hw/firmware/README"],
     "From Python": ["api"],
@@ -28,8 +29,8 @@ PAGES = {
 }  # fmt: skip
 MODULES = [
     "ic", "batch", "met.diagnostic", "met.parameter", "met.trace", "met.servos.servo", "met.environments.environment",
-    "met.sensors.sensor", "met.metrics.metric", "met.integrators.integrator", "met.guides.guide", "met.substitution.law",
-    "met.substitution.bed",
+    "met.sensors.sensor", "met.metrics.metric", "met.integrators.integrator", "met.guides.guide",
+    "met.substitution.law", "met.substitution.bed",
 ]  # fmt: skip
 """Public modules, which docs/api.md shows: what a script calls, then what a model of one's own imports."""
 
