@@ -1,0 +1,61 @@
+"""The error of a number by the length of the step, from runs with the step, half and a quarter of it.
+
+Richardson's extrapolation: where x(h) = x + c h^p, the differences d1 = x(h) - x(h/2) and d2 = x(h/2) - x(h/4) give
+p = log2(d1/d2) and the error c h^p = d1 2^p/(2^p - 1). Where the observed p is not that of the integrator, or that of
+a number which is looked at once a step and no better (1), the estimate has nothing to stand on; then three times the
+larger difference is a cautious bound, as the grid convergence index has it for two grids (P. J. Roache, Journal of
+Fluids Engineering 116, 1994, 405-413).
+"""
+
+from __future__ import annotations
+
+import math
+
+from met.frozen import frozen
+
+NEAR = 0.3
+"""How far an observed order may be from the expected one."""
+
+ROUNDING = 1e-12
+"""Differences below this share of the number are rounding, from which no order follows."""
+
+
+@frozen
+class StepError:
+    """The error of one number by the step.
+
+    error  estimate of |x(h) - x(0)|, or a bound of it where the order is unclear; in the number's unit
+    order  the observed power of the step; not a number where differences are of rounding, or not finite
+    clear  True where the order is the expected one, or all differences are of rounding
+    """
+
+    error: float
+    order: float
+    clear: bool
+
+    def step_for(self, h: float, tolerance: float) -> float:
+        """The step (s) at which the error would be this tolerance, where it is estimated at the step h (s)."""
+        if self.error <= tolerance:
+            return h
+        order = self.order if self.clear and not math.isnan(self.order) else 1.0
+        return h * (tolerance / self.error) ** (1.0 / order)
+
+
+def step_error(first: float, second: float, scale: float, expected: int) -> StepError:
+    """The error of a number at the step h.
+
+    first     |x(h) - x(h/2)|, of numbers in time its largest over time
+    second    |x(h/2) - x(h/4)|
+    scale     size of the number, |x|
+    expected  order of the integrator
+    """
+    if not (math.isfinite(first) and math.isfinite(second)):
+        return StepError(math.inf, math.nan, False)
+    if max(first, second) <= ROUNDING * scale:
+        return StepError(max(first, second), math.nan, True)
+    if first <= 0.0 or second <= 0.0:
+        return StepError(3.0 * max(first, second), math.nan, False)
+    order = math.log2(first / second)
+    if any(abs(order - p) <= NEAR for p in {1, expected}):
+        return StepError(first * 2.0**order / (2.0**order - 1.0), order, True)
+    return StepError(3.0 * max(first, second), order, False)
