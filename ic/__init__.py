@@ -12,7 +12,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from ic.meaning.lower import Compiled
+    from ic.driver.compile import Compiled
     from met.plan import Plan
 
 __all__ = ["check", "compile"]
@@ -27,7 +27,7 @@ def check(
     select: Sequence[str] | Literal["all"] | None = "all",
 ) -> Compiled:
     """The plan of all runs and sweeps or None, all diagnostics, every file's text. A mistake raises nothing."""
-    from ic.meaning.lower import check as lowered
+    from ic.driver.compile import check as lowered
 
     settings = [f"{path}={value}" for path, value in set.items()] if isinstance(set, Mapping) else set
     return lowered(

@@ -15,7 +15,7 @@ from met.diagnostic import Problem, did_you_mean, error
 from met.visible import say
 
 if TYPE_CHECKING:
-    from ic.meaning.lower import Compiled
+    from ic.driver.compile import Compiled
     from met.plan import Plan
 
 DECK = click.argument("deck")
@@ -311,7 +311,7 @@ def _source(
 def _plan_in_file(path: str, names: tuple[str, ...]) -> Plan:
     from dataclasses import replace
 
-    from ic.meaning.complaints import known_words
+    from ic.text.complaints import known_words
     from met.diagnostic import error
     from met.plan import file as plan_file
 

@@ -1,4 +1,4 @@
-"""The command import: a face over `ic.robots.importing`."""
+"""The command import: a face over `ic.driver.import_robot`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet
     `arm panda from urdf("panda.urdf") { ... }`.
     """
     from ic.beginnings.files import put
-    from ic.robots.importing import imported
+    from ic.driver.import_robot import imported
 
     if force and output is None:
         raise click.UsageError("--force is for -o: nothing is written without it")

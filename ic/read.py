@@ -8,10 +8,11 @@ from contextlib import suppress
 from pathlib import Path
 
 from ic.grammar.parse import parse_on
-from ic.grammar.syntax import Deck, Entry, SourceText, Wreck
+from ic.grammar.syntax import Deck, Entry
 from ic.text.files import LIBRARY
 from ic.text.limits import Findings, GiveUp
 from ic.text.preprocess import preprocess
+from ic.text.source import SourceText, Wreck
 from met.diagnostic import Diagnostic, Problem
 from met.render import shown_place
 

@@ -1,10 +1,10 @@
 """What the links look like: the deck's shapes as foxglove's primitives, each fixed to its link's frame.
 
 A rod, a box and a cylinder begin at the link frame's origin and extend along one of its axes; a sphere is centred there
-(ic/meaning/shapes.py). Where the deck writes a centre of mass and leaves the inertia to the shape, the solid that is
-simulated is centred on it, and so it is drawn. A link without a shape is a line to each joint that it carries, or to
-its centre of mass. Joints are drawn besides: a short cylinder about the axis of a revolute joint, and for a prismatic
-one a cube on a rail, which is as long as the case uses it.
+(ic/meaning/mechanics/shapes.py). Where the deck writes a centre of mass and leaves the inertia to the shape, the solid
+that is simulated is centred on it, and so it is drawn. A link without a shape is a line to each joint that it carries,
+or to its centre of mass. Joints are drawn besides: a short cylinder about the axis of a revolute joint, and for a
+prismatic one a cube on a rail, which is as long as the case uses it.
 """
 
 from __future__ import annotations

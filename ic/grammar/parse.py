@@ -18,9 +18,10 @@ from itertools import takewhile
 
 from ic.grammar.cursor import OPENING, SHOWN, Ended, Unreadable, found, span
 from ic.grammar.expressions import Expressions
-from ic.grammar.syntax import Broken, Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word, Wreck
+from ic.grammar.syntax import Broken, Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import Findings, GiveUp, without_collection
+from ic.text.source import Wreck
 from met import units
 from met.diagnostic import Diagnostic, Label, Place
 

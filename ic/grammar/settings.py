@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ic.grammar.parse import parse
-from ic.grammar.syntax import Setting, SourceText
+from ic.grammar.syntax import Setting
 from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, SPACE, Text, Token, logical_lines
 from ic.text.limits import Findings, GiveUp
+from ic.text.source import SourceText
 from ic.text.strays import complain_of_stray
 from met.diagnostic import Place, Problem, error
 

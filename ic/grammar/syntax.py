@@ -22,6 +22,7 @@ what may stand where is decided when the tree is resolved. So a joint may be cal
 
 from __future__ import annotations
 
+from ic.text.source import SourceText, Wreck
 from met.diagnostic import Diagnostic, Place
 from met.frozen import frozen
 
@@ -188,30 +189,6 @@ class Group:
 
 
 Entry = Let | Setting | Statement | Group
-
-
-@frozen
-class Wreck:
-    """A stretch of text that could not be read, which has been told: what else is wrong there follows from it.
-
-    place   its first token; the line and column of its end
-    names   what it may have named or defined
-    within  the place of the block that it stands in, where it is not known which of its entries this is
-    """
-
-    place: Place
-    end: tuple[int, int]
-    names: tuple[str, ...]
-    within: Place | None
-
-
-@frozen
-class SourceText:
-    """A file that was read: the name messages print, its text, SHA-256 of its bytes."""
-
-    name: str
-    text: str
-    sha256: str
 
 
 @frozen

@@ -16,7 +16,7 @@ from met.frozen import frozen
 
 if TYPE_CHECKING:
     from ic.grammar.syntax import Entry
-    from ic.meaning.merge import Block, Item
+    from ic.meaning.definitions.merge import Block, Item
     from met.plan import Plan
 
 GROUP = "met.stages"
@@ -92,9 +92,9 @@ def model(asked: Asked) -> Iterator[str]:
     """Definitions with `like`, overrides, `+=` and `remove` carried out, each entry with the places it overrode."""
     from ic.grammar.spell import spell
     from ic.language import DEFINITIONS
-    from ic.meaning.complaints import Complaints
-    from ic.meaning.resolve import Definitions
+    from ic.meaning.definitions.resolve import Definitions
     from ic.read import read
+    from ic.text.complaints import Complaints
 
     deck = read(asked.deck, asked.include_dirs, asked.defines)
     complaints = Complaints(deck.warnings)

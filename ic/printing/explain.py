@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from ic.language import HEADS
-from ic.meaning.complaints import known_words
-from ic.meaning.given import GIVEN
+from ic.meaning.expressions.given import GIVEN
 from ic.printing.codes import is_code
 from ic.printing.columns import columns, number, quantity, vector
 from ic.printing.settings import settings
+from ic.text.complaints import known_words
 from met import models, render
 from met.diagnostic import Diagnostic, Label, Place, Problem, error, nearest
 from met.models import parameter as declared

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ic.meaning.explain import explained, in_full
-from ic.meaning.lower import Compiled
+from ic.driver.compile import Compiled
+from ic.driver.explain import explained, in_full
 from ic.printing.explain import NO_MORE, explain_json, find_paths, print_explain, with_settings
 from met.diagnostic import Label, Problem
 from met.frozen import frozen

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ic.language import BLOCKS
-from ic.meaning import dh, shapes
+from ic.meaning.mechanics import dh, shapes
 from ic.printing import subjects, sweeps
 from ic.printing.language import type_of
 from ic.printing.models import HOW, KINDS, default, facts, how, rows, shown_of, unit_in_words, words_in

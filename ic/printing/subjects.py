@@ -10,8 +10,8 @@ from types import MappingProxyType
 from typing import Any
 
 from ic.language import BLOCKS
-from ic.meaning import dh, shapes
-from ic.meaning.substitution import DEFAULTS
+from ic.meaning.control.substitution import DEFAULTS
+from ic.meaning.mechanics import dh, shapes
 from ic.printing.columns import columns, exactly
 from ic.printing.language import block_json, print_block
 from ic.printing.models import FIELDS, OF_LANGUAGE, WORDS, default, rows, summary, unit_in_words

@@ -19,9 +19,9 @@ from typing import Any
 from ic.language import BLOCKS, DEFINITIONS
 from ic.language.bodies import JOINT_KINDS
 from ic.language.runs import BASE_KINDS, VELOCITY_PRODUCTS
-from ic.meaning import dh
-from ic.meaning.shapes import SHAPES
-from ic.meaning.values import CONSTANTS, FUNCTIONS
+from ic.meaning.expressions.values import CONSTANTS, FUNCTIONS
+from ic.meaning.mechanics import dh
+from ic.meaning.mechanics.shapes import SHAPES
 from ic.text.preprocess import DIRECTIVES
 from met import models, units
 from met.plan import BASE

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ic.grammar.syntax import Call, Deck, String
-from ic.meaning.complaints import known_words
-from ic.meaning.named_files import NamedFiles
+from ic.named_files import NamedFiles
+from ic.text.complaints import known_words
 from ic.text.limits import MOST_URDF_BYTES
 from met.diagnostic import Diagnostic, Problem, did_you_mean, error
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from ic.meaning.complaints import Complaints, known_words
 from ic.robots.attributes import XACRO, known, lenient, needed, number, numbers, one, shown, word
 from ic.robots.robot import TYPES, Inertial, Joint, Link, Numbers, Robot
 from ic.robots.xml import Element, parse
+from ic.text.complaints import Complaints, known_words
 from ic.text.limits import MOST_LINKS
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 

@@ -16,13 +16,13 @@ import numpy as np
 
 from ic.grammar.syntax import Call, Expression, Group, Name, Setting, Statement, String, Word
 from ic.language.runs import SWEEP
-from ic.meaning.checks import Varied
-from ic.meaning.complaints import Complaints, belongs, known_words
-from ic.meaning.names import Names
-from ic.meaning.resolve import Definition, Definitions
-from ic.meaning.values import PURE, Value, evaluate_number, measure_of, place_of
+from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.expressions.conditions import Varied
+from ic.meaning.expressions.names import Names
+from ic.meaning.expressions.values import PURE, Value, evaluate_number, measure_of, place_of
 from ic.sweeps.choices import MACRO, Chosen, check_still, chosen, decides, path_place, refuse_words
 from ic.sweeps.designs import DESIGNS, read_sample
+from ic.text.complaints import Complaints, belongs, known_words
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen

@@ -15,12 +15,12 @@ from typing import Any
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Call, Entry, Expression, Group, List, Name, Number, Setting, String, Unit, WithUnit, Word
 from ic.language import BLOCKS, choices
-from ic.meaning.merge import Block
-from ic.meaning.names import Names
-from ic.meaning.resolve import Definition, Definitions
-from ic.meaning.shapes import SHAPES
-from ic.meaning.unvaried import A_RUN_FOR_EACH
-from ic.meaning.values import FUNCTIONS, Value, Values, evaluate, measure_of, place_of, spanned
+from ic.meaning.definitions.merge import Block
+from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.expressions.names import Names
+from ic.meaning.expressions.values import FUNCTIONS, Value, Values, evaluate, measure_of, place_of, spanned
+from ic.meaning.mechanics.shapes import SHAPES
+from ic.meaning.parameters.unvaried import A_RUN_FOR_EACH
 from met import models, units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen

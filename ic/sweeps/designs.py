@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 
 from ic.grammar.syntax import Call, Expression, Setting, Statement, Unit, WithUnit
-from ic.meaning.complaints import Complaints, known_words
-from ic.meaning.names import Names
-from ic.meaning.resolve import Definitions
-from ic.meaning.values import PURE, Value, evaluate_number, measure_of, place_of
+from ic.meaning.definitions.resolve import Definitions
+from ic.meaning.expressions.names import Names
+from ic.meaning.expressions.values import PURE, Value, evaluate_number, measure_of, place_of
 from ic.sweeps.choices import check_still
+from ic.text.complaints import Complaints, known_words
 from met import units
 from met.diagnostic import Place, Problem, did_you_mean, error
 from met.distinct import distinct

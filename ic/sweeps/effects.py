@@ -14,17 +14,17 @@ import numpy as np
 
 from ic.grammar.settings import path_of
 from ic.grammar.syntax import Call, Entry, Expression, Group, Name, Setting, Statement, Word, children
-from ic.meaning.checks import Varied
-from ic.meaning.complaints import Complaints, known_words
-from ic.meaning.experiment import experiment
-from ic.meaning.resolve import Definition, Definitions
-from ic.meaning.run import BLOCKS, Resolved, resolve_run
-from ic.meaning.scope import Scope
-from ic.meaning.values import Value
+from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.expressions.conditions import Varied
+from ic.meaning.expressions.values import Value
+from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.experiment import experiment
+from ic.meaning.runs.run import BLOCKS, Resolved, resolve_run
 from ic.sweeps.choices import OF_RUN, OF_SERVO
 from ic.sweeps.reach import beginnings, continued, ends, without_effect
 from ic.sweeps.settings import SEED as SEED_PATH
 from ic.sweeps.settings import Goes, Settings, concerns, goes
+from ic.text.complaints import Complaints, known_words
 from met.diagnostic import Label, Problem, did_you_mean
 from met.plan import SEED, Cases, Coordinate, Experiment
 from met.trace import Graph, Scalar

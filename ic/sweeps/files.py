@@ -7,9 +7,9 @@ import re
 import numpy as np
 
 from ic.grammar.syntax import Name, String, Unit, Word
-from ic.meaning.checks import Varied
-from ic.meaning.resolve import Definitions
-from ic.meaning.values import Value
+from ic.meaning.definitions.resolve import Definitions
+from ic.meaning.expressions.conditions import Varied
+from ic.meaning.expressions.values import Value
 from ic.sweeps.choices import Chosen, Option
 from met.diagnostic import Place, Problem, error
 from met.trace import Graph

@@ -9,18 +9,18 @@ from dataclasses import field, replace
 import numpy as np
 
 from ic.grammar.syntax import Deck, Expression, Name, Word, children
-from ic.meaning.complaints import Complaints, known_words
-from ic.meaning.experiment import experiment
-from ic.meaning.resolve import Definition, Definitions
-from ic.meaning.run import resolve_run
-from ic.meaning.scope import Scope
-from ic.meaning.stops import check_stops
+from ic.meaning.checks.stops import check_stops
+from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.experiment import experiment
+from ic.meaning.runs.run import resolve_run
 from ic.sweeps.axes import Sweep, paths_of, read_sweep, whole
 from ic.sweeps.choices import Choices, put_in
 from ic.sweeps.effects import Effects
 from ic.sweeps.reach import check_coordinates, coordinates, idle
 from ic.sweeps.settings import Settings
 from ic.sweeps.table import columns, kept, repeats, structures
+from ic.text.complaints import Complaints, known_words
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan import Cases, Choice, Experiment, keys

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ic.meaning.complaints import Complaints, known_words
-from ic.meaning.scope import Scope
+from ic.meaning.parameters.scope import Scope
 from ic.sweeps.axes import Sweep
 from ic.sweeps.choices import ONE_OF_TWO
+from ic.text.complaints import Complaints, known_words
 from met import units
 from met.diagnostic import Label, did_you_mean
 from met.plan import REPEAT, Coordinate, Experiment

@@ -5,7 +5,7 @@ A path is one that `vary` takes, or the seed. Where its value goes is where the 
     let      a `let`: its value
     servo    a key of a servo's definition: upon what that writes
     run      what decides the structure of a run: upon every run that is asked for, where it has what the path names
-    number   any other number: in the stead of what the run settles (`ic.meaning.given`), as a sweep's coordinate is
+    number   any other number: in place of what the run settles (`expressions.given`), as a sweep's coordinate is
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from typing import Literal
 
 from ic.grammar.settings import path_of
 from ic.grammar.syntax import List, Name, Setting
-from ic.meaning.complaints import Complaints
-from ic.meaning.models import word_of
-from ic.meaning.names import Names
-from ic.meaning.remedies import mended
-from ic.meaning.resolve import Definition, Definitions
-from ic.meaning.scope import VARIES
-from ic.meaning.values import PURE, Value, place_of
+from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.expressions.names import Names
+from ic.meaning.expressions.remedies import mended
+from ic.meaning.expressions.values import PURE, Value, place_of
+from ic.meaning.parameters.models import word_of
+from ic.meaning.parameters.scope import VARIES
 from ic.sweeps.axes import Sweep
 from ic.sweeps.choices import OF_RUN, ONE_OF_TWO, SENSOR, decides, in_servo, inside, keys_of
+from ic.text.complaints import Complaints
 from met import units
 from met.diagnostic import Label, Problem, error
 from met.frozen import frozen

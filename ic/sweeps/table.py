@@ -10,11 +10,11 @@ import numpy as np
 
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Binary, Expression, Name, Unary
-from ic.meaning.complaints import known_words
-from ic.meaning.scope import Scope
-from ic.meaning.values import COMPARISONS, PURE, Value, Values, evaluate_number, place_of
+from ic.meaning.expressions.values import COMPARISONS, PURE, Value, Values, evaluate_number, place_of
+from ic.meaning.parameters.scope import Scope
 from ic.sweeps.axes import Sweep, named
 from ic.sweeps.choices import OF_JOINT, OF_RUN, Choices
+from ic.text.complaints import known_words
 from met import units
 from met.diagnostic import Label, Problem, did_you_mean, error
 from met.plan import Structure

@@ -15,8 +15,8 @@ import stat
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from ic.grammar.syntax import SourceText
 from ic.text.limits import MOST_BYTES
+from ic.text.source import SourceText
 from met.diagnostic import Diagnostic, Place, Problem, error
 from met.files import open_regular
 from met.frozen import frozen

@@ -10,7 +10,7 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ic.meaning.complaints import Complaints
+from ic.text.complaints import Complaints
 from met.diagnostic import Diagnostic
 
 MOST_BYTES = 2 << 20  # of one file

@@ -15,8 +15,7 @@ from typing import Any
 
 from pcpp import Action, OutputDirective
 
-from ic.grammar.syntax import SourceText
-from ic.meaning.complaints import Complaints
+from ic.text.complaints import Complaints
 from ic.text.conditions import Refused, evaluate, well_formed, with_defined
 from ic.text.files import LIBRARY, Files, FoundFile
 from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, NAME, NOTHING, SPACE, STRING, Text, Token, logical_lines
@@ -33,6 +32,7 @@ from ic.text.limits import (
     without_collection,
 )
 from ic.text.macros import Macros
+from ic.text.source import SourceText
 from ic.text.strays import complain_of_stray, complain_of_unseen
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, nearest
 from met.frozen import frozen

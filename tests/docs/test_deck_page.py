@@ -19,13 +19,13 @@ import ic
 from ic.grammar.syntax import Name
 from ic.language.bodies import JOINT, LINK, PAYLOAD
 from ic.language.runs import RATES, RUN
-from ic.meaning.complaints import Complaints
-from ic.meaning.resolve import Definitions
-from ic.meaning.scope import Scope
-from ic.meaning.shapes import SHAPES
-from ic.meaning.substitution import DEFAULTS
-from ic.meaning.values import FUNCTIONS, Values
+from ic.meaning.control.substitution import DEFAULTS
+from ic.meaning.definitions.resolve import Definitions
+from ic.meaning.expressions.values import FUNCTIONS, Values
+from ic.meaning.mechanics.shapes import SHAPES
+from ic.meaning.parameters.scope import Scope
 from ic.read import read
+from ic.text.complaints import Complaints
 from met import models, render, units
 
 ROOT = Path(__file__).parents[2]

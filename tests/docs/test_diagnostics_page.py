@@ -297,7 +297,7 @@ def whole(ask: Callable[[], object]) -> str:
 
 def test_a_word_that_is_no_unit_where_a_unit_is() -> None:
     from ic.grammar.syntax import Unit, Word
-    from ic.meaning.values import measure_of
+    from ic.meaning.expressions.values import measure_of
     from met.diagnostic import Place
 
     place = Place("deck.ic", 1, 9, 2)
@@ -309,7 +309,7 @@ def test_a_word_that_is_no_unit_where_a_unit_is() -> None:
 
 
 def test_python_asks_where_nothing_comes_from() -> None:
-    from ic.meaning.explain import explain
+    from ic.driver.explain import explain
 
     with in_a_folder() as folder:
         (folder / "swing.ic").write_text(shared(PAGE)["swing.ic"], encoding="utf-8")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import ic
-from ic.meaning.lower import Compiled, Select
+from ic.driver.compile import Compiled, Select
 from met.plan import Experiment
 from met.render import render
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import FrameType
 
 import ic
-from ic.meaning.lower import Compiled, Select
+from ic.driver.compile import Compiled, Select
 from met.render import render, to_json
 
 MOST_SECONDS = 20.0  # of processor time

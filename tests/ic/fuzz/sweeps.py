@@ -16,8 +16,8 @@ from itertools import islice
 from pathlib import Path
 
 import ic
+from ic.driver.compile import Compiled
 from ic.find import standard_decks
-from ic.meaning.lower import Compiled
 from ic.printing.explaining import print_explained
 from ic.sweeps.choices import OF_RUN
 from met.diagnostic import Problem

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ic.meaning import checks
+from ic.meaning.expressions import conditions
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, told
 
 
@@ -170,7 +170,7 @@ error[D087]: the inertia of link `bar` is no body's
 def test_an_inertia_that_some_cases_have_is_told_by_the_first_of_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: int
 ) -> None:
-    monkeypatch.setattr(checks, "PIECE", at_once)
+    monkeypatch.setattr(conditions, "PIECE", at_once)
     arm = changed(ARM, ("shape = rod(length = 1 m, along = x)", "inertia = [1, 1, turned] kg*m^2"))
     sweep = "default sweep many of hold { vary turned = linspace(1.5, 3, 7); }\n"
     said = shown(tmp_path, "let turned = 1;\n", arm, SERVO, RUN, sweep)

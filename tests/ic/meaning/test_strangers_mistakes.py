@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from ic.meaning.lower import Compiled
+from ic.driver.compile import Compiled
 from met import models
 from tests.ic.meaning.test_told_once import ARM, RUN, SLIDE
 from tests.ic.small_decks import ARM as SWING

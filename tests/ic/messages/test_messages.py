@@ -129,7 +129,8 @@ RAISED_ELSEWHERE = {"D001", "D002", "D037", "D231", "D232"}
 
 def test_every_code_of_text_and_grammar_has_a_whole_message_here() -> None:
     codes = set()
-    for path in [*ROOT.glob("ic/text/*.py"), *ROOT.glob("ic/grammar/*.py")]:
+    raising = {*ROOT.glob("ic/text/*.py"), *ROOT.glob("ic/grammar/*.py")}
+    for path in raising - {ROOT / "ic/text/complaints.py"}:  # which names codes that the rest of `ic` raises
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and re.fullmatch(r"D\d{3}", node.value):
                 codes.add(node.value)

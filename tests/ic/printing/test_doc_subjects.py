@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from ic.meaning.shapes import SHAPES
-from ic.meaning.values import CONSTANTS, FUNCTIONS
+from ic.meaning.expressions.values import CONSTANTS, FUNCTIONS
+from ic.meaning.mechanics.shapes import SHAPES
 from ic.printing import codes
 from ic.sweeps.designs import DESIGNS, DISTRIBUTIONS
 from met import cli, models, units

@@ -9,7 +9,7 @@ import pytest
 import ic
 from ic.printing.explain import find_paths, with_settings
 from ic.printing.plan import print_plan
-from tests.ic.meaning.test_payloads import ARM, FLIES, RUN
+from tests.ic.meaning.mechanics.test_payloads import ARM, FLIES, RUN
 from tests.ic.small_decks import changed
 
 HELD = "    payload tool { mass = 1 kg;  shape = rod(length = 0.2 m, along = x);  on = bar; }\n    environment {}\n"

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import ic
-from ic.meaning.explain import explain
+from ic.driver.explain import explain
+from ic.driver.import_robot import imported
 from ic.robots.entries import moments, rotation
-from ic.robots.importing import imported
 from ic.robots.names import deck_names
 from ic.robots.urdf import read
 from met import cli, run

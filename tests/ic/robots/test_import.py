@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ic
-from ic.robots.importing import imported
+from ic.driver.import_robot import imported
 from met import cli, run
 from met.diagnostic import Problem
 from tests.ic.robots.two import TWO, changed, refused

@@ -13,7 +13,7 @@ import pytest
 import robots
 
 import ic
-from ic.robots.importing import imported
+from ic.driver.import_robot import imported
 from ic.robots.robot import MOVING
 from met import run
 from met.diagnostic import Problem

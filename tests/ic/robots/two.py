@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import ic
-from ic.meaning.lower import Compiled
+from ic.driver.compile import Compiled
 from met.diagnostic import Problem
 from met.render import render
 from tests.ic.small_decks import changed, told

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from ic.grammar.syntax import Setting
-from ic.meaning.complaints import Complaints
-from ic.meaning.names import Names
-from ic.meaning.resolve import Definitions
-from ic.meaning.values import Values
+from ic.meaning.definitions.resolve import Definitions
+from ic.meaning.expressions.names import Names
+from ic.meaning.expressions.values import Values
 from ic.read import read
+from ic.text.complaints import Complaints
 from met import units
 
 UNITS = ("deg", "rad", "mm", "cm", "km", "ms", "us", "rpm", "arcsec", "%", "Hz", "kg", "min", "cycle")

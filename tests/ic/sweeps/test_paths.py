@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ic.meaning.explain import explain
+from ic.driver.explain import explain
 from met.plan import Experiment, Formula
 from met.run import run as simulate
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told

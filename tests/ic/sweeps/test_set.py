@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import ic
-from ic.meaning.lower import Compiled, Select
+from ic.driver.compile import Compiled, Select
 from met import cli
 from met.plan import Experiment, Formula, keys
 from met.plan import file as plan_file

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from ic.meaning.unit_words import units_of
+from ic.language.unit_words import units_of
 from met import models
 from met.diagnostic import Diagnostic
 from met.parameter import Parameter

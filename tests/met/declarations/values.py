@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from ic.meaning.lower import Compiled
+from ic.driver.compile import Compiled
 from met.diagnostic import Diagnostic
 from met.parameter import Parameter
 from tests.met.small_models import Use, Value

@@ -1,0 +1,177 @@
+"""From a deck to a plan: the runs and sweeps that were asked for, each as an experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import field, replace
+from functools import partial
+from os import PathLike
+from pathlib import Path
+from typing import Literal
+
+from ic.grammar.settings import command_line, read_settings
+from ic.grammar.syntax import Deck, Setting
+from ic.meaning.checks.degrees import remark_degrees
+from ic.meaning.control.servos import check_servo_definition
+from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.mechanics.arm import check_arm, resolve_arm
+from ic.meaning.parameters.scope import Scope
+from ic.read import in_order, read, read_again
+from ic.sweeps.effects import Effects
+from ic.sweeps.groups import Group, Source, lower
+from ic.sweeps.settings import Settings
+from ic.text.complaints import Complaints, known_words
+from ic.text.lexer import COMMAND_LINE
+from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
+from met.frozen import frozen
+from met.plan import Experiment, Plan
+from met.plan import Source as File
+
+Select = Sequence[str] | Literal["all"] | None
+
+
+@frozen
+class Compiled:
+    """A plan, None where an error stands in its way; all diagnostics, warnings too; every file's text by name."""
+
+    plan: Plan | None
+    diagnostics: tuple[Diagnostic, ...]
+    sources: Mapping[str, str] = field(default_factory=dict)
+    scopes: tuple[Scope, ...] = field(default=(), repr=False)  # one for each experiment: what `explain` looks into
+
+
+def check(
+    path: str | PathLike[str],
+    *,
+    include_dirs: Sequence[str | PathLike[str]],
+    defines: Sequence[str],
+    select: Select,
+    settings: Sequence[str] = (),
+) -> Compiled:
+    """The deck at `path`, compiled."""
+    try:
+        deck = read(Path(path), [Path(each) for each in include_dirs], defines, despite_errors=True)
+    except Problem as problem:
+        return Compiled(None, problem.diagnostics, problem.sources)
+    return compile_deck(deck, select=select, defines=defines, settings=settings)
+
+
+def compile_deck(
+    deck: Deck,
+    *,
+    select: Select = None,
+    defines: Iterable[str] = (),
+    settings: Sequence[str] = (),
+    complaints: Complaints | None = None,
+) -> Compiled:
+    """The plan of the deck's runs and sweeps that `select` names, with everything that is wrong on the way.
+
+    settings  `PATH=VALUE`, each as if the deck said so
+    """
+    complaints = complaints if complaints is not None else Complaints(deck.warnings)
+    complaints.after(deck.wrecks)
+    deck, entries = _with_settings(deck, settings, complaints)
+    definitions = Definitions(deck, complaints)
+    given = Settings(entries)
+    written, definitions = definitions, given.in_definitions(definitions)
+    source = Source(definitions, complaints, partial(read_again, deck), given, Effects(given))
+    experiments: list[Experiment] = []
+    scopes: list[Scope] = []
+    try:
+        given.check_lets(written, complaints)
+        complaints.add(
+            *(d for problem in Scope(definitions, complaints).names.check_lets() for d in problem.diagnostics)
+        )
+        remark_degrees(deck, definitions, complaints)
+        for kind in ("arm", "servo", "run"):
+            for definition in definitions.of_kind(kind).values():
+                definitions.block(definition)
+        asked = chosen(definitions, complaints, select)
+        for definition in asked:
+            groups: list[Group] = []
+            with complaints.gather():
+                groups = lower(source, definition)
+            source.effects.complete &= bool(groups)
+            experiments += (made for made, _ in groups)
+            scopes += (scope for _, scope in groups)
+        source.effects.tell(complaints, [definition.name for definition in asked])
+        blocks = [definitions.block(definition) for definition in definitions.of_kind("run").values()]
+        loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
+        for arm in definitions.of_kind("arm").values():  # with a payload its joints may move what has mass
+            (resolve_arm if loaded else check_arm)(Scope(definitions, complaints), arm)
+        for name in definitions.of_kind("servo"):
+            with complaints.gather():
+                check_servo_definition(Scope(definitions, complaints), name)
+    except RecursionError:
+        complaints.error("D078", "this deck's values are nested too deeply", help="build them up in steps, with `let`")
+    except Problem as problem:
+        complaints.add(*problem.diagnostics)
+    sources = (*deck.sources, *definitions.csv_files.sources, *definitions.robot_files.sources)
+    texts = {source.name: source.text for source in sources}
+    if not complaints.errors:
+        complaints.admit_remarks()
+    else:
+        return Compiled(None, in_order(complaints.all, sources), texts)
+    files = tuple(File(source.name, source.text, source.sha256) for source in sources)
+    selected = (select,) if isinstance(select, str) else tuple(dict.fromkeys(select or ()))
+    return Compiled(
+        Plan(deck.file, tuple(experiments), files, tuple(defines), selected, tuple(settings)),
+        in_order(complaints.all, sources),
+        texts,
+        tuple(scopes),
+    )
+
+
+def _with_settings(deck: Deck, settings: Sequence[str], complaints: Complaints) -> tuple[Deck, tuple[Setting, ...]]:
+    """The deck with the text of what is set among its sources, and the entries of that; those that are wrong are
+    told."""
+    if not settings:
+        return deck, ()
+    before = "".join(source.text for source in deck.sources if source.name == COMMAND_LINE)
+    files = (source for source in deck.sources if source.name != COMMAND_LINE)
+    deck = replace(deck, sources=(*files, command_line(settings, before)))
+    with complaints.gather():
+        return deck, read_settings(settings, before)
+    return deck, ()
+
+
+def chosen(definitions: Definitions, complaints: Complaints, select: Select) -> list[Definition]:
+    """The runs and sweeps that are asked for: by name, all, or the deck's only one, or the one marked `default`.
+
+    A deck's own come before those of files that it includes, whatever these mark.
+    """
+    known = {d.name: d for kind in ("run", "sweep") for d in definitions.of_kind(kind).values()}
+    if select == "all":
+        return list(known.values())
+    if select is not None:
+        names = [select] if isinstance(select, str) else list(dict.fromkeys(select))
+        for name in names:
+            if name not in known:
+                complaints.error(
+                    "D164",
+                    f"no run or sweep `{name}` in this deck",
+                    help=[*did_you_mean(name, known), known_words("it has", known)],
+                )
+        return [known[name] for name in names if name in known]
+    own = {name: definition for name, definition in known.items() if definitions.writes(definition)}
+    default = definitions.default() if not own or any(d.default for d in own.values()) else None
+    known = own or known
+    if len(known) == 1 or default is not None:
+        return [default] if default is not None else list(known.values())
+    if complaints.errors and not known:
+        return []
+    if not known:
+        raise Problem(error("D161", "this deck has no run", help="write `run NAME { ... }`"))
+    none = (
+        "several included files mark a `default`"
+        if any(d.default for d in known.values())
+        else "none is marked `default`"
+    )
+    raise Problem(
+        error(
+            "D162",
+            f"this deck has {len(known)} runs and sweeps, and {none}",
+            also=[Label(d.place, d.name) for d in known.values()],
+            help=[known_words("name one", known), "or write `default run ...` for one of them"],
+        )
+    )

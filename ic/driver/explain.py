@@ -1,0 +1,191 @@
+"""Where a value comes from: what it is, who wrote it, what it overrode, through which macros and names it came."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from os import PathLike
+
+import numpy as np
+
+from ic.driver.compile import Compiled, Select, check
+from ic.grammar.spell import spell
+from ic.grammar.syntax import Expression, Name, children
+from ic.meaning.expressions.given import GIVEN, is_given, written_origin
+from ic.meaning.expressions.values import Value, place_of
+from ic.meaning.parameters.owner import Settled
+from ic.meaning.parameters.scope import Scope
+from met import units
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.frozen import frozen
+from met.plan import Experiment, Formula, Origin, Quantity
+from met.trace import Formulas, Scalar
+
+DEEPEST = 16  # names behind names that are followed
+
+
+@frozen
+class Explanation:
+    """One parameter of one run or sweep.
+
+    path      the parameter's own path (`elbow.servo.kt`), of run or sweep `run`
+    value     in SI: a number, a list, a word; (least, greatest) over the cases where `varies`
+    written   the expression as the deck has it; "" for a default or a derived value
+    origin    "deck", "default", "case" or "derived", and `note` in words
+    place     where it was written, with the macros that it came through; None for a default
+    overrode  places of what that overrode, latest first
+    names     the names that the expression uses, each with its own expression and where it is defined
+    doc       what the parameter means
+    """
+
+    run: str
+    path: str
+    value: float | tuple[float, ...] | str
+    unit: str
+    varies: bool
+    written: str
+    origin: str
+    note: str
+    place: Place | None
+    overrode: tuple[Place, ...]
+    names: tuple[Label, ...]
+    doc: str
+
+
+def explain(
+    path: str | PathLike[str],
+    target: str,
+    *,
+    include_dirs: Sequence[str | PathLike[str]] = (),
+    defines: Sequence[str] = (),
+    select: Select = None,
+) -> tuple[Explanation, ...]:
+    """Every parameter that `target` names: by its own path, or by a definition's (`gearbox.kp`: all that follow it).
+
+    Raises Problem with the deck's errors, or D163 where the path names nothing.
+    """
+    compiled = check(path, include_dirs=tuple(include_dirs), defines=tuple(defines), select=select)
+    if compiled.plan is None:
+        raise Problem(compiled.diagnostics, compiled.sources)
+    found = tuple(explained(compiled, target))
+    if not found:
+        known = list(
+            dict.fromkeys(
+                path for scope in compiled.scopes for path in (*scope.parameters, *scope.beside, *scope.known)
+            )
+        )
+        inside = [path for path in known if path.startswith(target + ".")]
+        runs = ", ".join(f"`{experiment.name}`" for experiment in compiled.plan.experiments)
+        helps = [f"there are: {', '.join(inside[:24])}"] if inside else list(did_you_mean(target, known))
+        raise Problem(error("D163", f"nothing is called `{target}` in {runs}", help=helps), compiled.sources)
+    return found
+
+
+def in_full(compiled: Compiled, number: int = 0) -> Experiment:
+    """An experiment of a deck, with settings and what parameters are made of as if these were parameters."""
+    assert compiled.plan is not None
+    experiment, scope = compiled.plan.experiments[number], compiled.scopes[number]
+    parameters, outputs = scope.quantities(beside=True)
+    for name in scope.definitions.lets:
+        let = _let(scope, name)
+        if let is None or name in parameters or any(path.startswith(f"{name}.") for path in parameters):
+            continue
+        value = let.value
+        if isinstance(value, Scalar):
+            outputs.append(value)
+        parameters[name] = Quantity(
+            Formula(len(outputs) - 1) if isinstance(value, Scalar) else value, let.unit, let.origin
+        )
+    return replace(experiment, parameters=parameters, formulas=Formulas.of(scope.graph, outputs))
+
+
+def explained(compiled: Compiled, target: str) -> Iterator[Explanation]:
+    """The explanations of a deck that is compiled."""
+    assert compiled.plan is not None
+    for experiment, scope in zip(compiled.plan.experiments, compiled.scopes, strict=True):
+        paths = dict.fromkeys((target, *scope.known.get(target, ())))
+        vector = [
+            path
+            for path in (*scope.parameters, *scope.beside)
+            if path.startswith(target + ".")
+            and path.count(".") == target.count(".") + 1
+            and path.rpartition(".")[2] in ("x", "y", "z", "xx", "yy", "zz", "xy", "xz", "yz")
+        ]
+        for path in (*paths, *vector):
+            settled = scope.settled(path) or _let(scope, path)
+            if settled is not None:
+                yield _explanation(experiment, scope, path, settled)
+
+
+def _let(scope: Scope, name: str) -> Settled | None:
+    """A `let` as if it were a parameter; None where it is none, or no number or list of numbers."""
+    let = scope.definitions.lets.get(name)
+    if let is None:
+        return None
+    varied = scope.varied.get(name)
+    origin = written_origin(place_of(let.value), ())
+    if varied is not None or origin.note == GIVEN:
+        place = varied.place if varied is not None else origin.place
+        origin = Origin("case" if varied is not None else "deck", place, (let.name.place,), origin.note)
+    found = scope.names.find(Name((let.name,), let.name.place))
+    if isinstance(found, Value):
+        return Settled(found.number, units.text(found.dimension), origin, "", let.value)
+    numbers = [value for value in found.items if isinstance(value, Value) and not isinstance(value.number, Scalar)]
+    if not numbers or len(numbers) < len(found.items):
+        return None
+    unit = units.text(numbers[0].dimension)
+    return Settled(tuple(float(value.number) for value in numbers), unit, origin, "", let.value)
+
+
+def _explanation(experiment: Experiment, scope: Scope, path: str, settled: Settled) -> Explanation:
+    value = settled.value
+    varies = isinstance(value, Scalar)
+    if isinstance(value, Scalar):
+        inputs = {coordinate.path: coordinate.values for coordinate in experiment.cases.coordinates}
+        values = np.asarray(Formulas.of(scope.graph, [value]).replay(inputs)[0], dtype=float)
+        value = (float(values.min()), float(values.max()))
+    origin = settled.origin
+    written = spell(settled.expression) if settled.expression is not None else ""
+    names = tuple(_names(scope, settled.expression)) if settled.expression is not None else ()
+    return Explanation(
+        experiment.name,
+        path,
+        value,
+        settled.unit,
+        varies,
+        written,
+        origin.kind,
+        origin.note,
+        origin.place,
+        origin.overrides,
+        names,
+        settled.doc,
+    )
+
+
+def _names(scope: Scope, expression: Expression) -> Iterator[Label]:
+    """Every let that the expression uses, and what those use, with what it was written as."""
+    seen: set[str] = set()
+    level = [expression]
+    for _ in range(DEEPEST):
+        below = []
+        for each in level:
+            for name in names_in(each):
+                let = scope.definitions.lets.get(name.text)
+                if let is not None and name.text not in seen:
+                    seen.add(name.text)
+                    below.append(let.value)
+                    place = place_of(let.value)
+                    yield Label(place if is_given(place) else let.name.place, f"{name.text} = {spell(let.value)}")
+        level = below
+
+
+def names_in(expression: Expression) -> Iterable[Name]:
+    """The names that an expression uses."""
+    stack, found = [expression], []
+    while stack:
+        expression = stack.pop()
+        if isinstance(expression, Name):
+            found.append(expression)
+        stack.extend(reversed(children(expression)))
+    return found

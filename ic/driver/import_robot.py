@@ -1,0 +1,77 @@
+"""`met import`: a URDF file to the text of a deck. A robot that no arm can be made of is refused, with every reason."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from typing import Literal
+
+from ic.grammar.syntax import Deck, Group, Word
+from ic.meaning.definitions.resolve import Definitions
+from ic.meaning.mechanics.arm import check_arm
+from ic.meaning.parameters.scope import Scope
+from ic.read import in_order
+from ic.robots.deck import arm_name, print_deck
+from ic.robots.entries import Body, body
+from ic.robots.files import KIND, load
+from ic.robots.robot import Joint, Robot
+from ic.text.complaints import Complaints
+from ic.text.files import Files, FoundFile
+from ic.text.limits import MOST_URDF_BYTES
+from met.diagnostic import Diagnostic, Problem
+
+Mimic = Literal["free", "fixed"]
+
+
+def imported(path: str, mimic: Mimic | None = None) -> str:
+    """The deck's text. mimic: what joints that follow others do instead. Raises Problem, with the file's text."""
+    files = Files()
+    try:
+        found = FoundFile(path, os.path.normpath(path))
+        made = load(found.name, files.text(found, kind=KIND, most=MOST_URDF_BYTES))
+        if mimic is not None:
+            made = body(without_mimics(made.robot, mimic))
+        _check(made)
+    except Problem as problem:
+        sources = tuple(files.read_so_far.values())
+        raise Problem(in_order(problem.diagnostics, sources), {each.name: each.text for each in sources}) from None
+    (source,) = files.read_so_far.values()
+    option = f" --mimic {mimic}" if mimic is not None else ""
+    name = os.path.basename(path)
+    title = f"made by `met import {name}{option}` from a file with the SHA-256 {source.sha256[:16]}..."
+    lines = print_deck(made, title)
+    return "\n".join(lines) + "\n"
+
+
+def without_mimics(robot: Robot, mimic: Mimic) -> Robot:
+    """The robot with joints that follow others let go, or fixed where they are at 0; `print_deck` says which."""
+
+    def changed(joint: Joint) -> Joint:
+        if joint.mimic is None:
+            return joint
+        free = replace(joint, mimic=None, followed=joint.mimic)
+        return free if mimic == "free" else replace(free, type=replace(joint.type, text="fixed"), axis=None)
+
+    return replace(robot, joints=tuple(changed(joint) for joint in robot.joints))
+
+
+def _check(made: Body) -> None:
+    """Raises Problem where the arm of these entries is none."""
+    place = made.robot.root.name.place
+    words = (Word("arm", place), Word(arm_name(made), place))
+    complaints = Complaints()
+    definitions = Definitions(Deck(made.robot.file, (Group(words, None, None, made.entries, place),), ()), complaints)
+    for definition in definitions.of_kind("arm").values():
+        check_arm(Scope(definitions, complaints), definition)
+    if complaints.errors:
+        raise Problem(_mended(complaints.errors))
+
+
+def _mended(found: tuple[Diagnostic, ...]) -> list[Diagnostic]:
+    """With what `met import` can do about it, in the place of what a deck can."""
+    follow = "`--mimic free` lets such joints move by themselves, `--mimic fixed` holds them at 0"
+    made = [replace(each, help=(follow,)) if each.code == "D213" else each for each in found]
+    if made[-1].code != "D213":
+        other = 'write a deck with `arm NAME from urdf("FILE") { ... }`: its block can change what the file says'
+        made[-1] = replace(made[-1], help=(*made[-1].help, other))
+    return made

@@ -1,0 +1,201 @@
+"""What environment models do to the servo of a joint: that there is one to which they can, and that it is anything.
+
+`Environment.servo_of` has what a model does to a servo, `Environment.rubs` friction beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+from ic.meaning.control.schedule import Ticks
+from ic.meaning.control.servos import Use
+from ic.meaning.parameters.scope import Scope
+from ic.text.complaints import known_words
+from met import models
+from met.diagnostic import Label, Place
+from met.frozen import frozen
+from met.instants import has_come
+from met.plan import EnvironmentUse, Schedule, ServoUse, Substitution
+from met.probe import accelerates
+
+
+@frozen
+class Failure:
+    """A model that does something to the servo of a joint, or rubs the joint; place: of the joint's name."""
+
+    use: EnvironmentUse
+    model: Any
+    joint: str
+    place: Place
+
+
+def check_failures(
+    scope: Scope, uses: Iterable[Use], ticks: Mapping[str, Ticks], found: Iterable[Substitution],
+    environment: Sequence[EnvironmentUse], schedule: Schedule,
+) -> None:  # fmt: skip
+    """Tells of models about servos that are not there, have not what the model is about, or are on a bed."""
+    servos = {use.joint: use for use in uses}
+    beds = {each.joint: each.place for each in found}
+    sound = []
+    for failure in _about(scope, environment, "servo_of"):
+        use, model, joint, place = failure.use, failure.model, failure.joint, failure.place
+        servo, continuous = servos.get(joint), joint in ticks and ticks[joint].continuous
+        wrong = _wrong(scope, use, model, joint, servo, continuous=continuous)
+        also = [Label(servo.place, "its servo")] if servo is not None else []
+        if wrong is None and joint in beds and model.loose is not None:
+            wrong = f"`{use.name}` would let go of joint `{joint}`, whose motor is on a bed", "leave it out", place
+            also = [Label(bed, "on a bed")] if (bed := beds[joint]) is not None else []
+        if wrong is not None:
+            message, help, at = wrong
+            scope.complaints.error("D247", message, at or place, also=also, help=help)
+        elif servo is not None:
+            sound.append(failure)
+            _check_full(scope, failure, servo)
+            if not continuous:
+                _remark_between_ticks(scope, failure, ticks[joint].divisor / schedule.base_hz, schedule.duration)
+    _remark_overlaps(scope, sound)
+
+
+def check_friction(scope: Scope, uses: Iterable[Use], environment: Iterable[EnvironmentUse]) -> None:
+    """Tells of friction on a joint that is told its acceleration, for which it would do nothing."""
+    servos = {use.joint: use for use in uses}
+    for failure in _about(scope, environment, "rubs"):
+        servo = servos.get(failure.joint)
+        if servo is not None and servo.parameters is not None and accelerates(servo.bare, servo.parameters):
+            label = f"servo `{servo.definition}` ({servo.servo.name})"
+            scope.complaints.error(
+                "D291",
+                f"`{failure.use.name}` puts friction on joint `{failure.joint}`, which {label} tells its acceleration",
+                failure.place,
+                also=[Label(servo.place, "its servo")],
+                help="leave it out for this joint: no friction slows down or holds what is told its acceleration",
+            )
+
+
+def _about(scope: Scope, environment: Iterable[EnvironmentUse], which: str) -> Iterable[Failure]:
+    """The models of this sort on joints of which something can be said. which: the field that names the parameter."""
+    for use in environment:
+        model = models.find("environment", use.model)
+        named = getattr(model, which)
+        settled = scope.parameters.get(f"environment.{use.name}.{named}") if named else None
+        if settled is not None and use.place is not None and str(settled.value) not in scope.lost:
+            yield Failure(use, model, str(settled.value), settled.origin.place or use.place)
+
+
+def _wrong(
+    scope: Scope, use: EnvironmentUse, model: Any, joint: str, servo: Use | None, *, continuous: bool
+) -> tuple[str, str, Place | None] | None:
+    """What is wrong, its remedy, and where, if not at the joint's name; None: nothing."""
+    if servo is None:
+        message = f"joint `{joint}` has no servo to which `{use.name}` could do anything"
+        return message, "give the joint a servo, or leave it out", None
+    label = f"servo `{servo.definition}` ({servo.servo.name}) of joint `{joint}`"
+    if model.loose is not None and servo.servo.at_rest is not None:
+        message = f"{label} holds a joint that is at rest, and `{use.name}` would give it one that moves"
+        return message, f"leave it out: `release` lets a {servo.servo.name} joint go, and a `brake` stops one", None
+    if (model.gives is not None or model.sees is not None) and not servo.has_law:
+        return f"{label} has no law that `{use.name}` could do anything to", "leave it out", None
+    if model.gives is not None and servo.servo.full is None:
+        known = [name for name, each in models.find_own("servo").items() if each.full is not None]
+        own = servo.servo.name in models.find_own("servo")
+        remedy = (
+            known_words("servo models that have one", known)
+            if own
+            else (f"declare `full` in the model `{servo.servo.name}`: the law's outputs at full drive")
+        )
+        return f"{label} has no drive that could run away", remedy, None
+    if model.sees is None:
+        return None
+    head = f"environment.{use.name}"
+    of, reads = scope.parameters.get(f"{head}.of"), scope.parameters.get(f"{head}.reads")
+    seen = list(models.quantities(ServoUse(joint, "", servo.servo.name, servo.command, 1, words=servo.words)))
+    if of is not None and str(of.value) not in seen:
+        return f"{label} does not see `{of.value}`", known_words("it sees", seen), of.origin.place
+    if continuous and reads is not None and reads.value == "last":
+        message = f"the law of joint `{joint}` is continuous: it has no last tick"
+        return message, "write `reads = zero;`, or a rate in Hz for the law", reads.origin.place
+    return None
+
+
+def _check_full(scope: Scope, failure: Failure, servo: Use) -> None:
+    """Tells of a drive that would run away without a limit."""
+    if failure.model.gives is None or servo.servo.full is None or servo.parameters is None:
+        return
+    numbers = servo.parameters
+
+    def endless(values: Mapping[str, Any]) -> bool:
+        full = servo.servo.full(SimpleNamespace(**values)).values()
+        return any(isinstance(x, float) and math.isinf(x) for x in full)
+
+    if endless(numbers):
+        lacking = [
+            each
+            for each in servo.servo.parameters
+            if numbers.get(each.name) == math.inf and not endless({**numbers, each.name: 1.0})
+        ]
+        scope.complaints.error(
+            "D292",
+            f"`{failure.use.name}` would drive joint `{failure.joint}` with all that servo "
+            f"`{servo.definition}` ({servo.servo.name}) can give, and that has no limit",
+            failure.place,
+            also=[Label(servo.place, "its servo")],
+            help=[f"write `{each.name} = ... {each.unit};` in the servo: {each.doc}" for each in lacking],
+        )
+
+
+def _window(scope: Scope, failure: Failure) -> tuple[float, float] | None:
+    """When it acts, from and until, s; None where that varies, or the model has no such window."""
+    found = [scope.parameters.get(f"environment.{failure.use.name}.{name}") for name in ("from", "until")]
+    begins, ends = (each.value if each is not None else None for each in found)
+    return (begins, ends) if isinstance(begins, float) and isinstance(ends, float) else None
+
+
+def _remark_between_ticks(scope: Scope, failure: Failure, period: float, duration: float) -> None:
+    """Tells of a window that lies between two ticks of the law, which never sees it."""
+    window, model = _window(scope, failure), failure.model
+    if window is None or (model.gives is None and model.sees is None):
+        return
+    begins, ends = window
+    if not 0.0 <= begins < min(ends, duration):
+        return
+    tick = math.floor(begins / period)
+    while not has_come(tick * period, begins):
+        tick += 1
+    if has_come(tick * period, ends):
+        settled = scope.parameters[f"environment.{failure.use.name}.from"]
+        scope.complaints.remark(
+            "D168",
+            f"environment `{failure.use.name}` never acts: the law of joint `{failure.joint}` ticks at "
+            f"{(tick - 1) * period:.9g} s and at {tick * period:.9g} s, and not in between",
+            settled.origin.place or failure.place,
+            help="change that, or leave it out",
+        )
+
+
+def _remark_overlaps(scope: Scope, failures: Iterable[Failure]) -> None:
+    """Tells of two models of one sort that act on the same of a joint at a time: the later one has the last word."""
+    known = models.find_own("environment").values()  # what another package's does to an earlier one is its own affair
+    before: dict[tuple[str, str, Any], list[tuple[Failure, tuple[float, float]]]] = {}
+    for failure in failures:
+        window, model = _window(scope, failure), failure.model
+        if window is None or (model.gives is None and model.sees is None) or model not in known:
+            continue
+        of = scope.parameters.get(f"environment.{failure.use.name}.of")
+        same = before.setdefault((failure.joint, model.name, of.value if of is not None else None), [])
+        for earlier, (begins, ends) in same:
+            first, last = max(begins, window[0], 0.0), min(ends, window[1])
+            if first < last:
+                when = f"from {first:g} s" + (f" until {last:g} s" if math.isfinite(last) else " on")
+                also = [Label(earlier.use.place, "this one")] if earlier.use.place is not None else []
+                scope.complaints.remark(
+                    "D293",
+                    f"`{earlier.use.name}` does nothing {when}: `{failure.use.name}` acts on the same of joint "
+                    f"`{failure.joint}` then, and stands later",
+                    failure.place,
+                    also=also,
+                    help="let one end before the other begins",
+                )
+        same.append((failure, window))

@@ -1,0 +1,107 @@
+"""Environment models that do nothing in a run, or that act from its beginning where that is seldom meant: remarks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ic.meaning.control.servos import apart, unit_written
+from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.mechanics.arm import Arm
+from ic.meaning.parameters.models import value_at
+from ic.meaning.parameters.scope import Scope
+from met import models
+from met.diagnostic import Label
+from met.plan import EnvironmentUse
+from met.trace import Scalar
+
+
+def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str, Any], duration: float) -> bool:
+    """Whether a model's written constants make it nothing, all through the run, which is told.
+
+    values  with the bodies that links and payloads are parts of, in the place of their names
+    """
+    numbers = [x for value in values.values() for x in (value if isinstance(value, tuple) else (value,))]
+    if environment.idle is None or any(isinstance(x, Scalar) for x in numbers):
+        return False
+    found = environment.idle(SimpleNamespace(**values), duration)
+    if found is not None:
+        body = item.body or Block()
+        written = [part for name in found[0] if (part := body.get(name)) is not None and part.value is not None]
+        scope.complaints.remark(
+            "D168",
+            f"environment `{item.name}` never acts: {found[1]}",
+            value_at(written[0]) if written else item.place,
+            help="change that, or leave it out",
+        )
+    return found is not None
+
+
+def remark_kinds(scope: Scope, environment: Any, item: Item, arm: Arm) -> None:
+    """Tells of numbers for joints of a kind (`Parameter.joints`) that the arm has none of."""
+    kinds = {joint.kind for joint in arm.moving}
+    for parameter in environment.parameters:
+        written = (item.body or Block()).get(parameter.name)
+        if parameter.joints and parameter.joints not in kinds and written is not None and not arm.lost:
+            scope.complaints.remark(
+                "D168",
+                f"`{parameter.name}` of environment `{item.name}` changes nothing: no "
+                f"joint of arm `{arm.name}` is {parameter.joints}",
+                value_at(written),
+                help="leave it out",
+            )
+
+
+def remark_beginnings(scope: Scope, uses: tuple[EnvironmentUse, ...]) -> None:
+    """Tells of a joint that begins beyond the ends that a model keeps it between. After the initial state's."""
+    for use in uses:
+        model = models.find("environment", use.model)
+        found = {name: scope.parameters.get(f"environment.{use.name}.{name}") for name in model.between}
+        joint = next(
+            (
+                str(settled.value)
+                for each in model.parameters
+                if each.names == "joint" and (settled := scope.parameters.get(f"environment.{use.name}.{each.name}"))
+            ),
+            None,
+        )
+        begins = scope.parameters.get(f"initial.{joint}.q")
+        if begins is None or use.place is None or len(found) != 2 or None in found.values():
+            continue
+        ends = [each for each in found.values() if each is not None]
+        place = begins.origin.place or next((each.origin.place for each in ends if each.origin.place), use.place)
+        also, shown = [Label(use.place, "this one")], unit_written([begins, *ends], begins.unit)
+
+        def told(
+            values: np.ndarray,
+            use: EnvironmentUse = use,
+            joint: str | None = joint,
+            place: Any = place,
+            also: list[Label] = also,
+            shown: tuple[str, float] = shown,
+        ) -> tuple[np.ndarray, list[str]]:
+            q, lower, upper = values.T
+            beyond = np.flatnonzero(((q < lower) & apart(q, lower)) | ((q > upper) & apart(q, upper)))
+            if beyond.size:
+                (q, lower, upper), unit = values[beyond[0]] / shown[1], shown[0]
+                which = f"below {lower:g} {unit}" if q < lower else f"above {upper:g} {unit}"
+                scope.complaints.remark(
+                    "D294",
+                    f"joint `{joint}` begins at {q:g} {unit}, beyond an end of `{use.name}`: {which}",
+                    place,
+                    also=also,
+                    help="the run begins with what drives it back: begin within, or move the end",
+                )
+            return np.zeros(len(values), bool), []
+
+        scope.checks.hold(
+            (begins.value, *(each.value for each in ends)),  # type: ignore[arg-type]
+            told,
+            code="D294",
+            message="",
+            place=place,
+            needs=(f"initial.{joint}.q", f"environment.{use.name}"),
+        )

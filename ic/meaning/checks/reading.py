@@ -1,0 +1,59 @@
+"""What laws of servos read: sensors of anything else change nothing, nor do failures of such."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from ic.meaning.control.servos import Use
+from ic.meaning.parameters.scope import Scope
+from ic.text.complaints import known_words
+from met import models
+from met.plan import ServoUse, Structure
+from met.probe import reads
+
+
+def remark_unread(scope: Scope, uses: Iterable[Use], structure: Structure) -> None:
+    """Tells of sensors that no law sees through and nothing records, and of dead ones that no law would see."""
+    servos = {each.joint: each for each in structure.servos}
+    for use in uses:
+        servo = servos[use.joint]
+        read = reads(servo, use.parameters) if use.parameters is not None else None
+        if read is None:
+            continue
+        label = f"the law of servo `{use.definition}` ({servo.model})"
+        under = f" under a {servo.command.kind} command" if servo.command is not None else ""
+        known = [of for of in models.quantities(servo) if of in read]
+        helps = known_words(f"it reads{under}", known) if known else f"it reads nothing of its joint{under}"
+        for sensor in servo.sensors:
+            if sensor.of not in read and sensor.place is not None and not _kept(structure, servo, sensor.of):
+                scope.complaints.remark(
+                    "D290",
+                    f"sensor `{sensor.of}` changes nothing: {label} does not read `{sensor.of}`",
+                    sensor.place,
+                    help=[helps, f"leave it out, or record it: `record += [{servo.joint}.servo.sensor.{sensor.of}];`"],
+                )
+        for name, of in _dead(scope, structure, use.joint):
+            if str(of.value) not in read and of.origin.place is not None:
+                scope.complaints.remark(
+                    "D168",
+                    f"environment `{name}` never acts: {label} does not read `{of.value}`",
+                    of.origin.place,
+                    help=[helps, "change that, or leave it out"],
+                )
+
+
+def _kept(structure: Structure, servo: ServoUse, of: str) -> bool:
+    """Whether a metric or the archive has what this sensor reads."""
+    path = f"{servo.joint}.servo.sensor.{of}"
+    channels = [channel for each in structure.record for channel in each.channels]
+    return any(f"{each}.".startswith(f"{path}.") for each in (*channels, *(each.of for each in structure.metrics)))
+
+
+def _dead(scope: Scope, structure: Structure, joint: str) -> Iterable[tuple[str, Any]]:
+    """Models that keep the law of this joint from seeing: their names, and what of."""
+    for use in structure.environment:
+        model, head = models.find("environment", use.model), f"environment.{use.name}"
+        about, of = scope.parameters.get(f"{head}.{model.servo_of}"), scope.parameters.get(f"{head}.of")
+        if model.sees is not None and about is not None and about.value == joint and of is not None:
+            yield use.name, of

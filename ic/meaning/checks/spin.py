@@ -1,0 +1,76 @@
+"""Whether the step is short enough for what flies and spins from the start: a base that is free, payloads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from ic.meaning.control.schedule import slowest_that_fits
+from ic.meaning.definitions.merge import Block
+from ic.meaning.parameters.models import value_at
+from ic.meaning.parameters.owner import XYZ
+from ic.meaning.parameters.scope import Scope
+from met import models
+from met.diagnostic import Label, Place
+from met.plan import BASE, Structure
+
+LOST_A_TURN = 0.01
+"""Share of the energy of a body that tumbles; where a turn may lose or gain more, that is told."""
+
+FIRST, HIGHER = 1.6, 5.0
+"""An integrator of order p is off by up to (h rate/HIGHER)^p of the energy of a body that tumbles for each radian, and
+h rate/FIRST where p is 1: measured, of bodies whose centre of mass is as far from their frame as they are large
+(docs/physics.md, section 3)."""
+
+
+def check_spins(scope: Scope, block: Block, structure: Structure) -> None:
+    """Warns of what flies from the start, and turns too far in a step for the integrator to follow."""
+    integrator, schedule = models.find("integrator", structure.integrator), structure.schedule
+    limit = (FIRST if integrator.order == 1 else HIGHER) * (LOST_A_TURN / (2.0 * math.pi)) ** (1.0 / integrator.order)
+    for label, path, place in _spinning(block, structure):
+        paths = tuple(f"{path}.{axis}" for axis in XYZ)
+        settled = [each.value for name in paths if (each := scope.parameters.get(name)) is not None]
+
+        def warn(rows: np.ndarray, label: str = label, place: Place = place) -> tuple[np.ndarray, list[str]]:
+            fastest = float(np.max(np.sqrt((rows * rows).sum(axis=1))))
+            if schedule.step * fastest > limit:
+                fits = slowest_that_fits(schedule, limit)(fastest)
+                scope.complaints.remark(
+                    "D300",
+                    f"{label} turns by {schedule.step * fastest:.3g} rad in a step of the dynamics",
+                    Label(place, f"h = {schedule.step:g} s"),
+                    help=[
+                        f"below {limit:.2g} rad a step a body that tumbles keeps its energy to {LOST_A_TURN:.0%} a "
+                        f"turn with {integrator.name}: the slowest rate that fits is {fits}",
+                        "a steady spin about a principal axis through the frame's origin needs less",
+                    ],
+                )
+            return np.zeros(len(rows), bool), []
+
+        if len(settled) == len(paths):
+            scope.checks.hold(
+                tuple(settled),  # type: ignore[arg-type]
+                warn,
+                code="D300",
+                place=place,
+                message="",
+                needs=paths,
+            )
+
+
+def _spinning(block: Block, structure: Structure) -> Iterator[tuple[str, str, Place]]:
+    """What flies from the start: in words, the path of its angular velocity, and where that is written."""
+    if structure.base is not None and structure.free:
+        initial = block.get("initial")
+        written = initial.body.get(f"{BASE}.rate") if initial is not None and initial.body is not None else None
+        place = value_at(written) if written is not None else structure.base.place
+        assert place is not None  # a base that moves comes from a deck
+        yield "the base", f"initial.{BASE}.rate", place
+    items = {item.name: item for item in block.of_kind("payload")}
+    for payload in structure.payloads:
+        if payload.grappled:
+            item = items[payload.name]
+            written = item.body.get("rate") if item.body is not None else None
+            yield f"payload `{payload.name}`", f"payloads.{payload.name}.rate", value_at(written or item)

@@ -1,0 +1,74 @@
+"""Whether the step is short enough for the stops that joints may run into."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ic.meaning.control.schedule import slowest_that_fits
+from ic.text.complaints import Complaints
+from met import models
+from met.diagnostic import Label
+from met.plan import Experiment, Formula, Quantity
+
+ENOUGH = {1: 10.0, 2: 10.0}
+"""Steps in a contact, by the integrator's order, with which it gives or takes 3 % of the energy at most."""
+
+FEW = 4.0
+"""The same of higher orders: 2 %."""
+
+
+def check_stops(complaints: Complaints, experiment: Experiment) -> None:
+    """Warns of stops so stiff that a contact takes few steps, and gives energy that nobody put in."""
+    structure = experiment.structure
+    uses = {use.name: use for use in structure.environment if models.find("environment", use.model).springs}
+    if not uses or not experiment.cases.count:
+        return
+    from met.contact import contacts
+
+    integrator = models.find("integrator", structure.integrator)
+    enough = ENOUGH.get(integrator.order, FEW)
+    with complaints.gather():
+        named = {name: models.find("environment", use.model).springs[1] for name, use in uses.items()}
+        stiffness = {name: experiment.parameters[f"environment.{name}.{part}"] for name, part in named.items()}
+        stiffest = {name: _stiffest(experiment, quantity) for name, quantity in stiffness.items()}
+        found = {case: contacts(experiment, case) for case in set(stiffest.values())}
+        for each in (each for name, case in stiffest.items() for each in found[case] if each.stop == name):
+            if not each.steps < enough:
+                continue
+            unit = _unit(experiment, each.joint)
+            place = stiffness[each.stop].origin.place or uses[each.stop].place
+            times = enough / each.steps if each.steps > 0.0 else math.inf
+            rate = times * structure.schedule.base_hz / structure.schedule.dynamics
+            fits = "no rate is so high: make the stop softer"
+            if math.isfinite(rate):
+                least = slowest_that_fits(structure.schedule, _AT_MOST)(rate)
+                fits = f"quicken the dynamics to {least}, or make the stop softer"
+            complaints.remark(
+                "D295",
+                f"`{each.stop}` is stiff for the dynamics' step: joint `{each.joint}` touches it for "
+                f"{each.steps:.2g} steps",
+                Label(place, f"h = {structure.schedule.step:g} s") if place else place,
+                help=[
+                    f"with {integrator.name} a contact of fewer than {enough:g} steps gives energy that nobody put in",
+                    f"{fits}: the joint feels {each.inertia:.3g} {unit} at the start",
+                ],
+            )
+
+
+_AT_MOST = math.nextafter(1.0, 2.0)
+"""The first number that a step times the rate that is needed must stay below: 1 itself is enough."""
+
+
+def _stiffest(experiment: Experiment, stiffness: Quantity) -> int:
+    """The first case in which it is largest."""
+    if not isinstance(stiffness.value, Formula):
+        return 0
+    values = experiment.formulas.replay({each.path: each.values for each in experiment.cases.coordinates})
+    return int(np.argmax(np.asarray(values[stiffness.value.output])))
+
+
+def _unit(experiment: Experiment, joint: str) -> str:
+    kind = next(each.kind for each in experiment.structure.moving if each.name == joint)
+    return "kg" if kind == "prismatic" else "kg m^2"

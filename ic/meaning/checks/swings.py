@@ -1,0 +1,192 @@
+"""What swings in a servo or a sensor, and whether the integrator's steps make it grow: x'' = -a x - b x'.
+
+The figure h lambda is about decay, and a swing has roots beside the real axis, where integrators bear other steps: the
+methods of order 2 and 1 let an undamped swing grow at any step, slowly or fast. So the integrator itself is asked. Its
+step takes (x, x') to M (x, x'), and with r the largest size of M's eigenvalues a swing grows by r^n in n steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from types import SimpleNamespace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ic.meaning.control.schedule import Rate, check_stability, hz
+from ic.meaning.control.servos import Use
+from ic.meaning.parameters.scope import Scope
+from ic.text.complaints import known_words
+from met import models
+from met.diagnostic import Label
+from met.integrators.integrator import Motion, Slope
+from met.plan import Schedule
+from met.trace import Real
+
+T = TypeVar("T")
+
+GROWS = 1.0  # ln of the growth over a run, above which it is told: e times
+FINEST = 1000  # times the base rate: beyond, no rate is proposed
+
+
+def growth(integrator: Any, h: float, a: Any, b: Any) -> Any:
+    """ln of what one step of h s makes of a swing with these coefficients (1/s^2, 1/s), numbers or arrays of them."""
+
+    def slope(_: float, y: Motion) -> Slope:
+        return Slope((), (), (y.x[1], -a * y.x[0] - b * y.x[1]))
+
+    with np.errstate(all="ignore"):  # a step far too long is told of elsewhere
+        columns = []
+        for start in ((1.0, 0.0), (0.0, 1.0)):
+            y = Motion((), (), start)
+            columns.append(integrator.advance(slope, h, y, slope(0.0, y)).x)
+        (m11, m21), (m12, m22) = columns
+        half, det = 0.5 * (m11 + m22), m11 * m22 - m12 * m21
+        off = half * half - det
+        size = np.where(off < 0.0, np.sqrt(np.abs(det)), np.abs(half) + np.sqrt(np.maximum(off, 0.0)))
+        return np.log(size)
+
+
+def check_swing(
+    scope: Scope,
+    label: str,
+    swing: tuple[Real, Real],
+    schedule: Schedule,
+    integrator: Any,
+    dynamics: Rate,
+    path: str,
+    *,
+    held: bool,
+) -> None:
+    """A remark where a swing grows over the run at this step.
+
+    label  what swings, in words;  path: of what it belongs to
+    held   whether it is reckoned with a joint that stands still
+    """
+    known = models.find_own("integrator")
+    if integrator not in known.values():  # another package's is called only to be recorded
+        return
+    steps, h = schedule.ticks // schedule.dynamics, schedule.step
+
+    def told(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+        grown = steps * growth(integrator, h, values[:, 0], values[:, 1])
+        grown = np.where(np.isfinite(grown), grown, 0.0)
+        if (grown > GROWS).any():
+            a, b = map(float, values[int(np.argmax(grown))])
+            every = h / (float(np.max(grown)) / steps)
+            still = [
+                f"integrator = {name};"
+                for name, each in known.items()
+                if name != integrator.name and steps * growth(each, h, a, b) <= GROWS
+            ]
+            enough = _enough(integrator, h, steps, a, b)
+            helps = [f"the slowest rate at which it does not: {_slowest(schedule, integrator, a, b)}"]
+            if still:
+                helps.append(known_words("at this rate it does not with", (f"`{each}`" for each in still)))
+            if enough is not None:
+                helps.append(f"or damp it: of x'' = -a x - b x', b is {b:.3g} 1/s, and {enough:.3g} 1/s would do")
+            scope.complaints.remark(
+                "D249",
+                f"{label} swings, and this step of {integrator.name} makes that grow: by e in every {every:.3g} s",
+                Label(dynamics.place, f"h = {h:g} s"),
+                help=[*helps, *(["reckoned with the joint held: a gear swings faster against a light one"] * held)],
+            )
+        return np.zeros(len(values), bool), []
+
+    scope.checks.hold(swing, told, code="D249", place=dynamics.place, message="", needs=(path,))
+
+
+def _enough(integrator: Any, h: float, steps: int, a: float, b: float) -> float | None:
+    """The least damping b, 1/s, with which the swing does not grow over the run; None where none is enough."""
+    low, high = b, max(b, np.sqrt(a))
+    if steps * growth(integrator, h, a, high) > GROWS:
+        return None
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if steps * growth(integrator, h, a, middle) > GROWS else (low, middle)
+    return float(high)
+
+
+def _slowest(schedule: Schedule, integrator: Any, a: float, b: float) -> str:
+    """The slowest rate of the dynamics, faster than it is, at which the swing does not grow over the run; in words."""
+    for per_second, steps in _finer(schedule):
+        if steps * growth(integrator, 1.0 / per_second, a, b) <= GROWS:
+            return f"{hz(per_second)} Hz"
+    return "none that is sensible"
+
+
+def _finer(schedule: Schedule) -> Iterator[tuple[float, int]]:
+    """Rates that fit the run, from the next faster one on, Hz, and steps of the run."""
+    for n in range(schedule.dynamics - 1, 0, -1):
+        if schedule.ticks % n == 0:
+            yield schedule.base_hz / n, schedule.ticks // n
+    for times in range(2, FINEST + 1):
+        yield schedule.base_hz * times, schedule.ticks * times
+
+
+def check_circuits(
+    scope: Scope, use: Use, schedule: Schedule, integrator: Any, dynamics: Rate, *, on_bed: bool
+) -> None:
+    """What of a servo and its sensors swings, and the filters of these, at the dynamics' step.
+
+    on_bed  whether the motor is on a bed, and so no part of the step
+    """
+    path, servo = f"{use.joint}.servo", use.servo
+    if servo.swings is not None and not on_bed and use.parameters is not None:
+        kind = use.command.kind if use.command is not None else "none"
+        found = asked(scope, servo.swings, use.parameters, path, kind)
+        for what, swing in (found or {}).items():
+            label = f"the {what} of servo `{use.definition}`"
+            check_swing(scope, label, swing, schedule, integrator, dynamics, path, held=True)
+    for sensor in use.sensors:
+        own, label = f"{path}.sensor.{sensor.of}", f"sensor `{sensor.of}` of servo `{use.definition}`"
+        values = {
+            p.name: scope.parameters[f"{own}.{p.name}"].value
+            for p in models.sensor_parts(sensor, "parameters")
+            if f"{own}.{p.name}" in scope.parameters
+        }
+        check_sensor(scope, label, models.find("sensor", sensor.model), values, schedule, integrator, dynamics, own)
+
+
+def check_sensor(
+    scope: Scope,
+    label: str,
+    sensor: Any,
+    values: Mapping[str, Any],
+    schedule: Schedule,
+    integrator: Any,
+    dynamics: Rate,
+    path: str,
+) -> None:
+    """The filter of a sensor at the dynamics' step. label: the sensor in words; path: of its parameters."""
+    rate = asked(scope, sensor.fastest, values, path)
+    if rate is not None:
+        check_stability(
+            scope,
+            label,
+            rate,
+            schedule,
+            integrator,
+            dynamics,
+            path,
+            of="the rate constant of the sensor's filter, 2 pi cutoff",
+        )
+    swing = asked(scope, sensor.swing, values, path)
+    if swing is not None:
+        check_swing(scope, f"the filter of {label}", swing, schedule, integrator, dynamics, path, held=False)
+
+
+def asked(
+    scope: Scope, function: Callable[..., T] | None, values: Mapping[str, Any], path: str, *more: Any
+) -> T | None:
+    """What a declaration's function says of these parameters; None of no function, or if one of them is out of range.
+
+    path  of the parameters
+    """
+    if function is None or scope.checks.failed(path):
+        return None
+    # as in the engine, a division by a product that is too small for a double is infinite, and no exception
+    numbers = {name: np.float64(x) if isinstance(x, float) else x for name, x in values.items()}
+    with scope.complaints.gather(), np.errstate(all="ignore"):
+        return function(SimpleNamespace(**numbers), *more)
+    return None

@@ -1,0 +1,342 @@
+"""Guides of a run: their models' parameters, those of each joint that follows, the courses of their paths, their
+ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, Final
+
+import numpy as np
+
+from ic.grammar.spell import spell
+from ic.meaning.control.schedule import Rate
+from ic.meaning.control.servos import Use, course_named, fixed_rate, use_course
+from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.expressions.remedies import components
+from ic.meaning.expressions.values import place_of
+from ic.meaning.mechanics.arm import Arm
+from ic.meaning.parameters import unvaried
+from ic.meaning.parameters.models import find_model, refuse_values, use_model, value_at, word_of
+from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.relations import check_names
+from ic.meaning.parameters.scope import Scope
+from ic.text.complaints import known_words
+from met import models, units
+from met.diagnostic import Label, Place
+from met.frozen import frozen
+from met.plan import COMPONENTS, Course, GuideUse, Structure
+from met.plan.channel import carries
+from met.plan.defaults import component
+from met.trace import Real, Scalar
+
+KIND: Final = "guide"
+USAGE = "write `guide NAME = MODEL { ... }`"
+
+
+@frozen
+class Guiding:
+    """A guide of the run. rate None: that of the servos, or none where it has no computer (`ticks`).
+
+    link, components  what is guided, of one with a path
+    whole             whether the command of every joint is known, so that none is missing among `joints`
+    fastest           of its error, 1/s (`Guide.fastest`); None where that is unknown
+    """
+
+    name: str
+    model: Any
+    joints: tuple[str, ...]
+    courses: tuple[Course, ...]
+    rate: Rate | None
+    link: str
+    components: tuple[str, ...]
+    whole: bool
+    fastest: Real | None
+    place: Place
+
+    kind = KIND
+    does = "ticks"
+    code = "D277"
+
+    @property
+    def label(self) -> str:
+        return f"guide `{self.name}`"
+
+    @property
+    def path(self) -> str:
+        return f"guides.{self.name}"
+
+    @property
+    def ticks(self) -> bool:
+        return self.model.steer is not None
+
+    def use(self, divisor: int) -> GuideUse:
+        return GuideUse(self.name, self.model.name, self.joints, divisor, self.courses, self.place)
+
+
+def name_guides(scope: Scope, block: Block) -> None:
+    """Enters the run's guides in the scope, so that commands may name them; tells names that are something else's."""
+    scope.guides = {item.name: item for item in block.of_kind(KIND)}
+    for name, item in scope.guides.items():
+        let = scope.definitions.lets.get(name)
+        if meaning := _meaning(scope, name):
+            scope.complaints.error(
+                "D271",
+                f"`{name}` is {meaning}, so no guide can be called so",
+                item.place,
+                also=[Label(let.name.place, "the value")] if let is not None else [],
+                help="give the guide another name: `rate(NAME)` is to mean one thing",
+            )
+
+
+def _meaning(scope: Scope, name: str) -> str:
+    """What else a name means where a command's value stands; nothing where it may be a guide's."""
+    if name in scope.definitions.lets:
+        return "a value"
+    return "a unit" if units.is_unit(name) else "a course in time" if name in models.available("command") else ""
+
+
+def resolve_guides(scope: Scope, block: Block, arm: Arm, uses: list[Use], duration: float | None) -> list[Guiding]:
+    """Every guide of the run, in the deck's order; what is wrong is told. duration: of the run, s; None: unknown."""
+    found = []
+    for item in block.of_kind(KIND):
+        with scope.complaints.gather():
+            guiding = _guide(scope, item, arm, uses, duration)
+            if guiding is not None:
+                found.append(guiding)
+    return found
+
+
+def check_guides(scope: Scope, guides: Iterable[Guiding], structure: Structure) -> None:
+    """What is guided can be: the joints carry the link, and are as many as the components."""
+    for guide in guides:
+        idle = [joint for joint in guide.joints if guide.link and not carries(structure, guide.link, joint)]
+        if idle:
+            scope.complaints.error(
+                "D276",
+                f"joint `{idle[0]}` follows guide `{guide.name}`, and does not carry link `{guide.link}`",
+                guide.place,
+                help="give it a command of its own, or guide a link that it carries",
+            )
+        elif guide.whole and 0 < len(guide.joints) < len(guide.components):
+            words = next((p for p in guide.model.parameters if p.name == "guides"), None)
+            others = words.words if words is not None else ()
+            scope.complaints.error(
+                "D275",
+                f"guide `{guide.name}` moves {_count(guide.joints, 'joint')} and guides "
+                f"{_count(guide.components, 'component')}: {', '.join(guide.components)}",
+                guide.place,
+                help=[
+                    "let more joints follow it, or guide less",
+                    *([known_words("`guides` may be", others)] if others else ()),
+                ],
+            )
+
+
+def check_period(scope: Scope, guide: Guiding, rate: Rate) -> None:
+    """A guide brings its error down from tick to tick."""
+    if guide.fastest is None:
+        return
+
+    def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+        bad = ~(values[:, 0] < 2.0 * rate.hz)
+        return bad, [f"{x / rate.hz:.3g} times the error is taken off at each tick" for x in values[bad, 0][:1]]
+
+    scope.checks.hold(
+        (guide.fastest,),
+        test,
+        code="D279",
+        message=f"guide `{guide.name}` is unstable at {rate.hz:g} Hz",
+        place=guide.place,
+        needs=(f"guides.{guide.name}",),
+        help=f"what it takes off in a second, its gain, must stay below twice its rate, {2.0 * rate.hz:g}/s, and well "
+        "below what its servos can follow",
+    )
+
+
+def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use], duration: float | None) -> Guiding | None:
+    if item.detail or item.value is None:
+        at = item.detail[0].place if item.detail else item.place
+        told = f"guide `{item.name}` has no model"
+        told = f"`{item.detail[0].text}` after the name of a guide" if item.detail else told
+        scope.complaints.error(
+            "D270", told, at, help=[USAGE, known_words("guide models", sorted(models.available(KIND)))]
+        )
+        return None
+    guide = find_model(scope, KIND, word_of(item.value), place_of(item.value))
+    if guide is None or refuse_values(scope, item.value, [p.name for p in guide.parameters]):
+        return None
+    body = item.body or Block()
+    follow = [use for use in uses if use.command is not None and use.command.guide == item.name]
+    whole = not scope.lost and all(use.command is not None or not use.servo.commands for use in uses)
+    if not follow and whole and not _meaning(scope, item.name):
+        kind = guide.commands[0]
+        scope.complaints.error(
+            "D272",
+            f"no joint follows guide `{item.name}`",
+            item.place,
+            help=f"write `command = {kind}({item.name});` in the servo of each joint that it moves, "
+            "or leave the guide out",
+        )
+    for use in follow:
+        assert use.command is not None
+        if use.command.kind not in guide.commands:
+            scope.complaints.error(
+                "D273",
+                f"guide `{item.name}` ({guide.name}) commands no {use.command.kind}",
+                use.place,
+                also=[Label(item.place, "the guide")],
+                help=f"write `command = {guide.commands[0]}({item.name});` for joint `{use.joint}`",
+            )
+    joints = tuple(use.joint for use in follow)
+    owner = Owner(f"guide `{item.name}`", item.place, f"guides.{item.name}", homes=item.homes)
+    scope.setting(f"{owner.path}.model", guide.name, item=item)
+    known = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
+    named = check_names(scope, owner, guide.parameters, body, arm=arm.name, known=known, lost=arm.lost)
+    paths = list(COMPONENTS) if guide.components is not None else []
+    of_joint = [p.name for p in guide.of_joint]
+    extra = [
+        *(["rate"] if guide.steer is not None else []),
+        *paths,
+        *of_joint,
+        *(f"{joint}.{name}" for joint in joints for name in of_joint),
+    ]
+    values = use_model(scope, owner, guide.parameters, body, extra)
+    _of_joints(scope, owner, guide, body, arm, joints)
+    guided = guide.components(SimpleNamespace(**values)) if values is not None and paths else ()
+    courses = _courses(scope, owner, body, paths, guided if values is not None else COMPONENTS, joints)
+    rate = None
+    scope.unvaried[owner.path] = unvaried.model("a guide", owner.path)
+    if guide.steer is not None and body.get("rate") is not None:
+        rate = fixed_rate(scope, owner, body.items["rate"], owner.label)
+    scope.unvaried[owner.join("rate")] = unvaried.COMPILED_ALONE
+    fastest = None
+    if guide.fastest is not None and values is not None:
+        with scope.complaints.gather():
+            fastest = guide.fastest(SimpleNamespace(**values))
+    if values is not None and duration is not None:
+        _remark_idle(scope, guide, item, values, duration)
+    link = named.get("link", "") if guide.components is not None else ""
+    if link not in known["link"]:
+        link = ""
+    return Guiding(item.name, guide, joints, courses, rate, link, tuple(guided), whole, fastest, item.place)
+
+
+def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any], duration: float) -> None:
+    """Tells of a guide that does nothing, or of a part of it, by its written constants."""
+    numbers = [x for value in values.values() for x in (value if isinstance(value, tuple) else (value,))]
+    if guide.idle is None or any(isinstance(x, Scalar) for x in numbers):
+        return
+    found = guide.idle(SimpleNamespace(**values), duration)
+    if found is not None:
+        written = [part for name in found[0] if (part := (item.body or Block()).get(name)) is not None]
+        needed = [each for each in guide.parameters if each.name in found[0] and each.default is None]
+        scope.complaints.remark(
+            "D301",
+            f"guide `{item.name}` {found[1]}",
+            value_at(written[0] if written else item),
+            help="change that, or leave it out"
+            if not needed
+            else f"change {' or '.join(f'`{name}`' for name in found[0])}",
+        )
+
+
+def _of_joints(scope: Scope, owner: Owner, guide: Any, body: Block, arm: Arm, joints: Iterable[str]) -> None:
+    """The parameters of each joint: as written for it, else as written for all, whom a path without a joint reaches."""
+    kinds = {joint.name: joint.kind for joint in arm.moving}
+    joints = list(joints)
+    for wanted in guide.of_joint:
+        general = body.get(wanted.name)
+        parts = [part for part in components(general, len(joints)) if part is not None]
+        if general is not None and len(joints) > 1 and len(parts) == len(joints):
+            each = "  ".join(
+                f"{joint}.{wanted.name} = {spell(part)};" for joint, part in zip(joints, parts, strict=True)
+            )
+            scope.complaints.error(
+                "D071",
+                f"`{wanted.name}` of {owner.label} is one number for each joint, and this is a list",
+                value_at(general),
+                help=f"write `{each}`",
+            )
+            scope.checks.fail(owner.join(wanted.name))
+            continue
+        for joint in joints:
+            own = body.get(f"{joint}.{wanted.name}")
+            all_of_them = () if own is not None else (owner.path,)
+            item = own if own is not None else general
+            item = replace(item, homes=all_of_them) if item is not None else None
+            whose = Owner(
+                f"joint `{joint}` of {owner.label}",
+                item.place if item is not None else owner.place,
+                f"{owner.path}.{joint}",
+                homes=all_of_them,
+                local="",
+                joint=kinds[joint],
+            )
+            if scope.number(whose, wanted, item) is None and own is None:
+                break  # the same would be told of every joint
+
+
+def _courses(
+    scope: Scope, owner: Owner, body: Block, known: Iterable[str], guided: Iterable[str], joints: Iterable[str]
+) -> tuple[Course, ...]:
+    """The courses of the path's components that are written, in order."""
+    found = []
+    for name in known:
+        part = body.get(name)
+        if part is None:
+            continue
+        if name in joints:
+            scope.complaints.error(
+                "D274",
+                f"`{name}` of {owner.label} is a component of its path, and a joint that follows it",
+                part.place,
+                help="give the joint another name",
+            )
+            continue
+        if name not in guided:
+            chosen = body.get("guides")
+            later = chosen is not None and len(chosen.homes) < len(part.homes)  # by a run `like` the one of the path
+            scope.complaints.error(
+                "D274",
+                f"`{name}` is not guided by {owner.label}",
+                value_at(chosen) if chosen is not None and later else part.place,
+                also=[Label(part.place, "written here")] if later else [],
+                help=[
+                    f"it guides {', '.join(guided)}",
+                    f"write `remove {name};`, or guide more" if later else "leave it out, or guide more",
+                ],
+            )
+            continue
+        with scope.complaints.gather():
+            model = _course(scope, owner, part)
+            if model is not None:
+                found.append(Course(name, model))
+    return tuple(found)
+
+
+def _course(scope: Scope, owner: Owner, item: Item) -> str | None:
+    """The model of one component's course."""
+    kind = component(item.name).kind
+    if item.value is None:
+        unit = "1 m" if kind == "prismatic" else "30 deg"
+        scope.complaints.error(
+            "D274",
+            f"`{item.name}` of {owner.label} is a value or a course in time",
+            item.place,
+            help=f"write `{item.name} = ramp(to = {unit}, over = 10 s);`",
+        )
+        return None
+    told, path = f"`{item.name}` of {owner.label}", f"{owner.path}.{item.name}"
+    spot = Owner(told, item.place, path, homes=item.homes, joint=kind, command="position", called=told)
+    inner = course_named(scope, item.value)
+    model = use_course(scope, spot, inner, item, doc=f"{item.name} of the path", column=item.name, body=item.body)
+    if model is not None:
+        scope.setting(f"{path}.model", model, item=item)
+        scope.unvaried[path] = unvaried.model("a course in time", path)
+    return model
+
+
+def _count(things: tuple[str, ...], what: str) -> str:
+    return f"{len(things)} {what}{'s' * (len(things) != 1)}"

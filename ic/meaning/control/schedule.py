@@ -1,0 +1,260 @@
+"""Rates as whole divisors of one base rate, exactly, and what they mean for stability.
+
+Rates are taken as fractions, so that 1000/3 Hz divides 1 kHz and 333.3 Hz does not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ic.meaning.parameters.scope import Scope
+from ic.text.complaints import Complaints
+from met.diagnostic import Label, Place
+from met.frozen import frozen
+from met.plan import Schedule
+from met.trace import Real
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+MOST_TICKS = 10**12  # what a plan may have (met/plan_structure): thirty years at a kilohertz
+WARN_ABOVE = 0.5  # of h lambda: above it, a step sees less than the decay it should follow
+
+
+CONTINUOUS = math.inf
+"""The `Rate.hz` of a servo's law that is continuous."""
+
+
+@frozen
+class Rate:
+    """A rate as written: whose it is, in words, how often (Hz), and where."""
+
+    label: str
+    hz: float
+    place: Place
+
+
+@frozen
+class Ticks:
+    """When the law of a servo acts: every so many base ticks; continuous, as a part of each step of the dynamics."""
+
+    divisor: int
+    continuous: bool
+
+
+def exact(value: float) -> Fraction:
+    """The simplest fraction that is this number to a part in 1e12: 333.33333333333331 is 1000/3."""
+    from fractions import Fraction  # takes 2 ms, and whole rates do without
+
+    for most in (1, 1000, 1_000_000):
+        simple = Fraction(value).limit_denominator(most)
+        if simple > 0 and abs(float(simple) - value) <= 1e-12 * value:
+            return simple
+    return Fraction(value)
+
+
+def base_rate(rates: list[Rate], written: Rate | None) -> Rate:
+    """The base: as written, else the fastest of the rates (the first of those)."""
+    if written is not None:
+        return written
+    return max(rates, key=lambda rate: rate.hz)
+
+
+def divisor(complaints: Complaints, rate: Rate, base: Rate, others: list[Rate], *, written: bool) -> int:
+    """Base ticks a tick of this rate; tells where that is not a whole number, and gives 1 then."""
+    if base.hz.is_integer() and rate.hz.is_integer() and base.hz % rate.hz == 0.0:
+        return int(base.hz // rate.hz)
+    ratio = exact(base.hz) / exact(rate.hz)
+    if ratio.denominator == 1:
+        return int(ratio)
+    label = Label(rate.place, f"{hz(base.hz)}/{hz(rate.hz)} = {float(ratio):.4g}")
+    also = [Label(base.place, "base rate set here" if written else f"base rate set here: the fastest, {base.label}")]
+    helps = []
+    if ratio < 1:
+        message = f"{rate.label} at {hz(rate.hz)} Hz is faster than the base rate, {hz(base.hz)} Hz"
+    else:
+        message = f"{rate.label} at {hz(rate.hz)} Hz does not divide the base rate, {hz(base.hz)} Hz"
+        fits = dict.fromkeys((max(1, math.floor(ratio)), math.ceil(ratio)))
+        helps.append("nearest that fit: " + ", ".join(_fitting(base.hz, n) for n in fits))
+    common = _common([exact(each.hz) for each in (rate, base, *others)])
+    if common is not None:
+        helps.append(f"{'or ' if helps else ''}a base rate that all divide: `base = {common};` in `rates`")
+    complaints.error("D100", message, label, also=also, help=helps)
+    return 1
+
+
+def _fitting(base_hz: float, n: int) -> str:
+    exactly = exact(base_hz) / n
+    if exactly.denominator == 1 or float(exactly) == float(f"{float(exactly):.6g}"):
+        return f"{hz(float(exactly))} Hz ({hz(base_hz)}/{n})"
+    return f"{hz(float(exactly))} Hz, written ({hz(base_hz)}/{n}) Hz"
+
+
+def _common(rates: list[Fraction]) -> str | None:
+    """The slowest rate that all divide, where it is not absurd."""
+    from fractions import Fraction
+
+    common = Fraction(math.lcm(*(rate.numerator for rate in rates)), math.gcd(*(rate.denominator for rate in rates)))
+    if common > 100_000:
+        return None
+    return f"{hz(float(common))} Hz"
+
+
+def make_schedule(
+    complaints: Complaints,
+    dynamics: Rate,
+    record: Rate,
+    base: Rate,
+    others: list[Rate],
+    duration: float | None,
+    duration_place: Place,
+    *,
+    base_written: bool,
+) -> Schedule:
+    """The schedule. Tells what does not fit. duration: of the run, s; None: unknown, which was told."""
+    all_rates, before = [dynamics, record, *others], complaints.faults
+    step = divisor(complaints, dynamics, base, all_rates, written=base_written)
+    row = step if record == dynamics else divisor(complaints, record, base, all_rates, written=base_written)
+    if duration is None:
+        return Schedule(base.hz, step, row, step * row)
+    if duration * base.hz > MOST_TICKS:
+        ticks_in_words = f"{min(duration * base.hz, 1e308):.3g}"
+        complaints.error(
+            "D103",
+            f"a run of {ticks_in_words} ticks of the base rate",
+            duration_place,
+            also=[Label(base.place, "the base rate")],
+            help="at most 1e12 are possible: shorten the run",
+        )
+        return Schedule(base.hz, step, row, 1)
+    in_whole = duration.is_integer() and base.hz.is_integer()
+    refused = complaints.faults > before  # and so are the steps that a duration would be made of
+    ticks = int(duration) * int(base.hz) if in_whole else exact(duration) * exact(base.hz)
+    whole = round(ticks)
+    if refused:
+        return Schedule(base.hz, step, row, max(1, whole))
+    if ticks.denominator != 1 or whole % step:
+        length, per_step = exact(duration), step / exact(base.hz)
+        count = max(1, math.floor(length / per_step))
+        near = [f"{float(n * per_step):.9g} s" for n in (count, count + 1)]
+        complaints.error(
+            "D101",
+            f"a duration of {duration:g} s is {float(length / per_step):.6g} steps of the dynamics",
+            duration_place,
+            also=[Label(dynamics.place, f"a step is {float(per_step):g} s")],
+            help="nearest that fit: " + ", ".join(near),
+        )
+        whole = count * step
+    elif whole % row:
+        last = whole // row * row / exact(base.hz)
+        complaints.remark(
+            "D102",
+            f"the last row is recorded at {float(last):g} s, before the run's end at {duration:g} s",
+            record.place,
+            also=[Label(duration_place, "the end")],
+            help="a duration that is a whole number of rows records both ends",
+        )
+    return Schedule(base.hz, step, row, whole)
+
+
+def fastest_rate(
+    scope: Scope, servo: Any, parameters: Mapping[str, Any], path: str, *, continuous: bool = False
+) -> Real | None:
+    """The fastest rate constant of a joint under its servo (`Servo.fastest`); None where the servo does not know it.
+
+    path        of the servo: where a parameter of it is out of its range, that is told, and nothing is computed of it
+    continuous  whether its law is, so that its gains count
+    """
+    bound = servo.fastest_law if continuous and servo.fastest_law is not None else servo.fastest
+    if bound is None or scope.checks.failed(path):
+        return None
+    from types import SimpleNamespace
+
+    # as in the engine, a division by a product that is too small for a double is infinite, and no exception
+    numbers = {name: np.float64(x) if isinstance(x, float) else x for name, x in parameters.items()}
+    with scope.complaints.gather(), np.errstate(all="ignore"):
+        found: Real = bound(SimpleNamespace(**numbers))
+        return found
+    return None
+
+
+def check_stability(
+    scope: Scope,
+    label: str,
+    fastest: Real,
+    schedule: Schedule,
+    integrator: Any,
+    dynamics: Rate,
+    path: str,
+    of: str = "the servo's fastest rate constant, on any arm",
+) -> Real | None:
+    """h lambda of a joint under its servo, or of a sensor: given back, and warned of or told as an error.
+
+    label  the servo in words; joints with the same servo and the same figure are told of once, and of several servos
+           for which one rate is too slow the first that is checked
+    path   of the servo
+    of     what lambda is
+    """
+    with scope.complaints.gather():
+        limit, h = integrator.real_limit, schedule.step
+        slowest = slowest_that_fits(schedule, limit)
+
+        def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+            x = h * values[:, 0]
+            bad = ~(x < limit)
+            worst = float(np.max(values[:, 0])) if bad.any() else 0.0
+            return bad, [
+                f"h * lambda = {float(np.max(x)):.3g}; the slowest rate that fits is {slowest(worst)}"
+            ] if bad.any() else []
+
+        def warn(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+            x = h * values[:, 0]
+            above = WARN_ABOVE * (1.0 + 1e-9)
+            if above < float(np.max(x)) < limit:
+                better = slowest_that_fits(schedule, above)(float(np.max(values[:, 0])))
+                scope.complaints.remark(
+                    "D105",
+                    f"{label} is fast for the dynamics' step: h * lambda = {float(np.max(x)):.3g}",
+                    Label(dynamics.place, f"h = {h:g} s"),
+                    help=f"stable below {limit:g} with {integrator.name}, true to the motion below {WARN_ABOVE:g}: the "
+                    f"slowest rate that fits is {better}",
+                )
+            return np.zeros(len(values), bool), []
+
+        scope.checks.hold(
+            (fastest,),
+            test,
+            code="D104",
+            place=dynamics.place,
+            message=f"{label} is unstable with {integrator.name} at this rate of the dynamics",
+            help=f"h * lambda must stay below {limit:g}; lambda is {of}",
+            needs=(path,),
+        )
+        scope.checks.hold((fastest,), warn, code="D105", place=dynamics.place, message="", needs=(path,))
+        return fastest * h
+    return None
+
+
+def slowest_that_fits(schedule: Schedule, limit: float) -> Callable[[float], str]:
+    """Of a rate constant (1/s), the slowest rate of the dynamics with which h times it stays below the limit."""
+
+    def name(fastest: float) -> str:
+        if not math.isfinite(fastest):
+            return "none"
+        most = min(schedule.dynamics, math.ceil(limit * schedule.base_hz / fastest) - 1, 100_000)
+        for n in range(most, 0, -1):
+            if schedule.ticks % n == 0:
+                return f"{hz(schedule.base_hz / n)} Hz"
+        times = math.floor(fastest / limit / schedule.base_hz) + 1
+        return f"{hz(schedule.base_hz * times)} Hz"
+
+    return name
+
+
+def hz(value: float) -> str:
+    """A rate as it is written."""
+    return f"{value:.6g}"

@@ -1,0 +1,566 @@
+"""Servos on joints: the definition with what the use overrides, its model's parameters, its command and rate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from types import MappingProxyType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, Word
+from ic.meaning.control.schedule import CONTINUOUS, Rate
+from ic.meaning.control.sensors import use_sensor, without_sensors
+from ic.meaning.control.trajectories import use_file, with_file_named
+from ic.meaning.definitions.merge import Block, Item, open_call, overlay
+from ic.meaning.expressions.values import measure_of, place_of
+from ic.meaning.mechanics.arm import Arm
+from ic.meaning.parameters import unvaried
+from ic.meaning.parameters.models import (
+    check_keys,
+    find_bare_model,
+    find_model,
+    refuse_values,
+    use_model,
+    word_of,
+    words_chosen,
+)
+from ic.meaning.parameters.owner import Owner, Settled
+from ic.meaning.parameters.scope import Scope
+from ic.text.complaints import known_words
+from ic.text.files import library_defines
+from met import models, units
+from met.diagnostic import Label, Place, Problem, did_you_mean, error, meant
+from met.frozen import frozen
+from met.parameter import Parameter
+from met.plan import Command, SensorUse, ServoUse
+from met.plan.channel import COMMAND_UNIT
+from met.trace import Scalar, where
+
+SLOWEST, FASTEST = 1e-3, 1e9
+APART, DIGITS = 1e-9, 1e-5
+"""Positions are the same place within APART (rad or m: far above rounding of a deck's numbers, far below what anyone
+sees) and a unit of the sixth digit: so many are printed, and a position that was copied from there is the one meant."""
+
+RATE = Parameter(
+    name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, ticks=True, doc="how often the servo's computer ticks"
+)
+NOT_PARAMETERS = ("model", "command", "rate")
+ASKED: Mapping[str, Mapping[str, str]] = MappingProxyType(
+    {
+        "revolute": {"rate": "0.03 rad/s", "position": "30 deg", "torque": "2 N*m", "acceleration": "0.1 rad/s^2"},
+        "prismatic": {"rate": "0.03 m/s", "position": "0.1 m", "torque": "2 N", "acceleration": "0.1 m/s^2"},
+    }
+)
+"""What a command may ask of a joint, to show how one is written."""
+
+BESIDE = "write `model = {};`, and its parameters beside it"
+
+
+@frozen
+class Use:
+    """A servo on a joint. rate None: the run's `rates.servos`. parameters None: some failed, which was told.
+
+    words    those on which parts of the model depend
+    sensors  through which its law sees
+    """
+
+    joint: str
+    definition: str
+    servo: Any
+    command: Command | None
+    rate: Rate | None
+    parameters: dict[str, Any] | None
+    place: Place
+    words: tuple[tuple[str, str], ...] = ()
+    sensors: tuple[SensorUse, ...] = ()
+
+    @property
+    def has_law(self) -> bool:
+        return self.servo.control is not None
+
+    @property
+    def bare(self) -> ServoUse:
+        """As a plan has it, but for its rate and its sensors."""
+        return ServoUse(self.joint, self.definition, self.servo.name, self.command, 1, self.place, self.words)
+
+
+def resolve_servos(scope: Scope, body: Block, arm: Arm) -> tuple[list[Use], frozenset[str]]:
+    """Every servo of the run, in the order of the arm's joints; the joints whose servo failed or may be one of a name
+    that is no joint's, which was told.
+    """
+    uses = {}
+    _note_kinds(scope, body, arm)
+    for item in body.items.values():
+        with scope.complaints.gather():
+            use = _use(scope, item, arm)
+            if use is not None:
+                uses[use.joint] = use
+    moving = [joint.name for joint in arm.moving]
+    lost = frozenset(name for item in body.items.values() for name in (item.name, meant(item.name, moving))
+                     if name is not None and name not in uses)  # fmt: skip
+    return [uses[joint.name] for joint in arm.joints if joint.name in uses], lost
+
+
+def _note_kinds(scope: Scope, body: Block, arm: Arm) -> None:
+    """Of every servo definition and its bases, which kinds of joints it moves in this run."""
+    for item in body.items.values():
+        kind, definition = arm.kind(item.name), scope.definitions.of_kind("servo").get(word_of(item.value) or "")
+        if kind is not None and kind != "fixed" and definition is not None:
+            for home in scope.definitions.homes(definition):
+                scope.moved.setdefault(home, set()).add(kind)
+
+
+def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
+    if item.name in arm.lost and not item.kind:
+        return None
+    kind = moving_kind(scope, item, arm, "so no servo can move it")
+    if kind is None:
+        return None
+    name = word_of(item.value)
+    if name is None or (isinstance(item.value, Call) and item.value.positional):
+        scope.complaints.error(
+            "D146",
+            f"the servo of joint `{item.name}` is the name of a servo definition",
+            place_of(item.value) if item.value else item.place,
+            help=f"write `{item.name} = SERVO;` or `{item.name} = SERVO {{ kp = ...; }}`",
+        )
+        return None
+    assert item.value is not None
+    place = item.value.name.place if isinstance(item.value, Call) else item.value.place
+    if name not in scope.definitions.of_kind("servo") and name in models.find_own("servo"):
+        file = library_defines("servo", name)
+        include = [f"a standard deck defines a servo of this name: add `#include <{file}>`"] if file else []
+        scope.complaints.error(
+            "D147",
+            f"`{name}` is a servo model; a servo definition is needed here",
+            place,
+            help=[*include, f"`servo NAME {{ model = {name}; ... }}`, and `{item.name} = NAME;`"],
+        )
+        return None
+    definition = scope.definitions.find_or_meant("servo", Word(name, place), scope.complaints)
+    block = scope.definitions.block(definition)
+    if block is None:
+        return None
+    overridden = item.body is not None and bool(item.body.items or item.body.pending)
+    if item.body is not None:
+        block = overlay(block, item.body, scope.complaints)
+    label = f"servo `{name}` on joint `{item.name}`" if overridden else f"servo `{name}`"
+    owner = Owner(
+        label,
+        definition.place,
+        f"{item.name}.servo",
+        homes=scope.definitions.homes(definition),
+        local="",
+        joint=kind,  # type: ignore[arg-type]
+    )
+    model = block.get("model")
+    if model is None:
+        _tell_no_model(scope, block, owner, place)
+        return None
+    servo = find_bare_model(scope, "servo", model, BESIDE)
+    if servo is None:
+        return None
+    sensed, block = list(block.of_kind("sensor")), without_sensors(block)
+    parameters = use_model(scope, owner, servo.parameters, block, NOT_PARAMETERS)
+    command = _command(scope, owner, servo, block.get("command"), place)
+    if command is not None:
+        _check_needed(scope, owner, servo, command, block, place)
+    rate = None
+    if servo.control is None and block.get("rate") is not None:
+        scope.complaints.error(
+            "D150",
+            f"the model `{servo.name}` has no computer that ticks, so no rate",
+            block.items["rate"].place,
+            help="leave `rate` out",
+        )
+    elif block.get("rate") is not None:
+        rate = fixed_rate(
+            scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`", continuous=True
+        )
+    scope.setting(f"{item.name}.servo.model", servo.name, item=model)
+    scope.unvaried[f"{item.name}.servo.model"] = unvaried.chosen(f"vary `{item.name}.servo` over definitions")
+    words = words_chosen([each for each in servo.parameters if each.name in servo.deciding], block)
+    bare = ServoUse(item.name, name, servo.name, command, 1, words=words)
+    sensors = tuple(use for each in sensed if (use := use_sensor(scope, owner, bare, each)) is not None)
+    return Use(item.name, name, servo, command, rate, parameters, item.place, words, sensors)
+
+
+def _tell_no_model(scope: Scope, block: Block, owner: Owner, used: Place) -> None:
+    """A servo without a model, or the entry that may have been meant for it; of the others nothing can be said."""
+    known = known_words("servo models", sorted(models.find_own("servo")))
+    for item in block.items.values():
+        if not item.kind and (helps := did_you_mean(item.name, ("model",))):
+            scope.complaints.error("D141", f"{owner.label} has no `{item.name}`", item.place, help=[*helps, known])
+            return
+    scope.complaints.error(
+        "D148",
+        f"{owner.label} has no model",
+        owner.place,
+        also=[Label(used, "used here")],
+        help=["write `model = MODEL;`", known],
+    )
+
+
+def moving_kind(scope: Scope, item: Item, arm: Arm, so: str) -> str | None:
+    """The kind of the joint that an entry names; None where it is none or fixed, which was told. so: if it is fixed."""
+    kind = arm.kind(item.name) if item.kind in ("", "substitute") else None
+    definition = scope.definitions.of_kind("arm").get(arm.name)
+    if kind is None and definition is not None and scope.complaints.lacks(definition.place):
+        return None  # an entry of the arm could not be read, which may have been this joint
+    if kind is None:
+        moving = [joint.name for joint in arm.moving]
+        scope.complaints.error(
+            "D144",
+            f"no joint `{item.name}` in arm `{arm.name}`",
+            item.place,
+            help=[*did_you_mean(item.name, moving), known_words("joints", moving)],
+        )
+    if kind == "fixed":
+        scope.complaints.error(
+            "D145",
+            f"joint `{item.name}` is fixed, {so}",
+            item.place,
+            also=[Label(place, "fixed here") for j in arm.joints if j.name == item.name and (place := j.place)],
+            help="leave it out, or make the joint revolute or prismatic",
+        )
+        return None
+    return kind
+
+
+def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, block: Block, used: Place) -> None:
+    """What this kind of command needs is written, or given by a sweep or on the command line."""
+    item = block.get("command")
+    place = place_of(item.value) if item is not None and item.value is not None else used
+    for parameter in servo.parameters:
+        settled = scope.parameters.get(owner.join(parameter.name))
+        given = block.get(parameter.name) is not None or (settled is not None and settled.origin.kind != "default")
+        if command.kind in parameter.needed_for and not given:
+            message = f"{owner.label} needs `{parameter.name}` under a {command.kind} command"
+            scope.complaints.missing(
+                owner.place,
+                (parameter.name,),
+                "D160",
+                message,
+                place,
+                help=f"write `{parameter.name} = ... {scope.unit(owner, parameter)[0]};`: {parameter.doc}",
+            )
+        elif command.kind in parameter.needed_for and parameter.above_where_needed is not None:
+            _check_above(scope, owner, parameter, command, parameter.above_where_needed)
+
+
+def _check_above(scope: Scope, owner: Owner, parameter: Parameter, command: Command, bound: float) -> None:
+    """A number that does nothing under other commands is above its bound under this one, in every case."""
+    path = owner.join(parameter.name)
+    settled = scope.parameters.get(path)
+    if settled is None or settled.origin.place is None or isinstance(settled.value, str | tuple):
+        return
+    unit = "" if settled.unit == "1" else f" {settled.unit}"
+    limit = f"above {bound:g}{unit}"
+
+    def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+        bad = values[:, 0] <= bound
+        return bad, [f"this is {x:g}{unit}" for x in values[bad, 0][:1]]
+
+    scope.checks.hold(
+        (settled.value,),
+        test,
+        code="D077",
+        place=settled.origin.place,
+        path=f"{path}.needed",
+        needs=(path,),
+        message=f"{owner.what(parameter)} must be {limit} under a {command.kind} command",
+        help=f"write a number {limit} ({parameter.doc})",
+    )
+
+
+def check_rest(scope: Scope, use: Use) -> None:
+    """A joint whose servo must begin at rest does, in every case. After the initial state is settled."""
+    path = f"initial.{use.joint}.qd"
+    begins = scope.parameters.get(path)
+    if use.servo.at_rest is None or use.parameters is None or begins is None or begins.origin.place is None:
+        return
+    with scope.complaints.gather():
+        rate = where(use.servo.at_rest(SimpleNamespace(**use.parameters)), begins.value, 0.0)
+        scope.checks.hold(
+            (rate,),
+            lambda values: (values[:, 0] != 0.0, [f"this is {x:g} {begins.unit}" for x in values[:, 0] if x][:1]),
+            code="D119",
+            message=f"joint `{use.joint}` begins with a rate, and servo `{use.definition}` ({use.servo.name}) needs it "
+            "at rest",
+            place=begins.origin.place,
+            help=(f"leave `{use.joint}.qd` out of `initial`", "or give the joint another servo"),
+            path=f"{path}.rest",
+            needs=(path, f"{use.joint}.servo"),
+        )
+
+
+def check_start(scope: Scope, use: Use) -> None:
+    """Remarks where the joint of a servo that follows whatever the arm does not begin where its command does."""
+    command = use.command
+    if not use.servo.follows or command is None or command.kind != "position" or scope.complaints.errors:
+        return
+    begins = scope.parameters.get(f"initial.{use.joint}.q")
+    head = f"{use.joint}.servo.command."
+    asked = {path.removeprefix(head): each for path, each in scope.parameters.items() if path.startswith(head)}
+    profile = models.find_own("command").get(command.model)  # another package's is called only to be recorded
+    values = [each.value for each in asked.values()]
+    if begins is None or profile is None or {p.name for p in profile.parameters} - set(asked):
+        return
+    if not isinstance(begins.value, (int, float)) or any(isinstance(value, Scalar) for value in values):
+        return  # a sweep varies one of them
+    unit, scale = unit_written([*asked.values(), begins], begins.unit)
+    value, _ = profile.course(SimpleNamespace(**{name: each.value for name, each in asked.items()}), 0.0)
+    if apart(value, begins.value):
+        places = [each.origin.place for each in asked.values() if each.origin.place is not None]
+        also = [] if begins.origin.place is None else [Label(begins.origin.place, "the joint begins here")]
+        scope.complaints.remark(
+            "D169",
+            f"the command of joint `{use.joint}` begins at {value / scale:g} {unit}, and the joint at "
+            f"{begins.value / scale:g} {unit}: it jumps",
+            places[0] if places else use.place,
+            also=also,
+            help=f"write `{use.joint}.q = {value / scale:.12g} {unit};` in `initial`, or begin the command elsewhere",
+        )
+
+
+def apart(a: Any, b: Any) -> Any:
+    """Whether two positions, or two arrays of them, are more than rounding apart."""
+    return np.abs(a - b) > APART + DIGITS * np.maximum(np.abs(a), np.abs(b))
+
+
+def unit_written(found: Iterable[Settled], wanted: str) -> tuple[str, float]:
+    """The unit that the deck wrote first of the dimension of `wanted`, and its size; `wanted`, in SI, where none is."""
+    dimension = units.parse_unit(wanted).dimension
+    for each in found:
+        written = each.expression.unit if isinstance(each.expression, (Number, WithUnit)) else None
+        if written is not None and measure_of(written).dimension == dimension:
+            return written.text, measure_of(written).scale
+    return wanted, 1.0
+
+
+def fixed_rate(
+    scope: Scope, owner: Owner, item: Item, label: str, name: str = "rate", *, continuous: bool = False
+) -> Rate | None:
+    """A rate in Hz, which no sweep can vary; `CONTINUOUS` Hz where it may be `continuous`, and is."""
+    if word_of(item.value) == "continuous" and not isinstance(item.value, Call):
+        place = place_of(item.value or Name((), item.place))
+        if continuous:
+            return Rate(label, CONTINUOUS, place)
+        scope.complaints.error(
+            "D106", f"`{name}` cannot be continuous: only the law of a servo can", place, help="write a rate in Hz"
+        )
+        return None
+    wanted = replace(RATE, name=name)
+    hz = scope.constant(owner, wanted, item)
+    place = place_of(item.value) if item.value is not None else item.place
+    return Rate(label, hz, place) if hz is not None and SLOWEST <= hz <= FASTEST else None
+
+
+def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Place) -> Command | None:
+    known = ", ".join(f"{kind}(...)" for kind in servo.commands)
+    if item is None:
+        if servo.commands:
+            scope.complaints.missing(
+                owner.place,
+                ("command",),
+                "D149",
+                f"{owner.label} has no command",
+                used,
+                help=[
+                    f"write `command = {servo.commands[0]}(...);`, in the definition or for this joint",
+                    f"{servo.name} takes {known}",
+                ],
+            )
+        return None
+    call = item.value
+    place = place_of(call) if call is not None else item.place
+    if not servo.commands:
+        scope.complaints.error("D150", f"the model `{servo.name}` takes no command", place, help="leave `command` out")
+        return None
+    word = word_of(call)
+    if word is not None and word not in COMMAND_UNIT and word in models.available("command"):
+        kind = "position" if "position" in servo.commands else servo.commands[0]
+        scope.complaints.error(
+            "D152",
+            f"`{word}` is a course in time, and a command is of a kind",
+            place,
+            help=[f"write `{kind}({word}(...))`", f"{servo.name} takes {known}"],
+        )
+        return None
+    if not isinstance(call, Call) or item.body is not None or len(call.positional) != 1:
+        first = servo.commands[0]
+        scope.complaints.error(
+            "D151",
+            "a command is its kind and one value or course in time",
+            place,
+            help=f"{servo.name} takes {known}: `{first}({ASKED[owner.joint][first]})` or `{first}(step(to = ...))`",
+        )
+        return None
+    kind = call.name.text
+    if kind not in servo.commands:
+        scope.complaints.error(
+            "D152",
+            f"the model `{servo.name}` takes no command `{kind}`",
+            call.name.place,
+            help=[*did_you_mean(kind, servo.commands), f"it takes {known}"],
+        )
+        return None
+    if isinstance(call.positional[0], Name) and scope.guides:
+        guide = call.positional[0].text
+        if guide in scope.guides:
+            return Command(kind, "", guide)
+        _check_known(scope, call.positional[0])
+    inner = _asked(scope, call)
+    told = f"the command of {owner.label}"
+    spot = replace(
+        owner,
+        label=told,
+        called=told,
+        place=place,
+        path=f"{owner.path}.command",
+        local="command",
+        homes=item.homes,
+        command=kind,
+    )
+    assert kind in COMMAND_UNIT
+    value = replace(item, name="command")
+    model = use_course(scope, spot, inner, value, doc=f"{kind} asked", column=owner.path.removesuffix(".servo"))
+    return None if model is None else Command(kind, model)
+
+
+def use_course(
+    scope: Scope,
+    spot: Owner,
+    inner: Expression,
+    item: Item,
+    *,
+    doc: str,
+    column: str,
+    kind: str = "joint",
+    body: Block | None = None,
+) -> str | None:
+    """A value, or a course in time, entered in the scope under the path of `spot`: its model; None where there is none.
+
+    item    the entry that says it, whose expression is, or holds, `inner`;  body: what of the course is written apart
+    doc     what a value means;  column: of a CSV file, unless one is named: the name of the joint, or what `kind` says
+    """
+    name = word_of(inner) if isinstance(inner, Call) else None
+    if name is None or name in ("sqrt", "sin", "cos", "min", "max"):
+        constant = models.find_own("command")["constant"]
+        (value,) = constant.parameters
+        scope.number(spot, replace(value, doc=doc), item, expression=inner)
+        return "constant"
+    assert isinstance(inner, Call)
+    profile = find_model(scope, "command", name, inner.name.place)
+    if profile is None:
+        return None
+    inner = with_file_named(inner) if profile.from_file else inner
+    if refuse_values(scope, inner, [p.name for p in profile.written]):
+        return None
+    _, named = open_call(inner, None, scope.complaints)
+    inside = {
+        key: replace(part, homes=item.homes, overrides=item.overrides) for key, part in (named or Block()).items.items()
+    }
+    apart = body or Block()
+    opened = replace(
+        apart,
+        items=inside | dict(apart.items),
+        statements=(*(named or Block()).statements, *apart.statements),
+        pending=(*(named or Block()).pending, *apart.pending),
+    )
+    course = replace(spot, label=f"`{name}`", called=None, place=inner.name.place, call=True)
+    if profile.from_file:
+        use_file(scope, course, profile, opened, column, kind)
+        return profile.name
+    use_model(scope, course, profile.parameters, opened)
+    return profile.name
+
+
+def _asked(scope: Scope, command: Call) -> Expression:
+    """What the command is about: the name of a course alone is that course with nothing written. Raises Problem."""
+    inner = command.positional[0]
+    if isinstance(inner, String):
+        raise Problem(
+            error(
+                "D151",
+                "a command is about a value or a course in time, and this is text",
+                inner.place,
+                help=f"write `{command.name.text}(trajectory(...))` for a column of a CSV file",
+            )
+        )
+    return course_named(scope, inner)
+
+
+def course_named(scope: Scope, inner: Expression) -> Expression:
+    """The name of a course alone, and of nothing else, is that course with nothing written."""
+    if isinstance(inner, Name) and inner.text in models.available("command") and not scope.names.knows(inner.text):
+        return Call(inner, (), (), None, inner.place)
+    return inner
+
+
+def _check_known(scope: Scope, inner: Name) -> None:
+    """Raises Problem D278 for the name of nothing, where guides are what a command may follow too."""
+    if len(inner.path) > 1 or scope.names.knows(inner.text) or inner.text in models.available("command"):
+        return
+    raise Problem(
+        error(
+            "D278",
+            f"no guide, value or course in time `{inner.text}`",
+            inner.place,
+            help=[
+                *did_you_mean(inner.text, [*scope.guides, *scope.definitions.lets]),
+                known_words("guides of this run", scope.guides),
+            ],
+        )
+    )
+
+
+def _is_guide(scope: Scope, inner: Expression) -> bool:
+    """Whether this names a guide of one of the deck's runs."""
+    runs = [scope.definitions.block(run) for run in scope.definitions.of_kind("run").values()]
+    return any(run is not None and run.get(f"guide {word_of(inner)}") is not None for run in runs)
+
+
+def check_servo_definition(scope: Scope, name: str) -> None:
+    """What can be told of a definition that no run uses: its model and its keys."""
+    definition = scope.definitions.of_kind("servo")[name]
+    block = scope.definitions.block(definition)
+    if block is None:
+        return
+    with scope.complaints.gather():
+        model = block.get("model")
+        owner = Owner(f"servo `{name}`", definition.place, "")
+        if model is None:
+            return
+        servo = find_bare_model(scope, "servo", model, BESIDE)
+        for sensor in block.of_kind("sensor"):
+            if sensor.value is not None:
+                find_model(scope, "sensor", word_of(sensor.value), place_of(sensor.value))
+        block = without_sensors(block)
+        if servo is not None:
+            known = [*(p.name for p in servo.parameters), *NOT_PARAMETERS]
+            check_keys(scope, block, known, owner)
+            command = block.get("command")
+            if (
+                command is not None
+                and isinstance(command.value, Call)
+                and len(command.value.positional) == 1
+                and command.value.name.text in COMMAND_UNIT
+            ):
+                inner = _asked(scope, command.value)
+                if not isinstance(inner, Call) and not _is_guide(scope, inner):
+                    scope.names.evaluate(inner)
+            words = {p.name: p for p in servo.parameters if p.shape == "word"}
+            for key, item in block.items.items():
+                if key in NOT_PARAMETERS or key not in known or item.value is None:
+                    continue
+                if key in words:
+                    scope.word(owner, words[key], item)
+                    continue
+                try:
+                    scope.written(item)
+                except Problem as problem:
+                    if not (isinstance(item.value, Name) and servo.parameters):
+                        scope.complaints.add(*problem.diagnostics)

@@ -1,0 +1,64 @@
+"""What of a run ticks besides servos: guides and sensors of links. How often, and that it is at instants."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from ic.meaning.control.schedule import CONTINUOUS, Rate
+from ic.meaning.parameters.scope import Scope
+from met.diagnostic import Label, Place
+
+
+class Ticking(Protocol):
+    """A guide or a sensor of the run.
+
+    label     in words: "guide `tip`";  kind: "guide";  path: of its parameters
+    does      what it does at its ticks: "ticks", "reads"
+    code      of what is wrong with its rate
+    rate      as it says; None: that of the servos
+    ticks     whether it has a computer
+    """
+
+    @property
+    def label(self) -> str: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def path(self) -> str: ...
+    @property
+    def does(self) -> str: ...
+    @property
+    def code(self) -> str: ...
+    @property
+    def rate(self) -> Rate | None: ...
+    @property
+    def ticks(self) -> bool: ...
+    @property
+    def place(self) -> Place: ...
+
+
+def rate_of(scope: Scope, each: Ticking, shared: Rate | None) -> Rate | None:
+    """How often it ticks: as it says, else as the servos do; None where that is nothing, which was told."""
+    found = each.rate or shared
+    if found is None or found.hz == CONTINUOUS:
+        told = "the servos are continuous" if found is not None else "the run has no rate of the servos"
+        scope.complaints.error(
+            each.code,
+            f"{each.label} has no rate, and {told}",
+            each.place,
+            help=f"write `rate = 100 Hz;` in the {each.kind}",
+        )
+        return None
+    return found
+
+
+def check_instants(scope: Scope, each: Ticking, divisor: int, dynamics: int, rate: Rate, step: Rate) -> None:
+    """It ticks at instants of the dynamics: it sees the arm as it is there."""
+    if divisor % dynamics:
+        scope.complaints.error(
+            each.code,
+            f"{each.label} {each.does} at {rate.hz:g} Hz, between the steps of the dynamics",
+            rate.place,
+            also=[Label(step.place, f"{step.hz:g} Hz")],
+            help=f"give the {each.kind} a `rate` that divides {step.hz:g} Hz, or quicken the dynamics",
+        )

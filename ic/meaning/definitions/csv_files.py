@@ -1,0 +1,292 @@
+"""CSV files that a deck names: found, read once, looked into column by column; every fault placed in the file.
+
+    # what stands here is for the reader
+    time [s], shoulder [deg], elbow [deg]
+    0,        0,              10
+
+The first line that is neither empty nor begins with `#` names the columns, each with its unit in square brackets.
+Commas part them; spaces around a cell do not count, nor do double quotes around all of it. A line has as many cells as
+the first. UTF-8, with or without a byte order mark, lines ended in any of the three ways.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Iterable, Iterator
+
+from ic.grammar.syntax import Deck
+from ic.language.unit_words import in_degrees
+from ic.named_files import NamedFiles
+from ic.text.complaints import known_words
+from ic.text.limits import MOST_CSV_BYTES, MOST_CSV_ROWS
+from met import units
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.frozen import frozen
+from met.other_units import suggest
+from met.units import PURE, Dimension, Measure
+
+LONGEST_NAME = 40  # characters of a column's name that a message shows
+
+_HEADER = re.compile(r"(?P<name>[^\[\]]*)(?:\[(?P<unit>[^\[\]]*)\])?")  # spaces are cut off later, not tried here
+_WORD = re.compile(r"[^\W\d]\w*")
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+
+
+@frozen
+class Column:
+    """A column as its head names it: number, name, unit as written (None where there is none), place of its head."""
+
+    number: int
+    name: str
+    unit: str | None
+    place: Place
+
+
+@frozen
+class Table:
+    """A file's columns, and its rows as written: number of the line (from 1) and its text."""
+
+    file: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[int, str], ...]
+
+    def column(self, name: str) -> Column | None:
+        return next((column for column in self.columns if column.name == name), None)
+
+    def numbers(self, column: Column, text: str, dimension: Dimension, label: Label) -> tuple[float, ...]:
+        """The column in SI. text, dimension: the unit that is wanted; label: who wants it.
+
+        Raises Problem D193 for its unit, D194 for a cell that is no number.
+        """
+        return self._numbers(column, _measure(column, text, dimension, label))
+
+    def quantities(self, column: Column) -> tuple[tuple[float, ...], Measure]:
+        """The column in SI, and what its own unit means. Raises Problem D193, D194."""
+        measure = units.ONE if column.unit is None else _meaning(column, "", ())
+        return self._numbers(column, measure), measure
+
+    def words(self, column: Column) -> list[tuple[str, Place]] | None:
+        """The column's cells and their places, where they are words and it has no unit; None where they are numbers.
+
+        Raises Problem D194 for a cell that is no word below one that is.
+        """
+        cells = [(_stripped(row.split(",")[column.number])[0], line, row) for line, row in self.rows]
+        if column.unit is not None or not cells or not _WORD.fullmatch(cells[0][0]):
+            return None
+        first = Label(self._cell(*cells[0][1:], column.number), "this column begins with one")
+        for cell, line, row in cells:
+            if not _WORD.fullmatch(cell):
+                raise Problem(
+                    error(
+                        "D194",
+                        f"`{cell[:40]}` is no word" if cell else "there is no word here",
+                        self._cell(line, row, column.number),
+                        also=[first],
+                        help="a column without a unit holds words, or pure numbers",
+                    )
+                )
+        return [(cell, self._cell(line, row, column.number)) for cell, line, row in cells]
+
+    def _numbers(self, column: Column, measure: Measure) -> tuple[float, ...]:
+        made = []
+        for line, row in self.rows:
+            cell = _stripped(row.split(",")[column.number])[0]
+            number = measure.to_si(float(cell), cell) if _NUMBER.fullmatch(cell) else math.inf
+            lost = number == 0.0 and any(digit in "123456789" for digit in cell.lower().partition("e")[0])
+            if lost or not math.isfinite(number):
+                found = f"`{cell[:40]}` is not a number" if cell else "there is no number here"
+                if _NUMBER.fullmatch(cell):
+                    found = "this number is too large: the largest is 1.8e308"
+                if lost:
+                    found = "this number is too small: it would become 0"
+                raise Problem(
+                    error(
+                        "D194",
+                        found,
+                        self._cell(line, row, column.number),
+                        also=[Label(column.place, f"column `{column.name}`")],
+                        help="a number is written as 12.5 or -1e-3, with a point and without a unit",
+                    )
+                )
+            made.append(number)
+        return tuple(made)
+
+    def rising(self, column: Column, times: tuple[float, ...]) -> None:
+        """Raises Problem D195 where the column's numbers, its times, do not rise."""
+        for n, (before, after) in enumerate(itertools.pairwise(times)):
+            if not before < after:
+                line, row = self.rows[n + 1]
+                raise Problem(
+                    error(
+                        "D195",
+                        f"times of a file rise, and {after:g} s follows {before:g} s",
+                        self._cell(line, row, column.number),
+                        also=[Label(self._cell(*self.rows[n], column.number), "the row before")],
+                        help="sort the rows; for a jump, two times close together",
+                    )
+                )
+
+    def _cell(self, line: int, row: str, number: int) -> Place:
+        cells = row.split(",")
+        text, gap = _stripped(cells[number])
+        start = sum(len(cell) + 1 for cell in cells[:number]) + gap
+        return Place(self.file, line, start + 1, max(len(text), 1))
+
+
+def csv_files(deck: Deck) -> NamedFiles[Table]:
+    """The CSV files that a deck names."""
+    return NamedFiles(deck, _table, kind="CSV file", ending=".csv", most=MOST_CSV_BYTES, missing="D190")
+
+
+def _table(file: str, text: str) -> Table:
+    lines = text.split("\n")
+    rows = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
+    if not rows:
+        raise Problem(
+            error(
+                "D191",
+                f"`{file}` is empty",
+                Place(file, 1, 1),
+                help="its first line names the columns, as in `time [s], shoulder [deg]`",
+            )
+        )
+    if len(rows) > MOST_CSV_ROWS + 1:
+        raise Problem(
+            error(
+                "D018",
+                f"a CSV file has at most {MOST_CSV_ROWS} rows",
+                Place(file, rows[MOST_CSV_ROWS + 1][0], 1),
+                help="thin them out, or split the file",
+            )
+        )
+    head = rows.pop(0)
+    columns = tuple(_columns(file, *head))
+    for line, row in rows:
+        if row.count(",") + 1 != len(columns):
+            count = row.count(",") + 1
+            raise Problem(
+                error(
+                    "D197",
+                    f"this row has {count} {'cell' if count == 1 else 'cells'}, and the first line names "
+                    f"{len(columns)} columns",
+                    Place(file, line, 1, max(len(row), 1)),
+                    also=[Label(Place(file, head[0], 1, len(head[1])), "the columns")],
+                    help="commas part the cells, and a number has a decimal point",
+                )
+            )
+    return Table(file, columns, tuple(rows))
+
+
+def _columns(file: str, line: int, row: str) -> Iterator[Column]:
+    if all(_NUMBER.fullmatch(_stripped(cell)[0]) for cell in row.split(",")):
+        raise Problem(
+            error(
+                "D191",
+                "the first line names no columns: it holds numbers",
+                Place(file, line, 1, max(len(row), 1)),
+                help="put a line above them, as in `time [s], shoulder [deg]`",
+            )
+        )
+    seen: dict[str, Place] = {}
+    start = 0
+    for number, cell in enumerate(row.split(",")):
+        text, gap = _stripped(cell)
+        place = Place(file, line, start + gap + 1, max(len(text), 1))
+        start += len(cell) + 1
+        match = _HEADER.fullmatch(text)
+        name, unit = (match["name"].strip(), (match["unit"] or "").strip()) if match is not None else ("", "")
+        if not name:
+            helps = ["write the unit in square brackets behind the name, as in `shoulder [deg]`"]
+            if number == 0 and "," not in row and re.search(r"[;\t]", row):
+                helps = ["commas part the columns, as in `time [s], shoulder [deg]`"]
+            raise Problem(
+                error(
+                    "D191",
+                    f"`{text[:40]}` does not name a column" if text else "a column without a name",
+                    place,
+                    help=helps,
+                )
+            )
+        if name in seen:
+            raise Problem(
+                error(
+                    "D198",
+                    f"column `{name}` is there twice",
+                    place,
+                    also=[Label(seen[name], "first")],
+                    help="give one of them another name",
+                )
+            )
+        seen[name] = place
+        yield Column(number, name, unit or None, place)
+
+
+def _stripped(cell: str) -> tuple[str, int]:
+    """A cell without the spaces and quotes around it, and how many characters those are before it."""
+    text = cell.strip()
+    gap = len(cell) - len(cell.lstrip()) if text else 0
+    if len(text) > 1 and text[0] == text[-1] == '"':
+        inner = text[1:-1]
+        return inner.strip(), gap + 1 + len(inner) - len(inner.lstrip())
+    return text, gap
+
+
+def _measure(column: Column, text: str, dimension: Dimension, label: Label) -> Measure:
+    """What the column's unit means. Raises Problem D193 where it has none, or another than is wanted."""
+    shown = " or ".join(f"`{column.name} [{each}]`" for each in in_degrees(text))
+    if column.unit is None:
+        if dimension == PURE:
+            return units.ONE
+        raise Problem(
+            error("D193", f"column `{column.name}` has no unit", column.place, also=[label], help=f"write {shown}")
+        )
+    measure = _meaning(column, f"write {shown}", [label], dimension)
+    if not units.same(measure.dimension, dimension):
+        found = "a pure number" if measure.dimension == PURE else f"in {units.text(measure.dimension)}"
+        raise Problem(
+            error(
+                "D193",
+                f"column `{column.name}` is {found}, and {text} is needed",
+                column.place,
+                also=[label],
+                help=f"write {shown}, with numbers in that unit",
+            )
+        )
+    return measure
+
+
+def _meaning(column: Column, remedy: str, also: Iterable[Label], dimension: Dimension | None = None) -> Measure:
+    """What the column's unit means. remedy: where no unit like it is known; dimension: the one that is needed."""
+    assert column.unit is not None
+    try:
+        return units.parse_unit(column.unit)
+    except (ValueError, OverflowError, ZeroDivisionError):
+        near = suggest(column.unit)
+        if near is not None and (dimension is None or units.same(units.parse_unit(near).dimension, dimension)):
+            remedy = f"did you mean `{column.name} [{near}]`?"
+        known = remedy or f"the units: {', '.join(units.UNITS)}"
+        raise Problem(error("D193", f"`{column.unit}` is not a unit", column.place, also=also, help=known)) from None
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= LONGEST_NAME else name[:LONGEST_NAME] + "..."
+
+
+def missing_column(table: Table, name: str, place: Place, why: str = "") -> Problem:
+    """Says that a file has no column of this name, which is asked for at this place. why: in words, it is needed."""
+    names = [_short(column.name) for column in table.columns]
+    round_brackets = next((each for each in names if each.startswith(f"{name} (") and each.endswith(")")), None)
+    near = did_you_mean(name, names)
+    if round_brackets is not None:
+        near = (f"a unit stands in square brackets: write `{name} [{round_brackets[len(name) + 2 : -1]}]`",)
+    return Problem(
+        error(
+            "D192",
+            f"`{table.file}` has no column `{name}`",
+            place,
+            also=[Label(table.columns[0].place, "its first line")],
+            help=[*near, known_words("columns", names), *([why] if why else [])],
+        )
+    )

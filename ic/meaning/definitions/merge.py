@@ -1,0 +1,365 @@
+"""Blocks merged: what a base has with what is written upon it, each entry with its history.
+
+An entry with a kind (`metric settle = ...`, `link upper { ... }`) adds; one without overrides what the base has under
+that name. `+=` appends, `remove` takes away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import field, replace
+
+from ic.grammar.syntax import Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
+from ic.text.complaints import Complaints, known_words
+from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error, meant
+from met.frozen import frozen
+
+
+@frozen
+class Item:
+    """One entry of a merged block.
+
+    kind       the word that added it ("link", "metric"); "" for a plain key
+    detail     words after the name (`revolute`)
+    value      what stands after `=`; None for a block. A call's named arguments and body are in `body`
+    overrides  places of what it replaced, latest first
+    homes      definitions under whose names this entry is reached: the one that wrote it and those that took it over
+    """
+
+    kind: str
+    name: str
+    detail: tuple[Word, ...]
+    value: Expression | None
+    body: Block | None
+    place: Place
+    overrides: tuple[Place, ...] = ()
+    appended: tuple[Expression, ...] = ()
+    homes: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> str:
+        return f"{self.kind} {self.name}" if self.kind else self.name
+
+
+@frozen
+class Removed:
+    """What was taken away: its key, how many statements stood before its `remove`, and where that is written."""
+
+    key: str
+    before: int
+    place: Place
+
+
+@frozen
+class Block:
+    """Merged entries by key ("kind name", or the name of a plain key), in order, and statements such as `require`.
+
+    pending  in a block upon a name: each `remove` of what the block itself does not have, for `overlay`
+    """
+
+    items: Mapping[str, Item] = field(default_factory=dict)
+    statements: tuple[Statement, ...] = ()
+    removed: tuple[Removed, ...] = ()
+    pending: tuple[Statement, ...] = ()
+
+    def of_kind(self, kind: str) -> Iterator[Item]:
+        return (item for item in self.items.values() if item.kind == kind)
+
+    def get(self, key: str) -> Item | None:
+        return self.items.get(key)
+
+
+def merge(
+    base: Block | None,
+    body: tuple[Entry, ...],
+    *,
+    home: str | None,
+    base_name: str | None,
+    complaints: Complaints,
+    upon_name: bool = False,
+) -> Block:
+    """The base's entries with `body` upon them.
+
+    home       name of the definition that writes `body`; None for a use, whose entries no definition's path reaches
+    base_name  what to call the base in messages; None where there is none
+    upon_name  the body stands behind the name of a definition or a model (`j = drive { ... }`): what it removes may be
+               the definition's, which is not known here
+    """
+    merger = _Merger(base or Block(), home, base_name, complaints, upon_name)
+    for entry in body:
+        with complaints.gather():
+            merger.enter(entry)
+    return Block(merger.items, tuple(merger.statements), tuple(merger.removed), tuple(merger.pending))
+
+
+class _Merger:
+    def __init__(
+        self, base: Block, home: str | None, base_name: str | None, complaints: Complaints, upon_name: bool
+    ) -> None:
+        homes = (home,) if home else ()
+        self.home, self.base_name, self.complaints = homes, base_name, complaints
+        self.items = {key: _taken_over(item, homes) for key, item in base.items.items()}
+        self.statements = list(base.statements)
+        self.removed = list(base.removed)
+        self.upon_name, self.pending = upon_name, list(base.pending)
+        self.names: dict[str, list[str]] = {}
+        for key, item in self.items.items():
+            self.names.setdefault(item.name, []).append(key)
+        self.written: dict[str, Place] = {}
+
+    def enter(self, entry: Entry) -> None:
+        if isinstance(entry, Let):
+            raise Problem(
+                error(
+                    "D051",
+                    "`let` stands inside a definition",
+                    entry.place,
+                    help="move it out: a `let` belongs to the whole deck",
+                )
+            )
+        if isinstance(entry, Statement):
+            if entry.words[0].text == "remove":
+                self._remove(entry)
+            else:
+                self.statements.append(entry)
+            return
+        if isinstance(entry, Setting):
+            words, name = entry.words, ".".join(word.text for word in entry.path)
+        else:
+            if entry.like is not None or entry.of is not None or entry.made_from is not None:
+                raise Problem(
+                    error(
+                        "D052",
+                        "`like`, `of` and `from` belong to definitions, not to the blocks inside",
+                        entry.place,
+                        help="write the whole block, without it; a macro (`#define`) holds what blocks have in common",
+                    )
+                )
+            words, name = entry.words[:-1][:1], entry.words[min(1, len(entry.words) - 1)].text
+        detail = entry.words[2:]
+        if isinstance(entry, Setting) and len(words) > 1:  # `metric top fast = ...`: named as a block would be
+            name, detail = words[1].text, (*words[2:], *entry.path)
+        kind = words[0].text if words else ""
+        if isinstance(entry, Setting) and entry.operator == "+=":
+            self._append(entry, name)
+            return
+        earlier = self._earlier(kind, name, entry.place)
+        key = earlier.key if earlier else (f"{kind} {name}" if kind else name)
+        if key in self.written:
+            raise Problem(twice(kind, name, entry.place, self.written[key]))
+        if kind and earlier:
+            raise Problem(
+                error(
+                    "D053",
+                    f"{kind} `{name}` is in {self.base_name or 'the base'} already",
+                    entry.place,
+                    also=[Label(earlier.place, "here")],
+                    help=[
+                        f"leave out the word `{kind}` to change it",
+                        f"`remove {name};` first, to put another in its place",
+                    ],
+                )
+            )
+        self.written[key] = entry.place
+        self.names.setdefault(name, []).append(key) if earlier is None else None
+        self.items[key] = self._made(entry, kind, name, detail, earlier)
+
+    def _made(
+        self, entry: Setting | Group, kind: str, name: str, detail: tuple[Word, ...], earlier: Item | None
+    ) -> Item:
+        if isinstance(entry, Setting):
+            value, body = open_call(entry.value, self.home[0] if self.home else None, self.complaints)
+            if earlier is None:
+                return Item(kind, name, detail, value, body, entry.place, homes=self.home)
+            return Item(
+                earlier.kind,
+                name,
+                earlier.detail,
+                value,
+                body,
+                entry.place,
+                (earlier.place, *earlier.overrides),
+                homes=self.home,
+            )
+        if earlier is not None and earlier.body is None and not isinstance(earlier.value, (Call, Name)):
+            raise Problem(
+                error(
+                    "D054",
+                    f"`{name}` is a value, not a block",
+                    entry.place,
+                    also=[Label(earlier.place, "written here")],
+                    help=f"write `{name} = ...;`",
+                )
+            )
+        body = merge(
+            earlier.body if earlier else None,
+            entry.body,
+            home=self.home[0] if self.home else None,
+            base_name=f"`{name}`" if earlier else None,
+            complaints=self.complaints,
+            upon_name=self.upon_name or (earlier is not None and isinstance(earlier.value, (Call, Name))),
+        )
+        if earlier is None:
+            return Item(kind, name, detail, None, body, entry.place, homes=self.home)
+        return replace(earlier, body=body, detail=detail or earlier.detail)
+
+    def _earlier(self, kind: str, name: str, place: Place) -> Item | None:
+        if kind:
+            return self.items.get(f"{kind} {name}")
+        if name in self.items:
+            return self.items[name]
+        keys = self.names.get(name, [])
+        if len(keys) > 1:
+            both = [self.items[key] for key in keys]
+            raise Problem(
+                error(
+                    "D055",
+                    f"`{name}` may be " + " or ".join(f"the {item.kind} `{name}`" for item in both),
+                    place,
+                    also=[Label(item.place, item.kind) for item in both],
+                    help="give them different names in the base",
+                )
+            )
+        return self.items[keys[0]] if keys else None
+
+    def _append(self, entry: Setting, name: str) -> None:
+        earlier = self._earlier("", name, entry.place)
+        if earlier is None or earlier.value is None:
+            lists = [item.name for item in self.items.values() if item.value is not None]
+            raise Problem(
+                error(
+                    "D056",
+                    f"nothing is in `{name}` yet to append to",
+                    entry.place,
+                    help=did_you_mean(name, lists) or f"write `{name} = ...;`",
+                )
+            )
+        self.items[earlier.key] = replace(earlier, appended=(*earlier.appended, entry.value))
+
+    def _remove(self, entry: Statement) -> None:
+        if not isinstance(entry.value, Name) or len(entry.words) > 1:
+            meant = entry.value.text if isinstance(entry.value, Name) else "NAME"
+            raise Problem(
+                error("D057", "`remove` takes a name, and nothing else", entry.place, help=f"write `remove {meant};`")
+            )
+        name = entry.value.text
+        earlier = self._earlier("", name, entry.value.place)
+        if earlier is None:
+            if not self.upon_name:
+                raise Problem(_nothing(entry, self.items))
+            self.pending.append(entry)
+            return
+        del self.items[earlier.key]
+        self.names[name].remove(earlier.key)
+        self.written.pop(earlier.key, None)
+        self.removed.append(Removed(earlier.key, len(self.statements), entry.place))
+        if self.upon_name and not earlier.kind:  # it was written over the definition's, which goes too
+            self.pending.append(entry)
+
+
+def _meant(entry: Statement) -> Name:
+    """What a `remove` names."""
+    assert isinstance(entry.value, Name)
+    return entry.value
+
+
+def _nothing(entry: Statement, items: Mapping[str, Item]) -> Diagnostic:
+    """Says of a `remove` that there is nothing of its name."""
+    name, known = _meant(entry), [item.name for item in items.values()]
+    return error(
+        "D058",
+        f"nothing named `{name.text}` to remove",
+        name.place,
+        help=[*did_you_mean(name.text, known), known_words("there is", known)],
+    )
+
+
+def overlay(base: Block, over: Block, complaints: Complaints) -> Block:
+    """The base's entries with those of a use upon them, which no definition's path reaches. What the use removes goes
+    first, so that it may put another in its place."""
+    items, removed = dict(base.items), list(base.removed)
+    for entry in over.pending:
+        named = _of_name(items, _meant(entry).text)
+        if named is not None:
+            del items[named.key]
+            removed.append(Removed(named.key, len(base.statements), entry.place))
+        elif not any(each.key == _meant(entry).text for each in over.removed):
+            complaints.add(_nothing(entry, items))
+    for item in over.items.values():
+        earlier = items.get(item.key) if item.kind else _of_name(items, item.name)
+        if earlier is None:
+            items[item.key] = replace(item, homes=())
+        elif item.value is None and item.body is not None:
+            items[earlier.key] = replace(earlier, body=overlay(earlier.body or Block(), item.body, complaints))
+        else:
+            overrides = (*item.overrides, earlier.place, *earlier.overrides)
+            items[earlier.key] = replace(item, kind=earlier.kind, homes=(), overrides=overrides)
+    removed += (replace(each, before=len(base.statements) + each.before) for each in over.removed)
+    return Block(items, (*base.statements, *over.statements), tuple(removed))
+
+
+def _of_name(items: Mapping[str, Item], name: str) -> Item | None:
+    """The plain entry of a name, else the one that was added with a kind."""
+    return items.get(name) or next((item for item in items.values() if item.name == name), None)
+
+
+def as_meant(block: Block, keys: Iterable[str], kinds: Iterable[str]) -> Block:
+    """The block with entries that nobody knows, which is told, under the names that are meant: what is in them is
+    looked at, too, and nothing is missing besides.
+
+    keys, kinds  what the block may have; an entry that it has stays
+    """
+    items: dict[str, Item] = {}
+    keys, kinds, names = tuple(keys), tuple(kinds), [item.name for item in block.items.values() if item.kind]
+    for key, item in block.items.items():
+        near = None
+        if item.kind and item.kind not in kinds:
+            near = meant(item.kind, kinds)
+            item = replace(item, kind=near) if near is not None else item
+        elif not item.kind and item.name not in keys and "." not in item.name:
+            near = meant(item.name, (*keys, *names))
+            near = near if near in keys else None
+            item = replace(item, name=near) if near is not None else item
+        if near is None or item.key in block.items or item.key in items:
+            items[key] = block.items[key]
+        else:
+            items[item.key] = item
+    return replace(block, items=items)
+
+
+def refuse_pending(block: Block, complaints: Complaints) -> None:
+    """Tells each `remove` of a block upon a name that turned out to have no entries of its own, such as a model's."""
+    for entry in block.pending:
+        complaints.add(_nothing(entry, block.items))
+
+
+def open_call(value: Expression, home: str | None, complaints: Complaints) -> tuple[Expression, Block | None]:
+    """A call's named arguments and body as a block, so that they can be overridden one by one."""
+    if not isinstance(value, Call) or (value.body is None and not value.named):
+        return value, None
+    named = tuple(Setting((), (word,), "=", inner, word.place) for word, inner in value.named)
+    block = merge(None, (*named, *(value.body or ())), home=home, base_name=None, complaints=complaints, upon_name=True)
+    return Call(value.name, value.positional, (), None, value.place), block
+
+
+def _taken_over(item: Item, homes: tuple[str, ...]) -> Item:
+    """The item of a base, now reached under the name of the definition that took it over too."""
+    if not homes:
+        return item
+    body = item.body
+    if body is not None:
+        body = replace(body, items={key: _taken_over(inner, homes) for key, inner in body.items.items()})
+    return replace(item, body=body, homes=(*(h for h in item.homes if h not in homes), *homes))
+
+
+def twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnostic:
+    what = f"{kind} `{name}`" if kind else f"`{name}`"
+    helps = ["remove one of the two"]
+    if (place.file, place.line, place.column) == (earlier.file, earlier.line, earlier.column):
+        helps = ["its file is included twice: begin that file with `#pragma once`"]
+        if place.expansions and place.expansions != earlier.expansions:
+            helps = [
+                f"macro `{place.expansions[-1].macro}` is used twice here: give it the name as an argument, "
+                "another one each time, or use it once"
+            ]
+    return error("D040", f"{what} is written twice", Label(place, "again"), also=[Label(earlier, "first")], help=helps)

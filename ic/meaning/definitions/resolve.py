@@ -1,0 +1,412 @@
+"""From entries as written to definitions as meant: each under its kind and name, found when it is needed.
+
+A definition refers to its base, or to the file that it is made from, and is merged with it when asked for (`merge`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+
+from ic.grammar.syntax import Binary, Call, Deck, Entry, Group, Let, Name, Setting, Word
+from ic.language import DEFINITIONS, HEADS
+from ic.meaning.definitions.csv_files import csv_files
+from ic.meaning.definitions.merge import Block, merge, twice
+from ic.robots.files import RobotFiles
+from ic.text.complaints import Complaints, an, belongs, known_words
+from ic.text.files import library_defines
+from met.diagnostic import Label, Place, Problem, did_you_mean, error, meant
+from met.frozen import frozen
+from met.render import shown_place
+
+"""What paths of a run begin with, besides joints."""
+
+
+@frozen
+class Definition:
+    """A definition as written: `default run nominal like base { ... }`.
+
+    parts: of a sweep made of others, `sweep both = gains + spread;`, which are runs and sweeps
+    upon: further entries, each put upon all that the definition writes
+    """
+
+    kind: str
+    name: str
+    group: Group
+    default: bool = False
+    parts: tuple[Name, ...] = ()
+    upon: tuple[Entry, ...] = ()
+
+    @property
+    def place(self) -> Place:
+        return self.group.place
+
+    @property
+    def home(self) -> str:
+        """What paths that reach its entries begin with; a run with choices of a sweep's in it is called after both."""
+        return self.name.partition(" ")[0]
+
+
+class Definitions:
+    """All definitions and lets of a deck, by kind and name; and the CSV and URDF files that it names."""
+
+    def __init__(self, deck: Deck, complaints: Complaints) -> None:
+        self.lets: dict[str, Let] = {}
+        self.csv_files = csv_files(deck)
+        self.robot_files = RobotFiles(deck)
+        self._by_kind: dict[str, dict[str, Definition]] = {kind: {} for kind in DEFINITIONS}
+        self._merged: dict[tuple[str, str], Block] = {}
+        self._failed: set[tuple[str, str]] = set()
+        self._meant: dict[tuple[str, str], str] = {}  # by kind and name that there is not, the name that was meant
+        self._complaints = complaints
+        self._file = deck.file
+        for entry in deck.entries:
+            try:
+                self._enter(entry)
+            except Problem as problem:
+                complaints.add(*problem.diagnostics)
+                complaints.lost(*(word.text for word in getattr(entry, "words", ())[1:]))
+        self._check_defaults()
+
+    def instead(self, *changed: Definition, lets: Sequence[Let] = ()) -> Definitions:
+        """The same definitions and lets but for these, which take the places of those of their names."""
+        if not changed and not lets:
+            return self
+        other = copy(self)
+        other.lets = {**self.lets, **{let.name.text: let for let in lets}}
+        other._by_kind = {kind: dict(known) for kind, known in self._by_kind.items()}
+        other._merged, other._failed, other._meant = {}, set(), dict(self._meant)
+        for each in changed:
+            other._by_kind[each.kind][each.name] = each
+        return other
+
+    def of_kind(self, kind: str) -> Mapping[str, Definition]:
+        return self._by_kind[kind]
+
+    def find(self, kind: str, name: Word) -> Definition:
+        """The definition of this name. Raises D041 with what was probably meant."""
+        known = self._by_kind[kind]
+        if name.text in known:
+            return known[name.text]
+        for other, definitions in self._by_kind.items():
+            if name.text in definitions:
+                raise Problem(
+                    error(
+                        "D042",
+                        f"`{name.text}` is {an(other)}, and {an(kind)} is needed here",
+                        name.place,
+                        also=[Label(definitions[name.text].place, "defined here")],
+                        help=known_words(f"{kind}s of this deck", known),
+                    )
+                )
+        file = library_defines(kind, name.text)
+        include = [f"a standard deck defines it: add `#include <{file}>`"] if file else did_you_mean(name.text, known)
+        raise Problem(
+            error(
+                "D041",
+                f"no {kind} `{name.text}`",
+                name.place,
+                help=[*include, known_words(f"{kind}s of this deck", known)],
+            )
+        )
+
+    def find_or_meant(
+        self,
+        kind: str,
+        name: Word,
+        complaints: Complaints,
+        *,
+        user: Definition | None = None,
+    ) -> Definition:
+        """The definition of this name, else the one of the nearest name, which is told: then what it is used with is
+        looked at, too. Raises D041 where there is no near one.
+
+        user  what is like it, which itself is not meant
+        """
+        try:
+            return self.find(kind, name)
+        except Problem as problem:
+            known = [
+                each
+                for each in self._by_kind[kind]
+                if user is None or user.name not in self.homes(self._by_kind[kind][each])
+            ]
+            near = meant(name.text, known)
+            if near is None or any(each.code != "D041" for each in problem.diagnostics):
+                raise
+            complaints.add(*problem.diagnostics)
+            self._meant[(kind, name.text)] = near
+            return self._by_kind[kind][near]
+
+    def block(self, definition: Definition) -> Block | None:
+        """The definition merged with its bases; None where that failed (and was told)."""
+        chain: list[Definition] = []
+        at: Definition | None = definition
+        while at is not None and (at.kind, at.name) not in self._merged:
+            key = (at.kind, at.name)
+            if key in self._failed:
+                return None
+            if any(at is seen for seen in chain):
+                self._failed.update((d.kind, d.name) for d in chain)
+                loop = [*chain[next(i for i, d in enumerate(chain) if d is at) :], at]
+                self._complaints.error(
+                    "D043",
+                    f"{at.kind} `{at.name}` is like itself: " + " like ".join(f"`{d.name}`" for d in loop),
+                    at.place,
+                    also=[Label(d.place, f"`{d.name}`") for d in loop[1:-1]],
+                    help="let one of them stand alone, or be like something else",
+                )
+                return None
+            chain.append(at)
+            base = None
+            if at.group.like is not None:
+                try:
+                    base = self.find_or_meant(at.kind, _single(at.group.like), self._complaints, user=at)
+                except Problem as problem:
+                    self._complaints.add(*problem.diagnostics)
+                    self._failed.update((d.kind, d.name) for d in chain)
+                    return None
+            at = base
+        block = self._merged[(at.kind, at.name)] if at is not None else None
+        above = at
+        for each in reversed(chain):
+            base_name = f"{each.kind} `{above.name}`" if above is not None else None
+            if each.group.made_from is not None:
+                base_name = f"`{each.name}`"
+                block = self._made_from(each, each.group.made_from)
+                if block is None:
+                    self._failed.update((d.kind, d.name) for d in chain)
+                    return None
+            if above is not None:
+                self._complaints.inherits(each.place, above.place)
+            block = merge(block, each.group.body, home=each.home, base_name=base_name, complaints=self._complaints)
+            for entry in each.upon:
+                block = merge(block, (entry,), home=each.home, base_name=base_name, complaints=self._complaints)
+            self._merged[(each.kind, each.name)] = block
+            above = each
+        return block
+
+    def _made_from(self, definition: Definition, call: Call) -> Block | None:
+        """What a definition's file says, as its base; None where that failed (and was told)."""
+        with self._complaints.gather():
+            body = self.robot_files.body(call)
+            for each in self.robot_files.remarks(call):
+                self._complaints.remark(each.code, each.message, each.at, also=each.also, help=each.help)
+            return merge(None, body.entries, home=definition.name, base_name=None, complaints=self._complaints)
+        return None
+
+    def homes(self, definition: Definition) -> tuple[str, ...]:
+        """Names of the definition and its bases, outermost base first."""
+        names = [definition.name]
+        at = definition
+        while at.group.like is not None:
+            like = at.group.like.text
+            base = self._by_kind[at.kind].get(self._meant.get((at.kind, like), like))
+            if base is None or base.name in names:
+                break
+            names.append(base.name)
+            at = base
+        return tuple(reversed(names))
+
+    def _enter(self, entry: Entry) -> None:
+        if isinstance(entry, Let):
+            earlier = self.lets.get(entry.name.text)
+            if earlier is not None:
+                raise Problem(twice("let", entry.name.text, entry.name.place, earlier.name.place))
+            self.lets[entry.name.text] = entry
+        elif isinstance(entry, Group):
+            self._define(entry)
+        elif isinstance(entry, Setting) and [word.text for word in entry.words] in (["sweep"], ["default", "sweep"]):
+            self._define_sum(entry)
+        else:
+            name = entry.path[0].text if isinstance(entry, Setting) and entry.path else "..."
+            raise Problem(
+                error(
+                    "D044",
+                    "a deck holds definitions and `let`s; this is neither",
+                    entry.place,
+                    help=[
+                        f"a value: `let {name} = ...;`",
+                        "a definition: `arm`, `servo`, `run` or `sweep`, a name and a block in braces",
+                    ],
+                )
+            )
+
+    def _define(self, group: Group) -> None:
+        words = list(group.words)
+        if (
+            len(words) > 2
+            and words[1].text in DEFINITIONS
+            and meant(words[0].text, ("default",)) is not None
+            and words[0].text != "default"
+        ):
+            self._complaints.error(
+                "D045", f"no kind of definition `{words[0].text}`", words[0].place, help="did you mean `default`?"
+            )
+            words[0] = replace(words[0], text="default")
+        default = len(words) > 1 and words[0].text == "default"
+        if default:
+            words.pop(0)
+        kind = words[0]
+        lower = [word.text.lower() for word in group.words[:2]]
+        meant_kind = lower[-1] if lower[0] == "default" else lower[0]
+        if kind.text not in DEFINITIONS and meant_kind in DEFINITIONS:
+            written = f"{lower[0]} {lower[-1]}" if lower[0] == "default" else lower[0]
+            raise Problem(
+                error(
+                    "D045",
+                    f"no kind of definition `{kind.text}`",
+                    kind.place,
+                    help=f"write `{written}`: the language's words are in lower case",
+                )
+            )
+        if kind.text not in DEFINITIONS:
+            unknown = error(
+                "D045",
+                f"no kind of definition `{kind.text}`",
+                kind.place,
+                help=[*did_you_mean(kind.text, DEFINITIONS), *belongs(kind.text), "kinds: arm, servo, run, sweep"],
+            )
+            near = meant(kind.text, DEFINITIONS)
+            if near is None or len(words) != 2:
+                raise Problem(unknown)
+            self._complaints.add(unknown)  # what is in it is looked at, too
+            kind = replace(kind, text=near)
+        if len(words) == 1:
+            raise Problem(
+                error("D046", f"this {kind.text} has no name", kind.place, help=f"write `{kind.text} NAME {{ ... }}`")
+            )
+        if len(words) > 2:
+            if words[2].text in ("like", "of"):
+                raise Problem(
+                    error(
+                        "D047",
+                        f"the block of {kind.text} `{words[1].text}` is missing",
+                        words[2].place,
+                        help="write `{ ... }` behind its base, or `;` where nothing differs",
+                    )
+                )
+            raise Problem(
+                error(
+                    "D047",
+                    f"`{words[2].text}` after the name of {an(kind.text)}",
+                    words[2].place,
+                    help=f"write `{kind.text} {words[1].text} {{ ... }}`, `like BASE` before the brace",
+                )
+            )
+        if default and kind.text not in ("run", "sweep"):
+            raise Problem(
+                error(
+                    "D048",
+                    f"{an(kind.text)} cannot be the default",
+                    group.words[0].place,
+                    help="`default` marks the run or sweep that `met run` takes unless told another",
+                )
+            )
+        if (group.of is not None) != (kind.text == "sweep") or (kind.text == "sweep" and group.like is not None):
+            usage = f"sweep {words[1].text} of RUN {{ ... }}" if kind.text == "sweep" else f"{kind.text} NAME like BASE"
+            raise Problem(
+                error(
+                    "D049",
+                    "a sweep is `of` a run, other definitions are `like` another",
+                    kind.place,
+                    help=f"write `{usage}`",
+                )
+            )
+        if group.made_from is not None and kind.text != "arm":
+            raise Problem(
+                error(
+                    "D214",
+                    f"{an(kind.text)} is not made from a file",
+                    group.made_from.name.place,
+                    help="`from urdf(...)` makes an arm",
+                )
+            )
+        name = words[1]
+        if name.text in HEADS and kind.text in ("arm", "servo"):  # whose names begin paths of parameters
+            raise Problem(
+                error(
+                    "D166",
+                    f"`{name.text}` begins paths of its own, so no {kind.text} may be called so",
+                    name.place,
+                    help=f"give the {kind.text} another name",
+                )
+            )
+        self._add(Definition(kind.text, name.text, group, default))
+
+    def _define_sum(self, entry: Setting) -> None:
+        """`sweep both = gains + spread;`"""
+        if len(entry.path) > 1 or entry.operator != "=":
+            raise Problem(
+                error(
+                    "D120",
+                    "a sweep made of others is `sweep NAME = ONE + OTHER;`",
+                    entry.place,
+                    help="its name is one word, and `=` follows",
+                )
+            )
+        parts: list[Name] = []
+        at = entry.value
+        while isinstance(at, Binary) and at.operator == "+" and isinstance(at.right, Name):
+            parts.append(at.right)
+            at = at.left
+        if not isinstance(at, Name) or any(len(part.path) > 1 for part in (*parts, at)):
+            place = at.place if not isinstance(at, Binary) else at.right.place
+            raise Problem(
+                error(
+                    "D120",
+                    "a sweep is made of runs and sweeps, with `+` between them",
+                    place,
+                    help=f"write `sweep {entry.path[0].text} = ONE + OTHER;`",
+                )
+            )
+        group = Group((*entry.words, entry.path[0]), None, None, (), entry.place)
+        self._add(Definition("sweep", entry.path[0].text, group, len(entry.words) > 1, (at, *reversed(parts))))
+
+    def _add(self, definition: Definition) -> None:
+        """Enters a definition under its name, which nothing else of its kind may bear; runs and sweeps share theirs."""
+        kind, name = definition.kind, definition.group.words[-1]
+        for space in ("run", "sweep") if kind in ("run", "sweep") else (kind,):
+            if name.text in self._by_kind[space]:
+                raise Problem(twice(space, name.text, name.place, self._by_kind[space][name.text].place))
+        self._by_kind[kind][name.text] = definition
+
+    def _check_defaults(self) -> None:
+        first: dict[str, Definition] = {}  # of each file: decks that can be included together have one each
+        for each in self._defaults():
+            known = first.setdefault(each.place.file, each)
+            if known is not each:
+                self._complaints.error(
+                    "D050",
+                    f"`{each.name}` is a second default",
+                    each.place,
+                    also=[Label(known.place, "the first")],
+                    help="keep one `default`",
+                )
+
+    def _defaults(self) -> list[Definition]:
+        return [d for kind in ("run", "sweep") for d in self._by_kind[kind].values() if d.default]
+
+    def writes(self, definition: Definition) -> bool:
+        """Whether the deck itself writes a definition, and no file that it includes."""
+        return shown_place(definition.place).file == self._file
+
+    def default(self) -> Definition | None:
+        """The run or sweep marked `default`: the deck's own, else that of the one included file that has one."""
+        found = self._defaults()
+        own = [each for each in found if self.writes(each)]
+        return own[0] if own else found[0] if len({each.place.file for each in found}) == 1 else None
+
+
+def _single(name: Name) -> Word:
+    if len(name.path) > 1:
+        raise Problem(
+            error(
+                "D059",
+                f"`{name.text}` is a path; the name of a definition is needed",
+                name.place,
+                help=f"write `{name.path[0].text}`",
+            )
+        )
+    return name.path[0]

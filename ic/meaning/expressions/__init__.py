@@ -1,0 +1,1 @@
+"""Expressions to quantities in SI, the names in them, and conditions on their values."""

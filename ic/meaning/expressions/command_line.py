@@ -1,0 +1,48 @@
+"""Numbers that are given from outside of a deck, in the stead of what it writes; and how an origin says so."""
+
+from __future__ import annotations
+
+from ic.grammar.syntax import Expression, Setting
+from ic.meaning.expressions.names import Names
+from ic.meaning.expressions.values import Value
+from ic.text.lexer import COMMAND_LINE
+from met.diagnostic import Place, Problem, error
+from met.frozen import frozen
+from met.plan import Origin
+
+GIVEN = "set on the command line"
+"""The note of such an origin."""
+
+
+@frozen
+class Given:
+    """What is settled at a path in the stead of what a deck writes: its value, and the expression as written."""
+
+    path: str
+    value: Value
+    expression: Expression
+
+    def over(self, origin: Origin) -> Origin:
+        """The origin of a value that this one overrides, made its own."""
+        places = (origin.place,) if origin.place is not None else ()
+        return Origin("deck", self.value.place, (*places, *origin.overrides), GIVEN)
+
+
+def is_given(place: Place | None) -> bool:
+    """Whether it is written on the command line, but not in the body of a macro of -D."""
+    return place is not None and place.file == COMMAND_LINE and not place.expansions
+
+
+def written_origin(place: Place, overrides: tuple[Place, ...], note: str = "") -> Origin:
+    """The origin of a value that is written at a place, in the deck or outside of it."""
+    return Origin("deck", place, overrides, GIVEN if is_given(place) else note)
+
+
+def evaluated(entry: Setting, path: str, names: Names) -> Given:
+    """What is set to one number. Raises Problem where it is none."""
+    found = names.evaluate(entry.value)
+    if not isinstance(found, Value):
+        raise Problem(
+            error("D071", f"`{path}` is one number, and this is a list", found.place, help="leave the brackets out")
+        )
+    return Given(path, found, entry.value)

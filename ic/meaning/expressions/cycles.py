@@ -1,0 +1,156 @@
+"""Units that mean another angle: a hertz where radians or decays count, and the reverse. Nothing of it is an error.
+
+Hz and 1/s are one dimension, and beside metres or kilograms a radian counts as one. So `bandwidth = 5 Hz` is taken as
+5 1/s, and a volt for each hertz as a volt for each radian a second: less by 2 pi than cycles would be.
+"""
+
+from __future__ import annotations
+
+from ic.grammar.syntax import Unit
+from ic.meaning.expressions.values import Value, measure_of
+from met import units
+from met.frozen import frozen
+from met.trace import Scalar
+from met.units import Dimension, Measure
+
+_RATE = Dimension(s=-1)
+_FLUX = units.parse_unit("V*s").dimension  # of a motor's constant: V*s/rad and N*m/A are one thing
+
+
+@frozen
+class Doubt:
+    """What a value is taken for, in words, and what to write for each thing that may be meant."""
+
+    taken: str
+    helps: tuple[str, ...]
+
+
+def doubt(value: Value, text: str, wanted: Measure) -> Doubt | None:
+    """What may be meant otherwise by a value that has the right dimension; None where it is plain.
+
+    text, wanted  the unit that is declared, in SI, as text and as what it means
+    """
+    mine, declared = value.dimension, wanted.dimension
+    if value.hertz is None:
+        return None
+    if value.hertz != wanted.hertz:
+        if mine.rad and mine == declared and not (mine.kg or mine.m or mine.A or mine.K):
+            return None  # an angle times a frequency: 15 deg * 2 Hz
+        if wanted.hertz:
+            return _no_hertz(value) if mine == declared == _RATE and not value.hertz else None
+        if declared.rad:
+            return _hertz_for_rad(value, text)
+        return _hertz_for_rate(value) if declared == mine == _RATE else None
+    if mine.rad == declared.rad:
+        return None
+    if declared.rad and not mine.rad:
+        plain = not (declared.kg or declared.A or declared.K)
+        return _no_angle(value, text, declared.rad) if plain and declared.m else None
+    if not declared.rad and _unit(value) is not None and declared not in (_FLUX, units.PURE):
+        return _angle_for_none(value, text)
+    return None
+
+
+def _hertz_for_rate(value: Value) -> Doubt:
+    """Hz for 1/s."""
+    number = _number(value)
+    if isinstance(value.number, Scalar):
+        return Doubt(
+            "in 1/s, and Hz is taken as 1/s",
+            ("if that is meant, write `1/s`", "if cycles a second are meant, write `1/s`, and 2 pi times each number"),
+        )
+    return Doubt(
+        f"in 1/s, and {_written(value)} is taken as {number} 1/s",
+        (f"if that is meant, write `{number} 1/s`", f"if cycles a second are meant, write `(2*pi*{number}) 1/s`"),
+    )
+
+
+def _no_hertz(value: Value) -> Doubt | None:
+    """1/s for Hz; None where it was computed, as from a period."""
+    if _unit(value) is None:
+        return None
+    number = _number(value)
+    if isinstance(value.number, Scalar):
+        return Doubt(
+            "in Hz, and 1/s is taken as Hz, cycles a second",
+            (
+                "if that is meant, write `Hz`",
+                "if radians a second are meant, write `Hz`, and each number divided by 2 pi",
+            ),
+        )
+    return Doubt(
+        f"in Hz, and {_written(value)} is taken as {number} Hz, cycles a second",
+        (f"if that is meant, write `{number} Hz`", f"if radians a second are meant, write `({number}/(2*pi)) Hz`"),
+    )
+
+
+def _hertz_for_rad(value: Value, text: str) -> Doubt:
+    """V/Hz for V*s/rad."""
+    unit = _unit(value)
+    if unit is not None and "kHz" not in unit.text:
+        number = _in(value, unit)
+        helps = (
+            f"if that is meant, write `{number} {unit.text.replace('Hz', '(rad/s)')}`",
+            f"if cycles a second are meant, write `{number} {unit.text.replace('Hz', '(cycle/s)')}`",
+        )
+    else:
+        helps = (
+            f"if that is meant, write `{_number(value)} {text}`",
+            "if cycles a second are meant, write `cycle/s` in the place of the hertz",
+        )
+    return Doubt(f"in {text}, and {_written(value)} is taken as {_number(value)} {text}", helps)
+
+
+def _no_angle(value: Value, text: str, power: int) -> Doubt:
+    """1/mm for rad/m, and mm for m/rad."""
+    unit = _unit(value)
+    number = _number(value) if unit is None else _in(value, unit)
+    plain = unit.text if unit is not None else units.text(value.dimension)
+
+    def angled(angle: str) -> str:
+        angle = angle if abs(power) == 1 else f"{angle}^{abs(power)}"
+        if power < 0:
+            return f"`{number} {plain}/{angle}`"
+        return f"`{number} {angle}{plain[1:]}`" if plain.startswith("1/") else f"`{number} {angle}*{plain}`"
+
+    return Doubt(
+        f"in {text}, and {_written(value)} is taken as {_number(value)} {text}",
+        (f"if that is meant, write {angled('rad')}", f"if turns are meant, write {angled('cycle')}"),
+    )
+
+
+def _angle_for_none(value: Value, text: str) -> Doubt | None:
+    """1/cycle, 1/deg where no angle is declared: it counts in radians."""
+    unit = _unit(value)
+    if unit is None or not measure_of(unit).turns:
+        return None
+    number = _number(value)
+    return Doubt(
+        f"in {text}, and {_written(value)} is taken as {number} {text}: angles count in radians",
+        (f"write `{number} {text}`",),
+    )
+
+
+def _unit(value: Value) -> Unit | None:
+    """The unit that the whole value is written in; None where it is computed."""
+    unit = value.unit
+    if unit is None or not unit.factors or measure_of(unit).dimension != value.dimension:
+        return None
+    return unit
+
+
+def _number(value: Value) -> str:
+    """The number in SI, as a deck writes it."""
+    return "[...]" if isinstance(value.number, Scalar) else f"{value.number:.12g}"
+
+
+def _in(value: Value, unit: Unit) -> str:
+    """The number in its unit."""
+    return "[...]" if isinstance(value.number, Scalar) else f"{value.number / measure_of(unit).scale:.12g}"
+
+
+def _written(value: Value) -> str:
+    unit = _unit(value)
+    if unit is not None:
+        return f"{_in(value, unit)} {unit.text}"
+    return f"{_number(value)} {units.text(value.dimension)}" if not value.hertz else "a number with Hz in its unit"

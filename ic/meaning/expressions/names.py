@@ -1,0 +1,187 @@
+"""What names in expressions are worth: `let`s in any order, parameters of servo definitions, what a sweep varies."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from ic.grammar.syntax import Expression, Name
+from ic.meaning.definitions.resolve import Definitions
+from ic.meaning.expressions.values import CONSTANTS, FUNCTIONS, Value, Values, evaluate
+from ic.text.complaints import MOST, known_words
+from ic.text.lexer import COMMAND_LINE
+from met import other_units, units
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
+
+DEEPEST = 64  # lets that need lets: far more than a deck has, far less than Python's recursion bears
+
+
+def _uses(place: Place) -> list[Place]:
+    """Where the macros were used that a place came through."""
+    return [each.use for each in place.expansions]
+
+
+def _macro(place: Place) -> str:
+    """The macro whose body a place is in."""
+    return place.expansions[0].macro
+
+
+class Names:
+    """Evaluates expressions in a deck; what a name is worth is found once.
+
+    varied   paths that a sweep varies, with the value that stands for them
+    watched  paths whose being named is to be seen in `followed`, like that of the varied
+    """
+
+    def __init__(self, definitions: Definitions, varied: Mapping[str, Value], watched: Collection[str] = ()) -> None:
+        self.definitions = definitions
+        self.varied = varied
+        self.watched = watched
+        self.followed: dict[str, None] = {}  # coordinates that an expression named
+        self._worth: dict[str, Value | Values | Problem] = {}
+        self._open: dict[str, Place] = {}
+
+    def evaluate(self, expression: Expression) -> Value | Values:
+        return evaluate(expression, self.find)
+
+    def knows(self, text: str) -> bool:
+        """Whether a single word has a value."""
+        return text in self.varied or text in self.definitions.lets or text in CONSTANTS
+
+    def find(self, name: Name) -> Value | Values:
+        """The value of a name. Raises Problem D065 where there is none, D073 where it needs itself."""
+        text = self._reached(name)
+        if text in self.varied:
+            self.followed[text] = None
+            return self.varied[text]
+        if text in self.watched:
+            self.followed[text] = None
+        worth = self._worth.get(text)
+        if isinstance(worth, Problem):
+            raise worth  # which is told once, however often the name is used
+        if worth is not None:
+            return worth
+        if text in self._open:
+            loop = [*list(self._open)[list(self._open).index(text) :], text]
+            raise Problem(
+                error(
+                    "D073",
+                    f"`{text}` needs itself: " + " needs ".join(f"`{each}`" for each in loop),
+                    name.place,
+                    also=[Label(self._open[each], f"`{each}`") for each in loop[1:-1]],
+                    help="write one of them as a number",
+                )
+            )
+        if len(self._open) >= DEEPEST:
+            raise Problem(
+                error(
+                    "D073",
+                    f"`{text}` is at the end of a chain of {DEEPEST} names",
+                    name.place,
+                    help="define values before their uses",
+                )
+            )
+        self._open[text] = name.place
+        try:
+            found = self.evaluate(self._expression(name))
+        except Problem as problem:
+            if text in self.definitions.lets:
+                self._worth[text] = problem
+            raise
+        finally:
+            self._open.pop(text, None)
+        self._worth[text] = found
+        return found
+
+    def _reached(self, name: Name) -> str:
+        """The path to go by: that of the base that a sweep varies, where a servo definition has the value from it."""
+        first, *rest = (word.text for word in name.path)
+        servo = self.definitions.of_kind("servo").get(first) if rest else None
+        block = self.definitions.block(servo) if servo is not None and name.text not in self.varied else None
+        item = block.items.get(".".join(rest)) if block is not None else None
+        homes = item.homes if item is not None else ()
+        paths = [".".join((home, *rest)) for home in homes]
+        return next((path for path in paths if path in self.varied or path in self.watched), name.text)
+
+    def label(self, value: Value) -> list[Label]:
+        """Where the name that was written for this value is defined, for messages about it."""
+        for text, let in self.definitions.lets.items():
+            worth = self._worth.get(text)
+            if (
+                isinstance(worth, Value)
+                and worth.number is value.number
+                and worth.dimension == value.dimension
+                and worth.place != value.place
+                and value.place.length == len(text)
+            ):
+                return [Label(let.name.place, f"`{text}` is defined here")]
+        return []
+
+    def _expression(self, name: Name) -> Expression:
+        first, *rest = (word.text for word in name.path)
+        if not rest and first in self.definitions.lets:
+            return self.definitions.lets[first].value
+        servo = self.definitions.of_kind("servo").get(first)
+        if servo is not None and rest:
+            block = self.definitions.block(servo)
+            items = block.items if block is not None else {}
+            item = items.get(".".join(rest))
+            if item is not None and item.value is not None:
+                return item.value
+            raise Problem(
+                error(
+                    "D065",
+                    f"servo `{first}` writes no `{'.'.join(rest)}`",
+                    name.place,
+                    help=[*did_you_mean(".".join(rest), items), known_words("it writes", items)],
+                )
+            )
+        helps = list(did_you_mean(name.text, (*self.definitions.lets, *CONSTANTS)))
+        if name.text in FUNCTIONS:
+            helps = [f"`{name.text}` is a function: write `{name.text}(...)`"]
+        elif not rest and units.is_unit(first):
+            helps = [f"`{first}` is a unit: it follows a number, or closing brackets"]
+        elif not helps and rest:
+            helps = ["a value names a `let`, or what a servo's definition writes, such as `SERVO.kp`"]
+        elif first.lower() in ("nan", "inf", "infinity"):
+            helps = ["every number of a deck is finite: leave the entry out where its default is endless, or write one"]
+        elif not helps and name.place.file == COMMAND_LINE and not name.place.expansions:
+            helps = ["`--set` takes a value as the deck would write it: a number with its unit, or a name of the deck"]
+        elif not helps and any(use.file == COMMAND_LINE for use in (name.place, *_uses(name.place))):
+            helps = [
+                f"it comes from `-D`: write a number there, as in `-D {_macro(name.place)}=2`, or define "
+                f"`let {first} = ...;` in the deck"
+            ]
+        elif not helps:
+            unit = other_units.remedy(first) if len(first) > 1 else ()
+            helps = [f"define it: `let {first} = ...;`", *(f"if a unit is meant: {each}" for each in unit)]
+        raise Problem(error("D065", f"no value `{name.text}`", name.place, help=helps))
+
+    def check_lets(self) -> list[Problem]:
+        """What is wrong with the deck's lets, used or not."""
+        problems: list[Problem] = []
+        for text, let in self.definitions.lets.items():
+            if len(problems) >= MOST:  # no more would be told, and each looks at all names for one that is near
+                break
+            try:
+                if units.is_unit(text):
+                    raise Problem(
+                        error(
+                            "D079",
+                            f"`{text}` is a unit ({units.UNITS[text].word}), so no value may bear it",
+                            let.name.place,
+                            help="give the value another name",
+                        )
+                    )
+                if text in CONSTANTS or text in FUNCTIONS:
+                    raise Problem(
+                        error(
+                            "D079",
+                            f"`{text}` has a meaning already",
+                            let.name.place,
+                            help="give the value another name",
+                        )
+                    )
+                self.find(Name((let.name,), let.name.place))
+            except Problem as problem:
+                problems.append(problem)
+        return problems

@@ -1,0 +1,1 @@
+"""Arms: links, joints, payloads, their inertia and frames."""

@@ -1,0 +1,330 @@
+"""Arms: links with their inertia, joints with their frames, and whether they make a tree that could exist."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ic.grammar.syntax import Call, Expression, Name, Unary
+from ic.language import HEADS
+from ic.language.bodies import ARM, AT, AXIS, JOINT, JOINT_KINDS, LINK, RPY
+from ic.meaning.definitions.merge import Block, Item, as_meant
+from ic.meaning.definitions.resolve import Definition
+from ic.meaning.mechanics.bodies import check_moved
+from ic.meaning.mechanics.dh import use_dh
+from ic.meaning.mechanics.foreign import refused
+from ic.meaning.mechanics.matter import use_matter
+from ic.meaning.parameters.addresses import in_arm
+from ic.meaning.parameters.models import check_keys, value_at, word_of
+from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.relations import no_direction
+from ic.meaning.parameters.scope import Scope
+from ic.text.complaints import belongs, known_words
+from met.diagnostic import Label, Place, did_you_mean, meant
+from met.frozen import frozen
+from met.plan import BASE, Joint, Link
+from met.trace import Scalar, sqrt
+
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+NO_STOPS = "a joint has no stops in this version; a metric with `require` tells where it goes beyond"
+NOT_OF_A_JOINT = dict.fromkeys(("limit", "limits", "range", "stops"), NO_STOPS)
+
+
+@frozen
+class Arm:
+    """lost: names of joints and links that failed, which was told;  whole: nothing at all was wrong before."""
+
+    name: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    lost: frozenset[str] = frozenset()
+    whole: bool = True
+
+    def kind(self, joint: str) -> str | None:
+        return next((j.kind for j in self.joints if j.name == joint), None)
+
+    @property
+    def moving(self) -> tuple[Joint, ...]:
+        return tuple(joint for joint in self.joints if joint.kind != "fixed")
+
+
+def resolve_arm(scope: Scope, definition: Definition) -> Arm | None:
+    """The arm, with its numbers entered as parameters; None where its definition could not be merged."""
+    block = scope.definitions.block(definition)
+    if block is None:
+        return None
+    homes = scope.definitions.homes(definition)
+    for item in block.items.values():
+        if item.kind not in ARM.named:
+            _stray(scope, item, block)
+    block = as_meant(block, (), ARM.named)
+    for statement in block.statements:
+        scope.complaints.error(
+            "D080", "an arm holds links and joints; this is neither", statement.place, help="move it to the run"
+        )
+    links = [link for item in block.of_kind("link") if (link := _link(scope, item, homes)) is not None]
+    ends = {item.name: None for item in block.of_kind("link")}
+    made = [_joint(scope, item, homes, ends) for item in block.of_kind("joint")]
+    joints = [joint for joint in made if joint is not None]
+    if not any(True for _ in block.of_kind("link")):
+        scope.complaints.missing(
+            definition.place,
+            ("link",),
+            "D081",
+            f"arm `{definition.name}` has no links",
+            help="write `link NAME { ... }` and a joint to hold it",
+        )
+    complete = len(joints) == len(made) and not scope.complaints.lacks(definition.place, "joint")
+    check_tree(scope, definition.name, links, joints, complete=complete)
+    whole = not scope.complaints.errors
+    written = {item.name for kind in ARM.named for item in block.of_kind(kind)}
+    lost = frozenset(written - {link.name for link in links} - {joint.name for joint in joints})
+    return Arm(definition.name, tuple(links), tuple(joints), lost, whole)
+
+
+def check_arm(scope: Scope, definition: Definition) -> None:
+    """Tells what is wrong with an arm by itself, without payloads."""
+    arm = resolve_arm(scope, definition)
+    if arm is not None and arm.whole:
+        check_moved(scope, arm.links, arm.joints)
+
+
+def _stray(scope: Scope, item: Item, block: Block) -> None:
+    known = [other.name for other in block.items.values() if other.kind in ARM.named]
+    if item.kind:
+        scope.complaints.error(
+            "D082",
+            f"no `{item.kind}` in an arm",
+            item.place,
+            help=[*did_you_mean(item.kind, ARM.named), *belongs(item.kind), "an arm holds links and joints"],
+        )
+    else:
+        adds = f"`link {item.name} {{ ... }}` or `joint {item.name} revolute {{ ... }}` would add one"
+        helps = [*did_you_mean(item.name, known), adds if "." not in item.name else known_words("it has", known)]
+        scope.complaints.error(
+            "D083", f"nothing named `{item.name}` to change in this arm", item.place, help=in_arm(item, known) or helps
+        )
+
+
+# Links
+
+
+def _link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
+    owner = Owner(f"link `{item.name}`", item.place, f"links.{item.name}", homes=homes)
+    if item.detail:
+        scope.complaints.error(
+            "D085",
+            f"`{item.detail[0].text}` after the name of a link",
+            item.detail[0].place,
+            help=f"write `link {item.name} {{ ... }}`",
+        )
+    if item.body is None or item.value is not None:
+        scope.complaints.error(
+            "D085",
+            f"link `{item.name}` needs a block",
+            item.place,
+            help=f"write `link {item.name} {{ mass = ...; shape = ...; }}`",
+        )
+        return None
+    check_keys(scope, item.body, LINK.keys, owner)
+    return Link(item.name, item.place, use_matter(scope, owner, "link", item.name, item.body))
+
+
+# Joints
+
+
+def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str, None]) -> Joint | None:
+    owner = Owner(f"joint `{item.name}`", item.place, item.name, homes=homes)
+    if refused(scope, item):
+        return None
+    kind = item.detail[0].text if item.detail else None
+    if item.body is None or item.value is not None:
+        scope.complaints.error(
+            "D091",
+            f"joint `{item.name}` needs a block",
+            item.place,
+            help=f"write `joint {item.name} revolute {{ parent = base; child = ...; axis = z; }}`",
+        )
+        return None
+    if kind not in JOINT_KINDS:
+        place = item.detail[0].place if item.detail else item.place
+        message = f"no kind of joint `{kind}`" if kind else f"joint `{item.name}` has no kind"
+        scope.complaints.error(
+            "D090",
+            message,
+            place,
+            help=[
+                *(did_you_mean(kind, JOINT_KINDS) if kind else ()),
+                f"write `joint {item.name} revolute {{ ... }}`, or prismatic, or fixed",
+            ],
+        )
+        kind = meant(kind, JOINT_KINDS) if kind else None
+        if kind is None or (kind != "fixed" and item.body.get("axis") is None and item.body.get("dh") is None):
+            return None
+    if item.name in (*HEADS, BASE):
+        scope.complaints.error(
+            "D166",
+            f"`{item.name}` begins paths of its own, so no joint may be called so",
+            item.place,
+            help="give the joint another name",
+        )
+        return None
+    body = item.body
+    check_keys(scope, body, JOINT.keys, owner, NOT_OF_A_JOINT)
+    parent = _end(scope, owner, "parent", body.get("parent"), {BASE: None, **links})
+    child = _end(scope, owner, "child", body.get("child"), {name: None for name in links if name != BASE})
+    if body.get("dh") is not None:
+        use_dh(scope, owner, kind, body.items["dh"], body)
+    else:
+        _frame(scope, owner, kind, body)
+    if parent is None or child is None:
+        return None
+    return Joint(item.name, kind, parent, child, item.place)  # type: ignore[arg-type]
+
+
+def _frame(scope: Scope, owner: Owner, kind: str, body: Block) -> None:
+    """The joint's frame as `at`, `rpy` and `axis` say."""
+    for wanted in (AT, RPY):
+        scope.vector(owner, wanted, body.get(wanted.name))
+    _axis(scope, owner, kind, body.get("axis"))
+
+
+def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping[str, None]) -> str | None:
+    if item is None:
+        scope.complaints.missing(
+            owner.place, (key,), "D092", f"{owner.label} has no {key}", help=f"write `{key} = LINK;`"
+        )
+        return None
+    name = None if isinstance(item.value, Call) else word_of(item.value)
+    if name in known:
+        return name
+    if name == BASE:
+        scope.complaints.error(
+            "D093", "the base cannot be a child", value_at(item), help="turn the joint round: `parent = base;`"
+        )
+    elif name is None:
+        scope.complaints.error(
+            "D094", f"a link's name is needed for {key}", value_at(item), help=known_words("links", known)
+        )
+    else:
+        ground = name in scope.definitions.robot_files.roots
+        near = (f"`{name}` is the root of its robot: write `base`",) if ground else did_you_mean(name, known)
+        scope.complaints.error(
+            "D094", f"no link `{name}` in this arm", value_at(item), help=[*near, known_words("links", known)]
+        )
+    return None
+
+
+def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
+    if kind == "fixed":
+        if item is not None:
+            scope.complaints.error("D095", "a fixed joint has no axis", item.place, help="leave `axis` out")
+        return
+    if item is None:
+        scope.complaints.missing(
+            owner.place,
+            ("axis", "dh"),
+            "D096",
+            f"{owner.label} has no axis",
+            help="write `axis = z;`, or x, y, -x, ... or [0, 0.6, 0.8]",
+        )
+        return
+    named = _named_axis(item.value)
+    value = item.value.operand if isinstance(item.value, Unary) else item.value
+    if named is None and isinstance(value, Name) and len(value.path) == 1 and not scope.names.knows(value.text):
+        scope.complaints.error(
+            "D065",
+            f"no axis and no value `{value.text}`",
+            value.place,
+            help="an axis is x, y, z, -x, -y or -z, or three numbers such as [0, 0.6, 0.8]",
+        )
+        scope.checks.fail(owner.join("axis"))
+        return
+    written = scope.vector(owner, AXIS, item if named is None else replace(item, value=None), given=named)
+    if written is None:
+        return
+    scope.checks.hold(
+        written,
+        no_direction,
+        code="D097",
+        message=f"the axis of {owner.label} has no direction",
+        place=value_at(item),
+        needs=(owner.join("axis"),),
+        help="write numbers of ordinary size, not all of them zero",
+    )
+    x, y, z = written
+    length = sqrt(x * x + y * y + z * z)
+    if isinstance(length, Scalar) or 0.0 < length < math.inf:
+        parts = zip("xyz", written, strict=True)
+        scope.remake({owner.join(f"axis.{name}"): part / length for name, part in parts}, item)
+
+
+def _named_axis(value: Expression | None) -> tuple[float, float, float] | None:
+    sign = 1.0
+    if isinstance(value, Unary) and value.operator in ("-", "+"):
+        sign, value = (-1.0 if value.operator == "-" else 1.0), value.operand
+    if isinstance(value, Name) and value.text in AXES:
+        x, y, z = AXES[value.text]
+        return (sign * x + 0.0, sign * y + 0.0, sign * z + 0.0)
+    return None
+
+
+# The tree
+
+
+def check_tree(scope: Scope, name: str, links: list[Link], joints: list[Joint], *, complete: bool = True) -> None:
+    """Every link has one joint to its parent, and every chain of parents ends at the base.
+
+    complete  all joints are there; else a link without one says nothing
+    """
+    holder: dict[str, Joint] = {}
+    for joint in joints:
+        if joint.child in holder:
+            first = holder[joint.child]
+            scope.complaints.error(
+                "D098",
+                f"link `{joint.child}` has two parents",
+                Label(_place(joint), f"`{joint.parent}`"),
+                also=[Label(_place(first), f"`{first.parent}`, by joint `{first.name}`")],
+                help="a closed chain is not in this version; a branch is a parent with two children",
+            )
+            continue
+        holder[joint.child] = joint
+    failed = {link.name for link in links} - set(holder) - {BASE}
+    settled = {BASE} | failed
+    for link in links:
+        chain: list[Joint] = []
+        at = link.name
+        passed: dict[str, int] = {}
+        while at in holder and at not in settled and at not in passed:
+            passed[at] = len(chain)
+            chain.append(holder[at])
+            at = holder[at].parent
+        if at in passed:
+            _complain_loop(scope, chain[passed[at] :][::-1])
+        settled.update(passed)
+    for link in links:
+        if link.name in failed and complete:
+            scope.complaints.error(
+                "D099",
+                f"link `{link.name}` hangs in the air: no joint of arm `{name}` has it for a child",
+                link.place,
+                help=f"write `joint NAME revolute {{ parent = base; child = {link.name}; axis = z; }}`",
+            )
+
+
+def _complain_loop(scope: Scope, loop: list[Joint]) -> None:
+    path = " -> ".join([loop[0].parent, *(joint.child for joint in loop)])
+    scope.complaints.error(
+        "D086",
+        "these joints make a loop, which hangs on no base: " + path,
+        Label(_place(loop[-1]), f"joint `{loop[-1].name}` closes it"),
+        also=[Label(_place(joint), f"joint `{joint.name}`") for joint in loop[:-1]],
+        help="one of them should have `parent = base;`",
+    )
+
+
+def _place(joint: Joint) -> Place:
+    assert joint.place is not None  # joints that come from a deck have one
+    return joint.place

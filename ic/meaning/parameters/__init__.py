@@ -1,0 +1,1 @@
+"""The parameters of one run as they are settled: their values, origins, models and relations."""

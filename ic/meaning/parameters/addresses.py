@@ -1,0 +1,63 @@
+"""Where a run or an arm writes what a path names: `elbow.servo.kp` is `servos { elbow { kp = ...; } }` there."""
+
+from __future__ import annotations
+
+from ic.grammar.spell import spell
+from ic.language.bodies import JOINT, LINK
+from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.definitions.resolve import Definitions
+from ic.meaning.parameters.models import word_of
+
+OF_JOINT = (*JOINT.keys, "pivot")
+
+
+def in_run(definitions: Definitions, block: Block, item: Item, rates: tuple[str, ...]) -> list[str]:
+    """The remedy for a path that stands in a run's block as an entry; none where it names nothing that is known.
+
+    block  the run's;  rates: the names of those that a run has
+    """
+    joints, links, arm = _of_arm(definitions, block)
+    value = spell(item.value) if item.value is not None else "..."
+    match item.name.split("."):
+        case ["servos", joint, key] | [joint, "servo", key] if joint in joints:
+            return [f"write `servos {{ {joint} {{ {key} = {value}; }} }}`"]
+        case [joint, "servo"] | ["servos", joint] if joint in joints:
+            return [f"write `servos {{ {joint} = {value}; }}`"]
+        case [joint, "q" | "qd" as key] | ["initial", joint, "q" | "qd" as key] if joint in joints:
+            return [f"write `initial {{ {joint}.{key} = {value}; }}`"]
+        case ["environment", model, key]:
+            return [f"write `environment {{ {model} {{ {key} = {value}; }} }}`"]
+        case ["links", thing, key] if thing in links:
+            return _in_arm(arm, thing, key, value)
+        case [thing, key] if (thing in joints and key in OF_JOINT) or (thing in links and key in LINK.keys):
+            return _in_arm(arm, thing, key, value)
+        case [rate] if rate in rates:
+            return [f"write `rates {{ {rate} = {value}; }}`"]
+        case ["rates" | "tolerances" | "initial" | "environment" as head, *rest] if len(rest) == 1:
+            return [f"write `{head} {{ {rest[0]} = {value}; }}`"]
+        case ["tolerances", *rest]:
+            return [f"write `tolerances {{ {'.'.join(rest)} = {value}; }}`"]
+    return []
+
+
+def in_arm(item: Item, known: list[str]) -> list[str]:
+    """The same for an arm, whose links and joints are these."""
+    value = spell(item.value) if item.value is not None else "..."
+    words = item.name.removeprefix("links.").split(".")
+    if len(words) == 2 and words[0] in known and item.body is None:
+        return [f"write `{words[0]} {{ {words[1]} = {value}; }}`"]
+    return []
+
+
+def _in_arm(arm: str, thing: str, key: str, value: str) -> list[str]:
+    return [f"it is the arm's: `arm OTHER like {arm} {{ {thing} {{ {key} = {value}; }} }}`, and `arm = OTHER;` here"]
+
+
+def _of_arm(definitions: Definitions, block: Block) -> tuple[list[str], list[str], str]:
+    """The joints, the links and the name of the run's arm; nothing where it has none."""
+    named = block.get("arm")
+    arm = definitions.of_kind("arm").get(word_of(named.value) or "") if named is not None else None
+    body = definitions.block(arm) if arm is not None else None
+    if arm is None or body is None:
+        return [], [], ""
+    return [each.name for each in body.of_kind("joint")], [each.name for each in body.of_kind("link")], arm.name

@@ -1,0 +1,198 @@
+"""Uses of models checked against their declarations: keys, what is missing, units, ranges, words, lists."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+from ic.grammar.syntax import Call, Expression, Name
+from ic.meaning.definitions.merge import Block, Item, refuse_pending
+from ic.meaning.expressions.values import place_of
+from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.relations import check_relations
+from ic.meaning.parameters.scope import Scope
+from ic.text.complaints import an, belongs, known_words
+from met import models
+from met.diagnostic import Label, Place, Problem, did_you_mean
+from met.environments.environment import FILE
+from met.parameter import Only, Parameter, there
+
+
+def word_of(expression: Expression | None) -> str | None:
+    """The one word that an expression is, or calls; None where it is something else."""
+    if isinstance(expression, Call):
+        expression = expression.name
+    if isinstance(expression, Name) and len(expression.path) == 1:
+        return expression.path[0].text
+    return None
+
+
+def value_at(item: Item) -> Place:
+    """Where an entry's value is; the entry itself, where it has none."""
+    return place_of(item.value) if item.value is not None else item.place
+
+
+def upon(item: Item) -> Place | None:
+    """Where a block that was put upon an entry's value has its first entry; None where it has none."""
+    return next((each.place for each in item.body.items.values()), None) if item.body is not None else None
+
+
+def words_chosen(parameters: Sequence[Parameter], body: Block) -> tuple[tuple[str, str], ...]:
+    """The words that a body writes for these parameters, defaults left out."""
+    found = ((each.name, word_written(each, body)) for each in parameters)
+    defaults = {each.name: each.default for each in parameters}
+    return tuple((name, word) for name, word in found if word != defaults[name])
+
+
+def word_written(wanted: Parameter, body: Block) -> str:
+    """The word that a body writes for a parameter, else its default."""
+    item = body.get(wanted.name)
+    written = word_of(item.value) if item is not None else wanted.default
+    return written if isinstance(written, str) else ""
+
+
+def _check_unused(
+    scope: Scope, owner: Owner, wanted: Parameter, only: Only, body: Block, words: Mapping[str, str]
+) -> None:
+    """Tells a parameter that its word leaves out, unless that word was written over another, which may have had it."""
+    item, word = body.get(wanted.name), body.get(only[0])
+    if item is None or (word is not None and word.overrides):
+        return
+    also = [Label(place_of(word.value), "chosen here")] if word is not None and word.value is not None else []
+    needed = " or ".join(f"`{only[0]} = {each};`" for each in only[1])
+    scope.complaints.error(
+        "D141",
+        f"{owner.label} has no `{wanted.name}` with `{only[0]} = {words[only[0]]}`",
+        item.place,
+        also=also,
+        help=f"it is there with {needed}",
+    )
+
+
+def refuse_values(scope: Scope, expression: Expression | None, names: Iterable[str]) -> bool:
+    """Tells of values without a name, of which nobody can say what they are for; whether there are any."""
+    if not isinstance(expression, Call) or not expression.positional:
+        return False
+    name = word_of(expression)
+    usage = f"{name}({', '.join(f'{each} = ...' for each in names)})"
+    scope.complaints.error(
+        "D153", f"`{name}` takes its values by name", place_of(expression.positional[0]), help=f"write `{usage}`"
+    )
+    return True
+
+
+def check_keys(
+    scope: Scope, body: Block, known: Iterable[str], owner: Owner, others: Mapping[str, str] = MappingProxyType({})
+) -> None:
+    """Tells every entry of the body that is none of the known plain keys, and notes what it was meant for.
+
+    others  what to say of keys one expects
+    """
+    known = list(known)
+    for item in body.items.values():
+        if item.kind:
+            scope.complaints.error(
+                "D141",
+                f"no `{item.kind}` in {owner.label}",
+                item.place,
+                help=[*belongs(item.kind), known_words("it has", known)],
+            )
+        elif item.name not in known:
+            if item.name not in others:
+                scope.complaints.taken_for(owner.place, item.name, known)
+            scope.complaints.error(
+                "D141",
+                f"{owner.label} has no `{item.name}`",
+                item.place,
+                help=[
+                    *([others[item.name]] if item.name in others else did_you_mean(item.name, known)),
+                    known_words("it has", known),
+                ],
+            )
+    for statement in body.statements:
+        scope.complaints.error(
+            "D142",
+            f"`{statement.words[0].text}` inside {owner.label}",
+            statement.place,
+            help="it belongs to a run or a sweep",
+        )
+    refuse_pending(body, scope.complaints)
+    scope.removed.update((owner.join(each.key), each.place) for each in body.removed if body.get(each.key) is None)
+
+
+def find_bare_model(scope: Scope, kind: models.Kind, item: Item, remedy: str) -> Any:
+    """The declaration that an entry names with nothing in parentheses or braces; None where that failed, and was told.
+
+    remedy  what to write in the stead of parameters behind the name, with `{}` for the name
+    """
+    name, place = word_of(item.value), place_of(item.value) if item.value is not None else item.place
+    if name is not None and (isinstance(item.value, Call) or item.body is not None):
+        place = place if isinstance(item.value, Call) else upon(item) or place
+        scope.complaints.error(
+            "D143", f"`{item.name} = {name}` takes neither parentheses nor braces", place, help=remedy.format(name)
+        )
+        return None
+    return find_model(scope, kind, name, place)
+
+
+def find_model(scope: Scope, kind: models.Kind, name: str | None, place: Place) -> Any:
+    """The declaration; None where there is none, which was told."""
+    if name is None:
+        scope.complaints.error(
+            "D143",
+            f"the name of {an(kind)} model is needed here",
+            place,
+            help=known_words(f"{kind} models", sorted(models.available(kind))),
+        )
+        return None
+    try:
+        return models.find(kind, name, place)
+    except Problem as problem:
+        scope.complaints.add(*problem.diagnostics)
+        return None
+
+
+def use_model(
+    scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: Block, extra: Iterable[str] = ()
+) -> dict[str, Any] | None:
+    """Every parameter of a model used with this body, entered in the scope; None where one is missing or wrong.
+
+    Of those that are there only under a word (`Parameter.only`), those under the words of this body. Two of one name
+    are there under different words, as one that needs to be written under some.
+    """
+    parameters = tuple(parameters)
+    words = {p.name: word_written(p, body) for p in parameters if p.shape == "word"}
+    wrong = [p.name for p in parameters if p.words and not p.names and words[p.name] not in p.words]
+    known = [p.name for p in parameters if there(p, words) or body.get(p.name) is not None]
+    extra = list(extra)
+    check_keys(scope, body, [*known, *extra], owner)
+    if FILE.name in extra and scope.complaints.lacks(owner.place, FILE.name):  # which would have the lists
+        scope.complaints.lacking |= {(owner.place, each.name) for each in parameters if each.shape == "list"}
+    here = [p.name for p in parameters if there(p, words)]
+    owner = replace(owner, others=parameters)
+    values: dict[str, Any] = {}
+    for wanted in parameters:
+        item = body.get(wanted.name)
+        if wanted.only is not None and wanted.only[0] in wrong:
+            scope.checks.fail(owner.join(wanted.name))  # no word at all is told of where words are read
+            continue
+        if wanted.only is not None and not there(wanted, words):
+            if wanted.name not in here:
+                _check_unused(scope, owner, wanted, wanted.only, body, words)
+            continue
+        if wanted.shape == "vector":
+            values[wanted.name] = scope.vector(owner, wanted, item)
+        elif wanted.shape == "list":
+            values[wanted.name] = scope.numbers(owner, wanted, item)
+        elif wanted.shape == "word":
+            values[wanted.name] = scope.word(owner, wanted, item, record=True)
+        elif wanted.decides:
+            values[wanted.name] = scope.decisive(owner, wanted, item)
+        else:
+            values[wanted.name] = scope.number(owner, wanted, item)
+    if any(value is None for value in values.values()):
+        return None
+    check_relations(scope, owner, [each for each in parameters if each.name in values], body, values)
+    return values

@@ -1,0 +1,757 @@
+"""One run under resolution: its parameters as they are settled, and what a sweep varies in them.
+
+A parameter is settled once, at one spot, from four sources in this order: a sweep's coordinate that names it, what is
+given from outside of the deck, what the deck wrote, the declaration's default. It is named by its canonical path
+(`elbow.servo.kp`) and by the path of every definition that hands it down without its being overridden (`gearbox.kp`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ic.grammar.syntax import Call, Expression, Name, Setting, String
+from ic.language.unit_words import either, in_degrees, measure_here, unit_here
+from ic.meaning.definitions.merge import Item
+from ic.meaning.definitions.resolve import Definitions
+from ic.meaning.expressions.conditions import Checks, Varied
+from ic.meaning.expressions.cycles import doubt
+from ic.meaning.expressions.given import GIVEN, Given, evaluated, is_given, written_origin
+from ic.meaning.expressions.names import Names
+from ic.meaning.expressions.remedies import components, mended
+from ic.meaning.expressions.values import Value, Values, place_of
+from ic.meaning.parameters import unvaried
+from ic.meaning.parameters.owner import XYZ, Owner, Settled
+from ic.meaning.parameters.unvaried import Unvaried
+from ic.text.complaints import Complaints
+from met import units
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.parameter import Parameter
+from met.plan import JointKind, Origin, Quantity
+from met.trace import Graph, Real, Scalar
+from met.units import PURE, Dimension
+
+VARIES = "leave it out here, or name runs and sweeps that do not vary this"
+"""What to do where a sweep varies what is set from outside of the deck."""
+
+
+@dataclass
+class Scope:
+    """The definitions of a deck, and the parameters of one run as they are settled."""
+
+    definitions: Definitions
+    complaints: Complaints
+    varied: dict[str, Varied] = field(default_factory=dict)
+    graph: Graph = field(default_factory=Graph)
+    parameters: dict[str, Settled] = field(default_factory=dict)
+    beside: dict[str, Settled] = field(default_factory=dict)  # what parameters are made of, and settings of the run
+    known: dict[str, list[str]] = field(default_factory=dict)  # every path that would set something -> parameters
+    sets: dict[str, list[str]] = field(default_factory=dict)  # coordinate -> parameters that took it directly
+    unvaried: dict[str, Unvaried] = field(default_factory=dict)  # known paths that do not vary over numbers
+    notes: list[str] = field(default_factory=list)
+    moved: dict[str, set[str]] = field(default_factory=dict)  # servo definition -> kinds of joints it moves
+    lost: frozenset[str] = frozenset()  # joints whose servo failed: nothing can be said of its channels
+    gone: frozenset[str] = frozenset()  # joints and links that failed: nothing can be said of what begins with them
+    guides: Mapping[str, Item] = field(default_factory=dict)  # of the run, by name: what commands may follow
+    sensors: frozenset[str] = frozenset()  # of links, in the run, by name
+    removed: dict[str, Place] = field(default_factory=dict)  # by path of a parameter, where `remove` took it away
+    settings: Mapping[str, Setting] = field(default_factory=dict)  # by path, numbers given from outside of the deck
+
+    def __post_init__(self) -> None:
+        self.checks = Checks(self.complaints, self.graph, self.varied)
+        self.names = Names(self.definitions, {path: varied.value for path, varied in self.varied.items()})
+        self.given: dict[str, Given | None] = {}  # of the settings, as they are asked for; None for no number
+
+    def settled(self, path: str) -> Settled | None:
+        """What is settled under a path, whether the plan has it as a parameter or not."""
+        return self.parameters.get(path) or self.beside.get(path)
+
+    def hangs(self, path: str) -> bool:
+        """Whether nothing can be said of this path, because what it leads to has failed, which was told."""
+        first, _, rest = path.partition(".")
+        thing = rest.partition(".")[0] if first in ("links", "payloads") else first
+        if self.checks.touches(path) or thing in self.gone:
+            return True
+        return bool(self.lost) and (first in self.lost or first in self.definitions.of_kind("servo"))
+
+    # Numbers
+
+    def number(
+        self,
+        owner: Owner,
+        wanted: Parameter,
+        item: Item | None,
+        *,
+        expression: Expression | None = None,
+        value: Value | None = None,
+        record: bool = True,
+    ) -> Real | None:
+        """The parameter's number; None where it could not be had, which was told.
+
+        expression, value  what to take in the stead of the item's expression
+        """
+        written = value
+        if item is not None and value is None:
+            with self.complaints.gather():
+                found = self.written(item, expression)
+                if isinstance(found, Values):
+                    raise Problem(
+                        error(
+                            "D071",
+                            f"`{wanted.name}` of {owner.label} is one number, and this is a list",
+                            found.place,
+                            help="leave the brackets out",
+                        )
+                    )
+                written = found
+        default = wanted.default if isinstance(wanted.default, (int, float)) else None
+        return self._settle(owner, wanted, wanted.name, item, written, default, record, expression)
+
+    def vector(
+        self,
+        owner: Owner,
+        wanted: Parameter,
+        item: Item | None,
+        *,
+        names: Sequence[str] = XYZ,
+        short: int = 0,
+        given: Sequence[Real] | None = None,
+        record: bool = True,
+    ) -> tuple[Real, ...] | None:
+        """The parameter's numbers, `names` of them, or the first `short`, the rest zero.
+
+        given  numbers made of what the item says, in its stead
+        """
+        heads = [owner.path] * (wanted.name == owner.short) + [owner.join(wanted.name)]
+        for head in heads:
+            self.unvaried.setdefault(head, unvaried.several([f"{heads[0]}.{name}" for name in names]))
+        values: list[Value | None] = [None] * len(names)
+        if item is not None and given is None:
+            with self.complaints.gather():
+                values = list(self._components(owner, wanted, item, names, short))
+            if all(value is None for value in values):
+                self.checks.fail(owner.join(wanted.name))
+                return None
+        elif given is not None and item is not None:
+            place = place_of(item.value) if item.value is not None else item.place
+            values = [Value(x, PURE, place) for x in given]
+        elif wanted.default is None:
+            self._missing(owner, wanted)
+            return None
+        defaults = wanted.default if isinstance(wanted.default, tuple) else (None,) * len(names)
+        parts = components(item, len(names)) if given is None else (None,) * len(names)
+        numbers = [
+            self._settle(owner, wanted, f"{wanted.name}.{name}", item, value, default, record, part)
+            for name, value, default, part in zip(names, values, defaults, parts, strict=True)
+        ]
+        return None if any(number is None for number in numbers) else tuple(numbers)  # type: ignore[arg-type]
+
+    def _components(
+        self, owner: Owner, wanted: Parameter, item: Item, names: Sequence[str], short: int
+    ) -> Iterable[Value]:
+        count = len(names)
+        found = self.written(item)
+        text, dimension = self.unit(owner, wanted)
+        expected = f"{short} or {count}" if short else f"{count}"
+        if isinstance(found, Value):
+            unit = "" if text == "1" else f" {text}"
+            raise Problem(
+                error(
+                    "D071",
+                    f"{owner.what(wanted)} is a list of {expected} numbers",
+                    found.place,
+                    help=f"write `{item.name} = [...]{unit};`",
+                )
+            )
+        if len(found.items) not in (short, count):
+            shown = ", ".join(names)
+            raise Problem(
+                error(
+                    "D071",
+                    f"{owner.what(wanted)} has {expected} numbers, not {len(found.items)}",
+                    found.place,
+                    help=f"they are [{shown}]",
+                )
+            )
+        numbers = []
+        for value in found.items:
+            if isinstance(value, Values):
+                raise Problem(error("D071", "a list inside a list", value.place))
+            numbers.append(value)
+        if dimension != PURE and len(numbers) > 1 and all(value.bare for value in numbers):
+            raise Problem(
+                error(
+                    "D060",
+                    f"{owner.what(wanted)} is in {text}, and these are bare numbers",
+                    found.place,
+                    help=f"write {either(f'[...] {each}' for each in in_degrees(text))}: "
+                    "a unit after the bracket is for all of them",
+                )
+            )
+        dimensions = {value.dimension for value in numbers}
+        if found.unit is not None and len(dimensions) == 1:  # one unit for all: where it is wrong, it is so once
+            self.check_dimension(owner, wanted, replace(numbers[0], place=found.place))
+        numbers += [Value(0.0, dimension, found.place)] * (count - len(numbers))
+        return numbers
+
+    def constant(self, owner: Owner, wanted: Parameter, item: Item) -> float | None:
+        """A compile-time constant: another value is another program."""
+        path = owner.join(wanted.name)
+        for known in owner.paths(wanted.name, item.homes):
+            self.unvaried[known] = unvaried.COMPILED
+        number = None
+        with self.complaints.gather():
+            found = self.written(item)
+            if isinstance(found, Values):
+                raise Problem(
+                    error(
+                        "D071",
+                        f"`{wanted.name}` of {owner.label} is one number, and this is a list",
+                        found.place,
+                        help="leave the brackets out",
+                    )
+                )
+            self.check_dimension(owner, wanted, found)
+            if isinstance(found.number, Scalar):
+                raise Problem(
+                    error(
+                        "D122",
+                        f"`{wanted.name}` of {owner.label} varies with the sweep",
+                        found.place,
+                        help=f"it decides the program: vary `{path}` itself",
+                    )
+                )
+            before = self.complaints.faults
+            self._check_range(owner, wanted, found.number, found.place)
+            number = float(found.number) if self.complaints.faults == before else None
+            if number is not None:
+                self.beside[path] = Settled(
+                    number, self.unit(owner, wanted)[0], _origin(item, found.place), wanted.doc, item.value
+                )
+        if number is None:
+            self.checks.fail(path)
+        return number
+
+    def decisive(self, owner: Owner, wanted: Parameter, item: Item | None) -> float | None:
+        """A model's number that decides the program, the same in all cases."""
+        path = owner.join(wanted.name)
+        if item is None and isinstance(wanted.default, (int, float)):
+            unit = self.unit(owner, wanted)[0]
+            self.beside[path] = Settled(float(wanted.default), unit, Origin("default"), wanted.doc)
+        elif item is None:
+            self._missing(owner, wanted)
+        elif self.constant(owner, wanted, item) is None:
+            self.beside.pop(path, None)
+        self.unvaried[path] = unvaried.COMPILED_ALONE
+        if path not in self.beside:
+            return None
+        self.parameters[path] = self.beside.pop(path)
+        return self.parameters[path].value  # type: ignore[return-value]  # a number, by the two lines above
+
+    def numbers(self, owner: Owner, wanted: Parameter, item: Item | None) -> tuple[float, ...] | None:
+        """A list of any length, the same in all cases."""
+        path = owner.join(wanted.name)
+        self.unvaried[path] = unvaried.LIST
+        if item is None and isinstance(wanted.default, tuple):
+            self.parameters[path] = Settled(wanted.default, self.unit(owner, wanted)[0], Origin("default"), wanted.doc)
+            return wanted.default
+        if item is None:
+            self._missing(owner, wanted)
+            return None
+        numbers: tuple[float, ...] | None = None
+        with self.complaints.gather():
+            found = self.written(item)
+            if isinstance(found, Value):
+                raise Problem(
+                    error(
+                        "D071",
+                        f"`{wanted.name}` of {owner.label} is a list",
+                        found.place,
+                        help=f"write `{wanted.name} = [...] {self.unit(owner, wanted)[0]};`",
+                    )
+                )
+            made = []
+            for value in found.items:
+                if isinstance(value, Values):
+                    raise Problem(error("D071", "a list inside a list", value.place))
+                self.check_dimension(owner, wanted, value)
+                if isinstance(value.number, Scalar):
+                    remedy = "a list does not vary: write a run for each, and `sweep NAME = ONE + OTHER;`"
+                    raise Problem(
+                        error(
+                            "D122", f"`{wanted.name}` of {owner.label} varies with the sweep", value.place, help=remedy
+                        )
+                    )
+                self._check_range(owner, wanted, value.number, value.place)
+                made.append(float(value.number))
+            numbers = tuple(made)
+            self.parameters[path] = Settled(
+                numbers, self.unit(owner, wanted)[0], _origin(item, found.place), wanted.doc, item.value
+            )
+        if numbers is None:
+            self.checks.fail(path)
+        return numbers
+
+    def word(self, owner: Owner, wanted: Parameter, item: Item | None, *, record: bool = False) -> str | None:
+        """A word, one of `wanted.words` where it has any."""
+        path = owner.join(wanted.name)
+        self.unvaried[path] = unvaried.WORD
+        if item is None:
+            if not isinstance(wanted.default, str):
+                self._missing(owner, wanted)
+                return None
+            word, origin = wanted.default, Origin("default")
+        else:
+            named = item.value.text if isinstance(item.value, Name) else None
+            if named is None or (wanted.words and not wanted.names and named not in wanted.words):
+                place = place_of(item.value) if item.value is not None else item.place
+                helps = [
+                    *(did_you_mean(named, wanted.words) if named else ()),
+                    "one of: " + ", ".join(wanted.words) if wanted.words else "write a name, without quotes",
+                ]
+                message = f"`{wanted.name}` of {owner.label} is a word"
+                if isinstance(item.value, String):
+                    message += ", without quotes"
+                if named:
+                    message = f"`{wanted.name}` of {owner.label} cannot be `{named}`"
+                self.complaints.error("D076", message, place, help=helps)
+                self.checks.fail(path)
+                return None
+            word = named
+            place = place_of(item.value) if item.value else item.place
+            origin = written_origin(place, item.overrides)  # a word is no name that stands for something
+        kept = self.parameters if record else self.beside
+        kept[path] = Settled(word, "", origin, wanted.doc, item.value if item else None)
+        return word
+
+    def setting(self, path: str, value: Real | str, unit: str = "", item: Item | None = None, note: str = "") -> None:
+        """Keeps, for who asks where it comes from, what decides the program; item: who wrote it, None for a default."""
+        origin = Origin("default", note=note)
+        if item is not None:
+            place = item.place if item.value is None else place_of(item.value)
+            origin = written_origin(place, item.overrides)
+        self.beside[path] = Settled(value, unit, origin, "", item.value if item is not None else None)
+
+    def remake(self, values: Mapping[str, Real], item: Item) -> None:
+        """Puts values in the stead of settled ones, each made of all that the item writes: what varies one, varies
+        all."""
+        for path, value in values.items():
+            settled = self.parameters[path]
+            settled.value = self._plain(value)
+            if settled.origin.note == GIVEN:
+                continue
+            settled.expression = item.value
+            if settled.origin.kind == "deck" and item.value is not None:
+                settled.origin = replace(settled.origin, place=place_of(item.value))
+        for taken in self.sets.values():
+            if any(path in values for path in taken):
+                taken += [path for path in values if path not in taken]
+
+    def derived(self, owner: Owner, name: str, value: Real, unit: str, note: str) -> Real:
+        """A parameter that follows from others, unless a sweep varies it itself."""
+        wanted = Parameter(name=name, unit=unit, doc=note)
+        origin = Origin("derived", owner.place, (), note)
+        return self._finish(owner, wanted, name, owner.homes, self._plain(value), origin, owner.place, True)
+
+    def taken(self, owner: Owner, wanted: Parameter, of: str) -> Real | None:
+        """A parameter that is another's, of this path, unless a sweep varies it itself; None where the other failed."""
+        other = self.parameters.get(of)
+        if other is None or isinstance(other.value, str | tuple) or self.checks.failed(of):
+            self.checks.fail(owner.join(wanted.name))
+            return None
+        own = self._coordinate(owner, wanted.name, owner.homes) is not None
+        own = own or bool(self._given(owner, wanted.name, owner.homes))
+        origin = replace(other.origin, note="" if own else f"that of `{of}`")
+        value = self._finish(
+            owner,
+            wanted,
+            wanted.name,
+            owner.homes,
+            other.value,
+            origin,
+            origin.place or owner.place,
+            True,
+            other.expression,
+            needs=(of,),
+        )
+        for paths in self.sets.values():
+            if not own and of in paths:
+                paths.append(owner.join(wanted.name))
+        return value
+
+    def follows(self, path: str, value: Real, unit: str, item: Item, note: str) -> None:
+        """Keeps a parameter that an item makes of numbers of its own, which are varied in its stead."""
+        place = item.place if item.value is None else place_of(item.value)
+        self.parameters[path] = Settled(self._plain(value), unit, Origin("derived", place, item.overrides, note), note)
+
+    def written(self, item: Item, expression: Expression | None = None) -> Value | Values:
+        """What the item's expression is worth, lists with what `+=` appended. Raises Problem."""
+        expression = item.value if expression is None else expression
+        if expression is None or (item.body is not None and not isinstance(expression, Call)):
+            raise Problem(
+                error("D054", f"`{item.name}` is a value, not a block", item.place, help=f"write `{item.name} = ...;`")
+            )
+        found = self.names.evaluate(expression)
+        if not item.appended:
+            return found
+        if isinstance(found, Value):
+            raise Problem(
+                error(
+                    "D056",
+                    f"`{item.name}` is one number, and `+=` appends to a list",
+                    place_of(item.appended[0]),
+                    help=f"write `{item.name} = ...;`",
+                )
+            )
+        items = list(found.items)
+        for more in item.appended:
+            value = self.names.evaluate(more)
+            items.extend(value.items if isinstance(value, Values) else (value,))
+        return Values(tuple(items), found.place, found.unit)
+
+    def _missing(self, owner: Owner, wanted: Parameter) -> None:
+        self.checks.fail(owner.join(wanted.name))
+        servos = self.definitions.of_kind("servo")
+        bases = [servos[home].place for home in owner.homes if home in servos]
+        removed = self.removed.get(owner.join(wanted.name))
+        lacks = removed or owner.place
+        if any(self.complaints.lacks(place, wanted.name) for place in (lacks, *bases)):
+            return  # which was told: of another use, or of a base, or another word was taken for it
+        self.complaints.lacking.add((lacks, wanted.name))
+        unit = self.unit(owner, wanted)[0]
+        shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
+        shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {unit}"
+        doc = f" ({wanted.doc})" if wanted.doc != wanted.name else ""
+        also = [Label(owner.place, f"{owner.label} stands here")] if removed is not None else []
+        at = Label(removed, "removed here") if removed is not None else owner.place
+        self.complaints.error(
+            "D075",
+            f"{owner.label} has no `{wanted.name}`",
+            at,
+            also=also,
+            help=f"write `{wanted.name} = {shown}{'' if owner.call else ';'}`" + doc,
+        )
+
+    def _settle(
+        self,
+        owner: Owner,
+        wanted: Parameter,
+        name: str,
+        item: Item | None,
+        written: Value | None,
+        default: float | None,
+        record: bool,
+        part: Expression | None = None,
+    ) -> Real | None:
+        """part: of the item's expression, what this number was written as; None where that is the whole of it."""
+        homes = owner.homes if item is None else item.homes
+        place = owner.place if item is None else item.place
+        value: Real | None = None
+        origin = Origin("default")
+        if item is None:
+            value = default
+        elif written is not None:
+            place = written.place
+            with self.complaints.gather():
+                self.check_dimension(replace(owner, homes=homes), wanted, written)
+                value = self._plain(written.number)
+            origin = _origin(item, place)
+        coordinate = self._coordinate(owner, name, homes)
+        if value is None and (item is not None or coordinate is None) and not self._given(owner, name, homes):
+            if item is None:
+                self._missing(owner, wanted)
+            for path in (owner.join(name), *(owner.join_local(home, name) for home in homes)):
+                self.checks.fail(path)
+            return None
+        expression = part if part is not None else item.value if item is not None else None
+        return self._finish(owner, wanted, name, homes, value, origin, place, record, expression)
+
+    def _finish(
+        self,
+        owner: Owner,
+        wanted: Parameter,
+        name: str,
+        homes: tuple[str, ...],
+        value: Real | None,
+        origin: Origin,
+        place: Place,
+        record: bool,
+        expression: Expression | None = None,
+        needs: tuple[str, ...] = (),
+    ) -> Real:
+        path = owner.join(name)
+        for known in owner.paths(name, homes):
+            self.known.setdefault(known, []).append(path)
+        for given in self._given(owner, name, homes):
+            if origin.note == GIVEN:
+                self.complaints.error(
+                    "D232",
+                    f"this sets `{path}`, which is set already",
+                    given.value.place,
+                    also=[Label(origin.place, "here")] if origin.place is not None else [],
+                    help="leave one of the two out",
+                )
+            self.sets.setdefault(given.path, []).append(path)
+            value, expression, place = self._plain(given.value.number), given.expression, given.value.place
+            self._check_instead(owner, wanted, given.value, path)
+            origin = given.over(origin)
+        coordinate = self._coordinate(owner, name, homes)
+        if coordinate is not None:
+            if origin.note == GIVEN and not is_given(coordinate.place):
+                self.complaints.error(
+                    "D233",
+                    f"this sets `{path}`, which the sweep varies",
+                    origin.place,
+                    also=[Label(coordinate.place, f"`{coordinate.path}` varies here")],
+                    help=VARIES,
+                )
+            places = (origin.place,) if origin.place is not None else ()
+            origin = Origin("case", coordinate.place, (*places, *origin.overrides), origin.note)
+            place = coordinate.place
+            self.sets.setdefault(coordinate.path, []).append(path)
+            value = coordinate.value.number
+            self._check_instead(owner, wanted, coordinate.value, coordinate.path)
+        assert value is not None
+        endless = not isinstance(value, Scalar) and math.isinf(value)
+        if origin.kind != "default" or not endless:  # a model's own default may be: never
+            self._check_range(owner, wanted, value, place, path, needs)
+        kept = self.parameters if record else self.beside
+        if record or owner.called is None:
+            kept[path] = Settled(value, self.unit(owner, wanted)[0], origin, wanted.doc, expression)
+        return value
+
+    def _check_instead(self, owner: Owner, wanted: Parameter, value: Value, path: str) -> None:
+        """Tells of a value of the wrong dimension in place of the deck's; path: what has failed then."""
+        try:
+            self.check_dimension(owner, wanted, value)
+        except Problem as problem:
+            self.complaints.add(*problem.diagnostics)
+            self.checks.fail(path)
+
+    def _given(self, owner: Owner, name: str, homes: Iterable[str]) -> list[Given]:
+        """What is given for this parameter; more than one where paths are set that mean the same."""
+        found = [path for path in owner.paths(name, homes) if path in self.settings] if self.settings else []
+        for path in found:
+            if path not in self.given:
+                self.given[path] = None
+                with self.complaints.gather():
+                    self.given[path] = evaluated(self.settings[path], path, self.names)
+        return [given for path in found if (given := self.given[path]) is not None]
+
+    def _coordinate(self, owner: Owner, name: str, homes: tuple[str, ...]) -> Varied | None:
+        if not self.varied:
+            return None
+        paths = owner.paths(name, homes)
+        found = [varied for path, varied in self.varied.items() if path in paths]
+        for other in found[1:]:
+            self.sets.setdefault(other.path, [])
+            self.complaints.error(
+                "D123",
+                f"`{found[0].path}` and `{other.path}` both set `{owner.join(name)}`",
+                other.place,
+                also=[Label(found[0].place, "the first")],
+                help=["vary one of them, or different joints", *self._own(owner, name, homes, (found[0], other))],
+            )
+        return found[0] if found else None
+
+    def _own(self, owner: Owner, name: str, homes: tuple[str, ...], both: tuple[Varied, ...]) -> list[str]:
+        """What parts two coordinates of a servo's definition and of its base, where they are that."""
+        by_path = {owner.join_local(home, name): home for home in homes}
+        named = [home for path, home in by_path.items() if path in (both[0].path, both[1].path)]
+        return [f"or give `{named[1]}` its own `{name}`, which `{named[0]}` does not reach"] if len(named) > 1 else []
+
+    def _plain(self, number: Real) -> Real:
+        """A recorded number that turned out to be a constant is one."""
+        if isinstance(number, Scalar):
+            known = self.graph.value(number.ref)
+            return number if known is None else known
+        return float(number)
+
+    # Units
+
+    def unit(self, owner: Owner, wanted: Parameter) -> tuple[str, Dimension]:
+        """The unit wanted here, in SI, as text and dimension."""
+        return unit_here(wanted.unit, owner.joint, owner.command, owner.of)
+
+    def check_dimension(self, owner: Owner, wanted: Parameter, value: Value) -> None:
+        """Raises D060 for a bare number where there is a dimension, D061 for a wrong one."""
+        text, dimension = self.unit(owner, wanted)
+        if units.same(value.dimension, dimension):
+            self._remark_cycles(owner, wanted, value, text)
+            self._remark_share(owner, wanted, value)
+            return
+        what = owner.what(wanted)
+        also = self.names.label(value)
+        apart: str | list[str] = self._of_its_own(owner, wanted, value, text)
+        if value.dimension == PURE:
+            shown = f"a number in {text}"
+            if not isinstance(value.number, Scalar):
+                shown = either(f"{value.number:.12g} {each}" for each in in_degrees(text))
+            if value.bare and any(source.name == value.place.file for source in self.definitions.csv_files.sources):
+                shown = f"the unit in square brackets behind the column's name: `[{text}]`"
+            raise Problem(
+                error(
+                    "D060",
+                    f"{what} is in {text}, and this is a {'bare' if value.bare else 'pure'} number",
+                    value.place,
+                    also=also,
+                    help=apart or (f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}"),
+                )
+            )
+        found = units.text(value.dimension)
+        apart = apart or self._of_another_command(owner, wanted, value, text)
+        message = f"{what} is " + ("a pure number" if dimension == PURE else f"in {text}") + f", and this is in {found}"
+        other = self._other(owner, wanted, value) if dimension == PURE else []
+        raise Problem(
+            error("D061", message, value.place, also=also, help=apart or [*other, mended(value, text, dimension)])
+        )
+
+    def _of_another_command(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> list[str]:
+        """The remedy where a course's parameter has the unit that it has under another kind of command."""
+        if owner.command is None:
+            return []
+        fits = [
+            kind
+            for kind in ("position", "rate", "acceleration")
+            if kind != owner.command
+            and units.same(value.dimension, unit_here(wanted.unit, owner.joint, kind, owner.of)[1])
+        ]
+        found = units.text(value.dimension)
+        if not owner.label.startswith("`"):  # no course: the command is this number
+            return [f"`{owner.command}(...)` takes {text}; `{kind}(...)` takes {found}" for kind in fits]
+        course = owner.label.strip("`")
+        return [
+            f"of a `{owner.command}` command it is in {text}; with `{kind}({course}(...))` it would be in "
+            f"{found}, like all of that course"
+            for kind in fits
+        ]
+
+    def _remark_cycles(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> None:
+        """Tells of a unit that may mean cycles where radians count, or the reverse."""
+        if wanted.ticks:
+            return
+        found = doubt(value, text, measure_here(wanted.unit, owner.joint, owner.command, owner.of))
+        if found is not None:
+            self.complaints.warn(
+                "D305",
+                f"{owner.what(wanted)} is {found.taken}",
+                value.place,
+                also=self.names.label(value),
+                help=found.helps,
+            )
+
+    def _remark_share(self, owner: Owner, wanted: Parameter, value: Value) -> None:
+        """Tells of a bare number above 1 where a share is meant, which may have been meant in per cent."""
+        if not wanted.share or not value.bare:
+            return
+        number = value.number
+        if isinstance(number, Scalar):
+            found = (each.values for each in self.varied.values() if each.value.number is value.number)
+            number = max(next(found, np.zeros(1)).tolist(), key=abs, default=0.0)
+        if abs(number) <= 1.0:
+            return
+        shown, per_cent = f"{number:.12g}", f"{100.0 * number:.12g} %"
+        helps = [f"if per cent are meant, write `{shown} %`", f"if that is meant, write `{per_cent}`"]
+        if isinstance(value.number, Scalar):
+            helps = [
+                "if per cent are meant, write `%` behind the values",
+                f"if that is meant, write the values in per cent, such as `{per_cent}`",
+            ]
+        self.complaints.warn(
+            "D307", f"{owner.what(wanted)} is a share, and {shown} is {per_cent}", value.place, help=helps
+        )
+
+    def _other(self, owner: Owner, wanted: Parameter, value: Value) -> list[str]:
+        """The one optional parameter of the model that a number with this unit may be meant for."""
+        found = [
+            each
+            for each in owner.others
+            if each.shape == "number"
+            and each.default is not None
+            and each.name != wanted.name
+            and units.same(value.dimension, self.unit(owner, each)[1])
+        ]
+        if len(found) != 1:
+            return []
+        return [f"`{found[0].name}` is what is in {self.unit(owner, found[0])[0]}: {found[0].doc}"]
+
+    def _of_its_own(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> str:
+        """The remedy where a value is right for the other joints of its servo definition, which move otherwise."""
+        other: JointKind = "revolute" if owner.joint == "prismatic" else "prismatic"
+        both = [home for home in owner.homes if other in self.moved.get(home, ())]
+        if not both or not units.same(value.dimension, unit_here(wanted.unit, other, owner.command, owner.of)[1]):
+            return ""
+        joint = owner.path.partition(".servo")[0]
+        key = wanted.name if owner.command is None else "command"
+        shown = f"{value.number:g}" if value.bare and not isinstance(value.number, Scalar) else "..."
+        shown += "" if text == "1" else f" {text}"
+        written = f"{key} = {shown};" if owner.command is None else f"{key} = {owner.command}(...);"
+        moves, others = ("slides", "turn") if owner.joint == "prismatic" else ("turns", "slide")
+        why = f"joint `{joint}` {moves}, and others of servo `{both[-1]}` {others}"
+        if owner.homes[-1] != both[-1]:
+            return f"{why}: write `{written}` in servo `{owner.homes[-1]}`"
+        return f"{why}: give its servo a {key} of its own, `{joint} = {both[-1]} {{ {written} }}`"
+
+    def _check_range(
+        self, owner: Owner, wanted: Parameter, value: Real, place: Place, path: str = "", needs: tuple[str, ...] = ()
+    ) -> None:
+        bounds = [
+            (bound, word, sign)
+            for bound, word, sign in (
+                (wanted.above, "above", np.greater),
+                (wanted.at_least, "at least", np.greater_equal),
+                (wanted.below, "below", np.less),
+                (wanted.at_most, "at most", np.less_equal),
+            )
+            if bound is not None
+        ]
+        text = self.unit(owner, wanted)[0]
+        unit = "" if text == "1" else f" {text}"
+
+        def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+            bad = ~np.isfinite(values[:, 0])
+            for bound, _, holds in bounds:
+                bad |= ~holds(values[:, 0], bound)
+            if wanted.whole:
+                bad |= values[:, 0] != np.rint(values[:, 0])
+            return bad, [f"this is {x:g}{unit}" for x in values[bad, 0][:1]]
+
+        limits = " and ".join(f"{word} {bound:g}" for bound, word, _ in bounds) or "finite"
+        of = "of " if limits.startswith("at ") else ""
+        remedy = f"write a number {of}{limits}{unit}" if bounds else "write a finite number"
+        if wanted.whole:
+            limits, remedy = f"whole and {limits}", remedy.replace("a number", "a whole number")
+        limits += unit if bounds else ""
+        self.checks.hold(
+            (value,),
+            test,
+            code="D077",
+            message=f"{owner.what(wanted)} must be {limits}",
+            place=place,
+            path=path,
+            needs=needs,
+            help=remedy + (f" ({wanted.doc})" if wanted.doc else ""),
+        )
+
+    def quantities(self, *, beside: bool = False) -> tuple[dict[str, Any], list[Scalar]]:
+        """The parameters as a plan holds them, and the scalars of its formulas, in order. beside: the others too."""
+        from met.plan import Formula
+
+        outputs: list[Scalar] = []
+        made = {}
+        for path, settled in {**self.parameters, **(self.beside if beside else {})}.items():
+            value: Any = settled.value
+            if isinstance(value, Scalar):
+                outputs.append(value)
+                value = Formula(len(outputs) - 1)
+            made[path] = Quantity(value, settled.unit, settled.origin)
+        return made, outputs
+
+
+def _origin(item: Item, place: Place) -> Origin:
+    note = f"from `{item.value.text}`" if isinstance(item.value, Name) else ""
+    return written_origin(place, item.overrides, note)

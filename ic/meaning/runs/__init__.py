@@ -1,0 +1,1 @@
+"""Runs resolved, each to an experiment of a plan."""

@@ -1,0 +1,290 @@
+"""The base of a run: fixed, prescribed component by component, or free; and that what a run says goes with that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+from ic.grammar.syntax import Call, Expression
+from ic.language.runs import BASE_KINDS
+from ic.meaning.control.servos import course_named, use_course
+from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.expressions.values import place_of
+from ic.meaning.mechanics.arm import Arm
+from ic.meaning.mechanics.bodies import carried_loads
+from ic.meaning.parameters import unvaried
+from ic.meaning.parameters.models import check_keys, refuse_values, word_of
+from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.scope import Scope
+from ic.text.complaints import known_words
+from met import models
+from met.diagnostic import Label, Place, did_you_mean
+from met.parameter import WORLD, Parameter
+from met.plan import BASE, COMPONENTS, Base, Course, Link, Payload, Structure, ground
+from met.plan.defaults import INERTIA, OF_FREE_BASE, component
+
+USAGE = "write `base = fixed;`, `base = free;` or `base = prescribed { x = sine(amplitude = 1 cm, frequency = 2 Hz); }`"
+INITIAL_OF_BASE = tuple(f"{BASE}.{name}" for name, _ in OF_FREE_BASE)
+"""What `initial` may say of a free base."""
+
+DOCS = {
+    "position": "origin of the base at the start, world axes", "rpy": "turn of the base at the start, fixed x-y-z",
+    "velocity": "velocity of the base's origin at the start, world axes",
+    "rate": "angular velocity of the base at the start, world axes",
+}  # fmt: skip
+OTHERS = ("rate", "position", "acceleration", "torque", "force")
+"""Kinds of command, which stand in servos."""
+NOTHING = (0.0, 0.0, 0.0)
+
+
+def resolve_base(scope: Scope, item: Item | None, arm: Arm) -> tuple[Base | None, Arm]:
+    """The base, None where it is fixed or something failed, which was told; and the arm, which has it for a link where
+    it moves."""
+    scope.unvaried[BASE] = unvaried.chosen("write `vary base = [fixed, free];`")
+    kind = word_of(item.value) if item is not None and item.value is not None else None
+    if item is None:
+        scope.setting(BASE, "fixed")
+        return None, arm
+    if kind not in BASE_KINDS or item.appended:
+        wrong = item.appended[0] if item.appended else item.value
+        place = place_of(wrong) if wrong is not None else item.place
+        told = "a base is fixed, prescribed or free" if kind is None or item.appended else f"no base `{kind}`"
+        meant = did_you_mean(kind, BASE_KINDS) if kind is not None and kind not in BASE_KINDS else ()
+        scope.complaints.error("D250", told, place, help=[*meant, USAGE])
+        return None, arm
+    scope.setting(BASE, kind, item=item)
+    body = item.body or Block()
+    if kind != "prescribed":
+        if item.body is not None or (isinstance(item.value, Call) and item.value.positional):
+            help = "leave the block out"
+            if kind == "free":
+                help = f"its state at the start stands in `initial`: {', '.join(INITIAL_OF_BASE)}"
+            scope.complaints.error("D250", f"a {kind} base takes no block", item.place, help=help)
+        return (Base("free", (), item.place), _standing(scope, item, arm)) if kind == "free" else (None, arm)
+    courses = () if refuse_values(scope, item.value, COMPONENTS) else _courses(scope, item, body)
+    return Base("prescribed", courses, item.place), _standing(scope, item, arm)
+
+
+def check_base(scope: Scope, base: Base | None, structure: Structure, environment: Block, item: Item | None) -> None:
+    """What does not go with the base: a turn without velocity products, a free base without mass."""
+    off = environment.get("velocity_products")
+    if base is not None and base.turns and not structure.velocity_products and off is not None and item is not None:
+        what = "a free base" if base.kind == "free" else "a base that turns"
+        scope.complaints.error(
+            "D253",
+            f"{what} moves by velocity products, and they are off",
+            place_of(off.value) if off.value is not None else off.place,
+            also=[Label(item.place, f"{what}")],
+            help="leave `velocity_products = off` out",
+        )
+    if base is None or base.kind != "free" or item is None:
+        return
+    loads, passing = carried_loads(scope, structure.payloads)
+    paths = [f"links.{name}.mass" for name in structure.ground]
+    paths += [path for name in structure.ground for path, _ in loads.get(name, ())]
+    masses = [settled.value for path in paths if (settled := scope.parameters.get(path)) is not None]
+    own = scope.parameters.get(f"links.{BASE}.mass")
+    written = own is not None and own.origin.kind != "default"
+    scope.checks.hold(
+        tuple(masses),  # type: ignore[arg-type]  # masses are numbers
+        lambda rows: (~(rows.sum(axis=1) > 0.0), []),
+        code="D254",
+        message="the base moves freely and has no mass",
+        place=item.place,
+        needs=tuple(paths),
+        help=(
+            f"write a mass above 0 kg for link `{BASE}`"
+            if written
+            else "give the arm the base's body: `link base { mass = 400 kg; shape = sphere(radius = 0.5 m); }`",
+            "or write the mass of a link that is fixed to the base",
+            *(word for name in structure.ground for word in passing.get(name, ())),
+        ),
+    )
+
+
+def initial_base(scope: Scope, body: Block, base: Base | None) -> None:
+    """What `initial` says of the base."""
+    for name, unit in OF_FREE_BASE:
+        item = body.get(f"{BASE}.{name}")
+        wanted = Parameter(name=name, unit=unit, shape="vector", default=NOTHING, doc=DOCS[name])
+        if base is not None and base.kind == "free":
+            place = item.place if item is not None else base.place
+            assert place is not None  # a base that moves comes from a deck
+            scope.vector(Owner("the base", place, f"initial.{BASE}"), wanted, item)
+        elif item is not None:
+            told = "a fixed base stays at the world's origin"
+            help = "write `base = free;`, or put the arm elsewhere: `at` and `rpy` of the joints on the base"
+            if base is not None:
+                told = "a prescribed base begins where its courses do"
+                help = f"leave it out; `base = prescribed {{ ... }}` says where it is: {', '.join(COMPONENTS)}"
+            scope.complaints.error("D255", f"{told}, so `{item.name}` has no effect", item.place, help=help)
+
+
+def held_by(arm: Arm, payloads: Sequence[Payload]) -> dict[str, str]:
+    """What each link and payload is fixed to for good, down to a link that moves against it, or the base."""
+    held = {joint.child: joint.parent for joint in arm.joints if joint.kind == "fixed"}
+    held |= {payload.name: payload.link for payload in payloads if not payload.flies}
+    found = {}
+    for name in held:
+        last = name
+        for _ in held:  # as many steps as there can be: joints that go round were told of
+            last = held.get(last, last)
+        found[name] = last
+    return found
+
+
+def remark_ground(
+    scope: Scope,
+    item: Item,
+    arm: Arm,
+    base: Base | None,
+    environment: Any,
+    values: Mapping[str, Any],
+    payloads: Sequence[Payload],
+) -> None:
+    """Tells of an environment model that acts upon links none of which yields to it."""
+    if environment.pushes is None or (base is not None and base.kind == "free"):
+        return
+    keys = environment.pushes(SimpleNamespace(**values))
+    carriers = {payload.name: payload.link for payload in payloads if not payload.flies}
+    links = [carriers.get(values[key], values[key]) for key in keys]
+    still = (BASE, WORLD, *ground(arm.links, arm.joints))
+    if any(link not in still for link in links):
+        return
+    key, link = next((key, link) for key, link in zip(keys, links, strict=True) if link != WORLD)
+    given = (item.body or Block()).get(key)
+    place = place_of(given.value) if given is not None and given.value is not None else item.place
+    is_base = f"link `{link}`" + ("" if link == BASE else ", which is fixed to the base,")
+    is_base += " with all that it acts upon" if len(set(links) - {link, WORLD}) else ""
+    why = "moves as it is told" if base is not None else "is part of the ground"
+    scope.complaints.remark(
+        "D256",
+        f"environment `{item.name}` changes nothing: {is_base} {why}",
+        place,
+        help="write `base = free;` in the run, or name a link that a joint moves",
+    )
+
+
+def _standing(scope: Scope, item: Item, arm: Arm) -> Arm:
+    """The arm with its base among the links: without matter, where the arm does not say more."""
+    if any(link.name == BASE for link in arm.links) or BASE in arm.lost:
+        return arm
+    owner = Owner(f"link `{BASE}`", item.place, f"links.{BASE}")
+    scope.number(owner, Parameter(name="mass", unit="kg", default=0.0, at_least=0.0, doc="mass of the link"), None)
+    for name, unit, parts in (("com", "m", tuple("xyz")), ("inertia", "kg*m^2", INERTIA)):
+        wanted = Parameter(name=name, unit=unit, shape="vector", default=(0.0,) * len(parts), doc=f"{name} of the link")
+        for part in parts:
+            scope.number(replace(owner, path=f"links.{BASE}.{name}"), replace(wanted, name=part, default=0.0), None)
+    return replace(arm, links=(*arm.links, Link(BASE, item.place)))
+
+
+# A prescribed base
+
+
+def _courses(scope: Scope, item: Item, body: Block) -> tuple[Course, ...]:
+    """The courses of the components that are written, in order; what is wrong is told."""
+    owner = Owner("a prescribed base", item.place, BASE)
+    check_keys(scope, body, COMPONENTS, owner)
+    if not any(name in body.items for name in COMPONENTS) and not body.items:
+        scope.complaints.error("D250", "this base is prescribed, and nothing says how it moves", item.place, help=USAGE)
+    found = []
+    for name in COMPONENTS:
+        part = body.get(name)
+        if part is not None:
+            with scope.complaints.gather():
+                model = _course(scope, part)
+                if model is not None:
+                    found.append(Course(name, model))
+    return tuple(found)
+
+
+def _course(scope: Scope, item: Item) -> str | None:
+    """The model of one component's course."""
+    if item.value is None:
+        scope.complaints.error(
+            "D250",
+            f"`{item.name}` of the base is a value or a course in time",
+            item.place,
+            help=f"write `{item.name} = {_example(item.name)};`",
+        )
+        return None
+    other = item.value.name.text if isinstance(item.value, Call) else ""
+    if other in OTHERS and other not in models.available("command"):
+        scope.complaints.error(
+            "D250",
+            f"`{item.name}` of the base is told its positions, and `{other}` is a kind of command of servos",
+            place_of(item.value),
+            help=f"write the course alone: `{item.name} = {_example(item.name)};`",
+        )
+        return None
+    inner: Expression = course_named(scope, item.value)
+    told = f"`{item.name}` of the base"
+    spot = Owner(
+        told,
+        item.place,
+        f"{BASE}.{item.name}",
+        homes=item.homes,
+        joint=component(item.name).kind,
+        command="position",
+        called=told,
+    )
+    model = use_course(
+        scope, spot, inner, item, doc=f"{item.name} of the base", column=item.name, kind="component", body=item.body
+    )
+    if model is not None:
+        scope.setting(f"{BASE}.{item.name}.model", model, item=item)
+        path = f"{BASE}.{item.name}"
+        scope.unvaried[path] = unvaried.model("a course in time", path)
+        _check_jumps(scope, item, model, place_of(item.value))
+    return model
+
+
+def _check_jumps(scope: Scope, item: Item, model: str, place: Place) -> None:
+    """A base does not jump; where its rate does, the arm is not struck, which is told."""
+    profile, head = models.find("command", model, place), f"{BASE}.{item.name}."
+    values = {path.removeprefix(head): each.value for path, each in scope.parameters.items() if path.startswith(head)}
+    words: Mapping[str, object] = {name: value for name, value in values.items() if isinstance(value, str)}
+    wanted = [p.name for p in profile.parameters if p.shape == "word"]
+    jump = profile.jump(SimpleNamespace(**words)) if set(wanted) <= set(words) else "none"
+    smooth = _smooth()
+    if jump == "value":
+        scope.complaints.error(
+            "D251",
+            f"`{item.name}` of the base jumps, by `{model}`",
+            place,
+            help=[
+                "a body moves from place to place in time",
+                known_words("courses without a jump of the rate", smooth),
+            ],
+        )
+    elif jump == "rate":
+        scope.complaints.remark(
+            "D252",
+            f"the rate of `{item.name}` of the base jumps, by `{model}`: the blow that this is to the arm is left out",
+            place,
+            help=known_words("courses without a jump of the rate", smooth),
+        )
+
+
+def _smooth() -> Iterable[str]:
+    """Courses that are known never to jump, with the word that says so where one does."""
+    found = []
+    for name, each in models.find_own("command").items():
+        words = [(p.name, word) for p in each.parameters for word in p.words]
+        known = {p.name: p.default for p in each.parameters if p.words}
+        if not callable(each.jumps):
+            found += [name] * (each.jumps == "none")
+        else:
+            found += [
+                f"{name}({key} = {word})"
+                for key, word in words
+                if each.jump(SimpleNamespace(**{**known, key: word})) == "none"
+            ]
+    return sorted(found)
+
+
+def _example(name: str) -> str:
+    unit = "10 cm" if component(name).kind == "prismatic" else "10 deg"
+    return f"trapezoid(to = {unit}, max_rate = {unit}/s, max_acceleration = {unit}/s^2)"

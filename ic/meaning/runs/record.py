@@ -1,0 +1,340 @@
+"""What a run tells: recorded channels, metrics, and requirements on metrics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Literal
+
+from ic.grammar.spell import spell
+from ic.grammar.syntax import Binary, Expression, List, Name, Statement
+from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.expressions.values import place_of
+from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
+from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.scope import Scope
+from ic.meaning.parameters.unvaried import Unvaried
+from ic.text.complaints import known_words
+from met import models
+from met.diagnostic import Label, Place, did_you_mean, nearest
+from met.frozen import frozen
+from met.parameter import Parameter
+from met.plan import MetricUse, Recorded, Requirement, Structure
+from met.plan.channel import FAMILIES, Channel, carries, channels, recordable
+from met.plan.outputs import metric_units
+from met.trace import Scalar
+
+OF_SERVO = frozenset({"servo", "bed", "law"})
+"""Heads of channels that a joint has only with a servo, or with its motor on a bed."""
+
+FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+
+
+# Record
+
+
+def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Structure) -> tuple[Recorded, ...]:
+    """The variables that are recorded, in the deck's order."""
+    scope.unvaried["record"] = Unvaried("is one for the whole sweep", "record all that any case needs")
+    if item is None:
+        scope.complaints.missing(
+            run.place,
+            ("record",),
+            "D124",
+            f"{run.label} records nothing",
+            help="write `record = [q, qd, tau];`, or `record = [];` where metrics are all you want",
+        )
+        return ()
+    asked = [name for expression in (item.value, *item.appended) for name in _names(scope, item, expression)]
+    known = recordable(structure, [name.text for name in asked])
+    found: dict[str, tuple[Recorded, Place]] = {}
+    for name in asked:
+        made = known.get(name.text)
+        if made is None and scope.lost and not OF_SERVO.isdisjoint(word.text for word in name.path):
+            continue
+        if made is None and _of_lost(scope, name, structure):
+            continue
+        if made is None and scope.gone and (name.path[0].text in scope.gone or not structure.moving):
+            continue
+        if made is None:
+            scope.complaints.error(
+                "D125", f"no channel `{name.text}`", name.place, help=_nearest(name, known, structure)
+            )
+        for each in made or ():
+            if each.name in found:
+                scope.complaints.error(
+                    "D040",
+                    f"`{each.name}` is recorded twice",
+                    name.place,
+                    also=[Label(found[each.name][1], "first")],
+                    help="leave one out",
+                )
+            else:
+                found[each.name] = (each, name.place)
+    return tuple(recorded for recorded, _ in found.values())
+
+
+def _of_lost(scope: Scope, name: Name, structure: Structure) -> bool:
+    """Whether this is a channel of a guide or a link's sensor that failed, which was told."""
+    words = [word.text for word in name.path]
+    lost = {
+        "guides": set(scope.guides) - {guide.name for guide in structure.guides},
+        "sensors": scope.sensors - {sensor.name for sensor in structure.sensors},
+    }.get(words[0], set())
+    return bool(lost) and (len(words) == 1 or words[1] in lost)
+
+
+def _names(scope: Scope, item: Item, expression: Expression | None) -> Iterator[Name]:
+    if isinstance(expression, Name) and expression.text == "none":
+        return
+    items: Iterable[Expression] = expression.items if isinstance(expression, List) else ()
+    if not isinstance(expression, List):
+        scope.complaints.error(
+            "D124",
+            "a record is a list of channels",
+            place_of(expression) if expression else item.place,
+            help="write `record = [q, qd, tau];`",
+        )
+    for each in items:
+        if isinstance(each, Name):
+            yield each
+        else:
+            scope.complaints.error(
+                "D124",
+                "a record is a list of channels; this is none",
+                place_of(each),
+                help="write `record = [q, qd, tau];`",
+            )
+
+
+def _nearest(name: Name, known: dict[str, tuple[Recorded, ...]], structure: Structure) -> list[str]:
+    """Why there is none; or what was meant, and what there is: of the same joint or link, else of all; vectors and
+    families as a whole."""
+    why = _why_none([word.text for word in name.path], structure)
+    if why:
+        return [why]
+    first = name.path[0].text
+    if first == "sensors" and structure.sensors:
+        sensors = [each for each in known if each.startswith("sensors.")]
+        return [*did_you_mean(name.text, sensors), known_words("sensors of links", sensors)]
+    whole = [each for each in known if each.rpartition(".")[0] not in known]
+    head = ".".join(word.text for word in name.path[:2]) if first in ("links", "payloads") else first
+    own = [each for each in whole if each.startswith(head + ".")]
+    if own:
+        rests = [each.removeprefix(f"{head}.") for each in known if each.startswith(f"{head}.")]
+        near = nearest(name.text.removeprefix(f"{head}."), rests)  # all that begins with the joint looks alike
+        meant = [] if near is None else [f"did you mean `{head}.{near}`?"]
+        return [*meant, known_words(f"channels of `{head}`", own)]
+    joints = [each for each in whole if known[each][0].joints and not each.startswith("links.")]
+    arm = [each for each in whole if each in FAMILIES and not known[each][0].joints]
+    links = [each for each in whole if each.startswith("links.")]
+    some = [each for each in links if each.split(".")[1] == links[0].split(".")[1]]
+    payloads = [f"payloads.{payload.name}" for payload in structure.payloads[:1]]
+    of_payload = [each for each in whole for payload in payloads if each.startswith(f"{payload}.")]
+    return [
+        *did_you_mean(name.text, known),
+        known_words("channels of all joints", joints),
+        known_words("channels of the arm, and of a link", [*arm, *some]),
+        *([known_words("channels of a payload", of_payload)] if of_payload else []),
+    ]
+
+
+def _why_none(words: list[str], structure: Structure) -> str:
+    """Why a fixed joint has no channel, a servo not this one, and a joint none of a link that it does not carry; ""
+    where that is not it."""
+    if words[0] in {joint.name for joint in structure.joints if joint.kind == "fixed"}:
+        return (
+            f"joint `{words[0]}` is fixed: its two links move as one body, and nothing is computed between them; "
+            "what they take shows in the reaction of the moving joint that carries them"
+        )
+    if len(words) > 1 and words[-2] == "servo":
+        return _under_a_word(words, structure)
+    moving, links = ({each.name for each in group} for group in (structure.moving, structure.links))
+    if len(words) < 5 or (words[0], words[2]) != ("links", "jacobian") or words[3] not in FAMILIES["jacobian"]:
+        return ""
+    link, joint = words[1], words[4]
+    if link not in links or joint not in moving or carries(structure, link, joint):
+        return ""
+    return f"joint `{joint}` does not carry link `{link}`, so it does not move it"
+
+
+def _under_a_word(words: list[str], structure: Structure) -> str:
+    """Under which word of its model a servo would have this channel; "" where under none."""
+    for use in structure.servos:
+        model = models.find("servo", use.model, use.place)
+        parts = (part for group in models.HELD for part in getattr(model, group, ()) if part.name == words[-1])
+        only = next((part.only for part in parts if part.only is not None), None)
+        if only is not None and words[0] in ("servo", use.joint):
+            needed = " or ".join(f"`{only[0]} = {word};`" for word in only[1])
+            return f"the servo of joint `{use.joint}` ({use.model}) has it with {needed}"
+    return ""
+
+
+# Metrics
+
+
+def resolve_metrics(scope: Scope, block: Block, structure: Structure) -> tuple[MetricUse, ...]:
+    watched = [item.body.get("of") for item in block.of_kind("metric") if item.body is not None]
+    known = channels(structure, [of.value.text for of in watched if of is not None and isinstance(of.value, Name)])
+    found = (_metric(scope, item, structure, known) for item in block.of_kind("metric"))
+    return tuple(use for use in found if use is not None)
+
+
+def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Channel]) -> MetricUse | None:
+    if item.detail:
+        scope.complaints.error(
+            "D129",
+            f"`{item.detail[0].text}` after the name of a metric",
+            item.detail[0].place,
+            help=f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`",
+        )
+    if item.value is None:
+        scope.complaints.error(
+            "D129",
+            f"metric `{item.name}` has no model",
+            item.place,
+            help=[
+                f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`",
+                known_words("metric models", sorted(models.available("metric"))),
+            ],
+        )
+        return None
+    metric = find_model(scope, "metric", word_of(item.value), place_of(item.value))
+    if metric is None or refuse_values(scope, item.value, ["of", *(p.name for p in metric.parameters)]):
+        return None
+    body = item.body or Block()
+    owner = Owner(f"metric `{item.name}`", item.place, f"metrics.{item.name}")
+    of = body.get("of")
+    channel = None
+    if of is None:
+        check_keys(scope, body, ["of", *(p.name for p in metric.parameters)], owner)
+        scope.complaints.missing(
+            item.place,
+            ("of",),
+            "D125",
+            f"metric `{item.name}` watches no channel",
+            help="write `of = CHANNEL;`, such as `of = shoulder.qd;`",
+        )
+    elif not isinstance(of.value, Name) or of.value.text not in known:
+        name = of.value if isinstance(of.value, Name) else None
+        if name is not None and (name.path[0].text in scope.lost | scope.gone or _of_lost(scope, name, structure)):
+            return None
+        message, helps = "a channel is needed here", ["write `of = CHANNEL;`, such as `of = shoulder.qd;`"]
+        if name is not None:
+            message, helps = _not_one(name, structure)
+        scope.complaints.error("D125", message, place_of(of.value) if of.value is not None else of.place, help=helps)
+    else:
+        channel = known[of.value.text]
+    if channel is None:
+        return None
+    scope.setting(f"metrics.{item.name}.model", metric.name, item=item)
+    scope.setting(f"metrics.{item.name}.of", channel.path, item=of)
+    use_model(scope, replace(owner, of=channel.unit), metric.parameters, body, ("of",))
+    return MetricUse(item.name, metric.name, channel.path, item.place)
+
+
+def _not_one(name: Name, structure: Structure) -> tuple[str, list[str]]:
+    """What to say of a name that is no single channel: which ones it stands for, or else what was meant."""
+    known = recordable(structure, [name.text])
+    if name.text not in known:
+        return f"no channel `{name.text}`", _nearest(name, known, structure)
+    numbers = [f"`{path}`" for variable in known[name.text] for path in variable.channels]
+    count = f"{len(numbers)} channel{'s' * (len(numbers) != 1)}"
+    return f"`{name.text}` is {count}", [known_words("a metric watches one of them", numbers)]
+
+
+# Requirements
+
+
+@frozen
+class Comparison:
+    """A `require` with its metric on the left."""
+
+    statement: Statement
+    metric: str
+    operator: Literal["<", "<=", ">", ">="]
+    limit: Expression
+
+
+def read_requirements(scope: Scope, block: Block) -> list[Comparison]:
+    """Every `require` that compares a metric of the run with a limit; tells of the others."""
+    written = {item.name for item in block.of_kind("metric")}
+    found = []
+    for position, statement in enumerate(block.statements):
+        if [word.text for word in statement.words] != ["require"]:
+            continue
+        comparison = statement.value
+        if not isinstance(comparison, Binary) or comparison.operator not in FLIPPED:
+            scope.complaints.error(
+                "D131",
+                "a requirement compares a metric with a limit",
+                place_of(comparison),
+                help="write `require METRIC < LIMIT;`, or <=, >, >=",
+            )
+            continue
+        removed = {
+            each.key.removeprefix("metric ")
+            for each in block.removed
+            if each.key.startswith("metric ") and position < each.before
+        }
+        operator, metric, limit = comparison.operator, comparison.left, comparison.right
+        if not _is_metric(metric, written | removed) and _is_metric(limit, written | removed):
+            operator, metric, limit = FLIPPED[operator], limit, metric
+        if not _is_metric(metric, written | removed):
+            name = spell(metric)
+            watch = []
+            if isinstance(metric, Name) and len(metric.path) > 1:
+                watch = [f"a metric of a channel is `metric NAME = max {{ of = {name}; }}`, and `require NAME < ...;`"]
+            scope.complaints.error(
+                "D132",
+                f"no metric `{name}`",
+                place_of(metric),
+                help=[*did_you_mean(name, written), known_words("metrics of this run", sorted(written)), *watch],
+            )
+        elif spell(metric) in removed:
+            scope.notes.append(
+                f"`require {spell(comparison)}` went with the metric `{spell(metric)}`, which is removed"
+            )
+        else:
+            found.append(Comparison(statement, spell(metric), operator, limit))  # type: ignore[arg-type]
+    return found
+
+
+def _is_metric(expression: Expression, metrics: set[str]) -> bool:
+    return isinstance(expression, Name) and expression.text in metrics
+
+
+def share_metrics(structure: Structure) -> set[str]:
+    """The metrics that are a share of something, such as an overshoot."""
+    return {use.name for use in structure.metrics if models.find("metric", use.model, use.place).share}
+
+
+def resolve_requirements(scope: Scope, read: list[Comparison], structure: Structure) -> tuple[Requirement, ...]:
+    """The requirements with their limits in SI."""
+    metrics = metric_units(structure)
+    shares = share_metrics(structure)
+    found = []
+    for each in read:
+        if each.metric not in metrics:
+            continue  # the metric failed, which was told
+        owner = Owner("", each.statement.place, "require", called=f"the limit on `{each.metric}`")
+        wanted = Parameter(name="limit", unit=metrics[each.metric], doc="limit", share=each.metric in shares)
+        number = _limit(scope, owner, wanted, each.limit)
+        if number is not None:
+            text = spell(each.statement.value)
+            found.append(Requirement(text, each.metric, each.operator, number, each.statement.place))
+    return tuple(found)
+
+
+def _limit(scope: Scope, owner: Owner, wanted: Parameter, expression: Expression) -> float | None:
+    item = Item("", "limit", (), expression, None, place_of(expression))
+    number = scope.number(owner, wanted, item, record=False)
+    if isinstance(number, Scalar):
+        scope.complaints.error(
+            "D122",
+            "the limit of a requirement varies with the sweep",
+            place_of(expression),
+            help="it is the same for all cases: write a number that stands still",
+        )
+        return None
+    return number

@@ -1,0 +1,98 @@
+"""What a run allows another version to differ by: `tolerances { qd = 1e-6 rad/s;  rel = 1e-9; }`."""
+
+from __future__ import annotations
+
+from ic.grammar.spell import spell
+from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.expressions.values import place_of
+from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.record import share_metrics
+from ic.text.complaints import known_words
+from met.diagnostic import did_you_mean
+from met.parameter import Parameter
+from met.plan import Structure, Tolerance
+from met.plan.channel import recordable
+from met.plan.outputs import OF_ALL, joint_parts, tolerable
+from met.trace import Scalar
+
+WRITE = "write `NAME = SIZE;`: `qd = 1e-6 rad/s;`, `elbow.q = 0.01 deg;`, `rel = 1e-9;`, `time = 1 ms;`"
+
+
+def resolve_tolerances(scope: Scope, body: Block, structure: Structure) -> tuple[Tolerance, ...]:
+    """In SI, in the order in which they are written. structure: with its metrics and record."""
+    for statement in body.statements:
+        scope.complaints.error(
+            "D239",
+            f"`{statement.words[0].text}` inside the tolerances",
+            statement.place,
+            help="it belongs to a run or a sweep",
+        )
+    known = tolerable(structure)
+    found = (_tolerance(scope, item, structure, known) for item in body.items.values())
+    return tuple(each for each in found if each is not None)
+
+
+def _tolerance(scope: Scope, item: Item, structure: Structure, known: dict[str, tuple[str, ...]]) -> Tolerance | None:
+    name = item.name
+    if item.kind or item.value is None:
+        scope.complaints.error("D239", f"`{item.kind or name}` is no tolerance", item.place, help=WRITE)
+        return None
+    if name not in known:
+        if not scope.hangs(name):
+            scope.complaints.error(
+                "D237",
+                f"no signal or metric `{name}` here that could differ",
+                item.place,
+                help=_nearest(item, structure, known),
+            )
+        return None
+    if len(known[name]) > 1:
+        parts = [path for each in structure.record if each.name == name for path in joint_parts(name, each.joints)]
+        scope.complaints.error(
+            "D238",
+            f"`{name}` is in {' and in '.join(known[name])}",
+            item.place,
+            help=known_words("give each joint its own", parts),
+        )
+        return None
+    path = f"tolerances.{name}"
+    owner = Owner("the tolerances", item.place, "tolerances", called=f"the tolerance of `{name}`")
+    wanted = Parameter(
+        name=name,
+        unit=known[name][0],
+        at_least=0.0,
+        doc="what a diff allows",
+        share=name == "rel" or name in share_metrics(structure),
+    )
+    size = scope.number(owner, wanted, item, record=False)
+    if isinstance(size, Scalar):
+        at = scope.varied[path].place if path in scope.varied else place_of(item.value)
+        scope.complaints.error(
+            "D122",
+            f"the tolerance of `{name}` varies with the sweep",
+            at,
+            help="it is the same for all cases: write a number that stands still",
+        )
+        return None
+    if size is None:
+        return None
+    scope.setting(path, float(size), known[name][0], item=item)
+    given = scope.given.get(path)
+    if given is not None:
+        scope.beside[path].origin = given.over(scope.beside[path].origin)
+    return Tolerance(name, float(size), spell(given.expression if given else item.value), item.place)
+
+
+def _nearest(item: Item, structure: Structure, known: dict[str, tuple[str, ...]]) -> list[str]:
+    """How it could be, or what was meant."""
+    name = item.name
+    found = recordable(structure).get(name, ())
+    variables = [each.name for each in found]
+    if len(variables) > 1 and any(each in known for each in variables):
+        return [known_words(f"`{name}` is several signals", variables)]
+    inherited = f", or `remove {name};` here" if len(item.homes) > 1 else ""
+    record = [f"only what is recorded can differ: `record += [{name}];`{inherited}"] if found else []
+    parts = {part for each in structure.record for part in joint_parts(each.name, each.joints)}
+    shown = [each for each in known if each not in parts and each not in OF_ALL]
+    return [*(record or did_you_mean(name, known)), known_words("signals and metrics here", shown)]

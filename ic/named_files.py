@@ -1,0 +1,70 @@
+"""Files that a deck names besides decks: beside the file that names them, then where `-I` says; each read once."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from typing import Generic, TypeVar
+
+from ic.grammar.syntax import Deck, String
+from ic.text.files import LIBRARY, Files, FoundFile
+from ic.text.lexer import COMMAND_LINE
+from ic.text.source import SourceText
+from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
+
+T = TypeVar("T")
+
+
+class NamedFiles(Generic[T]):
+    """The files of one kind, each as what `load` makes of its name and text.
+
+    kind, ending  what messages call one, and how their names end;  most  bytes of one
+    missing       the code of the message where there is none of a name
+    """
+
+    def __init__(
+        self, deck: Deck, load: Callable[[str, str], T], *, kind: str, ending: str, most: int, missing: str
+    ) -> None:
+        self._deck, self._load, self._kind, self._ending = deck.file, load, kind, ending
+        self._most, self._missing = most, missing
+        self._files = Files(deck.include_dirs)
+        self._read: dict[str, T | Problem] = {}
+
+    @property
+    def sources(self) -> tuple[SourceText, ...]:
+        """The files that were read, whole, in order."""
+        return tuple(self._files.read_so_far.values())
+
+    @property
+    def loaded(self) -> Iterable[T]:
+        """What was made of the files in which nothing is wrong."""
+        return (each for each in self._read.values() if not isinstance(each, Problem))
+
+    def get(self, named: String) -> T:
+        """What is in the file of this name. Raises Problem; where that is the file's own fault, the same each time."""
+        found = self._find(named)
+        if found.name not in self._read:
+            try:
+                text = self._files.text(found, kind=self._kind, most=self._most)
+                self._read[found.name] = self._load(found.name, text)
+            except Problem as problem:
+                placed = (
+                    d if d.at else Diagnostic(d.code, d.message, Label(named.place), d.also, d.help)
+                    for d in problem.diagnostics
+                )
+                self._read[found.name] = Problem(placed)
+        made = self._read[found.name]
+        if isinstance(made, Problem):
+            raise made
+        return made
+
+    def _find(self, named: String) -> FoundFile:
+        file = self._deck if named.place.file == COMMAND_LINE else named.place.file
+        path = os.path.join(LIBRARY, file[1:-1]) if file.startswith("<") else file
+        folders = self._files.where(FoundFile(path, file), False)
+        found = self._files.find(named.value, folders) if named.value.strip() else None
+        if found is None:
+            near = did_you_mean(named.value, self._files.listed(folders, self._ending))
+            looked = f"looked in {', '.join(dict.fromkeys(folder.said for folder in folders))}"
+            raise Problem(error(self._missing, f'cannot find "{named.value}"', named.place, help=(*near, looked)))
+        return found

@@ -1,0 +1,207 @@
+"""A collector of diagnostics: a deck's mistakes are told together, so that none hides the next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+
+from ic.text.source import Wreck
+from met.diagnostic import Diagnostic, Label, Place, Problem, error, meant
+
+MOST = 200  # a deck with more mistakes than this is told the first ones: the rest seldom say more
+
+ONCE = ("D060", "D061", "D076", "D077", "D087", "D104", "D109", "D125", "D141", "D305", "D307")
+"""What is told once of a place, whoever finds it: a bare number, a wrong unit, no such word, out of range, no body's
+inertia, a rate too slow, no entry of a run, no channel, no such key, a unit that may mean cycles, a share above 1."""
+
+
+UNKNOWN_WORDS = ("D044", "D045", "D082", "D108", "D136", "D157")
+"""What is told of words of the language, which no deck defines."""
+
+
+class Complaints:
+    """Diagnostics in the order found, each once."""
+
+    def __init__(self, found: Iterable[Diagnostic] = ()) -> None:
+        self._found: dict[Diagnostic, None] = dict.fromkeys(found)
+        self._remarks: dict[Diagnostic, None] = {}
+        self.faults = 0  # errors so far, with those that are not told again: to see whether something brought one
+        self._wrecks: list[Wreck] = []
+        self._torn: set[Place] = set()  # definitions and blocks of which an entry could not be read
+        self._lost: set[str] = set()  # names that what could not be read may have defined
+        self._spots: set[tuple[str, int, int]] = set()  # where errors of syntax are told
+        self.lacking: set[tuple[Place, str]] = set()  # definitions, and entries that they lack, as was told
+
+    @property
+    def all(self) -> tuple[Diagnostic, ...]:
+        return tuple(self._found)
+
+    @property
+    def errors(self) -> tuple[Diagnostic, ...]:
+        return tuple(d for d in self._found if d.severity == "error")
+
+    @property
+    def warnings(self) -> tuple[Diagnostic, ...]:
+        return tuple(d for d in self._found if d.severity == "warning")
+
+    def add(self, *diagnostics: Diagnostic) -> None:
+        for diagnostic in diagnostics:
+            self.faults += diagnostic.severity == "error"
+            if len(self._found) < MOST and not self._told_of_another_user(diagnostic) and not self._follows(diagnostic):
+                self._found.setdefault(diagnostic)
+
+    def after(self, wrecks: Sequence[Wreck]) -> None:
+        """Notes what could not be read, so that nothing is told that follows from it, nor from the errors so far."""
+        self._spots.update(_spot(each.at.place) for each in self.errors if each.at is not None)
+        self._wrecks += wrecks
+        self._torn.update(each.within for each in wrecks if each.within is not None)
+        self.lost(*(name for each in wrecks for name in each.names))
+
+    def lost(self, *names: str) -> None:
+        """Notes names that something may have defined which could not be taken in, as was told."""
+        self._lost.update(names)
+
+    def inherits(self, of: Place, base: Place) -> None:
+        """Notes that what is defined at `of` has what its base has, and may lack what that lacks."""
+        if base in self._torn:
+            self._torn.add(of)
+
+    def _follows(self, diagnostic: Diagnostic) -> bool:
+        """Whether this is about something that could not be read, or about a name that this may have defined."""
+        if diagnostic.code not in UNKNOWN_WORDS and diagnostic.message.startswith("no "):
+            path = diagnostic.message.split("`")[1:2]
+            if any(word in self._lost for text in path for word in text.split(".")):
+                return True
+        if diagnostic.at is None or not (self._wrecks or self._spots):
+            return False
+        file, line, column = _spot(diagnostic.at.place)
+        return (file, line, column) in self._spots or any(
+            each.place.file == file and (each.place.line, each.place.column) <= (line, column) < each.end
+            for each in self._wrecks
+        )
+
+    def _told_of_another_user(self, diagnostic: Diagnostic) -> bool:
+        """Whether this value's mistake is known: what a base or a `let` writes is found wrong at each of its users."""
+        if diagnostic.at is None or diagnostic.code not in ONCE:
+            return False
+        return any(
+            each.code == diagnostic.code and each.at is not None and each.at.place == diagnostic.at.place
+            for each in self._found
+        )
+
+    def error(
+        self,
+        code: str,
+        message: str,
+        at: Label | Place | None = None,
+        *,
+        also: Iterable[Label] = (),
+        help: Iterable[str] | str = (),
+    ) -> None:
+        self.add(error(code, message, at, also=also, help=help))
+
+    def taken_for(self, of: Place, word: str, known: Iterable[str]) -> None:
+        """Notes what an unknown entry of what is defined at `of` may have been meant for: that is not missing
+        besides."""
+        near = meant(word, known)
+        if near is not None:
+            self.lacking.add((of, near.rpartition(".")[2]))
+
+    def lacks(self, of: Place, *names: str) -> bool:
+        """Whether it was told that what is defined at `of` lacks one of these entries, or has another word for it; or
+        whether one of its entries could not be read."""
+        if of in self._torn:
+            return True
+        return any((of, name) in self.lacking for name in names)
+
+    def missing(
+        self,
+        of: Place,
+        names: tuple[str, ...],
+        code: str,
+        message: str,
+        at: Place | None = None,
+        *,
+        also: Iterable[Label] = (),
+        help: Iterable[str] | str = (),
+    ) -> None:
+        """An error about what is defined at `of`, which has none of these entries, unless `lacks` says so."""
+        if not self.lacks(of, *names):
+            self.error(code, message, at or of, also=also, help=help)
+
+    def warn(
+        self,
+        code: str,
+        message: str,
+        at: Label | Place | None = None,
+        *,
+        also: Iterable[Label] = (),
+        help: Iterable[str] | str = (),
+    ) -> None:
+        made = error(code, message, at, also=also, help=help)
+        self.add(Diagnostic(made.code, made.message, made.at, made.also, made.help, "warning"))
+
+    def remark(
+        self,
+        code: str,
+        message: str,
+        at: Label | Place | None = None,
+        *,
+        also: Iterable[Label] = (),
+        help: Iterable[str] | str = (),
+    ) -> None:
+        """A warning about what the deck means, which says something only once the deck has no errors."""
+        made = error(code, message, at, also=also, help=help)
+        self._remarks.setdefault(Diagnostic(made.code, made.message, made.at, made.also, made.help, "warning"))
+
+    def admit_remarks(self) -> None:
+        """Makes warnings of the remarks."""
+        self.add(*self._remarks)
+        self._remarks = {}
+
+    def mark(self, since: int, *labels: Label) -> None:
+        """Adds places, and what they say, to the errors found after the first `since` diagnostics."""
+        found = list(self._found)
+        for n, each in enumerate(found):
+            if n >= since and each.severity == "error":
+                more = (label for label in labels if each.at is None or label.place != each.at.place)
+                found[n] = Diagnostic(each.code, each.message, each.at, (*each.also, *more), each.help, each.severity)
+        self._found = dict.fromkeys(found)
+
+    @contextmanager
+    def gather(self) -> Iterator[None]:
+        """What raises `Problem` inside is noted, and the rest of the block skipped."""
+        try:
+            yield
+        except Problem as problem:
+            self.add(*problem.diagnostics)
+
+
+def _spot(place: Place) -> tuple[str, int, int]:
+    """Where the reader of the deck sees it: of what a macro made, at the macro's use."""
+    at = place.expansions[-1].use if place.expansions else place
+    return at.file, at.line, at.column
+
+
+def belongs(word: str) -> list[str]:
+    """Where a word of the language stands that stands elsewhere only."""
+    told = {
+        "substitute": "`substitute JOINT { ... }`, in a run, puts a joint's motor on a bed",
+        "payload": "`payload NAME { ... }`, in a run, is a body that a link carries or grapples",
+        "guide": "`guide NAME = MODEL { ... }`, in a run, commands several joints together",
+        "sensor": "`sensor NAME = MODEL { link = LINK; ... }`, in a run, is on a link; `sensor QUANTITY = MODEL "
+        "{ ... }`, in a servo, is of its joint",
+    }
+    return [told[word]] if word in told else []
+
+
+def an(word: str, *, quoted: bool = False) -> str:
+    """`an arm`, `a servo`; quoted: in the quotes of what a deck writes."""
+    return f"{'an' if word[:1] in tuple('aeiou') else 'a'} {f'`{word}`' if quoted else word}"
+
+
+def known_words(what: str, known: Iterable[str], most: int = 24) -> str:
+    """`keys of a link: com, inertia, mass, shape`, cut where there are many."""
+    names = list(dict.fromkeys(known))
+    shown = ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+    return f"{what}: {shown}" if names else f"{what}: none"

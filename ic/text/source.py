@@ -1,0 +1,30 @@
+"""Text that was read, and stretches of it that could not be."""
+
+from __future__ import annotations
+
+from met.diagnostic import Place
+from met.frozen import frozen
+
+
+@frozen
+class Wreck:
+    """A stretch of text that could not be read, which has been told: what else is wrong there follows from it.
+
+    place   its first token; the line and column of its end
+    names   what it may have named or defined
+    within  the place of the block that it stands in, where it is not known which of its entries this is
+    """
+
+    place: Place
+    end: tuple[int, int]
+    names: tuple[str, ...]
+    within: Place | None
+
+
+@frozen
+class SourceText:
+    """A file that was read: the name messages print, its text, SHA-256 of its bytes."""
+
+    name: str
+    text: str
+    sha256: str

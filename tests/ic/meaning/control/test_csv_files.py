@@ -1,0 +1,645 @@
+"""Mistakes in CSV files of trajectories, and in naming one: whole messages."""
+
+from __future__ import annotations
+
+import random
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.ic.meaning.control.trajectories import MOVES, servo, shown
+from tests.ic.small_decks import ARM, RUN, changed, check, told
+
+
+def test_no_such_file(tmp_path: Path) -> None:
+    (tmp_path / "moves.csv").write_text(MOVES)
+    said = shown(tmp_path, None, 'trajectory(file = "move.csv")')
+    assert (
+        said.replace(str(tmp_path), "DIR")
+        == """\
+error[D190]: cannot find "move.csv"
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = "move.csv"));
+  |                                          ^^^^^^^^^^
+  = help: did you mean `moves.csv`?
+  = help: looked in `DIR`, the standard library
+"""
+    )
+
+
+def test_a_link_to_nowhere_is_not_what_was_meant(tmp_path: Path) -> None:
+    (tmp_path / "moves.csv").symlink_to(tmp_path / "gone.csv")
+    assert (
+        shown(tmp_path, None).replace(str(tmp_path), "DIR")
+        == """\
+error[D190]: cannot find "moves.csv"
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = "moves.csv"));
+  |                                          ^^^^^^^^^^^
+  = help: looked in `DIR`, the standard library
+"""
+    )
+
+
+MISTAKES: list[tuple[str, str | bytes, str, str]] = []  # what, the file's text, the command's course, what is said
+
+
+def mistake(what: str, text: str | bytes, message: str, course: str = 'trajectory(file = "moves.csv")') -> None:
+    MISTAKES.append((what, text, course, message))
+
+
+mistake(
+    "a column without a unit",
+    MOVES.replace("hinge [deg]", "hinge"),
+    """\
+error[D193]: column `hinge` has no unit
+ --> moves.csv:1:11
+  |
+1 | time [s], hinge, other [rad]
+  |           ^^^^^
+ ::: deck.ic:9:42  read here for joint `hinge`
+  = help: write `hinge [deg]` or `hinge [rad]`
+""",
+)
+mistake(
+    "a unit that is none",
+    MOVES.replace("[deg]", "[degree]"),
+    """\
+error[D193]: `degree` is not a unit
+ --> moves.csv:1:11
+  |
+1 | time [s], hinge [degree], other [rad]
+  |           ^^^^^^^^^^^^^^
+ ::: deck.ic:9:42  read here for joint `hinge`
+  = help: did you mean `hinge [deg]`?
+""",
+)
+mistake(
+    "a unit that is none and like none",
+    MOVES.replace("[deg]", "[lots]"),
+    """\
+error[D193]: `lots` is not a unit
+ --> moves.csv:1:11
+  |
+1 | time [s], hinge [lots], other [rad]
+  |           ^^^^^^^^^^^^
+ ::: deck.ic:9:42  read here for joint `hinge`
+  = help: write `hinge [deg]` or `hinge [rad]`
+""",
+)
+mistake(
+    "a unit of another dimension",
+    MOVES.replace("[deg]", "[mm]"),
+    """\
+error[D193]: column `hinge` is in m, and rad is needed
+ --> moves.csv:1:11
+  |
+1 | time [s], hinge [mm], other [rad]
+  |           ^^^^^^^^^^
+ ::: deck.ic:9:42  read here for joint `hinge`
+  = help: write `hinge [deg]` or `hinge [rad]`, with numbers in that unit
+""",
+)
+mistake(
+    "a pure number",
+    MOVES.replace("[deg]", "[1]"),
+    """\
+error[D193]: column `hinge` is a pure number, and rad is needed
+ --> moves.csv:1:11
+  |
+1 | time [s], hinge [1], other [rad]
+  |           ^^^^^^^^^
+ ::: deck.ic:9:42  read here for joint `hinge`
+  = help: write `hinge [deg]` or `hinge [rad]`, with numbers in that unit
+""",
+)
+mistake(
+    "a unit of the times",
+    MOVES.replace("[s]", "[rad]"),
+    """\
+error[D193]: column `time` is in rad, and s is needed
+ --> moves.csv:1:1
+  |
+1 | time [rad], hinge [deg], other [rad]
+  | ^^^^^^^^^^
+ ::: deck.ic:9:42  read here
+  = help: write `time [s]`, with numbers in that unit
+""",
+)
+mistake(
+    "no column of the joint's name",
+    MOVES.replace("hinge", "hinges"),
+    """\
+error[D192]: `moves.csv` has no column `hinge`
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = "moves.csv"));
+  |                                          ^^^^^^^^^^^
+ ::: moves.csv:1:1  its first line
+  = help: did you mean `hinges`?
+  = help: columns: time, hinges, other
+  = help: that of the joint's name is taken, unless `column = "NAME"` names another
+""",
+)
+mistake(
+    "no column of the name that is written",
+    MOVES,
+    """\
+error[D192]: `moves.csv` has no column `elbow`
+ --> deck.ic:9:64
+  |
+9 |     command = position(trajectory(file = "moves.csv", column = "elbow"));
+  |                                                                ^^^^^^^
+ ::: moves.csv:1:1  its first line
+  = help: columns: time, hinge, other
+""",
+    'trajectory(file = "moves.csv", column = "elbow")',
+)
+mistake(
+    "no times",
+    MOVES.replace("time", "when"),
+    """\
+error[D192]: `moves.csv` has no column `time`
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = "moves.csv"));
+  |                                          ^^^^^^^^^^^
+ ::: moves.csv:1:1  its first line
+  = help: columns: when, hinge, other
+  = help: the times of the rows stand in a column `time [s]`
+""",
+)
+mistake(
+    "not a number",
+    MOVES.replace("30", "nan"),
+    """\
+error[D194]: `nan` is not a number
+ --> moves.csv:3:11
+  |
+3 | 0.5,      nan,          2
+  |           ^^^
+ ::: moves.csv:1:11  column `hinge`
+  = help: a number is written as 12.5 or -1e-3, with a point and without a unit
+""",
+)
+mistake(
+    "an empty cell",
+    MOVES.replace("30,", "   ,"),
+    """\
+error[D194]: there is no number here
+ --> moves.csv:3:5
+  |
+3 | 0.5,         ,          2
+  |     ^
+ ::: moves.csv:1:11  column `hinge`
+  = help: a number is written as 12.5 or -1e-3, with a point and without a unit
+""",
+)
+mistake(
+    "a number that is too large",
+    MOVES.replace("30", "1e999"),
+    """\
+error[D194]: this number is too large: the largest is 1.8e308
+ --> moves.csv:3:11
+  |
+3 | 0.5,      1e999,          2
+  |           ^^^^^
+ ::: moves.csv:1:11  column `hinge`
+  = help: a number is written as 12.5 or -1e-3, with a point and without a unit
+""",
+)
+mistake(
+    "a number that would become nothing",
+    MOVES.replace("30", "4.9e-324"),
+    """\
+error[D194]: this number is too small: it would become 0
+ --> moves.csv:3:11
+  |
+3 | 0.5,      4.9e-324,          2
+  |           ^^^^^^^^
+ ::: moves.csv:1:11  column `hinge`
+  = help: a number is written as 12.5 or -1e-3, with a point and without a unit
+""",
+)
+mistake(
+    "brackets without a unit",
+    MOVES.replace("hinge [deg]", "hinge []"),
+    """\
+error[D193]: column `hinge` has no unit
+ --> moves.csv:1:11
+  |
+1 | time [s], hinge [], other [rad]
+  |           ^^^^^^^^
+ ::: deck.ic:9:42  read here for joint `hinge`
+  = help: write `hinge [deg]` or `hinge [rad]`
+""",
+)
+mistake(
+    "a unit in round brackets",
+    MOVES.replace("hinge [deg]", "hinge (deg)"),
+    """\
+error[D192]: `moves.csv` has no column `hinge`
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = "moves.csv"));
+  |                                          ^^^^^^^^^^^
+ ::: moves.csv:1:1  its first line
+  = help: a unit stands in square brackets: write `hinge [deg]`
+  = help: columns: time, hinge (deg), other
+  = help: that of the joint's name is taken, unless `column = "NAME"` names another
+""",
+)
+mistake(
+    "no line that names the columns",
+    "0, 0\n1, 1\n",
+    """\
+error[D191]: the first line names no columns: it holds numbers
+ --> moves.csv:1:1
+  |
+1 | 0, 0
+  | ^^^^
+  = help: put a line above them, as in `time [s], shoulder [deg]`
+""",
+)
+mistake(
+    "a column with a name that is a book",
+    MOVES.replace("other", 50 * "o"),
+    f"""\
+error[D192]: `moves.csv` has no column `knee`
+ --> deck.ic:9:64
+  |
+9 |     command = position(trajectory(file = "moves.csv", column = "knee"));
+  |                                                                ^^^^^^
+ ::: moves.csv:1:1  its first line
+  = help: columns: time, hinge, {40 * "o"}...
+""",
+    'trajectory(file = "moves.csv", column = "knee")',
+)
+mistake(
+    "a command about a file",
+    MOVES,
+    """\
+error[D151]: a command is about a value or a course in time, and this is text
+ --> deck.ic:9:24
+  |
+9 |     command = position("moves.csv");
+  |                        ^^^^^^^^^^^
+  = help: write `position(trajectory(...))` for a column of a CSV file
+""",
+    '"moves.csv"',
+)
+mistake(
+    "the name of a course alone",
+    MOVES,
+    """\
+error[D075]: `trajectory` has no `file`
+ --> deck.ic:9:24
+  |
+9 |     command = position(trajectory);
+  |                        ^^^^^^^^^^
+  = help: write `file = "NAME.csv"`
+""",
+    "trajectory",
+)
+mistake(
+    "a word in quotes",
+    MOVES,
+    """\
+error[D076]: `interpolation` of `trajectory` is a word, without quotes
+ --> deck.ic:9:64
+  |
+9 |     command = position(trajectory("moves.csv", interpolation = "cubic"));
+  |                                                                ^^^^^^^
+  = help: one of: linear, cubic
+""",
+    'trajectory("moves.csv", interpolation = "cubic")',
+)
+mistake(
+    "times that fall",
+    MOVES.replace("0.5,", "1.5,"),
+    """\
+error[D195]: times of a file rise, and 1 s follows 1.5 s
+ --> moves.csv:4:1
+  |
+4 | 1,        45,          -3e-1
+  | ^
+ ::: moves.csv:3:1  the row before
+  = help: sort the rows; for a jump, two times close together
+""",
+)
+mistake(
+    "times that stand still",
+    MOVES.replace("0.5,", "1,  "),
+    """\
+error[D195]: times of a file rise, and 1 s follows 1 s
+ --> moves.csv:4:1
+  |
+4 | 1,        45,          -3e-1
+  | ^
+ ::: moves.csv:3:1  the row before
+  = help: sort the rows; for a jump, two times close together
+""",
+)
+mistake(
+    "no rows",
+    MOVES.splitlines()[0],
+    """\
+error[D196]: `moves.csv` has no rows
+ --> moves.csv:1:1
+  |
+1 | time [s], hinge [deg], other [rad]
+  | ^^^^^^^^
+ ::: deck.ic:9:42  read here
+  = help: a trajectory has 2 at least; `table` takes a single point
+""",
+)
+mistake(
+    "one row",
+    "\n".join(MOVES.splitlines()[:2]),
+    """\
+error[D196]: `moves.csv` has 1 row
+ --> moves.csv:1:1
+  |
+1 | time [s], hinge [deg], other [rad]
+  | ^^^^^^^^
+ ::: deck.ic:9:42  read here
+  = help: a trajectory has 2 at least; `table` takes a single point
+""",
+)
+mistake(
+    "a row that is too short",
+    MOVES.replace("30,          2", "30"),
+    """\
+error[D197]: this row has 2 cells, and the first line names 3 columns
+ --> moves.csv:3:1
+  |
+3 | 0.5,      30
+  | ^^^^^^^^^^^^
+ ::: moves.csv:1:1  the columns
+  = help: commas part the cells, and a number has a decimal point
+""",
+)
+mistake(
+    "a decimal comma",
+    MOVES.replace("30", "12,5"),
+    """\
+error[D197]: this row has 4 cells, and the first line names 3 columns
+ --> moves.csv:3:1
+  |
+3 | 0.5,      12,5,          2
+  | ^^^^^^^^^^^^^^^^^^^^^^^^^^
+ ::: moves.csv:1:1  the columns
+  = help: commas part the cells, and a number has a decimal point
+""",
+)
+mistake(
+    "an empty file",
+    "",
+    """\
+error[D191]: `moves.csv` is empty
+ --> moves.csv:1:1
+  |
+1 |
+  | ^
+  = help: its first line names the columns, as in `time [s], shoulder [deg]`
+""",
+)
+mistake(
+    "not UTF-8",
+    MOVES.replace("other", "\xf6ther").encode("latin-1"),
+    """\
+error[D002]: `moves.csv` is not UTF-8: byte 0xf6
+ --> moves.csv:1:24
+  |
+1 | time [s], hinge [deg], �ther [rad]
+  |                        ^
+  = help: save the file as UTF-8
+""",
+)
+mistake(
+    "UTF-16",
+    MOVES.encode("utf-16"),
+    """\
+error[D002]: `moves.csv` is UTF-16, but CSV files are UTF-8
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = "moves.csv"));
+  |                                          ^^^^^^^^^^^
+  = help: save it as UTF-8
+""",
+)
+mistake(
+    "semicolons",
+    MOVES.replace(",", ";"),
+    """\
+error[D191]: `time [s]; hinge [deg]; other [rad]` does not name a column
+ --> moves.csv:1:1
+  |
+1 | time [s]; hinge [deg]; other [rad]
+  | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+  = help: commas part the columns, as in `time [s], shoulder [deg]`
+""",
+)
+mistake(
+    "a column that is there twice",
+    MOVES.replace("other", "hinge"),
+    """\
+error[D198]: column `hinge` is there twice
+ --> moves.csv:1:24
+  |
+1 | time [s], hinge [deg], hinge [rad]
+  |                        ^^^^^^^^^^^
+ ::: moves.csv:1:11  first
+  = help: give one of them another name
+""",
+)
+mistake(
+    "a column with a unit and no name",
+    MOVES.replace("hinge ", ""),
+    """\
+error[D191]: `[deg]` does not name a column
+ --> moves.csv:1:11
+  |
+1 | time [s], [deg], other [rad]
+  |           ^^^^^
+  = help: write the unit in square brackets behind the name, as in `shoulder [deg]`
+""",
+)
+mistake(
+    "a column without a name",
+    MOVES.replace("hinge [deg]", ""),
+    """\
+error[D191]: a column without a name
+ --> moves.csv:1:10
+  |
+1 | time [s], , other [rad]
+  |          ^
+  = help: write the unit in square brackets behind the name, as in `shoulder [deg]`
+""",
+)
+mistake(
+    "a file's name without quotes",
+    MOVES,
+    """\
+error[D076]: `file` of `trajectory` is the name of a file, in quotes
+ --> deck.ic:9:42
+  |
+9 |     command = position(trajectory(file = moves));
+  |                                          ^^^^^
+  = help: write `file = "moves"`
+""",
+    "trajectory(file = moves)",
+)
+mistake(
+    "a file's name alone without quotes",
+    MOVES,
+    """\
+error[D076]: `file` of `trajectory` is the name of a file, in quotes
+ --> deck.ic:9:35
+  |
+9 |     command = position(trajectory(moves.csv));
+  |                                   ^^^^^^^^^
+  = help: write `file = "moves.csv"`
+""",
+    "trajectory(moves.csv)",
+)
+mistake(
+    "no file",
+    MOVES,
+    """\
+error[D075]: `trajectory` has no `file`
+ --> deck.ic:9:24
+  |
+9 |     command = position(trajectory(interpolation = cubic));
+  |                        ^^^^^^^^^^
+  = help: write `file = "NAME.csv"`
+""",
+    "trajectory(interpolation = cubic)",
+)
+mistake(
+    "two files",
+    MOVES,
+    """\
+error[D153]: `trajectory` takes its values by name
+ --> deck.ic:9:35
+  |
+9 |     command = position(trajectory("moves.csv", "others.csv"));
+  |                                   ^^^^^^^^^^^
+  = help: write `trajectory(file = ..., column = ..., interpolation = ..., begin = ...)`
+""",
+    'trajectory("moves.csv", "others.csv")',
+)
+mistake(
+    "a file that is written twice",
+    MOVES,
+    """\
+error[D040]: `file` is written twice
+ --> deck.ic:9:48
+  |
+9 |     command = position(trajectory("moves.csv", file = "others.csv"));
+  |                                                ^^^^ again
+ ::: deck.ic:9:35  first
+  = help: remove one of the two
+""",
+    'trajectory("moves.csv", file = "others.csv")',
+)
+mistake(
+    "a column that is a number",
+    MOVES,
+    """\
+error[D076]: `column` of `trajectory` is the name of a column, in quotes
+ --> deck.ic:9:64
+  |
+9 |     command = position(trajectory(file = "moves.csv", column = 3));
+  |                                                                ^
+  = help: write `column = "NAME"`
+""",
+    'trajectory(file = "moves.csv", column = 3)',
+)
+mistake(
+    "a list that the file has",
+    MOVES,
+    """\
+error[D141]: `trajectory` has no `times`
+ --> deck.ic:9:55
+  |
+9 |     command = position(trajectory(file = "moves.csv", times = [1, 2] s));
+  |                                                       ^^^^^
+  = help: it has: file, column, interpolation, begin
+""",
+    'trajectory(file = "moves.csv", times = [1, 2] s)',
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("text", "course", "message"), [m[1:] for m in MISTAKES], ids=[m[0] for m in MISTAKES])
+def test_a_mistake_is_told_where_it_is(tmp_path: Path, text: str | bytes, course: str, message: str) -> None:
+    assert shown(tmp_path, text, course) == message
+
+
+@pytest.mark.slow
+def test_a_file_of_too_many_rows(tmp_path: Path) -> None:
+    rows = "".join(f"{i},0\n" for i in range(100_001))
+    assert (
+        shown(tmp_path, "time [s], hinge [rad]\n" + rows)
+        == """\
+error[D018]: a CSV file has at most 100000 rows
+      --> moves.csv:100002:1
+       |
+100002 | 100000,0
+       | ^
+       = help: thin them out, or split the file
+"""
+    )
+
+
+@pytest.mark.parametrize(("named", "message"), [
+    (".", "error[D001]: `DIR` is a directory, not a CSV file"),
+    ("/dev/zero", "error[D001]: `/dev/zero` is not a regular file"),
+    ("large.csv", "error[D018]: `DIR/large.csv` has 17.0 MiB; a CSV file has at most 16"),
+])  # fmt: skip
+def test_what_is_no_file_of_text_is_not_read(tmp_path: Path, named: str, message: str) -> None:
+    with open(tmp_path / "large.csv", "wb") as stream:
+        stream.truncate(17 << 20)
+    said = told(check(tmp_path, ARM, servo(f'trajectory(file = "{named}")'), RUN)).replace(str(tmp_path), "DIR")
+    assert said.splitlines()[:2] == [message, " --> deck.ic:9:42"]
+
+
+def test_one_mistake_of_a_file_is_told_once_however_many_joints_read_it(tmp_path: Path) -> None:
+    arm = changed(ARM, ("axis = z; }", "axis = z; }\n    link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n"
+                        "    joint other revolute { parent = bar; child = tip; axis = x; }"))  # fmt: skip
+    (tmp_path / "moves.csv").write_text(MOVES.replace("0.5,", "1.5,"))
+    said = check(tmp_path, arm, servo(), changed(RUN, ("hinge = drive;", "hinge = drive; other = drive;")))
+    assert [d.code for d in said.diagnostics] == ["D195"]
+
+
+@pytest.mark.slow
+def test_a_broken_file_is_told_with_a_place_whatever_is_wrong_with_it(tmp_path: Path) -> None:
+    pick = random.Random(190)
+    odd = b'0123456789.,;[]"#\n\r\t -+eE\xff\x00am/^*'
+    told_codes = set()
+    for _ in range(150):
+        text = bytearray(MOVES.encode())
+        for _ in range(pick.randint(1, 6)):
+            at = pick.randrange(len(text))
+            text[at : at + pick.randint(0, 3)] = bytes(pick.choices(odd, k=pick.randint(0, 2)))
+        (tmp_path / "moves.csv").write_bytes(bytes(text))
+        compiled = check(tmp_path, ARM, servo(), RUN)
+        assert all(diagnostic.at is not None for diagnostic in compiled.diagnostics)
+        assert (compiled.plan is None) == bool(compiled.diagnostics)
+        told_codes |= {diagnostic.code for diagnostic in compiled.diagnostics}
+    assert {"D002", "D191", "D192", "D194", "D197"} <= told_codes
+
+
+@pytest.mark.parametrize(
+    "head", ["a" + 60_000 * " " + "b [ " + 60_000 * " " + "x", 100_000 * "[ ", "a [" + 100_000 * " "]
+)
+def test_a_first_line_of_spaces_is_read_as_soon_as_another(tmp_path: Path, head: str) -> None:
+    """No pattern tries each way of cutting them: that took minutes."""
+    began = time.monotonic()
+    said = shown(tmp_path, head + "\n1\n")
+    assert said.startswith("error[D191]: `") and " does not name a column\n --> moves.csv:1:1\n" in said
+    assert time.monotonic() - began < 5.0  # s; in fact some hundredths
