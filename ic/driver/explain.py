@@ -9,10 +9,11 @@ from os import PathLike
 import numpy as np
 
 from ic.driver.compile import Compiled, Select, check
+from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Expression, Name, children
 from ic.meaning.expressions.given import GIVEN, is_given, written_origin
-from ic.meaning.expressions.values import Value, place_of
+from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.owner import Settled
 from ic.meaning.parameters.scope import Scope
 from met import units

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 
-from ic.meaning.expressions.values import CONSTANTS, FUNCTIONS, USAGE
+from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, USAGE
 from ic.printing.columns import columns, exactly
 from ic.sweeps.designs import DESIGNS, DIGITS, DISTRIBUTIONS
 from met.frozen import frozen

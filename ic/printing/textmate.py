@@ -19,7 +19,7 @@ from typing import Any
 from ic.language import BLOCKS, DEFINITIONS
 from ic.language.bodies import JOINT_KINDS
 from ic.language.runs import BASE_KINDS, VELOCITY_PRODUCTS
-from ic.meaning.expressions.values import CONSTANTS, FUNCTIONS
+from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
 from ic.meaning.mechanics import dh
 from ic.meaning.mechanics.shapes import SHAPES
 from ic.text.preprocess import DIRECTIVES

@@ -14,12 +14,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression, Group, Name, Setting, Statement, String, Word
 from ic.language.runs import SWEEP
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import Varied
+from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.values import PURE, Value, evaluate_number, measure_of, place_of
+from ic.meaning.expressions.quantity import Value, measure_of
 from ic.sweeps.choices import MACRO, Chosen, check_still, chosen, decides, path_place, refuse_words
 from ic.sweeps.designs import DESIGNS, read_sample
 from ic.text.complaints import Complaints, belongs, known_words

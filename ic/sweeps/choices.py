@@ -12,13 +12,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ic.grammar.places import place_of, spanned
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Call, Entry, Expression, Group, List, Name, Number, Setting, String, Unit, WithUnit, Word
 from ic.language import BLOCKS, choices
 from ic.meaning.definitions.merge import Block
 from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.expressions.evaluate import FUNCTIONS, evaluate
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.values import FUNCTIONS, Value, Values, evaluate, measure_of, place_of, spanned
+from ic.meaning.expressions.quantity import Value, Values, measure_of
 from ic.meaning.mechanics.shapes import SHAPES
 from ic.meaning.parameters.unvaried import A_RUN_FOR_EACH
 from met import models, units

@@ -18,10 +18,12 @@ from typing import Any
 
 import numpy as np
 
+from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression, Setting, Statement, Unit, WithUnit
 from ic.meaning.definitions.resolve import Definitions
+from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.values import PURE, Value, evaluate_number, measure_of, place_of
+from ic.meaning.expressions.quantity import Value, measure_of
 from ic.sweeps.choices import check_still
 from ic.text.complaints import Complaints, known_words
 from met import units

@@ -16,7 +16,7 @@ from ic.grammar.settings import path_of
 from ic.grammar.syntax import Call, Entry, Expression, Group, Name, Setting, Statement, Word, children
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import Varied
-from ic.meaning.expressions.values import Value
+from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.experiment import experiment
 from ic.meaning.runs.run import BLOCKS, Resolved, resolve_run

@@ -9,7 +9,7 @@ import numpy as np
 from ic.grammar.syntax import Name, String, Unit, Word
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.conditions import Varied
-from ic.meaning.expressions.values import Value
+from ic.meaning.expressions.quantity import Value
 from ic.sweeps.choices import Chosen, Option
 from met.diagnostic import Place, Problem, error
 from met.trace import Graph

@@ -14,12 +14,14 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
 
+from ic.grammar.places import place_of
 from ic.grammar.settings import path_of
 from ic.grammar.syntax import List, Name, Setting
 from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.expressions.evaluate import PURE
 from ic.meaning.expressions.names import Names
+from ic.meaning.expressions.quantity import Value
 from ic.meaning.expressions.remedies import mended
-from ic.meaning.expressions.values import PURE, Value, place_of
 from ic.meaning.parameters.models import word_of
 from ic.meaning.parameters.scope import VARIES
 from ic.sweeps.axes import Sweep

@@ -8,9 +8,11 @@ from contextlib import suppress
 
 import numpy as np
 
+from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Binary, Expression, Name, Unary
-from ic.meaning.expressions.values import COMPARISONS, PURE, Value, Values, evaluate_number, place_of
+from ic.meaning.expressions.evaluate import COMPARISONS, PURE, evaluate_number
+from ic.meaning.expressions.quantity import Value, Values
 from ic.meaning.parameters.scope import Scope
 from ic.sweeps.axes import Sweep, named
 from ic.sweeps.choices import OF_JOINT, OF_RUN, Choices

@@ -21,7 +21,8 @@ from ic.language.bodies import JOINT, LINK, PAYLOAD
 from ic.language.runs import RATES, RUN
 from ic.meaning.control.substitution import DEFAULTS
 from ic.meaning.definitions.resolve import Definitions
-from ic.meaning.expressions.values import FUNCTIONS, Values
+from ic.meaning.expressions.evaluate import FUNCTIONS
+from ic.meaning.expressions.quantity import Values
 from ic.meaning.mechanics.shapes import SHAPES
 from ic.meaning.parameters.scope import Scope
 from ic.read import read

@@ -297,7 +297,7 @@ def whole(ask: Callable[[], object]) -> str:
 
 def test_a_word_that_is_no_unit_where_a_unit_is() -> None:
     from ic.grammar.syntax import Unit, Word
-    from ic.meaning.expressions.values import measure_of
+    from ic.meaning.expressions.quantity import measure_of
     from met.diagnostic import Place
 
     place = Place("deck.ic", 1, 9, 2)

@@ -12,7 +12,7 @@ import pytest
 
 import ic
 from ic.formatting.rows import rows
-from ic.meaning.expressions.values import FUNCTIONS
+from ic.meaning.expressions.evaluate import FUNCTIONS
 from ic.printing import textmate
 from ic.text.lexer import NUMBERS, Text
 from met import units

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ic.meaning.expressions.values import CONSTANTS
+from ic.meaning.expressions.evaluate import CONSTANTS
 from ic.printing.models import default
 from ic.printing.reference import page
 from met import cli, models, units

@@ -10,12 +10,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.meaning.control.schedule import Rate
 from ic.meaning.control.servos import Use, course_named, fixed_rate, use_course
 from ic.meaning.definitions.merge import Block, Item
 from ic.meaning.expressions.remedies import components
-from ic.meaning.expressions.values import place_of
 from ic.meaning.mechanics.arm import Arm
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, value_at, word_of

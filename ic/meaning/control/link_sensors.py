@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
+from ic.grammar.places import place_of
 from ic.meaning.control.schedule import Rate
 from ic.meaning.control.servos import fixed_rate
 from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.expressions.values import place_of
 from ic.meaning.mechanics.arm import Arm
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of, words_chosen

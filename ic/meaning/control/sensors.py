@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ic.grammar.places import place_of
 from ic.language.unit_words import unit_here
 from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.expressions.values import place_of
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of, words_chosen
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope

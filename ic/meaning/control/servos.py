@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, Word
 from ic.meaning.control.schedule import CONTINUOUS, Rate
 from ic.meaning.control.sensors import use_sensor, without_sensors
 from ic.meaning.control.trajectories import use_file, with_file_named
 from ic.meaning.definitions.merge import Block, Item, open_call, overlay
-from ic.meaning.expressions.values import measure_of, place_of
+from ic.meaning.expressions.quantity import measure_of
 from ic.meaning.mechanics.arm import Arm
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import (

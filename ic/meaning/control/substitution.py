@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression
 from ic.language.runs import BED, LAW
 from ic.meaning.control.schedule import Ticks
 from ic.meaning.control.servos import Use, moving_kind
 from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.expressions.values import place_of
 from ic.meaning.mechanics.arm import Arm
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of

@@ -6,10 +6,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Name, String, Word
 from ic.meaning.definitions.csv_files import missing_column
 from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.expressions.values import place_of
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import check_keys, use_model
 from ic.meaning.parameters.owner import Owner

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ic.grammar.syntax import Expression, Setting
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.values import Value
+from ic.meaning.expressions.quantity import Value
 from ic.text.lexer import COMMAND_LINE
 from met.diagnostic import Place, Problem, error
 from met.frozen import frozen

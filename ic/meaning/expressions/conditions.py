@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ic.grammar.syntax import Unit
-from ic.meaning.expressions.values import Value
+from ic.meaning.expressions.quantity import Value
 from ic.text.complaints import Complaints
 from met.diagnostic import Label, Place
 from met.frozen import frozen

@@ -7,7 +7,7 @@ Hz and 1/s are one dimension, and beside metres or kilograms a radian counts as 
 from __future__ import annotations
 
 from ic.grammar.syntax import Unit
-from ic.meaning.expressions.values import Value, measure_of
+from ic.meaning.expressions.quantity import Value, measure_of
 from met import units
 from met.frozen import frozen
 from met.trace import Scalar

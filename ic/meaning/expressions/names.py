@@ -6,7 +6,8 @@ from collections.abc import Collection, Mapping
 
 from ic.grammar.syntax import Expression, Name
 from ic.meaning.definitions.resolve import Definitions
-from ic.meaning.expressions.values import CONSTANTS, FUNCTIONS, Value, Values, evaluate
+from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, evaluate
+from ic.meaning.expressions.quantity import Value, Values
 from ic.text.complaints import MOST, known_words
 from ic.text.lexer import COMMAND_LINE
 from met import other_units, units

@@ -8,7 +8,7 @@ from dataclasses import replace
 from ic.grammar.syntax import Expression, List, Number, WithUnit
 from ic.language.unit_words import in_degrees, units_of
 from ic.meaning.definitions.merge import Item
-from ic.meaning.expressions.values import Value
+from ic.meaning.expressions.quantity import Value
 from met.trace import Scalar
 from met.units import PURE, Dimension
 

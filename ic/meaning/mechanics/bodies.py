@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ic.grammar.places import place_of
 from ic.meaning.definitions.merge import Item
 from ic.meaning.expressions.conditions import in_pieces
-from ic.meaning.expressions.values import place_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from met.diagnostic import Place

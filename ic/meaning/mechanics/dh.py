@@ -15,9 +15,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from ic.grammar.places import place_of
 from ic.grammar.syntax import Call
 from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.expressions.values import place_of
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import check_keys, word_of
 from ic.meaning.parameters.owner import XYZ, Owner

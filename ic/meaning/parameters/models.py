@@ -7,9 +7,9 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
+from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression, Name
 from ic.meaning.definitions.merge import Block, Item, refuse_pending
-from ic.meaning.expressions.values import place_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_relations
 from ic.meaning.parameters.scope import Scope

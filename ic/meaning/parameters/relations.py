@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ic.grammar.places import place_of
 from ic.grammar.syntax import Name
 from ic.meaning.definitions.merge import Block
-from ic.meaning.expressions.values import place_of
 from ic.meaning.parameters.owner import XYZ, Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words

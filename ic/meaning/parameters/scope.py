@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression, Name, Setting, String
 from ic.language.unit_words import either, in_degrees, measure_here, unit_here
 from ic.meaning.definitions.merge import Item
@@ -22,8 +23,8 @@ from ic.meaning.expressions.conditions import Checks, Varied
 from ic.meaning.expressions.cycles import doubt
 from ic.meaning.expressions.given import GIVEN, Given, evaluated, is_given, written_origin
 from ic.meaning.expressions.names import Names
+from ic.meaning.expressions.quantity import Value, Values
 from ic.meaning.expressions.remedies import components, mended
-from ic.meaning.expressions.values import Value, Values, place_of
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.owner import XYZ, Owner, Settled
 from ic.meaning.parameters.unvaried import Unvaried

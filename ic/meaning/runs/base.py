@@ -7,11 +7,11 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression
 from ic.language.runs import BASE_KINDS
 from ic.meaning.control.servos import course_named, use_course
 from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.expressions.values import place_of
 from ic.meaning.mechanics.arm import Arm
 from ic.meaning.mechanics.bodies import carried_loads
 from ic.meaning.parameters import unvaried

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Literal
 
+from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Binary, Expression, List, Name, Statement
 from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.expressions.values import place_of
 from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Name, Word
 from ic.language.runs import BALANCED, DURATION, ENVIRONMENT, INITIAL, RATES, RUN, SEED, TOLERANCES, VELOCITY_PRODUCTS
 from ic.meaning.checks.failures import check_failures, check_friction
@@ -36,7 +37,7 @@ from ic.meaning.control.substitution import check_brakes, check_ticks, resolve_s
 from ic.meaning.control.ticking import Ticking, check_instants, rate_of
 from ic.meaning.definitions.merge import Block, Item, as_meant
 from ic.meaning.definitions.resolve import Definition
-from ic.meaning.expressions.values import Value, Values, place_of
+from ic.meaning.expressions.quantity import Value, Values
 from ic.meaning.mechanics.arm import Arm, resolve_arm
 from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.payloads import check_payloads, resolve_payloads

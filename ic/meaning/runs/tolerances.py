@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.expressions.values import place_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.record import share_metrics

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ic.meaning.expressions.values import CONSTANTS, FUNCTIONS
+from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
 from ic.meaning.mechanics.shapes import SHAPES
 from ic.printing import codes
 from ic.sweeps.designs import DESIGNS, DISTRIBUTIONS

@@ -12,7 +12,7 @@ import pytest
 from ic.grammar.syntax import Setting
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.values import Values
+from ic.meaning.expressions.quantity import Values
 from ic.read import read
 from ic.text.complaints import Complaints
 from met import units

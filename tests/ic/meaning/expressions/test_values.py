@@ -10,7 +10,7 @@ import pytest
 from ic.grammar.syntax import Name, Word
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.values import Value, Values
+from ic.meaning.expressions.quantity import Value, Values
 from ic.read import read
 from ic.text.complaints import Complaints
 from met import units

@@ -1,0 +1,35 @@
+"""The stretch of text that an expression takes up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ic.grammar.syntax import Binary, Expression, Number, Range, Unary, WithUnit
+from met.diagnostic import Place
+
+
+def place_of(expression: Expression) -> Place:
+    """The stretch that an expression takes up, as far as it is on one line."""
+    match expression:
+        case Number(unit=unit) if unit is not None:
+            return spanned(expression.place, unit.place)
+        case Unary():
+            return spanned(expression.place, place_of(expression.operand))
+        case Binary():
+            left = expression.left
+            while isinstance(left, Binary):
+                left = left.left
+            return spanned(place_of(left), place_of(expression.right))
+        case WithUnit():
+            return spanned(place_of(expression.inner), expression.unit.place)
+        case Range():
+            return spanned(place_of(expression.first), place_of(expression.step))
+    return expression.place
+
+
+def spanned(first: Place, last: Place) -> Place:
+    """From the first place to the end of the last, where both are on one line and by one way there."""
+    if (first.file, first.line, first.expansions) != (last.file, last.line, last.expansions):
+        return first
+    end = last.column + last.length
+    return replace(first, length=end - first.column) if end > first.column else first

@@ -1,0 +1,161 @@
+"""Rows of values that a deck does not write out: `first .. last by step`, linspace and logspace."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import cast
+
+from ic.grammar.places import place_of
+from ic.grammar.spell import spell
+from ic.grammar.syntax import Call, Number, Range
+from ic.meaning.expressions import series
+from ic.meaning.expressions.quantity import Value, Values, in_words, measure_of
+from met import units
+from met.diagnostic import Label, Problem, error
+from met.trace import Scalar
+from met.units import PURE
+
+MOST_POINTS = 100_000
+
+
+def range_of(expression: Range, first: Value, last: Value, step: Value) -> Values:
+    """`first .. last by step`: steps from the first, as far as the last."""
+    place = place_of(expression)
+    for other in (last, step):
+        if not units.same(first.dimension, other.dimension):
+            remedy = "all three must be of one dimension"
+            if first.bare and last.bare and isinstance(expression.step, Number) and expression.step.unit is not None:
+                inside = f"{spell(expression.first)} .. {spell(expression.last)} by {expression.step.text}"
+                remedy = f"a unit behind the brackets is for all: `({inside}) {expression.step.unit.text}`"
+            raise Problem(
+                error(
+                    "D063",
+                    f"a range from {in_words(first)} to {in_words(last)} by {in_words(step)}",
+                    expression.place,
+                    also=[Label(each.place, in_words(each)) for each in (first, last, step)],
+                    help=remedy,
+                )
+            )
+    if any(isinstance(value.number, Scalar) for value in (first, last, step)):
+        raise Problem(
+            error(
+                "D121",
+                "the values of a sweep depend on what the sweep varies",
+                place,
+                help="write numbers that stand still",
+            )
+        )
+    a, b, by = (float(value.number) for value in (first, last, step))
+    turning = measure_of(step.unit) if step.unit is not None else units.ONE
+    if turning.turns and turning.dimension == step.dimension:  # a multiple of pi is no decimal: steps are of the unit
+        scale = turning.scale
+        low, high, stride = (float(f"{x / scale:.15g}") for x in (a, b, by))
+        between = list(_steps(low, high, stride, expression, first, scale))[1:-1]
+        points: Iterable[float] = (a, *(turning.to_si(x) for x in between), *((b,) if low != high else ()))
+    else:
+        points = _steps(a, b, by, expression, first)
+    bare = first.bare and last.bare and step.bare
+    made = (Value(x, first.dimension, place, bare, first.unit, hertz=first.hertz) for x in points)
+    return Values(tuple(made), place, first.unit)
+
+
+def _steps(a: float, b: float, step: float, expression: Range, first: Value, scale: float = 1.0) -> Iterable[float]:
+    """The points of a range. scale: SI units in one of what the numbers are in."""
+
+    def shown(number: float) -> str:
+        """In the unit of the first value, where it has one of its own."""
+        number *= scale
+        if first.unit is None or measure_of(first.unit).dimension != first.dimension:
+            return f"{number:g}"
+        return f"{number / measure_of(first.unit).scale:g} {first.unit.text}"
+
+    if step == 0.0:
+        raise Problem(error("D072", "a range by steps of zero has no end", place_of(expression.step)))
+    if (b - a) * step < 0.0:
+        raise Problem(
+            error(
+                "D072",
+                f"steps of {shown(step)} do not lead from {shown(a)} to {shown(b)}",
+                place_of(expression.step),
+                help="give the step the other sign, or change the ends about",
+            )
+        )
+    found = series.Steps.between(a, b, step)
+    if found.count > MOST_POINTS:
+        raise Problem(
+            error(
+                "D072",
+                f"a range of {min(found.count, 10**300):.3g} values",
+                place_of(expression),
+                help=f"up to {MOST_POINTS} are possible",
+            )
+        )
+    if not found.meet:
+        raise Problem(
+            error(
+                "D220",
+                f"the steps do not meet the end: they reach {shown(found.last)}, and {shown(b)} "
+                "is not a whole number of steps from the first",
+                place_of(expression.last),
+                help="end where the steps do, or `linspace(from, to, count)`, whose ends are met",
+            )
+        )
+    return found.points
+
+
+def spaced(call: Call, start: Value, end: Value, count: Value) -> Values:
+    """Points from `from` to `to`, both included: evenly (of the decimal numbers as written), or by one ratio."""
+    name = call.name.text
+    if count.dimension != PURE or isinstance(count.number, Scalar) or not float(count.number).is_integer():
+        raise Problem(
+            error(
+                "D072",
+                f"the count of a {name} is a whole number",
+                count.place,
+                help=f"write `{name}(from, to, count) unit`",
+            )
+        )
+    n = int(count.number)
+    if not 2 <= n <= MOST_POINTS:
+        raise Problem(error("D072", f"a {name} of {n} points", count.place, help=f"2 to {MOST_POINTS} are possible"))
+    if not units.same(start.dimension, end.dimension):
+        raise Problem(
+            error(
+                "D063",
+                f"a {name} from {in_words(start)} to {in_words(end)}",
+                end.place,
+                help="both must be of one dimension",
+            )
+        )
+    if isinstance(start.number, Scalar) or isinstance(end.number, Scalar):
+        raise Problem(
+            error(
+                "D121",
+                "the values of a sweep depend on what the sweep varies",
+                call.place,
+                help="write numbers that stand still",
+            )
+        )
+    a, b = float(start.number), float(end.number)
+    if name == "logspace" and not a * b > 0.0:
+        raise Problem(
+            error(
+                "D072",
+                "the ends of a logspace are both above or both below zero",
+                call.place,
+                help=[*_not_exponents(start, end, n), "linspace(...) has no such limit"],
+            )
+        )
+    points = series.even(a, b, n) if name == "linspace" else series.by_ratio(a, b, n)
+    bare = start.bare and end.bare
+    made = (Value(x, start.dimension, call.place, bare, start.unit, hertz=start.hertz) for x in points)
+    return Values(tuple(made), call.place, start.unit)
+
+
+def _not_exponents(start: Value, end: Value, count: int) -> list[str]:
+    """The remedy where the ends of a logspace look like exponents."""
+    ends = [float(cast(float, value.number)) for value in (start, end)]
+    if not (start.bare and end.bare) or any(not x.is_integer() or abs(x) > 300 for x in ends):
+        return []
+    shown = ", ".join(f"{10.0**x:g}" for x in ends)
+    return [f"it takes the ends themselves, not their exponents: `logspace({shown}, {count})`"]
