@@ -245,7 +245,7 @@ def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, bloc
                 "D160",
                 message,
                 place,
-                help=f"write `{parameter.name} = ... {scope.unit(owner, parameter)[0]};`: {parameter.doc}",
+                help=f"write `{parameter.name} = ... {owner.unit(parameter)[0]};`: {parameter.doc}",
             )
         elif command.kind in parameter.needed_for and parameter.above_where_needed is not None:
             _check_above(scope, owner, parameter, command, parameter.above_where_needed)

@@ -8,17 +8,7 @@ from collections.abc import Collection
 import numpy as np
 
 from ic.grammar.syntax import Name
-from ic.language.bodies import (
-    ATTITUDE,
-    GRAPPLE,
-    PAYLOAD,
-    PAYLOAD_AT,
-    PAYLOAD_RPY,
-    POSITION,
-    RATE,
-    RELEASE,
-    VELOCITY,
-)
+from ic.language.bodies import ATTITUDE, GRAPPLE, PAYLOAD, PAYLOAD_AT, PAYLOAD_RPY, POSITION, RATE, RELEASE, VELOCITY
 from ic.meaning.definitions.merge import Block, Item
 from ic.meaning.mechanics.arm import Arm
 from ic.meaning.mechanics.matter import use_matter

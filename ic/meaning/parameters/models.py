@@ -196,3 +196,15 @@ def use_model(
         return None
     check_relations(scope, owner, [each for each in parameters if each.name in values], body, values)
     return values
+
+
+def body_of(scope: Scope, item: Item | None) -> Block:
+    """The block of an entry; an empty one where there is none, or a value in its place, which is told."""
+    if item is None:
+        return Block()
+    if item.body is None or item.value is not None:
+        scope.complaints.error(
+            "D111", f"`{item.name}` is a block, not a value", item.place, help=f"write `{item.name} {{ ... }}`"
+        )
+        return Block()
+    return item.body

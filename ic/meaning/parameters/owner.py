@@ -6,11 +6,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ic.grammar.syntax import Expression
+from ic.language.unit_words import unit_here
 from met.diagnostic import Place
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import JointKind, Origin
 from met.trace import Real
+from met.units import Dimension
 
 XYZ = ("x", "y", "z")
 
@@ -39,6 +41,10 @@ class Owner:
 
     def what(self, wanted: Parameter) -> str:
         return self.called or f"`{wanted.name}` of {self.label}"
+
+    def unit(self, wanted: Parameter) -> tuple[str, Dimension]:
+        """The SI unit of a parameter here, as text and as dimension."""
+        return unit_here(wanted.unit, self.joint, self.command, self.of)
 
     def join(self, name: str) -> str:
         return f"{self.path}.{name}" if self.path else name

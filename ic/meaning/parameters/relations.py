@@ -124,7 +124,7 @@ def _check_list(
         scope.complaints.error("D155", f"{owner.what(wanted)} has no numbers", place, help="it has one at least")
     for n, (before, after) in enumerate(itertools.pairwise(numbers if wanted.rises else ())):
         if not after > before:
-            unit = scope.unit(owner, wanted)[0]
+            unit = owner.unit(wanted)[0]
             scope.complaints.error(
                 "D156",
                 f"{owner.what(wanted)} must rise, and number {n + 2}, {after:g} {unit}, follows {before:g} {unit}",

@@ -12,29 +12,26 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression, Name, Setting, String
-from ic.language.unit_words import either, in_degrees, measure_here, unit_here
+from ic.language.unit_words import either, in_degrees
 from ic.meaning.definitions.merge import Item
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.conditions import Checks, Varied
-from ic.meaning.expressions.cycles import doubt
 from ic.meaning.expressions.given import GIVEN, Given, evaluated, is_given, written_origin
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, Values
-from ic.meaning.expressions.remedies import components, mended
+from ic.meaning.expressions.remedies import components
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.owner import XYZ, Owner, Settled
 from ic.meaning.parameters.unvaried import Unvaried
+from ic.meaning.parameters.value_checks import ValueChecks
 from ic.text.complaints import Complaints
-from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.parameter import Parameter
-from met.plan import JointKind, Origin, Quantity
+from met.plan import Origin, Quantity
 from met.trace import Graph, Real, Scalar
-from met.units import PURE, Dimension
+from met.units import PURE
 
 VARIES = "leave it out here, or name runs and sweeps that do not vary this"
 """What to do where a sweep varies what is set from outside of the deck."""
@@ -65,6 +62,7 @@ class Scope:
     def __post_init__(self) -> None:
         self.checks = Checks(self.complaints, self.graph, self.varied)
         self.names = Names(self.definitions, {path: varied.value for path, varied in self.varied.items()})
+        self.value_checks = ValueChecks(self.complaints, self.definitions, self.names, self.checks, self.moved)
         self.given: dict[str, Given | None] = {}  # of the settings, as they are asked for; None for no number
 
     def settled(self, path: str) -> Settled | None:
@@ -156,7 +154,7 @@ class Scope:
     ) -> Iterable[Value]:
         count = len(names)
         found = self.written(item)
-        text, dimension = self.unit(owner, wanted)
+        text, dimension = owner.unit(wanted)
         expected = f"{short} or {count}" if short else f"{count}"
         if isinstance(found, Value):
             unit = "" if text == "1" else f" {text}"
@@ -195,7 +193,7 @@ class Scope:
             )
         dimensions = {value.dimension for value in numbers}
         if found.unit is not None and len(dimensions) == 1:  # one unit for all: where it is wrong, it is so once
-            self.check_dimension(owner, wanted, replace(numbers[0], place=found.place))
+            self.value_checks.dimension(owner, wanted, replace(numbers[0], place=found.place))
         numbers += [Value(0.0, dimension, found.place)] * (count - len(numbers))
         return numbers
 
@@ -216,7 +214,7 @@ class Scope:
                         help="leave the brackets out",
                     )
                 )
-            self.check_dimension(owner, wanted, found)
+            self.value_checks.dimension(owner, wanted, found)
             if isinstance(found.number, Scalar):
                 raise Problem(
                     error(
@@ -227,11 +225,11 @@ class Scope:
                     )
                 )
             before = self.complaints.faults
-            self._check_range(owner, wanted, found.number, found.place)
+            self.value_checks.range(owner, wanted, found.number, found.place)
             number = float(found.number) if self.complaints.faults == before else None
             if number is not None:
                 self.beside[path] = Settled(
-                    number, self.unit(owner, wanted)[0], _origin(item, found.place), wanted.doc, item.value
+                    number, owner.unit(wanted)[0], _origin(item, found.place), wanted.doc, item.value
                 )
         if number is None:
             self.checks.fail(path)
@@ -241,7 +239,7 @@ class Scope:
         """A model's number that decides the program, the same in all cases."""
         path = owner.join(wanted.name)
         if item is None and isinstance(wanted.default, (int, float)):
-            unit = self.unit(owner, wanted)[0]
+            unit = owner.unit(wanted)[0]
             self.beside[path] = Settled(float(wanted.default), unit, Origin("default"), wanted.doc)
         elif item is None:
             self._missing(owner, wanted)
@@ -258,7 +256,7 @@ class Scope:
         path = owner.join(wanted.name)
         self.unvaried[path] = unvaried.LIST
         if item is None and isinstance(wanted.default, tuple):
-            self.parameters[path] = Settled(wanted.default, self.unit(owner, wanted)[0], Origin("default"), wanted.doc)
+            self.parameters[path] = Settled(wanted.default, owner.unit(wanted)[0], Origin("default"), wanted.doc)
             return wanted.default
         if item is None:
             self._missing(owner, wanted)
@@ -272,14 +270,14 @@ class Scope:
                         "D071",
                         f"`{wanted.name}` of {owner.label} is a list",
                         found.place,
-                        help=f"write `{wanted.name} = [...] {self.unit(owner, wanted)[0]};`",
+                        help=f"write `{wanted.name} = [...] {owner.unit(wanted)[0]};`",
                     )
                 )
             made = []
             for value in found.items:
                 if isinstance(value, Values):
                     raise Problem(error("D071", "a list inside a list", value.place))
-                self.check_dimension(owner, wanted, value)
+                self.value_checks.dimension(owner, wanted, value)
                 if isinstance(value.number, Scalar):
                     remedy = "a list does not vary: write a run for each, and `sweep NAME = ONE + OTHER;`"
                     raise Problem(
@@ -287,11 +285,11 @@ class Scope:
                             "D122", f"`{wanted.name}` of {owner.label} varies with the sweep", value.place, help=remedy
                         )
                     )
-                self._check_range(owner, wanted, value.number, value.place)
+                self.value_checks.range(owner, wanted, value.number, value.place)
                 made.append(float(value.number))
             numbers = tuple(made)
             self.parameters[path] = Settled(
-                numbers, self.unit(owner, wanted)[0], _origin(item, found.place), wanted.doc, item.value
+                numbers, owner.unit(wanted)[0], _origin(item, found.place), wanted.doc, item.value
             )
         if numbers is None:
             self.checks.fail(path)
@@ -423,7 +421,7 @@ class Scope:
         if any(self.complaints.lacks(place, wanted.name) for place in (lacks, *bases)):
             return  # which was told: of another use, or of a base, or another word was taken for it
         self.complaints.lacking.add((lacks, wanted.name))
-        unit = self.unit(owner, wanted)[0]
+        unit = owner.unit(wanted)[0]
         shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
         shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {unit}"
         doc = f" ({wanted.doc})" if wanted.doc != wanted.name else ""
@@ -458,7 +456,7 @@ class Scope:
         elif written is not None:
             place = written.place
             with self.complaints.gather():
-                self.check_dimension(replace(owner, homes=homes), wanted, written)
+                self.value_checks.dimension(replace(owner, homes=homes), wanted, written)
                 value = self._plain(written.number)
             origin = _origin(item, place)
         coordinate = self._coordinate(owner, name, homes)
@@ -519,16 +517,16 @@ class Scope:
         assert value is not None
         endless = not isinstance(value, Scalar) and math.isinf(value)
         if origin.kind != "default" or not endless:  # a model's own default may be: never
-            self._check_range(owner, wanted, value, place, path, needs)
+            self.value_checks.range(owner, wanted, value, place, path, needs)
         kept = self.parameters if record else self.beside
         if record or owner.called is None:
-            kept[path] = Settled(value, self.unit(owner, wanted)[0], origin, wanted.doc, expression)
+            kept[path] = Settled(value, owner.unit(wanted)[0], origin, wanted.doc, expression)
         return value
 
     def _check_instead(self, owner: Owner, wanted: Parameter, value: Value, path: str) -> None:
         """Tells of a value of the wrong dimension in place of the deck's; path: what has failed then."""
         try:
-            self.check_dimension(owner, wanted, value)
+            self.value_checks.dimension(owner, wanted, value)
         except Problem as problem:
             self.complaints.add(*problem.diagnostics)
             self.checks.fail(path)
@@ -571,172 +569,6 @@ class Scope:
             known = self.graph.value(number.ref)
             return number if known is None else known
         return float(number)
-
-    # Units
-
-    def unit(self, owner: Owner, wanted: Parameter) -> tuple[str, Dimension]:
-        """The unit wanted here, in SI, as text and dimension."""
-        return unit_here(wanted.unit, owner.joint, owner.command, owner.of)
-
-    def check_dimension(self, owner: Owner, wanted: Parameter, value: Value) -> None:
-        """Raises D060 for a bare number where there is a dimension, D061 for a wrong one."""
-        text, dimension = self.unit(owner, wanted)
-        if units.same(value.dimension, dimension):
-            self._remark_cycles(owner, wanted, value, text)
-            self._remark_share(owner, wanted, value)
-            return
-        what = owner.what(wanted)
-        also = self.names.label(value)
-        apart: str | list[str] = self._of_its_own(owner, wanted, value, text)
-        if value.dimension == PURE:
-            shown = f"a number in {text}"
-            if not isinstance(value.number, Scalar):
-                shown = either(f"{value.number:.12g} {each}" for each in in_degrees(text))
-            if value.bare and any(source.name == value.place.file for source in self.definitions.csv_files.sources):
-                shown = f"the unit in square brackets behind the column's name: `[{text}]`"
-            raise Problem(
-                error(
-                    "D060",
-                    f"{what} is in {text}, and this is a {'bare' if value.bare else 'pure'} number",
-                    value.place,
-                    also=also,
-                    help=apart or (f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}"),
-                )
-            )
-        found = units.text(value.dimension)
-        apart = apart or self._of_another_command(owner, wanted, value, text)
-        message = f"{what} is " + ("a pure number" if dimension == PURE else f"in {text}") + f", and this is in {found}"
-        other = self._other(owner, wanted, value) if dimension == PURE else []
-        raise Problem(
-            error("D061", message, value.place, also=also, help=apart or [*other, mended(value, text, dimension)])
-        )
-
-    def _of_another_command(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> list[str]:
-        """The remedy where a course's parameter has the unit that it has under another kind of command."""
-        if owner.command is None:
-            return []
-        fits = [
-            kind
-            for kind in ("position", "rate", "acceleration")
-            if kind != owner.command
-            and units.same(value.dimension, unit_here(wanted.unit, owner.joint, kind, owner.of)[1])
-        ]
-        found = units.text(value.dimension)
-        if not owner.label.startswith("`"):  # no course: the command is this number
-            return [f"`{owner.command}(...)` takes {text}; `{kind}(...)` takes {found}" for kind in fits]
-        course = owner.label.strip("`")
-        return [
-            f"of a `{owner.command}` command it is in {text}; with `{kind}({course}(...))` it would be in "
-            f"{found}, like all of that course"
-            for kind in fits
-        ]
-
-    def _remark_cycles(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> None:
-        """Tells of a unit that may mean cycles where radians count, or the reverse."""
-        if wanted.ticks:
-            return
-        found = doubt(value, text, measure_here(wanted.unit, owner.joint, owner.command, owner.of))
-        if found is not None:
-            self.complaints.warn(
-                "D305",
-                f"{owner.what(wanted)} is {found.taken}",
-                value.place,
-                also=self.names.label(value),
-                help=found.helps,
-            )
-
-    def _remark_share(self, owner: Owner, wanted: Parameter, value: Value) -> None:
-        """Tells of a bare number above 1 where a share is meant, which may have been meant in per cent."""
-        if not wanted.share or not value.bare:
-            return
-        number = value.number
-        if isinstance(number, Scalar):
-            found = (each.values for each in self.varied.values() if each.value.number is value.number)
-            number = max(next(found, np.zeros(1)).tolist(), key=abs, default=0.0)
-        if abs(number) <= 1.0:
-            return
-        shown, per_cent = f"{number:.12g}", f"{100.0 * number:.12g} %"
-        helps = [f"if per cent are meant, write `{shown} %`", f"if that is meant, write `{per_cent}`"]
-        if isinstance(value.number, Scalar):
-            helps = [
-                "if per cent are meant, write `%` behind the values",
-                f"if that is meant, write the values in per cent, such as `{per_cent}`",
-            ]
-        self.complaints.warn(
-            "D307", f"{owner.what(wanted)} is a share, and {shown} is {per_cent}", value.place, help=helps
-        )
-
-    def _other(self, owner: Owner, wanted: Parameter, value: Value) -> list[str]:
-        """The one optional parameter of the model that a number with this unit may be meant for."""
-        found = [
-            each
-            for each in owner.others
-            if each.shape == "number"
-            and each.default is not None
-            and each.name != wanted.name
-            and units.same(value.dimension, self.unit(owner, each)[1])
-        ]
-        if len(found) != 1:
-            return []
-        return [f"`{found[0].name}` is what is in {self.unit(owner, found[0])[0]}: {found[0].doc}"]
-
-    def _of_its_own(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> str:
-        """The remedy where a value is right for the other joints of its servo definition, which move otherwise."""
-        other: JointKind = "revolute" if owner.joint == "prismatic" else "prismatic"
-        both = [home for home in owner.homes if other in self.moved.get(home, ())]
-        if not both or not units.same(value.dimension, unit_here(wanted.unit, other, owner.command, owner.of)[1]):
-            return ""
-        joint = owner.path.partition(".servo")[0]
-        key = wanted.name if owner.command is None else "command"
-        shown = f"{value.number:g}" if value.bare and not isinstance(value.number, Scalar) else "..."
-        shown += "" if text == "1" else f" {text}"
-        written = f"{key} = {shown};" if owner.command is None else f"{key} = {owner.command}(...);"
-        moves, others = ("slides", "turn") if owner.joint == "prismatic" else ("turns", "slide")
-        why = f"joint `{joint}` {moves}, and others of servo `{both[-1]}` {others}"
-        if owner.homes[-1] != both[-1]:
-            return f"{why}: write `{written}` in servo `{owner.homes[-1]}`"
-        return f"{why}: give its servo a {key} of its own, `{joint} = {both[-1]} {{ {written} }}`"
-
-    def _check_range(
-        self, owner: Owner, wanted: Parameter, value: Real, place: Place, path: str = "", needs: tuple[str, ...] = ()
-    ) -> None:
-        bounds = [
-            (bound, word, sign)
-            for bound, word, sign in (
-                (wanted.above, "above", np.greater),
-                (wanted.at_least, "at least", np.greater_equal),
-                (wanted.below, "below", np.less),
-                (wanted.at_most, "at most", np.less_equal),
-            )
-            if bound is not None
-        ]
-        text = self.unit(owner, wanted)[0]
-        unit = "" if text == "1" else f" {text}"
-
-        def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
-            bad = ~np.isfinite(values[:, 0])
-            for bound, _, holds in bounds:
-                bad |= ~holds(values[:, 0], bound)
-            if wanted.whole:
-                bad |= values[:, 0] != np.rint(values[:, 0])
-            return bad, [f"this is {x:g}{unit}" for x in values[bad, 0][:1]]
-
-        limits = " and ".join(f"{word} {bound:g}" for bound, word, _ in bounds) or "finite"
-        of = "of " if limits.startswith("at ") else ""
-        remedy = f"write a number {of}{limits}{unit}" if bounds else "write a finite number"
-        if wanted.whole:
-            limits, remedy = f"whole and {limits}", remedy.replace("a number", "a whole number")
-        limits += unit if bounds else ""
-        self.checks.hold(
-            (value,),
-            test,
-            code="D077",
-            message=f"{owner.what(wanted)} must be {limits}",
-            place=place,
-            path=path,
-            needs=needs,
-            help=remedy + (f" ({wanted.doc})" if wanted.doc else ""),
-        )
 
     def quantities(self, *, beside: bool = False) -> tuple[dict[str, Any], list[Scalar]]:
         """The parameters as a plan holds them, and the scalars of its formulas, in order. beside: the others too."""

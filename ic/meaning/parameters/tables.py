@@ -91,7 +91,7 @@ def keep_column(
     scope: Scope, owner: Owner, wanted: Parameter, table: Table, column: Column, label: Label
 ) -> tuple[float, ...]:
     """A column as the model's list, entered in the scope. Raises Problem D193, D194, D195. label: who wants it."""
-    text, dimension = scope.unit(owner, wanted)
+    text, dimension = owner.unit(wanted)
     numbers = table.numbers(column, text, dimension, label)
     if column.name == TIME:
         table.rising(column, numbers)
@@ -108,7 +108,7 @@ def _alike(scope: Scope, owner: Owner, column: Column, by_column: Mapping[str, P
         meant = units.parse_unit(column.unit or "").dimension
     except (ValueError, OverflowError, ZeroDivisionError):
         return list(by_column)
-    return [name for name, wanted in by_column.items() if units.same(scope.unit(owner, wanted)[1], meant)]
+    return [name for name, wanted in by_column.items() if units.same(owner.unit(wanted)[1], meant)]
 
 
 def _columns(scope: Scope, owner: Owner, lists: list[Parameter], item: Item) -> dict[str, tuple[float, ...]]:
@@ -138,7 +138,7 @@ def _columns(scope: Scope, owner: Owner, lists: list[Parameter], item: Item) -> 
         if found is not None:
             columns[wanted.name] = keep_column(scope, owner, wanted, table, found, label)
         elif isinstance(wanted.default, tuple) and name != TIME:
-            text, _ = scope.unit(owner, wanted)
+            text, _ = owner.unit(wanted)
             columns[wanted.name] = wanted.default
             scope.parameters[owner.join(wanted.name)] = Settled(wanted.default, text, Origin("default"), wanted.doc)
         else:

@@ -1,0 +1,198 @@
+"""A value against the parameter that it is for: its dimension, its range, and units that may mean something else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ic.language.unit_words import either, in_degrees, measure_here, unit_here
+from ic.meaning.definitions.resolve import Definitions
+from ic.meaning.expressions.conditions import Checks
+from ic.meaning.expressions.cycles import doubt
+from ic.meaning.expressions.names import Names
+from ic.meaning.expressions.quantity import Value
+from ic.meaning.expressions.remedies import mended
+from ic.meaning.parameters.owner import Owner
+from ic.text.complaints import Complaints
+from met import units
+from met.diagnostic import Place, Problem, error
+from met.parameter import Parameter
+from met.plan import JointKind
+from met.trace import Real, Scalar
+from met.units import PURE
+
+
+@dataclass
+class ValueChecks:
+    """The checks of each single value of a run.
+
+    moved  servo definition -> kinds of joints that it moves; filled in while servos are resolved
+    """
+
+    complaints: Complaints
+    definitions: Definitions
+    names: Names
+    checks: Checks
+    moved: Mapping[str, set[str]]
+
+    def dimension(self, owner: Owner, wanted: Parameter, value: Value) -> None:
+        """Raises D060 for a bare number where there is a dimension, D061 for a wrong one."""
+        text, dimension = owner.unit(wanted)
+        if units.same(value.dimension, dimension):
+            self._remark_cycles(owner, wanted, value, text)
+            self._remark_share(owner, wanted, value)
+            return
+        what = owner.what(wanted)
+        also = self.names.label(value)
+        apart: str | list[str] = self._of_its_own(owner, wanted, value, text)
+        if value.dimension == PURE:
+            shown = f"a number in {text}"
+            if not isinstance(value.number, Scalar):
+                shown = either(f"{value.number:.12g} {each}" for each in in_degrees(text))
+            if value.bare and any(source.name == value.place.file for source in self.definitions.csv_files.sources):
+                shown = f"the unit in square brackets behind the column's name: `[{text}]`"
+            raise Problem(
+                error(
+                    "D060",
+                    f"{what} is in {text}, and this is a {'bare' if value.bare else 'pure'} number",
+                    value.place,
+                    also=also,
+                    help=apart or (f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}"),
+                )
+            )
+        found = units.text(value.dimension)
+        apart = apart or self._of_another_command(owner, wanted, value, text)
+        message = f"{what} is " + ("a pure number" if dimension == PURE else f"in {text}") + f", and this is in {found}"
+        other = self._other(owner, wanted, value) if dimension == PURE else []
+        raise Problem(
+            error("D061", message, value.place, also=also, help=apart or [*other, mended(value, text, dimension)])
+        )
+
+    def range(
+        self, owner: Owner, wanted: Parameter, value: Real, place: Place, path: str = "", needs: tuple[str, ...] = ()
+    ) -> None:
+        bounds = [
+            (bound, word, sign)
+            for bound, word, sign in (
+                (wanted.above, "above", np.greater),
+                (wanted.at_least, "at least", np.greater_equal),
+                (wanted.below, "below", np.less),
+                (wanted.at_most, "at most", np.less_equal),
+            )
+            if bound is not None
+        ]
+        text = owner.unit(wanted)[0]
+        unit = "" if text == "1" else f" {text}"
+
+        def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+            bad = ~np.isfinite(values[:, 0])
+            for bound, _, holds in bounds:
+                bad |= ~holds(values[:, 0], bound)
+            if wanted.whole:
+                bad |= values[:, 0] != np.rint(values[:, 0])
+            return bad, [f"this is {x:g}{unit}" for x in values[bad, 0][:1]]
+
+        limits = " and ".join(f"{word} {bound:g}" for bound, word, _ in bounds) or "finite"
+        of = "of " if limits.startswith("at ") else ""
+        remedy = f"write a number {of}{limits}{unit}" if bounds else "write a finite number"
+        if wanted.whole:
+            limits, remedy = f"whole and {limits}", remedy.replace("a number", "a whole number")
+        limits += unit if bounds else ""
+        self.checks.hold(
+            (value,),
+            test,
+            code="D077",
+            message=f"{owner.what(wanted)} must be {limits}",
+            place=place,
+            path=path,
+            needs=needs,
+            help=remedy + (f" ({wanted.doc})" if wanted.doc else ""),
+        )
+
+    def _of_another_command(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> list[str]:
+        """The remedy where a course's parameter has the unit that it has under another kind of command."""
+        if owner.command is None:
+            return []
+        fits = [
+            kind
+            for kind in ("position", "rate", "acceleration")
+            if kind != owner.command
+            and units.same(value.dimension, unit_here(wanted.unit, owner.joint, kind, owner.of)[1])
+        ]
+        found = units.text(value.dimension)
+        if not owner.label.startswith("`"):  # no course: the command is this number
+            return [f"`{owner.command}(...)` takes {text}; `{kind}(...)` takes {found}" for kind in fits]
+        course = owner.label.strip("`")
+        return [
+            f"of a `{owner.command}` command it is in {text}; with `{kind}({course}(...))` it would be in "
+            f"{found}, like all of that course"
+            for kind in fits
+        ]
+
+    def _remark_cycles(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> None:
+        """Tells of a unit that may mean cycles where radians count, or the reverse."""
+        if wanted.ticks:
+            return
+        found = doubt(value, text, measure_here(wanted.unit, owner.joint, owner.command, owner.of))
+        if found is not None:
+            self.complaints.warn(
+                "D305",
+                f"{owner.what(wanted)} is {found.taken}",
+                value.place,
+                also=self.names.label(value),
+                help=found.helps,
+            )
+
+    def _remark_share(self, owner: Owner, wanted: Parameter, value: Value) -> None:
+        """Tells of a bare number above 1 where a share is meant, which may have been meant in per cent."""
+        if not wanted.share or not value.bare:
+            return
+        number = value.number
+        if isinstance(number, Scalar):
+            found = (each.values for each in self.checks.varied.values() if each.value.number is value.number)
+            number = max(next(found, np.zeros(1)).tolist(), key=abs, default=0.0)
+        if abs(number) <= 1.0:
+            return
+        shown, per_cent = f"{number:.12g}", f"{100.0 * number:.12g} %"
+        helps = [f"if per cent are meant, write `{shown} %`", f"if that is meant, write `{per_cent}`"]
+        if isinstance(value.number, Scalar):
+            helps = [
+                "if per cent are meant, write `%` behind the values",
+                f"if that is meant, write the values in per cent, such as `{per_cent}`",
+            ]
+        self.complaints.warn(
+            "D307", f"{owner.what(wanted)} is a share, and {shown} is {per_cent}", value.place, help=helps
+        )
+
+    def _other(self, owner: Owner, wanted: Parameter, value: Value) -> list[str]:
+        """The one optional parameter of the model that a number with this unit may be meant for."""
+        found = [
+            each
+            for each in owner.others
+            if each.shape == "number"
+            and each.default is not None
+            and each.name != wanted.name
+            and units.same(value.dimension, owner.unit(each)[1])
+        ]
+        if len(found) != 1:
+            return []
+        return [f"`{found[0].name}` is what is in {owner.unit(found[0])[0]}: {found[0].doc}"]
+
+    def _of_its_own(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> str:
+        """The remedy where a value is right for the other joints of its servo definition, which move otherwise."""
+        other: JointKind = "revolute" if owner.joint == "prismatic" else "prismatic"
+        both = [home for home in owner.homes if other in self.moved.get(home, ())]
+        if not both or not units.same(value.dimension, unit_here(wanted.unit, other, owner.command, owner.of)[1]):
+            return ""
+        joint = owner.path.partition(".servo")[0]
+        key = wanted.name if owner.command is None else "command"
+        shown = f"{value.number:g}" if value.bare and not isinstance(value.number, Scalar) else "..."
+        shown += "" if text == "1" else f" {text}"
+        written = f"{key} = {shown};" if owner.command is None else f"{key} = {owner.command}(...);"
+        moves, others = ("slides", "turn") if owner.joint == "prismatic" else ("turns", "slide")
+        why = f"joint `{joint}` {moves}, and others of servo `{both[-1]}` {others}"
+        if owner.homes[-1] != both[-1]:
+            return f"{why}: write `{written}` in servo `{owner.homes[-1]}`"
+        return f"{why}: give its servo a {key} of its own, `{joint} = {both[-1]} {{ {written} }}`"

@@ -1,0 +1,125 @@
+"""The environment of a run: its models, their parameters, and what of them does nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ic.grammar.places import place_of
+from ic.language.runs import VELOCITY_PRODUCTS
+from ic.meaning.checks.idle import remark_idle, remark_kinds
+from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.expressions.quantity import Value
+from ic.meaning.mechanics.arm import Arm
+from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
+from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.relations import check_names
+from ic.meaning.parameters.scope import Scope
+from ic.meaning.parameters.tables import tell_named_lists, use_table
+from ic.meaning.runs.base import held_by, remark_ground
+from ic.text.complaints import known_words
+from met import models
+from met.parameter import WORLD
+from met.plan import Base, EnvironmentUse, Payload
+from met.trace import Scalar
+
+
+def resolve_environment(
+    scope: Scope, body: Block, arm: Arm, base: Base | None, payloads: tuple[Payload, ...], duration: float | None
+) -> tuple[tuple[EnvironmentUse, ...], bool]:
+    uses = []
+    products = True
+    for item in body.items.values():
+        if item.kind:
+            meant = f"{item.name} = {item.kind}" if item.kind in models.available("environment") else "NAME = MODEL"
+            scope.complaints.error(
+                "D157", f"no `{item.kind}` in an environment", item.place, help=f"write `{meant} {{ ... }}`"
+            )
+        elif item.name == "velocity_products":
+            owner = Owner("the environment", item.place, "environment")
+            products = scope.word(owner, VELOCITY_PRODUCTS, item) != "off"
+        else:
+            use = _environment_use(scope, item, arm, base, payloads, duration)
+            if use is not None:
+                uses.append(use)
+    for statement in body.statements:
+        scope.complaints.error(
+            "D142",
+            f"`{statement.words[0].text}` inside the environment",
+            statement.place,
+            help="it belongs to a run or a sweep",
+        )
+    return tuple(uses), products
+
+
+def _environment_use(
+    scope: Scope, item: Item, arm: Arm, base: Base | None, payloads: tuple[Payload, ...], duration: float | None
+) -> EnvironmentUse | None:
+    owner = Owner(f"environment `{item.name}`", item.place, f"environment.{item.name}", homes=item.homes)
+    name = word_of(item.value)
+    if item.name == "gravity" and name in (None, "gravity", *scope.definitions.lets):
+        owner = replace(owner, short="g")
+    is_value = item.name == "gravity" and (name is None or name in scope.definitions.lets)
+    if item.value is not None and is_value:
+        gravity = models.find_own("environment")["gravity"]
+        with scope.complaints.gather():
+            found = scope.written(item)
+            if isinstance(found, Value):
+                size = "9.81" if isinstance(found.number, Scalar) else f"{abs(found.number):g}"
+                scope.complaints.error(
+                    "D071",
+                    "`gravity` is a list of 3 numbers",
+                    found.place,
+                    help=f"write `gravity = [0, 0, -{size}] m/s^2;`",
+                )
+                return None
+        scope.vector(replace(owner, label="gravity", called="`gravity`"), gravity.parameters[0], item)
+        return EnvironmentUse(item.name, gravity.name, None, item.place)
+    if item.value is None:
+        scope.complaints.error(
+            "D158",
+            f"no environment model `{item.name}` to change",
+            item.place,
+            help=[
+                f"`{item.name} = MODEL {{ ... }}` would add one",
+                known_words("models", sorted(models.available("environment"))),
+            ],
+        )
+        return None
+    environment = find_model(scope, "environment", name, place_of(item.value))
+    if environment is None or refuse_values(scope, item.value, [p.name for p in environment.written]):
+        return None
+    body = item.body or Block()
+    # a payload called `world` was told of, and is no reason to tell of those that mean the ground
+    bodies = [*(link.name for link in arm.links), *(each.name for each in payloads if each.name != WORLD)]
+    lost = (*arm.lost, *(each.name for each in payloads if each.name == WORLD))
+    known = {"joint": [joint.name for joint in arm.moving], "link": bodies}
+    named = check_names(scope, owner, environment.parameters, body, arm=arm.name, known=known, lost=lost)
+    about = next((named[p.name] for p in environment.parameters if p.names == "joint" and p.name in named), None)
+    if about is not None:  # what the unit words `joint` and `effort` mean
+        kinds = {joint.name: joint.kind for joint in arm.moving}
+        if about not in kinds:  # which was told: without its joint, nothing can be said of the model's units
+            check_keys(scope, body, [each.name for each in environment.written], owner)
+            scope.checks.fail(owner.path)
+            return EnvironmentUse(item.name, environment.name, None, item.place)
+        owner = replace(owner, joint=kinds[about])
+    lists = [each for each in environment.parameters if each.shape == "list" and environment.from_file]
+    if tell_named_lists(scope, owner, lists, body):
+        scope.checks.fail(owner.path)
+        return EnvironmentUse(item.name, environment.name, None, item.place)
+    if environment.from_file and body.get("file") is not None:
+        values = use_table(scope, owner, environment, body)
+    else:
+        values = use_model(
+            scope,
+            owner,
+            environment.parameters,
+            body,
+            extra=[each.name for each in environment.written[len(environment.parameters) :]],
+        )
+    if values is not None:
+        held = held_by(arm, payloads)
+        words = {p.name: held.get(values[p.name], values[p.name]) for p in environment.parameters if p.names == "link"}
+        if not (duration is not None and remark_idle(scope, environment, item, {**values, **words}, duration)):
+            remark_ground(scope, item, arm, base, environment, values, payloads)
+            remark_kinds(scope, environment, item, arm)
+    return EnvironmentUse(item.name, environment.name, None, item.place)

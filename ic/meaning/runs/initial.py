@@ -1,0 +1,110 @@
+"""The initial state of a run: positions and rates of joints, and servos that begin balanced."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ic.language.runs import BALANCED
+from ic.meaning.control.servos import Use
+from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.expressions.quantity import Value, Values
+from ic.meaning.mechanics.arm import Arm
+from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.base import INITIAL_OF_BASE
+from ic.text.complaints import known_words
+from met import models, units
+from met.diagnostic import did_you_mean
+from met.parameter import Parameter
+from met.plan import BASE
+from met.units import PURE
+
+
+def resolve_initial(scope: Scope, body: Block, arm: Arm, uses: Sequence[Use]) -> bool:
+    """What a run says of its start; whether its servos begin balanced."""
+    known = dict.fromkeys(("q", "qd"), "")
+    known |= {f"{joint.name}.{name}": "" for joint in arm.moving for name in ("q", "qd")}
+    known["servos"] = ""
+    of_base = dict.fromkeys(INITIAL_OF_BASE if any(link.name == BASE for link in arm.links) else (), "")
+    for item in body.items.values():
+        if not item.kind and item.name.partition(".")[0] in arm.lost:
+            continue
+        if item.kind or item.name not in (*known, *INITIAL_OF_BASE):
+            there = (*known, *of_base)
+            scope.complaints.error(
+                "D114",
+                f"no initial `{item.name}`",
+                item.place,
+                help=[*did_you_mean(item.name, there), known_words("there is", there)],
+            )
+    for name, unit in (("q", "joint"), ("qd", "joint/s")):
+        wanted = Parameter(name=name, unit=unit, default=0.0, doc=f"initial {name}")
+        general = body.get(name)
+        listed: Values | None = None
+        if general is not None:
+            with scope.complaints.gather():
+                found = scope.written(general)
+                listed = found if isinstance(found, Values) else None
+            if listed is not None and arm.lost:
+                continue
+            if listed is not None and len(listed.items) != len(arm.moving):
+                given, moving = len(listed.items), len(arm.moving)
+                told = f"{given} number{'s' * (given != 1)} for {moving} joint{'s' * (moving != 1)}"
+                names = ", ".join(joint.name for joint in arm.moving)
+                helps = f"one for each moving joint, in the arm's order, or one for all: {names}"
+                scope.complaints.error("D071", told, listed.place, help=helps)
+                continue
+        for n, joint in enumerate(arm.moving):
+            own = body.get(f"{joint.name}.{name}")
+            owner = Owner(
+                f"joint `{joint.name}`",
+                (own or general).place if own or general else joint.place,  # type: ignore
+                f"initial.{joint.name}",
+                joint=joint.kind,
+            )
+            value = listed.items[n] if listed is not None and own is None else None
+            if isinstance(value, Values):
+                scope.complaints.error("D071", "a list inside a list", value.place)
+                continue
+            if general is not None and own is None and listed is None and _mixed(scope, owner, wanted, general, arm):
+                break
+            scope.number(owner, wanted, own or general, value=value)
+    return _balanced(scope, body.get("servos"), uses)
+
+
+def _balanced(scope: Scope, item: Item | None, uses: Sequence[Use]) -> bool:
+    """Whether servos begin balanced; a remark where none of them can."""
+    if item is None:
+        return False
+    balanced = scope.word(Owner("the initial state", item.place, "initial"), BALANCED, item) == "balanced"
+    if balanced and not any(use.servo.balance for use in uses):
+        able = [name for name, model in models.available("servo").items() if model.balance]
+        scope.complaints.remark(
+            "D248",
+            "no servo of this run can begin balanced: this changes nothing",
+            item.place,
+            help=known_words("models that can", able),
+        )
+    return balanced
+
+
+def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: Arm) -> bool:
+    """Whether one value for all joints has not this joint's unit, since others move otherwise; tells that."""
+    if len({joint.kind for joint in arm.moving}) < 2:
+        return False
+    with scope.complaints.gather():
+        found = scope.written(general)
+        unit, dimension = owner.unit(wanted)
+        if isinstance(found, Value) and found.dimension != PURE and not units.same(found.dimension, dimension):
+            scope.complaints.error(
+                "D061",
+                f"`{wanted.name}` of {owner.label}, which is {owner.joint}, is in {unit}, and this is in "
+                f"{units.text(found.dimension)}",
+                found.place,
+                help=[
+                    f"write it joint by joint: `{owner.path.removeprefix('initial.')}.{wanted.name} = 0 {unit};`",
+                    "or leave it out: without it all joints begin at 0",
+                ],
+            )
+            return True
+    return False
