@@ -257,13 +257,13 @@ def dump(
 
     STAGE is tokens, syntax, model, plan, program, kernel or assembly.
     """
-    from ic.printing.dump import WRITTEN, Asked, find_stage
+    from ic.printing.dump import WRITTEN, DumpRequest, find_stage
 
     check_options(deck, settings=settings)
     shown = find_stage(stage)
     if settings and stage in WRITTEN:
         raise click.UsageError(f"`met dump {stage}` shows what the deck says; `met dump plan`, what --set makes of it")
-    _print(shown(Asked(deck, include_dirs, defines, names or None, settings)))
+    _print(shown(DumpRequest(deck, include_dirs, defines, names or None, settings)))
 
 
 def _plan(

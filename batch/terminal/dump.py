@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ic.printing.dump import Asked
+from ic.printing.dump import DumpRequest
 
 if TYPE_CHECKING:
     from met.plan import Experiment
     from met.trace.recording import Recording
 
 
-def program(asked: Asked) -> Iterator[str]:
+def program(asked: DumpRequest) -> Iterator[str]:
     """What is computed when: control, then each straight piece, operation by operation; `%n` is what number n gives."""
     from met.backends.reference.listing import lines
 
@@ -21,7 +21,7 @@ def program(asked: Asked) -> Iterator[str]:
         yield from lines(recording)
 
 
-def kernel(asked: Asked) -> Iterator[str]:
+def kernel(asked: DumpRequest) -> Iterator[str]:
     """The code of the program as MET writes it for this machine."""
     from met import backends
 
@@ -29,7 +29,7 @@ def kernel(asked: Asked) -> Iterator[str]:
         yield backends.find().emit(recording)
 
 
-def assembly(asked: Asked) -> Iterator[str]:
+def assembly(asked: DumpRequest) -> Iterator[str]:
     """The machine code of the program, as this processor's assembler would read it."""
     from met import backends
 
@@ -37,7 +37,7 @@ def assembly(asked: Asked) -> Iterator[str]:
         yield backends.find().listing(recording)
 
 
-def _recorded(asked: Asked) -> Iterator[tuple[Experiment, Recording]]:
+def _recorded(asked: DumpRequest) -> Iterator[tuple[Experiment, Recording]]:
     """Each run of the plan with its recorded program."""
     from met.program.build import build
     from met.trace.recorder import record

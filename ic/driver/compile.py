@@ -18,7 +18,7 @@ from ic.meaning.mechanics.arm import check_arm, resolve_arm
 from ic.meaning.parameters.scope import Scope
 from ic.read import in_order, read, read_again
 from ic.sweeps.effects import Effects
-from ic.sweeps.groups import Group, Source, lower
+from ic.sweeps.groups import DeckSource, ScopedExperiment, lower
 from ic.sweeps.settings import Settings
 from ic.text.complaints import Complaints, known_words
 from ic.text.lexer import COMMAND_LINE
@@ -74,7 +74,7 @@ def compile_deck(
     definitions = Definitions(deck, complaints)
     given = Settings(entries)
     written, definitions = definitions, given.in_definitions(definitions)
-    source = Source(definitions, complaints, partial(read_again, deck), given, Effects(given))
+    source = DeckSource(definitions, complaints, partial(read_again, deck), given, Effects(given))
     experiments: list[Experiment] = []
     scopes: list[Scope] = []
     try:
@@ -88,7 +88,7 @@ def compile_deck(
                 definitions.block(definition)
         asked = chosen(definitions, complaints, select)
         for definition in asked:
-            groups: list[Group] = []
+            groups: list[ScopedExperiment] = []
             with complaints.gather():
                 groups = lower(source, definition)
             source.effects.complete &= bool(groups)

@@ -12,7 +12,7 @@ from ic.driver.compile import Compiled, Select, check
 from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Expression, Name, children
-from ic.meaning.expressions.given import GIVEN, is_given, written_origin
+from ic.meaning.expressions.command_line import ON_COMMAND_LINE, is_on_command_line, written_origin
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.owner import Settled
 from ic.meaning.parameters.scope import Scope
@@ -125,7 +125,7 @@ def _let(scope: Scope, name: str) -> Settled | None:
         return None
     varied = scope.varied.get(name)
     origin = written_origin(place_of(let.value), ())
-    if varied is not None or origin.note == GIVEN:
+    if varied is not None or origin.note == ON_COMMAND_LINE:
         place = varied.place if varied is not None else origin.place
         origin = Origin("case" if varied is not None else "deck", place, (let.name.place,), origin.note)
     found = scope.names.find(Name((let.name,), let.name.place))
@@ -177,7 +177,9 @@ def _names(scope: Scope, expression: Expression) -> Iterator[Label]:
                     seen.add(name.text)
                     below.append(let.value)
                     place = place_of(let.value)
-                    yield Label(place if is_given(place) else let.name.place, f"{name.text} = {spell(let.value)}")
+                    yield Label(
+                        place if is_on_command_line(place) else let.name.place, f"{name.text} = {spell(let.value)}"
+                    )
         level = below
 
 

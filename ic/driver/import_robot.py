@@ -12,7 +12,7 @@ from ic.meaning.mechanics.arm import check_arm
 from ic.meaning.parameters.scope import Scope
 from ic.read import in_order
 from ic.robots.deck import arm_name, print_deck
-from ic.robots.entries import Body, body
+from ic.robots.entries import ArmEntries, arm_entries
 from ic.robots.files import KIND, load
 from ic.robots.robot import Joint, Robot
 from ic.text.complaints import Complaints
@@ -30,7 +30,7 @@ def imported(path: str, mimic: Mimic | None = None) -> str:
         found = FoundFile(path, os.path.normpath(path))
         made = load(found.name, files.text(found, kind=KIND, most=MOST_URDF_BYTES))
         if mimic is not None:
-            made = body(without_mimics(made.robot, mimic))
+            made = arm_entries(without_mimics(made.robot, mimic))
         _check(made)
     except Problem as problem:
         sources = tuple(files.read_so_far.values())
@@ -55,7 +55,7 @@ def without_mimics(robot: Robot, mimic: Mimic) -> Robot:
     return replace(robot, joints=tuple(changed(joint) for joint in robot.joints))
 
 
-def _check(made: Body) -> None:
+def _check(made: ArmEntries) -> None:
     """Raises Problem where the arm of these entries is none."""
     place = made.robot.root.name.place
     words = (Word("arm", place), Word(arm_name(made), place))

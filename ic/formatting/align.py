@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from ic.formatting.begins import goes_on, stands_below
-from ic.formatting.pieces import Piece, gap
+from ic.formatting.pieces import RowPiece, gap
 from ic.formatting.rows import BLANK, CODE, REMARK, Row
 
 REACH = 3  # lines: two that are aligned may have as many less one between them
@@ -60,7 +60,7 @@ class Groups:
         self._leaders[second] = first
 
 
-def offset(piece: Piece, anchor: Anchor) -> int:
+def offset(piece: RowPiece, anchor: Anchor) -> int:
     """How far behind the piece's first character its anchor is."""
     if anchor == "start":
         return 0
@@ -93,7 +93,7 @@ def aligned(found: Sequence[Row], *, paragraphs: bool) -> Groups:
     return groups
 
 
-class Line:
+class AlignedLine:
     """What alignment asks of the pieces of a row.
 
     wide      those that are set apart
@@ -105,7 +105,7 @@ class Line:
 
     __slots__ = ("_columns", "entries", "families", "lists", "pieces", "wide")
 
-    def __init__(self, pieces: Sequence[Piece]) -> None:
+    def __init__(self, pieces: Sequence[RowPiece]) -> None:
         self.pieces = pieces
         self.wide = {at for at in range(1, len(pieces)) if _is_wide(pieces, at)}
         self.families = list(_families(pieces))
@@ -125,12 +125,12 @@ class Line:
         return self._columns[anchor]
 
 
-def lines_of(found: Sequence[Row]) -> dict[int, Line]:
+def lines_of(found: Sequence[Row]) -> dict[int, AlignedLine]:
     """What there is to align, by the position of its row."""
-    return {at: Line(row.pieces) for at, row in enumerate(found) if row.kind == CODE and not row.exact}
+    return {at: AlignedLine(row.pieces) for at, row in enumerate(found) if row.kind == CODE and not row.exact}
 
 
-def _families(pieces: Sequence[Piece]) -> Iterator[tuple[int, str]]:
+def _families(pieces: Sequence[RowPiece]) -> Iterator[tuple[int, str]]:
     depth, before = 0, ""
     for piece in pieces:
         depth -= piece.kind == "close"
@@ -139,7 +139,7 @@ def _families(pieces: Sequence[Piece]) -> Iterator[tuple[int, str]]:
         depth, before = depth + (piece.kind == "open"), piece.kind
 
 
-def _family(piece: Piece) -> str:
+def _family(piece: RowPiece) -> str:
     if piece.text in ("=", "+=", "{"):
         return "="
     if piece.text in COMPARISONS:
@@ -149,11 +149,11 @@ def _family(piece: Piece) -> str:
     return piece.kind if piece.kind in ("unit", "close", "stop", "comment") else "value"
 
 
-def _begins_list(pieces: Sequence[Piece], at: int) -> bool:
+def _begins_list(pieces: Sequence[RowPiece], at: int) -> bool:
     return pieces[at].kind == "number" and pieces[at - 1].text == "[" and pieces[at - 2].text in ("=", "+=")
 
 
-def _unsigned(lists: Sequence[tuple[str, int, Piece]], others: Sequence[tuple[str, int, Piece]]) -> Iterator[int]:
+def _unsigned(lists: Sequence[tuple[str, int, RowPiece]], others: Sequence[tuple[str, int, RowPiece]]) -> Iterator[int]:
     """Of the other lists, numbers with a blank before them where one of these lists, of the same name, has a sign."""
     signed = {name for name, _, number in lists if number.text[0] in "+-"}
     for name, at, number in others:
@@ -161,11 +161,11 @@ def _unsigned(lists: Sequence[tuple[str, int, Piece]], others: Sequence[tuple[st
             yield at
 
 
-def _may_meet(one: Line, other: Line) -> bool:
+def _may_meet(one: AlignedLine, other: AlignedLine) -> bool:
     return bool(one.wide or other.wide or (one.entries and other.entries))
 
 
-def meeting(one: Line, other: Line, anchor: Anchor) -> Iterator[tuple[int, int]]:
+def meeting(one: AlignedLine, other: AlignedLine, anchor: Anchor) -> Iterator[tuple[int, int]]:
     """Pieces of two lines whose anchors meet, one of them set apart. Behind the first word they may be of any family.
 
     Entries of one name also meet where one of them has two blanks before it, as where one blank is thought enough.
@@ -179,7 +179,7 @@ def meeting(one: Line, other: Line, anchor: Anchor) -> Iterator[tuple[int, int]]
             yield met, at
 
 
-def _is_one_entry(one: Line, first: int, other: Line, second: int) -> bool:
+def _is_one_entry(one: AlignedLine, first: int, other: AlignedLine, second: int) -> bool:
     """Whether two pieces begin entries of one name, with blanks before them that differ."""
     above, below = one.pieces[first], other.pieces[second]
     entries = first in one.entries and second in other.entries
@@ -239,7 +239,7 @@ def neighbours(found: Sequence[Row]) -> Iterator[tuple[int, int]]:
             block[how] = [*block.get(how, ())[1 - REACH :], at]
 
 
-def _is_wide(pieces: Sequence[Piece], at: int) -> bool:
+def _is_wide(pieces: Sequence[RowPiece], at: int) -> bool:
     """Whether this piece is set apart. Behind a `[` one blank does that, as in `[ 90, 5]` below `[-90, 5]`."""
     before, piece = pieces[at - 1], pieces[at]
     needed = gap(before, piece)

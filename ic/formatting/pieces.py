@@ -33,7 +33,7 @@ _OPERANDS = ("name", "number", "unit", "string", "close")
 
 
 @frozen
-class Piece:
+class RowPiece:
     """Tokens that stand together.
 
     text    as it is laid out
@@ -63,9 +63,9 @@ def cut(rows: Iterable[Row]) -> None:
         at += len(row.tokens)
 
 
-def _cut(row: Row, at: int, parser: Expressions) -> list[Piece]:
+def _cut(row: Row, at: int, parser: Expressions) -> list[RowPiece]:
     """The pieces of one row, whose first token is the parser's token `at`."""
-    found: list[Piece] = []
+    found: list[RowPiece] = []
     line = row.whole[: len(row.whole) - (row.tail is not None)]
     operand = at > 0 and _ends_operand(parser.tokens[at - 1])
     i = end = 0
@@ -84,7 +84,7 @@ def _cut(row: Row, at: int, parser: Expressions) -> list[Piece]:
         text = "".join(each.source.text[each.offset : each.end] for each in line[i : i + count])
         column, last = row.column(first.offset), row.column(line[i + count - 1].end)
         before = column - end if found else 0
-        found.append(Piece(kind, text, column, last - column, before, tuple(line[i : i + count])))
+        found.append(RowPiece(kind, text, column, last - column, before, tuple(line[i : i + count])))
         i += count
         end = last
     return found
@@ -94,7 +94,7 @@ def _ends_operand(token: Token) -> bool:
     return (token.kind in (NAME, STRING, *NUMBERS) and token.text not in WORDS) or token.text in (")", "]", "%")
 
 
-def _piece(parser: Expressions, at: int, free: int, before: Piece | None, operand: bool) -> tuple[Kind, int]:
+def _piece(parser: Expressions, at: int, free: int, before: RowPiece | None, operand: bool) -> tuple[Kind, int]:
     """What begins at the parser's token `at`, and how many tokens it has, at most `free`."""
     token = parser.tokens[at]
     text = token.text
@@ -137,7 +137,7 @@ def _number(parser: Expressions, at: int, free: int) -> int:
     return 3 if fraction and number.end == line.offset and line.end == below.offset else 1
 
 
-def _unit(parser: Expressions, at: int, before: Piece) -> int:
+def _unit(parser: Expressions, at: int, before: RowPiece) -> int:
     """How many tokens the unit has that begins behind this piece; 0 where none does."""
     token, following = parser.tokens[at], parser.tokens[at + 1]
     over = None
@@ -151,7 +151,7 @@ def _unit(parser: Expressions, at: int, before: Piece) -> int:
     return 0 if product is None else product[1] - at
 
 
-def gap(before: Piece, piece: Piece) -> int:
+def gap(before: RowPiece, piece: RowPiece) -> int:
     """How many blanks stand between two pieces of a line that are not aligned with anything."""
     wanted = _wanted(before, piece)
     own = min(piece.gap, 1)
@@ -162,7 +162,7 @@ def gap(before: Piece, piece: Piece) -> int:
     return wanted if wanted or not own or _stay_apart(before.text, piece.text) else own
 
 
-def _wanted(before: Piece, piece: Piece) -> int | None:
+def _wanted(before: RowPiece, piece: RowPiece) -> int | None:
     """The same by what the two are; None to leave it to the author, whether one or none."""
     first, second = before.kind, piece.kind
     if second == "stop" and first != "comment":
@@ -188,7 +188,7 @@ def _wanted(before: Piece, piece: Piece) -> int | None:
     return 1
 
 
-def _around_brace(before: Piece, piece: Piece) -> int | None:
+def _around_brace(before: RowPiece, piece: RowPiece) -> int | None:
     if before.text == "{" or piece.text == "}":
         return 1
     if piece.text == "{":

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
-from ic.formatting.pieces import Piece, cut
+from ic.formatting.pieces import RowPiece, cut
 from ic.grammar.cursor import OPENING
 from ic.text.lexer import BAD, SPACE, Text, Token, logical_lines
 from ic.text.limits import CONDITION_DEPTH, DEPTH, LONGEST_LINE, MOST_TOKENS, Findings
@@ -57,8 +57,8 @@ class Row:
         self.whole = [token for token in line if token.kind != SPACE or written(token)[:1] == "/"]
         self.tokens = [token for token in self.whole if token.kind != SPACE]
         self.opaque = False
-        self.pieces: list[Piece] = []
-        self.tail: Piece | None = None
+        self.pieces: list[RowPiece] = []
+        self.tail: RowPiece | None = None
         self.parent: tuple[Row, int] | None = None
         self.closes: Row | None = None
         self.behind: Token | None = None
@@ -77,7 +77,7 @@ class Row:
             self.kind, self.exact = BLANK, "\\" in self.raw
         last = self.whole[-1] if self.tokens and not joined else None
         if last is not None and last.kind == SPACE:
-            self.tail = Piece("comment", written(last).rstrip(BLANKS), self.column(last.offset), last.length, 0, ())
+            self.tail = RowPiece("comment", written(last).rstrip(BLANKS), self.column(last.offset), last.length, 0, ())
 
     @property
     def directive(self) -> str:
@@ -141,7 +141,7 @@ def written(token: Token) -> str:
     return token.source.text[token.offset : token.end]
 
 
-class _Open:
+class _OpenBracket:
     """A bracket that is open: its token, its row, and which of the row's pieces it is."""
 
     __slots__ = ("piece", "row", "token")
@@ -152,30 +152,30 @@ class _Open:
         self.piece = piece
 
 
-class _If:
+class _OpenConditional:
     """A conditional that is open: where it begins, the brackets open before it and behind each of its parts."""
 
     __slots__ = ("at", "broken", "ends", "otherwise", "start")
 
-    def __init__(self, at: int, start: list[_Open]) -> None:
+    def __init__(self, at: int, start: list[_OpenBracket]) -> None:
         self.at = at
         self.start = start
-        self.ends: list[list[_Open]] = []
+        self.ends: list[list[_OpenBracket]] = []
         self.otherwise = False
         self.broken = False
 
 
 def _match_all(found: list[Row], findings: Findings) -> None:
     """Matches the brackets, and makes opaque what `#if` surrounds where they do not match; elsewhere that is told."""
-    stack: list[_Open] = []
-    ifs: list[_If] = []
+    stack: list[_OpenBracket] = []
+    ifs: list[_OpenConditional] = []
     for at, row in enumerate(found):
         word = row.directive
         if word in ("if", "ifdef", "ifndef"):
             if len(ifs) >= CONDITION_DEPTH:
                 findings.error("D018", f"`#if` goes deeper than {CONDITION_DEPTH}", row.tokens[1].place)
                 return
-            ifs.append(_If(at, list(stack)))
+            ifs.append(_OpenConditional(at, list(stack)))
         elif word not in CONDITIONALS:
             complaint = _match(row, stack) if row.kind == CODE and not (ifs and ifs[-1].broken) else None
             if complaint is None:
@@ -211,7 +211,7 @@ def _match_all(found: list[Row], findings: Findings) -> None:
         findings.error("D022", f"this `{text}` is not closed", opened.token.place, help=helps)
 
 
-def _match(row: Row, stack: list[_Open]) -> Diagnostic | None:
+def _match(row: Row, stack: list[_OpenBracket]) -> Diagnostic | None:
     """Opens and closes the row's brackets. Gives back what is wrong with the row, if anything is."""
     for token in row.tokens:
         if token.kind == BAD:
@@ -221,7 +221,7 @@ def _match(row: Row, stack: list[_Open]) -> Diagnostic | None:
         if token.text in OPENING:
             if len(stack) >= DEPTH:
                 return error("D029", f"braces, brackets and parentheses go deeper than {DEPTH}", token.place)
-            stack.append(_Open(token, row))
+            stack.append(_OpenBracket(token, row))
         elif token.text in _CLOSING:
             if not stack:
                 helps = ("leave it out, or open it where it begins", _BY_ITSELF)
@@ -250,8 +250,8 @@ def _keep_uses(found: Sequence[Row], names: Collection[str]) -> None:
 
 def _nest(found: list[Row]) -> None:
     """Tells every row the bracket that it begins in. All brackets that count are known to match."""
-    stack: list[_Open] = []
-    ifs: list[tuple[list[_Open], list[list[_Open]]]] = []
+    stack: list[_OpenBracket] = []
+    ifs: list[tuple[list[_OpenBracket], list[list[_OpenBracket]]]] = []
     behind: Token | None = None
     for row in found:
         word = "" if row.opaque else row.directive
@@ -270,7 +270,7 @@ def _nest(found: list[Row]) -> None:
         for position, piece in enumerate(row.pieces):
             leading = leading and piece.kind == "close"
             if piece.kind == "open":
-                stack.append(_Open(piece.tokens[0], row, position))
+                stack.append(_OpenBracket(piece.tokens[0], row, position))
             elif piece.kind == "close":
                 opened = stack.pop().row
                 row.closes = opened if leading else row.closes

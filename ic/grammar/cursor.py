@@ -21,7 +21,7 @@ class Unreadable(Exception):
     """This entry cannot be read, and that has been said."""
 
 
-class Ended(Exception):
+class EndedInsideBlock(Exception):
     """The tokens ended inside a block, and that has been said."""
 
 

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from itertools import takewhile
 
-from ic.grammar.cursor import OPENING, SHOWN, Ended, Unreadable, found, span
+from ic.grammar.cursor import OPENING, SHOWN, EndedInsideBlock, Unreadable, found, span
 from ic.grammar.expressions import Expressions
 from ic.grammar.syntax import Broken, Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, Token
@@ -44,7 +44,7 @@ def parse_on(tokens: Sequence[Token], findings: Findings) -> tuple[tuple[Entry, 
     parser = _Parser(tokens, findings)
     entries: list[Entry] = []
     sound = False
-    with without_collection(), suppress(GiveUp, Ended):
+    with without_collection(), suppress(GiveUp, EndedInsideBlock):
         parser.entries(entries)
         sound = not parser.unbalanced
     return tuple(entries), tuple(parser.wrecks), sound
@@ -134,7 +134,7 @@ class _Parser(Expressions):
         self.unbalanced = True
         self.tell("D022", f"this `{opening.text}` is not closed", opening, also=also,
                   help=f"write the `{OPENING[opening.text]}` where it ends")  # fmt: skip
-        raise Ended
+        raise EndedInsideBlock
 
     def closes_nothing(self) -> None:
         token = self.advance()

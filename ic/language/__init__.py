@@ -7,7 +7,7 @@ sweeps are made of these declarations. A key more is an `Entry` more, and the co
 from __future__ import annotations
 
 from ic.language.bodies import ARM, JOINT, LINK, PAYLOAD
-from ic.language.declaration import Block, Entry
+from ic.language.declaration import BlockDeclaration, Entry
 from ic.language.runs import ENVIRONMENT, INITIAL, METRIC, RATES, RUN, SUBSTITUTE, SWEEP, TOLERANCES
 from ic.language.servos import SERVO
 
@@ -39,4 +39,4 @@ def choices(head: str) -> tuple[str, ...]:
     return tuple(last for first, _, last in split if first == head)
 
 
-__all__ = ["BLOCKS", "DEFINITIONS", "HEADS", "Block", "Entry", "choices"]
+__all__ = ["BLOCKS", "DEFINITIONS", "HEADS", "BlockDeclaration", "Entry", "choices"]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from ic.language.declaration import Block, Entry
+from ic.language.declaration import BlockDeclaration, Entry
 from met.parameter import ZEROS, Parameter
 
 MASS = Parameter(name="mass", unit="kg", at_least=0.0, doc="mass of the {}")
 COM = Parameter(name="com", unit="m", shape="vector", doc="centre of mass, {} frame")
 INERTIA = Parameter(name="inertia", unit="kg*m^2", shape="list", doc="inertia about the centre of mass, {} axes")
 
-LINK = Block(
+LINK = BlockDeclaration(
     name="link",
     written="link NAME { ... }",
     within="arm",
@@ -34,7 +34,7 @@ AXIS = Parameter(name="axis", unit="1", shape="vector", doc="axis of motion, joi
 
 JOINT_KINDS = ("revolute", "prismatic", "fixed")
 
-JOINT = Block(
+JOINT = BlockDeclaration(
     name="joint",
     written="joint NAME revolute { ... }",
     within="arm",
@@ -77,7 +77,7 @@ def _of_flight(wanted: Parameter, doc: str, default: str, written: str) -> Entry
                  path=f"payloads.PAYLOAD.{wanted.name}", default=default, doc=doc)  # fmt: skip
 
 
-PAYLOAD = Block(
+PAYLOAD = BlockDeclaration(
     name="payload",
     written="payload NAME { ... }",
     within="run",
@@ -108,7 +108,7 @@ PAYLOAD = Block(
     ),
 )  # fmt: skip
 
-ARM = Block(
+ARM = BlockDeclaration(
     name="arm",
     written="arm NAME { ... }",
     doc="Links, and joints that hold them.",

@@ -45,7 +45,7 @@ class Entry:
 
 
 @frozen(kw_only=True)
-class Block:
+class BlockDeclaration:
     """A block of the deck language.
 
     name     the word it begins with;  written: how a deck writes it;  within: the block that it stands in, "" for a

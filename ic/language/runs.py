@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ic.language.declaration import Block, Entry
+from ic.language.declaration import BlockDeclaration, Entry
 from met.parameter import Parameter
 
 DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
@@ -21,7 +21,7 @@ def _rate(name: str, doc: str, default: str) -> Entry:
                  parameter=Parameter(name=name, unit="Hz", above=0.0, doc=doc), doc=doc)  # fmt: skip
 
 
-RATES = Block(
+RATES = BlockDeclaration(
     name="rates",
     written="rates { ... }",
     within="run",
@@ -36,7 +36,7 @@ RATES = Block(
     ),
 )  # fmt: skip
 
-INITIAL = Block(
+INITIAL = BlockDeclaration(
     name="initial",
     written="initial { ... }",
     within="run",
@@ -53,7 +53,7 @@ INITIAL = Block(
     free="`base.position`, `base.rpy`, `base.velocity` and `base.rate` of a base that is free",
 )  # fmt: skip
 
-ENVIRONMENT = Block(
+ENVIRONMENT = BlockDeclaration(
     name="environment",
     written="environment { ... }",
     within="run",
@@ -67,7 +67,7 @@ ENVIRONMENT = Block(
     free="`NAME = MODEL { ... }`: models, `met doc environment`; none act unless they are written",
 )  # fmt: skip
 
-SUBSTITUTE = Block(
+SUBSTITUTE = BlockDeclaration(
     name="substitute",
     written="substitute JOINT { ... }",
     within="run",
@@ -80,7 +80,7 @@ SUBSTITUTE = Block(
     ),
 )  # fmt: skip
 
-METRIC = Block(
+METRIC = BlockDeclaration(
     name="metric",
     written="metric NAME = MODEL { of = CHANNEL; ... }",
     within="run",
@@ -90,7 +90,7 @@ METRIC = Block(
     free="parameters of the model: `met doc metric` lists the models",
 )
 
-TOLERANCES = Block(
+TOLERANCES = BlockDeclaration(
     name="tolerances",
     written="tolerances { ... }",
     within="run",
@@ -103,7 +103,7 @@ TOLERANCES = Block(
     free="`NAME = SIZE;` of a signal, `qd`, a joint's part of one, `elbow.q`, or a metric",
 )  # fmt: skip
 
-RUN = Block(
+RUN = BlockDeclaration(
     name="run",
     written="run NAME { ... }",
     doc="Everything that one simulation needs.",
@@ -145,7 +145,7 @@ RUN = Block(
     ),
 )  # fmt: skip
 
-SWEEP = Block(
+SWEEP = BlockDeclaration(
     name="sweep",
     written="sweep NAME of RUN { ... }",
     doc="What of a run varies. The cases are the product of its axes.",

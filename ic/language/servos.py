@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ic.language.declaration import Block, Entry
+from ic.language.declaration import BlockDeclaration, Entry
 
-SERVO = Block(
+SERVO = BlockDeclaration(
     name="servo",
     written="servo NAME { ... }",
     doc="What drives joints: a model, its parameters, a command, a rate.",

@@ -1,6 +1,6 @@
 """What each stage of the way hands to the next, as text: `met dump STAGE deck.ic`.
 
-A stage is a function from `Asked` to lines, offered as an entry point in the group `met.stages` by the lowest package
+A stage is a function from `DumpRequest` to lines, offered as an entry point in the group `met.stages` by the lowest package
 that may import all it needs: tokens, syntax, model and plan from here, program, kernel and assembly from
 batch/terminal/dump.py.
 """
@@ -16,7 +16,7 @@ from met.frozen import frozen
 
 if TYPE_CHECKING:
     from ic.grammar.syntax import Entry
-    from ic.meaning.definitions.merge import Block, Item
+    from ic.meaning.definitions.merge import Item, MergedBlock
     from met.plan import Plan
 
 GROUP = "met.stages"
@@ -25,7 +25,7 @@ WRITTEN = ("tokens", "syntax", "model")  # stages before anything is set from ou
 
 
 @frozen
-class Asked:
+class DumpRequest:
     """Which deck is to be shown, and of its plan which runs (None: the only one, else the default)."""
 
     deck: str
@@ -47,7 +47,7 @@ class Asked:
         )
 
 
-Stage = Callable[[Asked], Iterator[str]]
+Stage = Callable[[DumpRequest], Iterator[str]]
 
 
 def stage_names() -> list[str]:
@@ -67,7 +67,7 @@ def find_stage(name: str) -> Stage:
     return stage
 
 
-def tokens(asked: Asked) -> Iterator[str]:
+def tokens(asked: DumpRequest) -> Iterator[str]:
     """Tokens behind the preprocessor: place, kind, text, and the macros that a token came through."""
     from ic.text.preprocess import preprocess
 
@@ -80,7 +80,7 @@ def tokens(asked: Asked) -> Iterator[str]:
         yield f"{place!s:32} {token.kind:14} {token.text}{through}"
 
 
-def syntax(asked: Asked) -> Iterator[str]:
+def syntax(asked: DumpRequest) -> Iterator[str]:
     """The tree of what was written, entry by entry."""
     from ic.read import read
 
@@ -88,7 +88,7 @@ def syntax(asked: Asked) -> Iterator[str]:
         yield from _entry(entry, "")
 
 
-def model(asked: Asked) -> Iterator[str]:
+def model(asked: DumpRequest) -> Iterator[str]:
     """Definitions with `like`, overrides, `+=` and `remove` carried out, each entry with the places it overrode."""
     from ic.grammar.spell import spell
     from ic.language import DEFINITIONS
@@ -119,7 +119,7 @@ def model(asked: Asked) -> Iterator[str]:
         raise Problem(complaints.all, {source.name: source.text for source in deck.sources})
 
 
-def plan(asked: Asked) -> Iterator[str]:
+def plan(asked: DumpRequest) -> Iterator[str]:
     """The run plan, as `met plan -o` writes it, its case tables inside; with a line for each value on a terminal."""
     import json
     import sys
@@ -174,7 +174,7 @@ def _value(value: Any, named_apart: bool = False) -> tuple[str, Sequence[Entry]]
     return spell(value), ()
 
 
-def _block(block: Block, indent: str) -> Iterator[str]:
+def _block(block: MergedBlock, indent: str) -> Iterator[str]:
     from ic.grammar.spell import spell
 
     for item in block.items.values():

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ic.language import HEADS
-from ic.meaning.expressions.given import GIVEN
+from ic.meaning.expressions.command_line import ON_COMMAND_LINE
 from ic.printing.codes import is_code
 from ic.printing.columns import columns, number, quantity, vector
 from ic.printing.settings import settings
@@ -239,7 +239,7 @@ def _one(
         unit = "" if coordinate.unit == "1" else f" {coordinate.unit}"
         yield f"  varied by {coordinate.path}: {_series(coordinate.values / coordinate.scale)}{unit}"
     note = _note(origin)
-    said = note if note == GIVEN else SAID[origin.kind] + (f": {note}" if note else "")
+    said = note if note == ON_COMMAND_LINE else SAID[origin.kind] + (f": {note}" if note else "")
     if origin.place is None and origin.kind == "deck":
         said = IN_PLAN
     if origin.place is None:

@@ -21,7 +21,7 @@ Sources = Sequence[Callable[[], Source]]
 
 
 @frozen
-class Found:
+class ExplainedExperiment:
     """An experiment that knows what is asked, in full. alone: whether all of the first source's experiments do."""
 
     experiment: Experiment
@@ -42,7 +42,7 @@ class Found:
 
 def print_explained(sources: Sources, path: str) -> Iterator[str]:
     """Line by line; once where all experiments say the same. Raises Problem where none knows the path."""
-    said: dict[tuple[str, ...], list[Found]] = {}
+    said: dict[tuple[str, ...], list[ExplainedExperiment]] = {}
     for found in _found(sources, path):
         texts = {source.name: source.text for source in found.plan.sources}
         lines = tuple(print_explain(found.experiment, path, texts, found.names_of, found.known))
@@ -66,7 +66,7 @@ def explained_json(sources: Sources, path: str) -> list[dict[str, Any]]:
     ]
 
 
-def _found(sources: Sources, path: str) -> list[Found]:
+def _found(sources: Sources, path: str) -> list[ExplainedExperiment]:
     problem: Problem | None = None
     for n, source in enumerate(sources):
         try:
@@ -78,7 +78,7 @@ def _found(sources: Sources, path: str) -> list[Found]:
         made = []
         for number, experiment in enumerate(plan.experiments):
             whole = with_settings(experiment if compiled is None else in_full(compiled, number))
-            found = Found(whole, plan, compiled, number, True)
+            found = ExplainedExperiment(whole, plan, compiled, number, True)
             try:
                 find_paths(whole, path, found.known)
             except Problem as one:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ic.language import BLOCKS, Block, Entry
+from ic.language import BLOCKS, BlockDeclaration, Entry
 from ic.printing.columns import columns, exactly
 from met.parameter import Parameter
 
@@ -19,7 +19,7 @@ MARK = "<!-- table of {} -->"
 """What stands above a table of docs/deck.md that is made here, with the block's name."""
 
 
-def print_block(block: Block) -> Iterator[str]:
+def print_block(block: BlockDeclaration) -> Iterator[str]:
     """The page of a block, for a terminal."""
     yield f"{block.name}: {block.doc}"
     yield ""
@@ -43,7 +43,7 @@ def print_block(block: Block) -> Iterator[str]:
         yield from columns(varying)
 
 
-def block_json(block: Block) -> list[dict[str, Any]]:
+def block_json(block: BlockDeclaration) -> list[dict[str, Any]]:
     """The entries of a block, for programs."""
     return [
         {
@@ -54,7 +54,7 @@ def block_json(block: Block) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def table(block: Block) -> Iterator[str]:
+def table(block: BlockDeclaration) -> Iterator[str]:
     """The block's entries as a table in Markdown."""
     by_key = block.within and not block.named and not block.statements
     yield f"| {'key' if by_key else 'entry'} of {_an(block.name)} | is | default |"

@@ -12,10 +12,10 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Setting
 from ic.robots.attributes import shown
-from ic.robots.entries import Body, Part, spelled
+from ic.robots.entries import ArmEntries, RobotEntry, spelled
 from ic.robots.names import word
 from ic.robots.robot import MOVING, Inertial, Joint
-from ic.robots.told import limits
+from ic.robots.warnings import limits
 
 WIDE = 100  # columns of a block on one line
 WIDEST = 120  # with what is said of it behind
@@ -23,7 +23,7 @@ FREE = "follows `{}` in the file{}; here it moves by itself"
 HELD = "follows `{}` in the file{}; here it is held at 0"
 
 
-def print_deck(body: Body, title: str) -> Iterator[str]:
+def print_deck(body: ArmEntries, title: str) -> Iterator[str]:
     """The deck's lines. title: its first comment."""
     arm = arm_name(body)
     yield f"// {_safe(title)}"
@@ -40,12 +40,12 @@ def print_deck(body: Body, title: str) -> Iterator[str]:
     yield from _runs(body, arm)
 
 
-def arm_name(body: Body) -> str:
+def arm_name(body: ArmEntries) -> str:
     stem = os.path.basename(body.robot.file).partition(".")[0]
     return word(body.robot.name or stem, "arm")
 
 
-def _about(body: Body) -> Iterator[str]:
+def _about(body: ArmEntries) -> Iterator[str]:
     root = body.robot.root
     weight = " What it weighs rests on the ground." if root.inertial is not None else ""
     yield f"// `base` is the file's link `{_safe(root.name.text)}`.{weight}"
@@ -54,7 +54,7 @@ def _about(body: Body) -> Iterator[str]:
         yield f"// Not in this deck: {', '.join(f'{len(places)} {_safe(tag)}' for tag, places in kinds)}."
 
 
-def _block(part: Part, notes: list[str]) -> Iterator[str]:
+def _block(part: RobotEntry, notes: list[str]) -> Iterator[str]:
     """An entry on one line where it is short, else a line for each key; notes behind the first line, or above it."""
     words = " ".join(word.text for word in part.entry.words)
     entries = [entry for entry in part.entry.body if isinstance(entry, Setting)]
@@ -79,7 +79,7 @@ def _block(part: Part, notes: list[str]) -> Iterator[str]:
     yield "    }"
 
 
-def _link_notes(part: Part, changed: Mapping[tuple[str, str], str]) -> list[str]:
+def _link_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> list[str]:
     notes = _called(part, "link", changed)
     inertial = getattr(part.of, "inertial", None)
     if isinstance(inertial, Inertial) and inertial.rpy is not None and not inertial.rpy.nothing:
@@ -87,7 +87,7 @@ def _link_notes(part: Part, changed: Mapping[tuple[str, str], str]) -> list[str]
     return notes
 
 
-def _joint_notes(part: Part, changed: Mapping[tuple[str, str], str]) -> list[str]:
+def _joint_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> list[str]:
     notes = _called(part, "joint", changed)
     joint = part.of
     assert isinstance(joint, Joint)
@@ -113,7 +113,7 @@ def _limit_notes(joint: Joint) -> Iterator[str]:
         yield f"at most {spelled(found['effort'])} {effort}"
 
 
-def _called(part: Part, kind: str, changed: Mapping[tuple[str, str], str]) -> list[str]:
+def _called(part: RobotEntry, kind: str, changed: Mapping[tuple[str, str], str]) -> list[str]:
     name = changed.get((kind, part.entry.words[1].text))
     return [] if name is None else [f"`{shown(name)}` in the file"]
 
@@ -121,7 +121,7 @@ def _called(part: Part, kind: str, changed: Mapping[tuple[str, str], str]) -> li
 # Runs to begin with
 
 
-def _runs(body: Body, arm: str) -> Iterator[str]:
+def _runs(body: ArmEntries, arm: str) -> Iterator[str]:
     joints = {part.entry.words[1].text: part.of for part in body.joints
               if isinstance(part.of, Joint) and part.of.type.text in MOVING}  # fmt: skip
     if not joints:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from ic.grammar.syntax import Entry, Expression, Group, List, Name, Number, Setting, Unary, Unit, WithUnit, Word
-from ic.robots.names import Names, deck_names
+from ic.robots.names import DeckNames, deck_names
 from ic.robots.robot import Inertial, Joint, Link, Numbers, Robot, Written
 from met.diagnostic import Place
 from met.frozen import frozen
@@ -23,7 +23,7 @@ NOISE = 1e-15  # of sines and cosines of right angles, whose size is 1: cos(pi/2
 
 
 @frozen
-class Part:
+class RobotEntry:
     """A link or joint of the robot as an entry."""
 
     of: Link | Joint
@@ -31,24 +31,24 @@ class Part:
 
 
 @frozen
-class Body:
+class ArmEntries:
     """A robot's arm: its entries, links and then joints, in the file's order, and what its names are in decks."""
 
     robot: Robot
-    names: Names
-    links: tuple[Part, ...]
-    joints: tuple[Part, ...]
+    names: DeckNames
+    links: tuple[RobotEntry, ...]
+    joints: tuple[RobotEntry, ...]
 
     @property
     def entries(self) -> tuple[Entry, ...]:
         return tuple(part.entry for part in (*self.links, *self.joints))
 
 
-def body(robot: Robot) -> Body:
+def arm_entries(robot: Robot) -> ArmEntries:
     names = deck_names(robot)
-    links = tuple(Part(link, _link(link, names.links[link.name.text])) for link in robot.carried)
-    joints = tuple(Part(joint, _joint(joint, names)) for joint in robot.joints)
-    return Body(robot, names, links, joints)
+    links = tuple(RobotEntry(link, _link(link, names.links[link.name.text])) for link in robot.carried)
+    joints = tuple(RobotEntry(joint, _joint(joint, names)) for joint in robot.joints)
+    return ArmEntries(robot, names, links, joints)
 
 
 def _link(link: Link, name: str) -> Group:
@@ -98,7 +98,7 @@ def _turn(angle: float) -> tuple[float, float]:
     return (0.0 if abs(c) < NOISE else c), (0.0 if abs(s) < NOISE else s)
 
 
-def _joint(joint: Joint, names: Names) -> Group:
+def _joint(joint: Joint, names: DeckNames) -> Group:
     kind = "revolute" if joint.type.text == "continuous" else joint.type.text
     settings = [_end("parent", joint.parent, names), _end("child", joint.child, names)]
     if joint.at is not None and not joint.at.nothing:
@@ -114,7 +114,7 @@ def _joint(joint: Joint, names: Names) -> Group:
     return _group("joint", names.joints[joint.name.text], Word(kind, joint.type.place), settings, joint.name.place)
 
 
-def _end(key: str, link: Written, names: Names) -> Setting:
+def _end(key: str, link: Written, names: DeckNames) -> Setting:
     return _setting(key, _name(names.links[link.text], link.place), link.place)
 
 

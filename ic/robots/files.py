@@ -12,14 +12,14 @@ from ic.text.limits import MOST_URDF_BYTES
 from met.diagnostic import Diagnostic, Problem, did_you_mean, error
 
 if TYPE_CHECKING:
-    from ic.robots.entries import Body
+    from ic.robots.entries import ArmEntries
 
 USAGE = 'write `arm NAME from urdf("FILE") { ... }`'
 MODELS = ("urdf",)
 KIND = "URDF file"
 
 
-class RobotFiles(NamedFiles["Body"]):
+class RobotFiles(NamedFiles["ArmEntries"]):
     """The URDF files that a deck names."""
 
     def __init__(self, deck: Deck) -> None:
@@ -30,23 +30,23 @@ class RobotFiles(NamedFiles["Body"]):
         """Names of the links that are `base` in arms."""
         return {each.robot.root.name.text for each in self.loaded}
 
-    def body(self, made_from: Call) -> Body:
+    def arm_entries(self, made_from: Call) -> ArmEntries:
         """The robot that `urdf("FILE")` names. Raises Problem."""
         return self.get(_file_named(made_from))
 
     def remarks(self, made_from: Call) -> Iterator[Diagnostic]:
         """What the arm has not of the file, which was read."""
-        from ic.robots.told import told
+        from ic.robots.warnings import warnings_of
 
-        return told(self.body(made_from), _file_named(made_from).place)
+        return warnings_of(self.arm_entries(made_from), _file_named(made_from).place)
 
 
-def load(name: str, text: str) -> Body:
+def load(name: str, text: str) -> ArmEntries:
     """The robot of a file. Raises Problem."""
-    from ic.robots.entries import body  # only who has such a file pays for reading them
+    from ic.robots.entries import arm_entries  # only who has such a file pays for reading them
     from ic.robots.urdf import read
 
-    return body(read(name, text))
+    return arm_entries(read(name, text))
 
 
 def _file_named(made_from: Call) -> String:

@@ -29,7 +29,7 @@ _MACRO = re.compile(r"__\w+__")  # __LINE__ and its like: the preprocessor's
 
 
 @frozen
-class Changed:
+class ChangedName:
     """A name that is another in decks."""
 
     kind: str  # "link", "joint"
@@ -38,21 +38,21 @@ class Changed:
 
 
 @frozen
-class Names:
+class DeckNames:
     """The deck's name of each link and joint, by the file's; changed: those that differ, without the root."""
 
     links: Mapping[str, str]
     joints: Mapping[str, str]
-    changed: tuple[Changed, ...]
+    changed: tuple[ChangedName, ...]
 
 
-def deck_names(robot: Robot) -> Names:
+def deck_names(robot: Robot) -> DeckNames:
     links = {robot.root.name.text: "base"}
     links |= _named([link.name for link in robot.carried], "link", {"base"})
     joints = _named([joint.name for joint in robot.joints], "joint", set(links.values()))
-    changed = [Changed("link", each.name, links[each.name.text]) for each in robot.carried]
-    changed += [Changed("joint", each.name, joints[each.name.text]) for each in robot.joints]
-    return Names(links, joints, tuple(each for each in changed if each.name != each.written.text))
+    changed = [ChangedName("link", each.name, links[each.name.text]) for each in robot.carried]
+    changed += [ChangedName("joint", each.name, joints[each.name.text]) for each in robot.joints]
+    return DeckNames(links, joints, tuple(each for each in changed if each.name != each.written.text))
 
 
 def word(text: str, kind: str) -> str:

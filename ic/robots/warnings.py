@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ic.robots.attributes import shown
-from ic.robots.entries import Body
+from ic.robots.entries import ArmEntries
 from ic.robots.robot import MOVING, Joint
 from met.diagnostic import Diagnostic, Label, Place
 
@@ -13,7 +13,7 @@ MOST_NAMED = 8  # names, kinds of elements
 MOST_JOINTS = 4  # in a line; of more the first and the last
 
 
-def told(body: Body, named: Place) -> Iterator[Diagnostic]:
+def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
     """named: where the deck names the file."""
     labels = list(_left_out(body))
     if labels:
@@ -30,7 +30,7 @@ def told(body: Body, named: Place) -> Iterator[Diagnostic]:
                          also, ("a deck's names are letters, digits and `_`, each once",), "warning")  # fmt: skip
 
 
-def _left_out(body: Body) -> Iterator[Label]:
+def _left_out(body: ArmEntries) -> Iterator[Label]:
     robot = body.robot
     root = robot.root.inertial
     if root is not None and root.mass.values[0] != 0.0:
@@ -60,7 +60,7 @@ def limits(joint: Joint) -> dict[str, float]:
     return found
 
 
-def _joints(body: Body, joints: Sequence[Joint]) -> str:
+def _joints(body: ArmEntries, joints: Sequence[Joint]) -> str:
     names = [body.names.joints[joint.name.text] for joint in joints]
     listed = names if len(names) <= MOST_JOINTS else [*names[:2], "...", names[-1]]
     return f"{_count(len(names), 'joint')} ({', '.join(listed)})"

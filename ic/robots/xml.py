@@ -22,7 +22,7 @@ _NO_URDF = "a URDF file is XML, `<robot> ... </robot>`: is this the right file?"
 _REMEDY = "URDF needs neither: write the values out"
 
 
-class Source:
+class XmlSource:
     """A file's name and bytes, and where in its text a byte stands."""
 
     def __init__(self, name: str, text: str) -> None:
@@ -48,7 +48,7 @@ class Element:
 
     __slots__ = ("_at", "_source", "attributes", "children", "tag")
 
-    def __init__(self, tag: str, attributes: dict[str, str], source: Source, at: int) -> None:
+    def __init__(self, tag: str, attributes: dict[str, str], source: XmlSource, at: int) -> None:
         self.tag, self.attributes = tag, attributes
         self.children: list[Element] = []
         self._source, self._at = source, at
@@ -83,7 +83,7 @@ class Element:
 
 def parse(name: str, text: str) -> Element:
     """The outermost element. Raises Problem D200 for what is no XML, D201 for what expands, D202 beyond a limit."""
-    source = Source(name, text)
+    source = XmlSource(name, text)
     parser = expat.ParserCreate(encoding="utf-8")  # that is what the text is, whatever the file's first line says
     open_: list[Element] = []
     root: list[Element] = []
@@ -131,7 +131,7 @@ def parse(name: str, text: str) -> Element:
     return root[0]
 
 
-def _not_xml(source: Source, at: int, code: int, open_: list[Element]) -> Diagnostic:
+def _not_xml(source: XmlSource, at: int, code: int, open_: list[Element]) -> Diagnostic:
     """What expat found, in words that say what to do."""
     at = max(0, min(at, len(source.data) - 1))
     place = source.place(at, at + 1)

@@ -18,7 +18,7 @@ from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression, Group, Name, Setting, Statement, String, Word
 from ic.language.runs import SWEEP
 from ic.meaning.definitions.resolve import Definition, Definitions
-from ic.meaning.expressions.conditions import Varied
+from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, measure_of
@@ -34,11 +34,11 @@ MOST_CASES = 10_000_000
 MOST_COUNTED = 16  # axes that are read of a sweep that has too many cases
 KNOWN = tuple(entry.name for entry in SWEEP.entries)
 
-Column = Varied | Chosen
+Column = VariedPath | Chosen
 
 
 @frozen
-class Axis:
+class SweepAxis:
     """What varies together: columns of one length. note: what to tell of how they were made."""
 
     columns: tuple[Column, ...]
@@ -58,7 +58,7 @@ class Sweep:
     """
 
     name: str
-    axes: tuple[Axis, ...]
+    axes: tuple[SweepAxis, ...]
     excludes: tuple[Statement, ...]
     seed: int | None
     independent: Place | None
@@ -67,8 +67,8 @@ class Sweep:
     place: Place
 
     @property
-    def varied(self) -> tuple[Varied, ...]:
-        return tuple(column for axis in self.axes for column in axis.columns if isinstance(column, Varied))
+    def varied(self) -> tuple[VariedPath, ...]:
+        return tuple(column for axis in self.axes for column in axis.columns if isinstance(column, VariedPath))
 
     @property
     def chosen(self) -> tuple[Chosen, ...]:
@@ -84,7 +84,7 @@ def read_sweep(
     definitions: Definitions, complaints: Complaints, definition: Definition, graph: Graph, *, seed: int = 0
 ) -> Sweep:
     """The sweep's axes with their values; tells what is wrong with them. seed: the run's, for what is drawn."""
-    reader = _Reader(definitions, complaints, definition, graph, seed)
+    reader = _SweepReader(definitions, complaints, definition, graph, seed)
     for entry in definition.group.body:
         with complaints.gather():
             reader.enter(entry)
@@ -119,19 +119,19 @@ def read_sweep(
     return sweep
 
 
-def _product(reader: _Reader) -> int:
+def _product(reader: _SweepReader) -> int:
     """The cases of what is read so far."""
     return math.prod((*(axis.size for axis in reader.axes), reader.repeat))
 
 
-class _Reader:
+class _SweepReader:
     """Entry after entry of a sweep's block."""
 
     def __init__(
         self, definitions: Definitions, complaints: Complaints, definition: Definition, graph: Graph, seed: int
     ) -> None:
         self.definitions, self.complaints, self.graph, self.drawn = definitions, complaints, graph, 0
-        self.axes: list[Axis] = []
+        self.axes: list[SweepAxis] = []
         self.excludes: list[Statement] = []
         self.seed: int | None = None
         self.independent: Place | None = None
@@ -153,7 +153,7 @@ class _Reader:
             case Setting() if words in (["vary"], ["vary", "macro"]):
                 column = self.column(entry, entry.words[1:])
                 check_equal([column], self.places.get(column.path, ()))
-                self.axes.append(Axis((column,)))
+                self.axes.append(SweepAxis((column,)))
             case Group() if words == ["zip"]:
                 self.zip(entry)
             case Statement() if words == ["from"]:
@@ -218,7 +218,7 @@ class _Reader:
                 )
         if columns and self.complaints.faults == before:
             check_equal(columns, self.places.get(columns[0].path, ()))
-            self.axes.append(Axis(tuple(columns)))
+            self.axes.append(SweepAxis(tuple(columns)))
 
     def file(self, statement: Statement) -> None:
         """`from "cases.csv";`: a row of the file a case, or a value of the axis; its columns are paths."""
@@ -237,7 +237,7 @@ class _Reader:
         for column in columns:
             self.note(column.path, column.place)
         check_equal(columns, rows)
-        self.axes.append(Axis(tuple(columns)))
+        self.axes.append(SweepAxis(tuple(columns)))
 
     def sample(self, statement: Statement) -> None:
         sample = read_sample(
@@ -253,7 +253,7 @@ class _Reader:
             columns.append(replace(column, drawn=part.distribution))
         if sample.warning is not None:
             self.complaints.remark("D228", *sample.warning, help="take a power of 2")
-        self.axes.append(Axis(tuple(columns), sample.note))
+        self.axes.append(SweepAxis(tuple(columns), sample.note))
 
     def repeats(self, statement: Statement) -> None:
         if self.repeated is not None:
@@ -299,7 +299,7 @@ class _Reader:
         refuse_words(path, place, entry.value, names)
         return self.numbers(path, entry, names)
 
-    def numbers(self, path: str, entry: Setting, names: Names) -> Varied:
+    def numbers(self, path: str, entry: Setting, names: Names) -> VariedPath:
         found = names.evaluate(entry.value)
         check_still(path, entry, names, self.paths)
         if isinstance(found, Value):
@@ -349,13 +349,13 @@ class _Reader:
             unit,
         )
 
-    def varied(self, path: str, place: Place, numbers: np.ndarray, like: Value, unit) -> Varied:  # type: ignore[no-untyped-def]
+    def varied(self, path: str, place: Place, numbers: np.ndarray, like: Value, unit) -> VariedPath:  # type: ignore[no-untyped-def]
         """A column of numbers in SI. like: a value of its dimension; unit: the one that the deck wrote."""
         scale = 1.0
         if unit is not None and measure_of(unit).dimension == like.dimension:
             scale = measure_of(unit).scale
         value = Value(self.graph.input(path), like.dimension, like.place, like.bare, unit, hertz=like.hertz)
-        return Varied(path, place, numbers, value, unit, scale)
+        return VariedPath(path, place, numbers, value, unit, scale)
 
 
 def _is(entry: Setting, name: str) -> bool:
@@ -473,7 +473,8 @@ def check_equal(columns: Sequence[Column], places: Sequence[Place]) -> None:
     """The same values twice are the same case twice. places: of the rows, or of the first column's numbers."""
     seen: dict[tuple[float | str, ...], int] = {}
     keys = [
-        column.values.tolist() if isinstance(column, Varied) else [o.text for o in column.options] for column in columns
+        column.values.tolist() if isinstance(column, VariedPath) else [o.text for o in column.options]
+        for column in columns
     ]
     for n, row in enumerate(zip(*keys, strict=True)):
         if row in seen:

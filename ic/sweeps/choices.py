@@ -16,11 +16,11 @@ from ic.grammar.places import place_of, spanned
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Call, Entry, Expression, Group, List, Name, Number, Setting, String, Unit, WithUnit, Word
 from ic.language import BLOCKS, choices
-from ic.meaning.definitions.merge import Block
+from ic.meaning.definitions.merge import MergedBlock
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.evaluate import FUNCTIONS, evaluate
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Value, Values, measure_of
+from ic.meaning.expressions.quantity import Value, ValueList, measure_of
 from ic.meaning.mechanics.shapes import SHAPES
 from ic.meaning.parameters.unvaried import A_RUN_FOR_EACH
 from met import models, units
@@ -185,7 +185,7 @@ def chosen(path: str, entry: Setting, names: Names) -> Chosen:
         ]
     else:
         found = evaluate(values, names.find) if not isinstance(values, (Name, String)) else None
-        if not isinstance(found, Values):
+        if not isinstance(found, ValueList):
             raise Problem(
                 error(
                     "D126",
@@ -273,7 +273,7 @@ def put_in(definitions: Definitions, run: Definition, choices: Choices) -> tuple
     return made, Definition("run", name, group)
 
 
-def keys_of(first: str, rest: Sequence[str], run: Block | None) -> tuple[str, ...]:
+def keys_of(first: str, rest: Sequence[str], run: MergedBlock | None) -> tuple[str, ...]:
     """Where in a run's block the path's value is written. run: that block, as it is so far."""
     if rest and rest[0] == "servo":
         servos = run.get("servos") if run is not None else None
@@ -284,7 +284,7 @@ def keys_of(first: str, rest: Sequence[str], run: Block | None) -> tuple[str, ..
     return (first, *rest)
 
 
-def in_servo(keys: Sequence[str], block: Block | None) -> tuple[str, ...]:
+def in_servo(keys: Sequence[str], block: MergedBlock | None) -> tuple[str, ...]:
     """Where in a servo's block the rest of a path is written; a sensor without its word where the block has it."""
     if len(keys) < 2 or keys[0] != SENSOR:
         return tuple(keys)

@@ -43,7 +43,7 @@ DISTRIBUTIONS: Mapping[str, tuple[str, ...]] = {
 
 
 @frozen
-class Part:
+class DrawnParameter:
     """One parameter that is drawn: its distribution, with arguments in SI. low: the first of them as written."""
 
     path: str
@@ -66,13 +66,13 @@ class Part:
 
 
 @frozen
-class Sample:
+class SampleDesign:
     """What a `sample` says. warning: message and place of what to tell of it."""
 
     design: str
     count: int
     seed: int
-    parts: tuple[Part, ...]
+    parts: tuple[DrawnParameter, ...]
     warning: tuple[str, Place] | None = None
 
     @property
@@ -144,7 +144,7 @@ QUANTILES: Mapping[str, Callable[..., np.ndarray]] = {
 
 def read_sample(
     definitions: Definitions, complaints: Complaints, statement: Statement, paths: Mapping[str, Place], seed: int
-) -> Sample:
+) -> SampleDesign:
     """`sample lhs(200) { PATH = uniform(a, b) UNIT; ... }`. paths: what the sweep varies, and where.
 
     Raises Problem, placed.
@@ -208,7 +208,7 @@ def read_sample(
             f"{count} points of a Sobol sequence are less even than {lower} or {2 * lower}",
             place_of(call.positional[0]),
         )
-    return Sample(design, count, seed, tuple(parts), warning)
+    return SampleDesign(design, count, seed, tuple(parts), warning)
 
 
 def _count(found: Value) -> int:
@@ -223,7 +223,7 @@ def _count(found: Value) -> int:
     return int(number)
 
 
-def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> Part:
+def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> DrawnParameter:
     path = ".".join(word.text for word in entry.path)
     unit, call = None, entry.value
     if isinstance(call, WithUnit):
@@ -260,7 +260,7 @@ def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> Part:
     unit = unit or next((value.unit for value in found if value.unit is not None), None)
     if unit is not None and measure_of(unit).dimension != found[0].dimension:
         unit = None
-    return Part(path, entry.place, name, arguments, found[0], unit)
+    return DrawnParameter(path, entry.place, name, arguments, found[0], unit)
 
 
 def _in_unit(expression: Expression, unit: Unit | None) -> Expression:

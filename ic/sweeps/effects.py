@@ -15,7 +15,7 @@ import numpy as np
 from ic.grammar.settings import path_of
 from ic.grammar.syntax import Call, Entry, Expression, Group, Name, Setting, Statement, Word, children
 from ic.meaning.definitions.resolve import Definition, Definitions
-from ic.meaning.expressions.conditions import Varied
+from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.experiment import experiment
@@ -185,7 +185,7 @@ def _idle(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> tup
         found = scope.names.evaluate(entry.value)
         assert isinstance(found, Value)
         number = np.array([float(found.number)])
-        varied[path] = Varied(path, entry.place, number, replace(found, number=graph.input(path)), None, 1.0)
+        varied[path] = VariedPath(path, entry.place, number, replace(found, number=graph.input(path)), None, 1.0)
     others = {path: entry for path, entry in scope.settings.items() if path not in settings}
     trial = Scope(scope.definitions, Complaints(), varied, graph, settings=others)
     resolved = _resolved(trial, run)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ic.grammar.syntax import Name, String, Unit, Word
 from ic.meaning.definitions.resolve import Definitions
-from ic.meaning.expressions.conditions import Varied
+from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.quantity import Value
 from ic.sweeps.choices import Chosen, Option
 from met.diagnostic import Place, Problem, error
@@ -17,10 +17,10 @@ from met.trace import Graph
 _PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 
 
-def columns_of(definitions: Definitions, named: String, graph: Graph) -> tuple[list[Varied | Chosen], list[Place]]:
+def columns_of(definitions: Definitions, named: String, graph: Graph) -> tuple[list[VariedPath | Chosen], list[Place]]:
     """The columns of the file, in its order, and the places of its rows. Raises Problem, placed in the file."""
     table = definitions.csv_files.get(named)
-    made: list[Varied | Chosen] = []
+    made: list[VariedPath | Chosen] = []
     for column in table.columns:
         if not _PATH.fullmatch(column.name):
             raise Problem(
@@ -41,7 +41,7 @@ def columns_of(definitions: Definitions, named: String, graph: Graph) -> tuple[l
         value = Value(
             graph.input(column.name), measure.dimension, column.place, column.unit is None, hertz=measure.hertz
         )
-        made.append(Varied(column.name, column.place, np.array(numbers), value, unit, measure.scale))
+        made.append(VariedPath(column.name, column.place, np.array(numbers), value, unit, measure.scale))
     if not table.rows:
         raise Problem(
             error(

@@ -26,7 +26,7 @@ from met.frozen import frozen
 from met.plan import Cases, Choice, Experiment, keys
 from met.trace import Formulas, Graph, Scalar
 
-Group = tuple[Experiment, Scope]
+ScopedExperiment = tuple[Experiment, Scope]
 Reread = Callable[[Sequence[str]], Deck]
 """The deck read again with further macros, `NAME=VALUE`. Raises Problem."""
 
@@ -34,7 +34,7 @@ MOST_STRUCTURES = 256
 
 
 @frozen
-class Source:
+class DeckSource:
     """Where definitions come from: what is known of the deck, and how to read it with other macros.
 
     settings, effects  what is set from outside of the deck, and what was found to come of it
@@ -47,7 +47,7 @@ class Source:
     effects: Effects = field(default_factory=lambda: Effects(Settings()))
 
 
-def lower(source: Source, definition: Definition) -> list[Group]:
+def lower(source: DeckSource, definition: Definition) -> list[ScopedExperiment]:
     """The experiments of a run or sweep; none where something of it is wrong, which was told."""
     if definition.kind == "run":
         definitions, run = source.settings.in_run(source.definitions, definition)
@@ -80,12 +80,12 @@ class _Read:
 class _Sweep:
     """One sweep on its way to experiments."""
 
-    def __init__(self, source: Source, definition: Definition) -> None:
+    def __init__(self, source: DeckSource, definition: Definition) -> None:
         self.source, self.definition = source, definition
         self.definitions, self.complaints = source.definitions, source.complaints
         self.read_so_far: dict[tuple[str, ...], _Read] = {}
 
-    def groups(self) -> list[Group]:
+    def groups(self) -> list[ScopedExperiment]:
         before = self.complaints.faults
         read = self._read(self.definitions, self.definition)
         sweep = read.sweep
@@ -106,7 +106,7 @@ class _Sweep:
                     ],
                 )
             )
-        made: list[tuple[Group, np.ndarray]] = []
+        made: list[tuple[ScopedExperiment, np.ndarray]] = []
         dropped: dict[Place, int] = {}  # by each `exclude when`, of which a macro may bring other ones
         for choices, rows in found:
             faults = self.complaints.faults
@@ -156,7 +156,7 @@ class _Sweep:
 
     def _group(
         self, sweep: Sweep, choices: Choices, rows: np.ndarray
-    ) -> tuple[tuple[Group, np.ndarray] | None, list[tuple[Place, int]]] | None:
+    ) -> tuple[tuple[ScopedExperiment, np.ndarray] | None, list[tuple[Place, int]]] | None:
         """The cases of one structure, with their rows of the product; and how many each `exclude when` drops."""
         read = self._with_macros(sweep, choices)
         there = read.sweep
@@ -239,7 +239,7 @@ class _Sweep:
             if some and not count:
                 self.complaints.remark("D138", "this excludes no case", place, help="the sweep is the same without it")
 
-    def _tell_of_idle_choices(self, sweep: Sweep, groups: Sequence[Group]) -> None:
+    def _tell_of_idle_choices(self, sweep: Sweep, groups: Sequence[ScopedExperiment]) -> None:
         """A choice of which every option makes the same program of the same numbers is none."""
         for column in sweep.chosen:
             same: dict[tuple[str, ...], list[str]] = {}
@@ -310,7 +310,7 @@ def _dependents(scope: Scope) -> dict[str, list[str]]:
     return found
 
 
-def _numbered(name: str, made: Sequence[tuple[Group, np.ndarray]]) -> list[Group]:
+def _numbered(name: str, made: Sequence[tuple[ScopedExperiment, np.ndarray]]) -> list[ScopedExperiment]:
     """The groups with their names, and the positions of their cases in the sweep's table."""
     if len(made) == 1:
         return [made[0][0]]
@@ -338,7 +338,7 @@ def _slugs(groups: Sequence[Experiment]) -> list[str]:
 # Sums
 
 
-def _sum(source: Source, definition: Definition, within: tuple[str, ...]) -> list[Group]:
+def _sum(source: DeckSource, definition: Definition, within: tuple[str, ...]) -> list[ScopedExperiment]:
     """The groups of all parts, one part's cases after the other's."""
     known = {**source.definitions.of_kind("run"), **source.definitions.of_kind("sweep")}
     unknown = [named for named in definition.parts if named.text not in known]
@@ -362,7 +362,7 @@ def _sum(source: Source, definition: Definition, within: tuple[str, ...]) -> lis
         if not found:
             return []
         parts.append((named, found))
-    made: list[Group] = []
+    made: list[ScopedExperiment] = []
     seen: dict[tuple[str, str], str] = {}
     first = 0
     names = [name.text for name in definition.parts]

@@ -5,7 +5,7 @@ A path is one that `vary` takes, or the seed. Where its value goes is where the 
     let      a `let`: its value
     servo    a key of a servo's definition: upon what that writes
     run      what decides the structure of a run: upon every run that is asked for, where it has what the path names
-    number   any other number: in place of what the run settles (`expressions.given`), as a sweep's coordinate is
+    number   any other number: in place of what the run settles (`expressions.command_line`), as a sweep's coordinate is
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Binary, Expression, Name, Unary
 from ic.meaning.expressions.evaluate import COMPARISONS, PURE, evaluate_number
-from ic.meaning.expressions.quantity import Value, Values
+from ic.meaning.expressions.quantity import Value, ValueList
 from ic.meaning.parameters.scope import Scope
 from ic.sweeps.axes import Sweep, named
 from ic.sweeps.choices import OF_JOINT, OF_RUN, Choices
@@ -218,7 +218,7 @@ class _Truths:
         }[expression.operator]
         return np.asarray(holds(left, right))
 
-    def _find(self, name: Name) -> Value | Values:
+    def _find(self, name: Name) -> Value | ValueList:
         """Names in `exclude when`: coordinates, parameters of the run, then what any expression may name."""
         scope = self.scope
         if scope.checks.failed(name.text):

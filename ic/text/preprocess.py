@@ -86,7 +86,7 @@ def preprocess(
     return Tokens(tuple(run.output), sources, findings.all, whole)
 
 
-class _If:
+class _Conditional:
     """A conditional that is open: the directive, whether what surrounds it counts, whether its present part does."""
 
     __slots__ = ("active", "done", "otherwise", "outer", "token")
@@ -107,7 +107,7 @@ class _Preprocessor(Macros):
         self.given: dict[str, Token] = {}
         self._including: list[tuple[FoundFile, Text]] = []
         self._entered: list[Place] = []
-        self._ifs: list[list[_If]] = []
+        self._ifs: list[list[_Conditional]] = []
         self._misspelt_ifs = 0  # such as `#ifdfe`, that no `#endif` has closed
         self._once: set[str] = set()
         self._included = 0
@@ -340,7 +340,7 @@ class _Preprocessor(Macros):
         tell = self.findings.error if name == "error" else self.findings.warn
         tell("D014" if name == "error" else "D015", said[:LONGEST_NAME], directive.place)
 
-    def _conditional(self, name: str, directive: Token, args: list[Token], ifs: list[_If]) -> None:
+    def _conditional(self, name: str, directive: Token, args: list[Token], ifs: list[_Conditional]) -> None:
         """Follows the conditionals beside pcpp, which is given only what it can digest: a name, 0 or 1."""
         if name in ("if", "ifdef", "ifndef"):
             outer = not ifs or ifs[-1].active
@@ -350,7 +350,7 @@ class _Preprocessor(Macros):
                 args[:] = [_constant(truth, directive)]
             elif outer:
                 truth = self._known(name, directive, args) == (name == "ifdef")
-            ifs.append(_If(directive, outer, truth))
+            ifs.append(_Conditional(directive, outer, truth))
             if len(ifs) > CONDITION_DEPTH:
                 self._give_up("D018", f"`#if` goes deeper than {CONDITION_DEPTH}", directive.place)
             return

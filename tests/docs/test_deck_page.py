@@ -22,7 +22,7 @@ from ic.language.runs import RATES, RUN
 from ic.meaning.control.substitution import DEFAULTS
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.evaluate import FUNCTIONS
-from ic.meaning.expressions.quantity import Values
+from ic.meaning.expressions.quantity import ValueList
 from ic.meaning.mechanics.shapes import SHAPES
 from ic.meaning.parameters.scope import Scope
 from ic.read import read
@@ -197,7 +197,7 @@ def test_a_value_is_what_its_row_says(row: list[str], tmp_path: Path) -> None:
     scope = Scope(Definitions(read(tmp_path / "one.ic", [], []), complaints), complaints)
     place = scope.definitions.lets["it"].name
     found = scope.names.find(Name((place,), place.place))
-    values = found.items if isinstance(found, Values) else (found,)
+    values = found.items if isinstance(found, ValueList) else (found,)
     assert ", ".join(f"{value.number:g}" for value in values) == numbers  # type: ignore[union-attr]
     assert {units.text(value.dimension) for value in values} == {unit}  # type: ignore[union-attr]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import ic
-from ic.robots.entries import Body
+from ic.robots.entries import ArmEntries
 from ic.robots.files import load
 from met.dynamics.kinematics import link_motions
 from met.dynamics.recursion import solve
@@ -28,7 +28,7 @@ run fall {{
 """
 
 
-def body(path: Path) -> Body:
+def body(path: Path) -> ArmEntries:
     return load(str(path), path.read_text(encoding="utf-8"))
 
 

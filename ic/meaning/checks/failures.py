@@ -23,7 +23,7 @@ from met.probe import accelerates
 
 
 @frozen
-class Failure:
+class ServoFailure:
     """A model that does something to the servo of a joint, or rubs the joint; place: of the joint's name."""
 
     use: EnvironmentUse
@@ -75,14 +75,14 @@ def check_friction(scope: Scope, uses: Iterable[Use], environment: Iterable[Envi
             )
 
 
-def _about(scope: Scope, environment: Iterable[EnvironmentUse], which: str) -> Iterable[Failure]:
+def _about(scope: Scope, environment: Iterable[EnvironmentUse], which: str) -> Iterable[ServoFailure]:
     """The models of this sort on joints of which something can be said. which: the field that names the parameter."""
     for use in environment:
         model = models.find("environment", use.model)
         named = getattr(model, which)
         settled = scope.parameters.get(f"environment.{use.name}.{named}") if named else None
         if settled is not None and use.place is not None and str(settled.value) not in scope.lost:
-            yield Failure(use, model, str(settled.value), settled.origin.place or use.place)
+            yield ServoFailure(use, model, str(settled.value), settled.origin.place or use.place)
 
 
 def _wrong(
@@ -120,7 +120,7 @@ def _wrong(
     return None
 
 
-def _check_full(scope: Scope, failure: Failure, servo: Use) -> None:
+def _check_full(scope: Scope, failure: ServoFailure, servo: Use) -> None:
     """Tells of a drive that would run away without a limit."""
     if failure.model.gives is None or servo.servo.full is None or servo.parameters is None:
         return
@@ -146,14 +146,14 @@ def _check_full(scope: Scope, failure: Failure, servo: Use) -> None:
         )
 
 
-def _window(scope: Scope, failure: Failure) -> tuple[float, float] | None:
+def _window(scope: Scope, failure: ServoFailure) -> tuple[float, float] | None:
     """When it acts, from and until, s; None where that varies, or the model has no such window."""
     found = [scope.parameters.get(f"environment.{failure.use.name}.{name}") for name in ("from", "until")]
     begins, ends = (each.value if each is not None else None for each in found)
     return (begins, ends) if isinstance(begins, float) and isinstance(ends, float) else None
 
 
-def _remark_between_ticks(scope: Scope, failure: Failure, period: float, duration: float) -> None:
+def _remark_between_ticks(scope: Scope, failure: ServoFailure, period: float, duration: float) -> None:
     """Tells of a window that lies between two ticks of the law, which never sees it."""
     window, model = _window(scope, failure), failure.model
     if window is None or (model.gives is None and model.sees is None):
@@ -175,10 +175,10 @@ def _remark_between_ticks(scope: Scope, failure: Failure, period: float, duratio
         )
 
 
-def _remark_overlaps(scope: Scope, failures: Iterable[Failure]) -> None:
+def _remark_overlaps(scope: Scope, failures: Iterable[ServoFailure]) -> None:
     """Tells of two models of one sort that act on the same of a joint at a time: the later one has the last word."""
     known = models.find_own("environment").values()  # what another package's does to an earlier one is its own affair
-    before: dict[tuple[str, str, Any], list[tuple[Failure, tuple[float, float]]]] = {}
+    before: dict[tuple[str, str, Any], list[tuple[ServoFailure, tuple[float, float]]]] = {}
     for failure in failures:
         window, model = _window(scope, failure), failure.model
         if window is None or (model.gives is None and model.sees is None) or model not in known:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ic.meaning.control.servos import apart, unit_written
-from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.mechanics.arm import Arm
+from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters.models import value_at
 from ic.meaning.parameters.scope import Scope
 from met import models
@@ -29,7 +29,7 @@ def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str,
         return False
     found = environment.idle(SimpleNamespace(**values), duration)
     if found is not None:
-        body = item.body or Block()
+        body = item.body or MergedBlock()
         written = [part for name in found[0] if (part := body.get(name)) is not None and part.value is not None]
         scope.complaints.remark(
             "D168",
@@ -40,11 +40,11 @@ def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str,
     return found is not None
 
 
-def remark_kinds(scope: Scope, environment: Any, item: Item, arm: Arm) -> None:
+def remark_kinds(scope: Scope, environment: Any, item: Item, arm: ResolvedArm) -> None:
     """Tells of numbers for joints of a kind (`Parameter.joints`) that the arm has none of."""
     kinds = {joint.kind for joint in arm.moving}
     for parameter in environment.parameters:
-        written = (item.body or Block()).get(parameter.name)
+        written = (item.body or MergedBlock()).get(parameter.name)
         if parameter.joints and parameter.joints not in kinds and written is not None and not arm.lost:
             scope.complaints.remark(
                 "D168",

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ic.meaning.control.schedule import slowest_that_fits
-from ic.meaning.definitions.merge import Block
+from ic.meaning.definitions.merge import MergedBlock
 from ic.meaning.parameters.models import value_at
 from ic.meaning.parameters.owner import XYZ
 from ic.meaning.parameters.scope import Scope
@@ -25,7 +25,7 @@ h rate/FIRST where p is 1: measured, of bodies whose centre of mass is as far fr
 (docs/physics.md, section 3)."""
 
 
-def check_spins(scope: Scope, block: Block, structure: Structure) -> None:
+def check_spins(scope: Scope, block: MergedBlock, structure: Structure) -> None:
     """Warns of what flies from the start, and turns too far in a step for the integrator to follow."""
     integrator, schedule = models.find("integrator", structure.integrator), structure.schedule
     limit = (FIRST if integrator.order == 1 else HIGHER) * (LOST_A_TURN / (2.0 * math.pi)) ** (1.0 / integrator.order)
@@ -60,7 +60,7 @@ def check_spins(scope: Scope, block: Block, structure: Structure) -> None:
             )
 
 
-def _spinning(block: Block, structure: Structure) -> Iterator[tuple[str, str, Place]]:
+def _spinning(block: MergedBlock, structure: Structure) -> Iterator[tuple[str, str, Place]]:
     """What flies from the start: in words, the path of its angular velocity, and where that is written."""
     if structure.base is not None and structure.free:
         initial = block.get("initial")

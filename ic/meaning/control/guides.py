@@ -14,9 +14,9 @@ from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.meaning.control.schedule import Rate
 from ic.meaning.control.servos import Use, course_named, fixed_rate, use_course
-from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.remedies import components
-from ic.meaning.mechanics.arm import Arm
+from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, value_at, word_of
 from ic.meaning.parameters.owner import Owner
@@ -75,7 +75,7 @@ class Guiding:
         return GuideUse(self.name, self.model.name, self.joints, divisor, self.courses, self.place)
 
 
-def name_guides(scope: Scope, block: Block) -> None:
+def name_guides(scope: Scope, block: MergedBlock) -> None:
     """Enters the run's guides in the scope, so that commands may name them; tells names that are something else's."""
     scope.guides = {item.name: item for item in block.of_kind(KIND)}
     for name, item in scope.guides.items():
@@ -97,7 +97,9 @@ def _meaning(scope: Scope, name: str) -> str:
     return "a unit" if units.is_unit(name) else "a course in time" if name in models.available("command") else ""
 
 
-def resolve_guides(scope: Scope, block: Block, arm: Arm, uses: list[Use], duration: float | None) -> list[Guiding]:
+def resolve_guides(
+    scope: Scope, block: MergedBlock, arm: ResolvedArm, uses: list[Use], duration: float | None
+) -> list[Guiding]:
     """Every guide of the run, in the deck's order; what is wrong is told. duration: of the run, s; None: unknown."""
     found = []
     for item in block.of_kind(KIND):
@@ -155,7 +157,7 @@ def check_period(scope: Scope, guide: Guiding, rate: Rate) -> None:
     )
 
 
-def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use], duration: float | None) -> Guiding | None:
+def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration: float | None) -> Guiding | None:
     if item.detail or item.value is None:
         at = item.detail[0].place if item.detail else item.place
         told = f"guide `{item.name}` has no model"
@@ -167,7 +169,7 @@ def _guide(scope: Scope, item: Item, arm: Arm, uses: list[Use], duration: float 
     guide = find_model(scope, KIND, word_of(item.value), place_of(item.value))
     if guide is None or refuse_values(scope, item.value, [p.name for p in guide.parameters]):
         return None
-    body = item.body or Block()
+    body = item.body or MergedBlock()
     follow = [use for use in uses if use.command is not None and use.command.guide == item.name]
     whole = not scope.lost and all(use.command is not None or not use.servo.commands for use in uses)
     if not follow and whole and not _meaning(scope, item.name):
@@ -230,7 +232,7 @@ def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any]
         return
     found = guide.idle(SimpleNamespace(**values), duration)
     if found is not None:
-        written = [part for name in found[0] if (part := (item.body or Block()).get(name)) is not None]
+        written = [part for name in found[0] if (part := (item.body or MergedBlock()).get(name)) is not None]
         needed = [each for each in guide.parameters if each.name in found[0] and each.default is None]
         scope.complaints.remark(
             "D301",
@@ -242,7 +244,9 @@ def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any]
         )
 
 
-def _of_joints(scope: Scope, owner: Owner, guide: Any, body: Block, arm: Arm, joints: Iterable[str]) -> None:
+def _of_joints(
+    scope: Scope, owner: Owner, guide: Any, body: MergedBlock, arm: ResolvedArm, joints: Iterable[str]
+) -> None:
     """The parameters of each joint: as written for it, else as written for all, whom a path without a joint reaches."""
     kinds = {joint.name: joint.kind for joint in arm.moving}
     joints = list(joints)
@@ -279,7 +283,7 @@ def _of_joints(scope: Scope, owner: Owner, guide: Any, body: Block, arm: Arm, jo
 
 
 def _courses(
-    scope: Scope, owner: Owner, body: Block, known: Iterable[str], guided: Iterable[str], joints: Iterable[str]
+    scope: Scope, owner: Owner, body: MergedBlock, known: Iterable[str], guided: Iterable[str], joints: Iterable[str]
 ) -> tuple[Course, ...]:
     """The courses of the path's components that are written, in order."""
     found = []

@@ -8,8 +8,8 @@ from typing import Any, Final
 from ic.grammar.places import place_of
 from ic.meaning.control.schedule import Rate
 from ic.meaning.control.servos import fixed_rate
-from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.mechanics.arm import Arm
+from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of, words_chosen
 from ic.meaning.parameters.owner import Owner
@@ -53,7 +53,9 @@ class Sensing:
         return LinkSensor(self.name, self.model, divisor, self.words, self.place)
 
 
-def resolve_link_sensors(scope: Scope, block: Block, arm: Arm, payloads: tuple[Payload, ...]) -> list[Sensing]:
+def resolve_link_sensors(
+    scope: Scope, block: MergedBlock, arm: ResolvedArm, payloads: tuple[Payload, ...]
+) -> list[Sensing]:
     """Every sensor of the run, in the deck's order; what is wrong is told."""
     scope.sensors = frozenset(item.name for item in block.of_kind(KIND))
     found = []
@@ -65,7 +67,7 @@ def resolve_link_sensors(scope: Scope, block: Block, arm: Arm, payloads: tuple[P
     return found
 
 
-def _sensor(scope: Scope, item: Item, arm: Arm, payloads: tuple[Payload, ...]) -> Sensing | None:
+def _sensor(scope: Scope, item: Item, arm: ResolvedArm, payloads: tuple[Payload, ...]) -> Sensing | None:
     if item.detail or item.value is None:
         at = item.detail[0].place if item.detail else item.place
         told = (
@@ -89,7 +91,7 @@ def _sensor(scope: Scope, item: Item, arm: Arm, payloads: tuple[Payload, ...]) -
             ],
         )
         return None
-    body = item.body or Block()
+    body = item.body or MergedBlock()
     owner = Owner(f"sensor `{item.name}`", item.place, f"sensors.{item.name}", homes=item.homes, of=sensor.unit)
     scope.setting(f"{owner.path}.model", sensor.name, item=item)
     bodies = [*(link.name for link in arm.links), *(payload.name for payload in payloads)]

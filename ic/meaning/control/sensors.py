@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from ic.grammar.places import place_of
 from ic.language.unit_words import unit_here
-from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of, words_chosen
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
@@ -18,7 +18,7 @@ from met.plan import SensorUse, ServoUse
 USAGE = "write `sensor QUANTITY = MODEL { ... }`"
 
 
-def without_sensors(block: Block) -> Block:
+def without_sensors(block: MergedBlock) -> MergedBlock:
     """A servo's block, its plain entries alone."""
     return replace(block, items={key: item for key, item in block.items.items() if item.kind != "sensor"})
 
@@ -74,7 +74,7 @@ def use_sensor(scope: Scope, servo: Owner, use: ServoUse, item: Item) -> SensorU
         local=path,
         homes=item.homes,
     )
-    body = item.body or Block()
+    body = item.body or MergedBlock()
     use_model(scope, owner, sensor.parameters, body)
     scope.setting(f"{owner.path}.model", sensor.name, item=item)
     words = [each for each in sensor.parameters if each.shape == "word"]

@@ -14,9 +14,9 @@ from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, 
 from ic.meaning.control.schedule import CONTINUOUS, Rate
 from ic.meaning.control.sensors import use_sensor, without_sensors
 from ic.meaning.control.trajectories import use_file, with_file_named
-from ic.meaning.definitions.merge import Block, Item, open_call, overlay
+from ic.meaning.definitions.merge import Item, MergedBlock, open_call, overlay
 from ic.meaning.expressions.quantity import measure_of
-from ic.meaning.mechanics.arm import Arm
+from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import (
     check_keys,
@@ -87,7 +87,7 @@ class Use:
         return ServoUse(self.joint, self.definition, self.servo.name, self.command, 1, self.place, self.words)
 
 
-def resolve_servos(scope: Scope, body: Block, arm: Arm) -> tuple[list[Use], frozenset[str]]:
+def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[list[Use], frozenset[str]]:
     """Every servo of the run, in the order of the arm's joints; the joints whose servo failed or may be one of a name
     that is no joint's, which was told.
     """
@@ -104,7 +104,7 @@ def resolve_servos(scope: Scope, body: Block, arm: Arm) -> tuple[list[Use], froz
     return [uses[joint.name] for joint in arm.joints if joint.name in uses], lost
 
 
-def _note_kinds(scope: Scope, body: Block, arm: Arm) -> None:
+def _note_kinds(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> None:
     """Of every servo definition and its bases, which kinds of joints it moves in this run."""
     for item in body.items.values():
         kind, definition = arm.kind(item.name), scope.definitions.of_kind("servo").get(word_of(item.value) or "")
@@ -113,7 +113,7 @@ def _note_kinds(scope: Scope, body: Block, arm: Arm) -> None:
                 scope.moved.setdefault(home, set()).add(kind)
 
 
-def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
+def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
     if item.name in arm.lost and not item.kind:
         return None
     kind = moving_kind(scope, item, arm, "so no servo can move it")
@@ -188,7 +188,7 @@ def _use(scope: Scope, item: Item, arm: Arm) -> Use | None:
     return Use(item.name, name, servo, command, rate, parameters, item.place, words, sensors)
 
 
-def _tell_no_model(scope: Scope, block: Block, owner: Owner, used: Place) -> None:
+def _tell_no_model(scope: Scope, block: MergedBlock, owner: Owner, used: Place) -> None:
     """A servo without a model, or the entry that may have been meant for it; of the others nothing can be said."""
     known = known_words("servo models", sorted(models.find_own("servo")))
     for item in block.items.values():
@@ -204,7 +204,7 @@ def _tell_no_model(scope: Scope, block: Block, owner: Owner, used: Place) -> Non
     )
 
 
-def moving_kind(scope: Scope, item: Item, arm: Arm, so: str) -> str | None:
+def moving_kind(scope: Scope, item: Item, arm: ResolvedArm, so: str) -> str | None:
     """The kind of the joint that an entry names; None where it is none or fixed, which was told. so: if it is fixed."""
     kind = arm.kind(item.name) if item.kind in ("", "substitute") else None
     definition = scope.definitions.of_kind("arm").get(arm.name)
@@ -230,7 +230,7 @@ def moving_kind(scope: Scope, item: Item, arm: Arm, so: str) -> str | None:
     return kind
 
 
-def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, block: Block, used: Place) -> None:
+def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, block: MergedBlock, used: Place) -> None:
     """What this kind of command needs is written, or given by a sweep or on the command line."""
     item = block.get("command")
     place = place_of(item.value) if item is not None and item.value is not None else used
@@ -440,7 +440,7 @@ def use_course(
     doc: str,
     column: str,
     kind: str = "joint",
-    body: Block | None = None,
+    body: MergedBlock | None = None,
 ) -> str | None:
     """A value, or a course in time, entered in the scope under the path of `spot`: its model; None where there is none.
 
@@ -462,14 +462,15 @@ def use_course(
         return None
     _, named = open_call(inner, None, scope.complaints)
     inside = {
-        key: replace(part, homes=item.homes, overrides=item.overrides) for key, part in (named or Block()).items.items()
+        key: replace(part, homes=item.homes, overrides=item.overrides)
+        for key, part in (named or MergedBlock()).items.items()
     }
-    apart = body or Block()
+    apart = body or MergedBlock()
     opened = replace(
         apart,
         items=inside | dict(apart.items),
-        statements=(*(named or Block()).statements, *apart.statements),
-        pending=(*(named or Block()).pending, *apart.pending),
+        statements=(*(named or MergedBlock()).statements, *apart.statements),
+        pending=(*(named or MergedBlock()).pending, *apart.pending),
     )
     course = replace(spot, label=f"`{name}`", called=None, place=inner.name.place, call=True)
     if profile.from_file:

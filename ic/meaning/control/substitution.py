@@ -11,8 +11,8 @@ from ic.grammar.syntax import Call, Expression
 from ic.language.runs import BED, LAW
 from ic.meaning.control.schedule import Ticks
 from ic.meaning.control.servos import Use, moving_kind
-from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.mechanics.arm import Arm
+from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
 from ic.meaning.parameters.owner import Owner
@@ -27,7 +27,9 @@ DEFAULTS: dict[models.Kind, str] = {"bed": BED, "law": LAW}
 USAGE = "write `substitute JOINT { bed = BED(...);  law = LAW(...); }`"
 
 
-def resolve_substitutions(scope: Scope, block: Block, arm: Arm, uses: list[Use]) -> tuple[Substitution, ...]:
+def resolve_substitutions(
+    scope: Scope, block: MergedBlock, arm: ResolvedArm, uses: list[Use]
+) -> tuple[Substitution, ...]:
     """Every joint whose motor is on a bed, in the order of the arm's joints; those that failed join `scope.lost`."""
     servos = {use.joint: use for use in uses}
     found: dict[str, tuple[Substitution, Place]] = {}
@@ -100,7 +102,9 @@ def check_brakes(scope: Scope, found: tuple[Substitution, ...], environment: Ite
                 )
 
 
-def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use]) -> tuple[Substitution, Place] | None:
+def _substitution(
+    scope: Scope, item: Item, arm: ResolvedArm, servos: Mapping[str, Use]
+) -> tuple[Substitution, Place] | None:
     """The joint's bed and law, and the place that names the law; None where something failed, which was told."""
     if item.name in arm.lost:
         return None
@@ -157,7 +161,7 @@ def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use])
             help="leave the sensor out in this run: `remove QUANTITY;`, or a servo `like` it without",
         )
         return None
-    block = item.body or Block()
+    block = item.body or MergedBlock()
     check_keys(scope, block, DEFAULTS, Owner(f"`substitute {item.name}`", item.place, ""))
     bed, law = (_model(scope, each, block.get(each), item) for each in DEFAULTS)
     for each, model in (("bed", bed), ("law", law)):
@@ -173,7 +177,7 @@ def _substitution(scope: Scope, item: Item, arm: Arm, servos: Mapping[str, Use])
             call=True,
         )
         scope.unvaried[f"{owner.path}.model"] = unvaried.chosen(f"vary `{owner.path}` over models")
-        body = (part.body if part is not None else None) or Block()
+        body = (part.body if part is not None else None) or MergedBlock()
         if each == "bed":
             _use_bed(scope, owner, model, body, use)
         else:
@@ -200,7 +204,7 @@ def _model(scope: Scope, kind: models.Kind, item: Item | None, around: Item) -> 
     return model
 
 
-def _use_bed(scope: Scope, owner: Owner, bed: Any, body: Block, use: Use) -> None:
+def _use_bed(scope: Scope, owner: Owner, bed: Any, body: MergedBlock, use: Use) -> None:
     """Every parameter of a bed: what the deck writes, else the word's of its faults, the servo's, the default."""
     written = models.written(bed)
     check_keys(scope, body, [p.name for p in written], owner)
@@ -218,7 +222,7 @@ def _use_bed(scope: Scope, owner: Owner, bed: Any, body: Block, use: Use) -> Non
         elif item is None and wanted.name in preset:
             _preset(scope, owner, replace(wanted, default=preset[wanted.name]), faults)
         else:
-            use_model(scope, owner, (wanted,), Block({wanted.name: item} if item is not None else {}))
+            use_model(scope, owner, (wanted,), MergedBlock({wanted.name: item} if item is not None else {}))
 
 
 def _preset(scope: Scope, owner: Owner, wanted: Parameter, faults: Item | None) -> None:

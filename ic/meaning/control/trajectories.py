@@ -9,7 +9,7 @@ from typing import Any
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Name, String, Word
 from ic.meaning.definitions.csv_files import missing_column
-from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import check_keys, use_model
 from ic.meaning.parameters.owner import Owner
@@ -32,7 +32,7 @@ def with_file_named(call: Call) -> Call:
 
 
 def use_file(
-    scope: Scope, owner: Owner, profile: Profile, body: Block, name: str, kind: str = "joint"
+    scope: Scope, owner: Owner, profile: Profile, body: MergedBlock, name: str, kind: str = "joint"
 ) -> dict[str, Any] | None:
     """Every parameter of a profile that reads a file, entered in the scope; None where one is missing or wrong.
 
@@ -44,7 +44,7 @@ def use_file(
         scope,
         owner,
         others,
-        Block({key: item for key, item in body.items.items() if key in [each.name for each in others]}),
+        MergedBlock({key: item for key, item in body.items.items() if key in [each.name for each in others]}),
     )
     for each in (FILE.name, COLUMN.name, *LISTS):
         scope.unvaried[owner.join(each)] = unvaried.FILE
@@ -64,7 +64,7 @@ def use_file(
 
 
 def _columns(
-    scope: Scope, owner: Owner, profile: Profile, body: Block, file: Item, own: str, kind: str
+    scope: Scope, owner: Owner, profile: Profile, body: MergedBlock, file: Item, own: str, kind: str
 ) -> dict[str, tuple[float, ...]]:
     """The two lists. Raises Problem."""
     named = named_file(owner, file)

@@ -35,7 +35,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 
 @frozen
-class Column:
+class CsvColumn:
     """A column as its head names it: number, name, unit as written (None where there is none), place of its head."""
 
     number: int
@@ -45,29 +45,29 @@ class Column:
 
 
 @frozen
-class Table:
+class CsvTable:
     """A file's columns, and its rows as written: number of the line (from 1) and its text."""
 
     file: str
-    columns: tuple[Column, ...]
+    columns: tuple[CsvColumn, ...]
     rows: tuple[tuple[int, str], ...]
 
-    def column(self, name: str) -> Column | None:
+    def column(self, name: str) -> CsvColumn | None:
         return next((column for column in self.columns if column.name == name), None)
 
-    def numbers(self, column: Column, text: str, dimension: Dimension, label: Label) -> tuple[float, ...]:
+    def numbers(self, column: CsvColumn, text: str, dimension: Dimension, label: Label) -> tuple[float, ...]:
         """The column in SI. text, dimension: the unit that is wanted; label: who wants it.
 
         Raises Problem D193 for its unit, D194 for a cell that is no number.
         """
         return self._numbers(column, _measure(column, text, dimension, label))
 
-    def quantities(self, column: Column) -> tuple[tuple[float, ...], Measure]:
+    def quantities(self, column: CsvColumn) -> tuple[tuple[float, ...], Measure]:
         """The column in SI, and what its own unit means. Raises Problem D193, D194."""
         measure = units.ONE if column.unit is None else _meaning(column, "", ())
         return self._numbers(column, measure), measure
 
-    def words(self, column: Column) -> list[tuple[str, Place]] | None:
+    def words(self, column: CsvColumn) -> list[tuple[str, Place]] | None:
         """The column's cells and their places, where they are words and it has no unit; None where they are numbers.
 
         Raises Problem D194 for a cell that is no word below one that is.
@@ -89,7 +89,7 @@ class Table:
                 )
         return [(cell, self._cell(line, row, column.number)) for cell, line, row in cells]
 
-    def _numbers(self, column: Column, measure: Measure) -> tuple[float, ...]:
+    def _numbers(self, column: CsvColumn, measure: Measure) -> tuple[float, ...]:
         made = []
         for line, row in self.rows:
             cell = _stripped(row.split(",")[column.number])[0]
@@ -113,7 +113,7 @@ class Table:
             made.append(number)
         return tuple(made)
 
-    def rising(self, column: Column, times: tuple[float, ...]) -> None:
+    def rising(self, column: CsvColumn, times: tuple[float, ...]) -> None:
         """Raises Problem D195 where the column's numbers, its times, do not rise."""
         for n, (before, after) in enumerate(itertools.pairwise(times)):
             if not before < after:
@@ -135,12 +135,12 @@ class Table:
         return Place(self.file, line, start + 1, max(len(text), 1))
 
 
-def csv_files(deck: Deck) -> NamedFiles[Table]:
+def csv_files(deck: Deck) -> NamedFiles[CsvTable]:
     """The CSV files that a deck names."""
     return NamedFiles(deck, _table, kind="CSV file", ending=".csv", most=MOST_CSV_BYTES, missing="D190")
 
 
-def _table(file: str, text: str) -> Table:
+def _table(file: str, text: str) -> CsvTable:
     lines = text.split("\n")
     rows = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
     if not rows:
@@ -176,10 +176,10 @@ def _table(file: str, text: str) -> Table:
                     help="commas part the cells, and a number has a decimal point",
                 )
             )
-    return Table(file, columns, tuple(rows))
+    return CsvTable(file, columns, tuple(rows))
 
 
-def _columns(file: str, line: int, row: str) -> Iterator[Column]:
+def _columns(file: str, line: int, row: str) -> Iterator[CsvColumn]:
     if all(_NUMBER.fullmatch(_stripped(cell)[0]) for cell in row.split(",")):
         raise Problem(
             error(
@@ -220,7 +220,7 @@ def _columns(file: str, line: int, row: str) -> Iterator[Column]:
                 )
             )
         seen[name] = place
-        yield Column(number, name, unit or None, place)
+        yield CsvColumn(number, name, unit or None, place)
 
 
 def _stripped(cell: str) -> tuple[str, int]:
@@ -233,7 +233,7 @@ def _stripped(cell: str) -> tuple[str, int]:
     return text, gap
 
 
-def _measure(column: Column, text: str, dimension: Dimension, label: Label) -> Measure:
+def _measure(column: CsvColumn, text: str, dimension: Dimension, label: Label) -> Measure:
     """What the column's unit means. Raises Problem D193 where it has none, or another than is wanted."""
     shown = " or ".join(f"`{column.name} [{each}]`" for each in in_degrees(text))
     if column.unit is None:
@@ -257,7 +257,7 @@ def _measure(column: Column, text: str, dimension: Dimension, label: Label) -> M
     return measure
 
 
-def _meaning(column: Column, remedy: str, also: Iterable[Label], dimension: Dimension | None = None) -> Measure:
+def _meaning(column: CsvColumn, remedy: str, also: Iterable[Label], dimension: Dimension | None = None) -> Measure:
     """What the column's unit means. remedy: where no unit like it is known; dimension: the one that is needed."""
     assert column.unit is not None
     try:
@@ -274,7 +274,7 @@ def _short(name: str) -> str:
     return name if len(name) <= LONGEST_NAME else name[:LONGEST_NAME] + "..."
 
 
-def missing_column(table: Table, name: str, place: Place, why: str = "") -> Problem:
+def missing_column(table: CsvTable, name: str, place: Place, why: str = "") -> Problem:
     """Says that a file has no column of this name, which is asked for at this place. why: in words, it is needed."""
     names = [_short(column.name) for column in table.columns]
     round_brackets = next((each for each in names if each.startswith(f"{name} (") and each.endswith(")")), None)

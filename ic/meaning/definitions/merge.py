@@ -30,7 +30,7 @@ class Item:
     name: str
     detail: tuple[Word, ...]
     value: Expression | None
-    body: Block | None
+    body: MergedBlock | None
     place: Place
     overrides: tuple[Place, ...] = ()
     appended: tuple[Expression, ...] = ()
@@ -51,7 +51,7 @@ class Removed:
 
 
 @frozen
-class Block:
+class MergedBlock:
     """Merged entries by key ("kind name", or the name of a plain key), in order, and statements such as `require`.
 
     pending  in a block upon a name: each `remove` of what the block itself does not have, for `overlay`
@@ -70,14 +70,14 @@ class Block:
 
 
 def merge(
-    base: Block | None,
+    base: MergedBlock | None,
     body: tuple[Entry, ...],
     *,
     home: str | None,
     base_name: str | None,
     complaints: Complaints,
     upon_name: bool = False,
-) -> Block:
+) -> MergedBlock:
     """The base's entries with `body` upon them.
 
     home       name of the definition that writes `body`; None for a use, whose entries no definition's path reaches
@@ -85,16 +85,16 @@ def merge(
     upon_name  the body stands behind the name of a definition or a model (`j = drive { ... }`): what it removes may be
                the definition's, which is not known here
     """
-    merger = _Merger(base or Block(), home, base_name, complaints, upon_name)
+    merger = _Merger(base or MergedBlock(), home, base_name, complaints, upon_name)
     for entry in body:
         with complaints.gather():
             merger.enter(entry)
-    return Block(merger.items, tuple(merger.statements), tuple(merger.removed), tuple(merger.pending))
+    return MergedBlock(merger.items, tuple(merger.statements), tuple(merger.removed), tuple(merger.pending))
 
 
 class _Merger:
     def __init__(
-        self, base: Block, home: str | None, base_name: str | None, complaints: Complaints, upon_name: bool
+        self, base: MergedBlock, home: str | None, base_name: str | None, complaints: Complaints, upon_name: bool
     ) -> None:
         homes = (home,) if home else ()
         self.home, self.base_name, self.complaints = homes, base_name, complaints
@@ -274,7 +274,7 @@ def _nothing(entry: Statement, items: Mapping[str, Item]) -> Diagnostic:
     )
 
 
-def overlay(base: Block, over: Block, complaints: Complaints) -> Block:
+def overlay(base: MergedBlock, over: MergedBlock, complaints: Complaints) -> MergedBlock:
     """The base's entries with those of a use upon them, which no definition's path reaches. What the use removes goes
     first, so that it may put another in its place."""
     items, removed = dict(base.items), list(base.removed)
@@ -290,12 +290,12 @@ def overlay(base: Block, over: Block, complaints: Complaints) -> Block:
         if earlier is None:
             items[item.key] = replace(item, homes=())
         elif item.value is None and item.body is not None:
-            items[earlier.key] = replace(earlier, body=overlay(earlier.body or Block(), item.body, complaints))
+            items[earlier.key] = replace(earlier, body=overlay(earlier.body or MergedBlock(), item.body, complaints))
         else:
             overrides = (*item.overrides, earlier.place, *earlier.overrides)
             items[earlier.key] = replace(item, kind=earlier.kind, homes=(), overrides=overrides)
     removed += (replace(each, before=len(base.statements) + each.before) for each in over.removed)
-    return Block(items, (*base.statements, *over.statements), tuple(removed))
+    return MergedBlock(items, (*base.statements, *over.statements), tuple(removed))
 
 
 def _of_name(items: Mapping[str, Item], name: str) -> Item | None:
@@ -303,7 +303,7 @@ def _of_name(items: Mapping[str, Item], name: str) -> Item | None:
     return items.get(name) or next((item for item in items.values() if item.name == name), None)
 
 
-def as_meant(block: Block, keys: Iterable[str], kinds: Iterable[str]) -> Block:
+def as_meant(block: MergedBlock, keys: Iterable[str], kinds: Iterable[str]) -> MergedBlock:
     """The block with entries that nobody knows, which is told, under the names that are meant: what is in them is
     looked at, too, and nothing is missing besides.
 
@@ -327,13 +327,13 @@ def as_meant(block: Block, keys: Iterable[str], kinds: Iterable[str]) -> Block:
     return replace(block, items=items)
 
 
-def refuse_pending(block: Block, complaints: Complaints) -> None:
+def refuse_pending(block: MergedBlock, complaints: Complaints) -> None:
     """Tells each `remove` of a block upon a name that turned out to have no entries of its own, such as a model's."""
     for entry in block.pending:
         complaints.add(_nothing(entry, block.items))
 
 
-def open_call(value: Expression, home: str | None, complaints: Complaints) -> tuple[Expression, Block | None]:
+def open_call(value: Expression, home: str | None, complaints: Complaints) -> tuple[Expression, MergedBlock | None]:
     """A call's named arguments and body as a block, so that they can be overridden one by one."""
     if not isinstance(value, Call) or (value.body is None and not value.named):
         return value, None

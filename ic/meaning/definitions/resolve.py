@@ -12,7 +12,7 @@ from dataclasses import replace
 from ic.grammar.syntax import Binary, Call, Deck, Entry, Group, Let, Name, Setting, Word
 from ic.language import DEFINITIONS, HEADS
 from ic.meaning.definitions.csv_files import csv_files
-from ic.meaning.definitions.merge import Block, merge, twice
+from ic.meaning.definitions.merge import MergedBlock, merge, twice
 from ic.robots.files import RobotFiles
 from ic.text.complaints import Complaints, an, belongs, known_words
 from ic.text.files import library_defines
@@ -56,7 +56,7 @@ class Definitions:
         self.csv_files = csv_files(deck)
         self.robot_files = RobotFiles(deck)
         self._by_kind: dict[str, dict[str, Definition]] = {kind: {} for kind in DEFINITIONS}
-        self._merged: dict[tuple[str, str], Block] = {}
+        self._merged: dict[tuple[str, str], MergedBlock] = {}
         self._failed: set[tuple[str, str]] = set()
         self._meant: dict[tuple[str, str], str] = {}  # by kind and name that there is not, the name that was meant
         self._complaints = complaints
@@ -139,7 +139,7 @@ class Definitions:
             self._meant[(kind, name.text)] = near
             return self._by_kind[kind][near]
 
-    def block(self, definition: Definition) -> Block | None:
+    def block(self, definition: Definition) -> MergedBlock | None:
         """The definition merged with its bases; None where that failed (and was told)."""
         chain: list[Definition] = []
         at: Definition | None = definition
@@ -187,10 +187,10 @@ class Definitions:
             above = each
         return block
 
-    def _made_from(self, definition: Definition, call: Call) -> Block | None:
+    def _made_from(self, definition: Definition, call: Call) -> MergedBlock | None:
         """What a definition's file says, as its base; None where that failed (and was told)."""
         with self._complaints.gather():
-            body = self.robot_files.body(call)
+            body = self.robot_files.arm_entries(call)
             for each in self.robot_files.remarks(call):
                 self._complaints.remark(each.code, each.message, each.at, also=each.also, help=each.help)
             return merge(None, body.entries, home=definition.name, base_name=None, complaints=self._complaints)

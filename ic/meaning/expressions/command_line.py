@@ -10,12 +10,12 @@ from met.diagnostic import Place, Problem, error
 from met.frozen import frozen
 from met.plan import Origin
 
-GIVEN = "set on the command line"
+ON_COMMAND_LINE = "set on the command line"
 """The note of such an origin."""
 
 
 @frozen
-class Given:
+class CommandLineValue:
     """What is settled at a path in the stead of what a deck writes: its value, and the expression as written."""
 
     path: str
@@ -25,24 +25,24 @@ class Given:
     def over(self, origin: Origin) -> Origin:
         """The origin of a value that this one overrides, made its own."""
         places = (origin.place,) if origin.place is not None else ()
-        return Origin("deck", self.value.place, (*places, *origin.overrides), GIVEN)
+        return Origin("deck", self.value.place, (*places, *origin.overrides), ON_COMMAND_LINE)
 
 
-def is_given(place: Place | None) -> bool:
+def is_on_command_line(place: Place | None) -> bool:
     """Whether it is written on the command line, but not in the body of a macro of -D."""
     return place is not None and place.file == COMMAND_LINE and not place.expansions
 
 
 def written_origin(place: Place, overrides: tuple[Place, ...], note: str = "") -> Origin:
     """The origin of a value that is written at a place, in the deck or outside of it."""
-    return Origin("deck", place, overrides, GIVEN if is_given(place) else note)
+    return Origin("deck", place, overrides, ON_COMMAND_LINE if is_on_command_line(place) else note)
 
 
-def evaluated(entry: Setting, path: str, names: Names) -> Given:
+def evaluate_setting(entry: Setting, path: str, names: Names) -> CommandLineValue:
     """What is set to one number. Raises Problem where it is none."""
     found = names.evaluate(entry.value)
     if not isinstance(found, Value):
         raise Problem(
             error("D071", f"`{path}` is one number, and this is a list", found.place, help="leave the brackets out")
         )
-    return Given(path, found, entry.value)
+    return CommandLineValue(path, found, entry.value)

@@ -31,7 +31,7 @@ def in_pieces(test: Test, values: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 
 @frozen
-class Varied:
+class VariedPath:
     """A coordinate of a sweep while the run is resolved: its values in SI, and the scalar that stands for them.
 
     drawn  the distribution that they are drawn from; "" where the deck lists them
@@ -66,7 +66,7 @@ class Check:
 class Checks:
     """The checks of one run, and the paths of what failed, so that nothing is said twice of one mistake."""
 
-    def __init__(self, complaints: Complaints, graph: Graph, varied: Mapping[str, Varied]) -> None:
+    def __init__(self, complaints: Complaints, graph: Graph, varied: Mapping[str, VariedPath]) -> None:
         self.complaints, self.graph, self.varied = complaints, graph, varied
         self._waiting: list[Check] = []
         self._failed: set[str] = set()

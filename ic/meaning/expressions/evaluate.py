@@ -24,7 +24,7 @@ from ic.grammar.syntax import (
 )
 from ic.meaning.expressions.quantity import (
     Value,
-    Values,
+    ValueList,
     as_float,
     in_unit,
     in_words,
@@ -46,10 +46,10 @@ FUNCTIONS = ("sqrt", "sin", "cos", "min", "max", "linspace", "logspace")
 CONSTANTS = {"pi": math.pi}
 
 
-Lookup = Callable[[Name], Value | Values]
+Lookup = Callable[[Name], Value | ValueList]
 
 
-def evaluate(expression: Expression, lookup: Lookup) -> Value | Values:
+def evaluate(expression: Expression, lookup: Lookup) -> Value | ValueList:
     """What the expression is worth; `lookup` gives names their values. Raises Problem, placed."""
     spine: list[Binary] = []
     while isinstance(expression, Binary):  # a long sum leans to the left: no recursion along it
@@ -64,12 +64,12 @@ def evaluate(expression: Expression, lookup: Lookup) -> Value | Values:
 def evaluate_number(expression: Expression, lookup: Lookup) -> Value:
     """The expression's value, which must be one number."""
     value = evaluate(expression, lookup)
-    if isinstance(value, Values):
+    if isinstance(value, ValueList):
         raise Problem(error("D071", "one number is needed here, and this is a list", place_of(expression)))
     return value
 
 
-def _leaf(expression: Expression, lookup: Lookup) -> Value | Values:
+def _leaf(expression: Expression, lookup: Lookup) -> Value | ValueList:
     match expression:
         case Number():
             return _number(expression)
@@ -78,7 +78,7 @@ def _leaf(expression: Expression, lookup: Lookup) -> Value | Values:
                 return Value(CONSTANTS[expression.text], PURE, expression.place, hertz=None)
             return replace(lookup(expression), place=expression.place)
         case List():
-            return Values(tuple(_items(expression, lookup)), expression.place)
+            return ValueList(tuple(_items(expression, lookup)), expression.place)
         case Range():
             ends = (expression.first, expression.last, expression.step)
             return range_of(expression, *(evaluate_number(each, lookup) for each in ends))
@@ -116,7 +116,7 @@ def _of_pi(decimal: str) -> bool:
     )
 
 
-def _with_unit(expression: WithUnit, lookup: Lookup) -> Value | Values:
+def _with_unit(expression: WithUnit, lookup: Lookup) -> Value | ValueList:
     inner = _written_unit(expression.inner)
     if inner is not None:
         raise Problem(
@@ -130,9 +130,9 @@ def _with_unit(expression: WithUnit, lookup: Lookup) -> Value | Values:
         )
     measure_of(expression.unit)
 
-    def apply(value: Value | Values) -> Value | Values:
-        if isinstance(value, Values):
-            return Values(tuple(apply(item) for item in value.items), value.place, expression.unit)
+    def apply(value: Value | ValueList) -> Value | ValueList:
+        if isinstance(value, ValueList):
+            return ValueList(tuple(apply(item) for item in value.items), value.place, expression.unit)
         if value.dimension != PURE:
             raise Problem(
                 error(
@@ -167,7 +167,7 @@ def _unary(expression: Unary, lookup: Lookup) -> Value:
     return replace(value, number=-value.number if expression.operator == "-" else value.number, place=place)
 
 
-def _binary(node: Binary, left: Value | Values, lookup: Lookup) -> Value:
+def _binary(node: Binary, left: Value | ValueList, lookup: Lookup) -> Value:
     operator = node.operator
     if operator in COMPARISONS or operator in ("and", "or"):
         raise Problem(
@@ -178,7 +178,7 @@ def _binary(node: Binary, left: Value | Values, lookup: Lookup) -> Value:
                 help="comparisons stand in `exclude when` and `require`",
             )
         )
-    if isinstance(left, Values):
+    if isinstance(left, ValueList):
         raise Problem(error("D071", f"`{operator}` needs one number on its left, and this is a list", left.place))
     right = evaluate_number(node.right, lookup)
     place = spanned(left.place, right.place)
@@ -274,12 +274,12 @@ def _power(node: Binary, base: Value, exponent: Value) -> Value:
     return Value(representable(result, node.place, base.number), dimension, base.place)
 
 
-def _items(written: List, lookup: Lookup) -> Iterable[Value | Values]:
+def _items(written: List, lookup: Lookup) -> Iterable[Value | ValueList]:
     """A list's items; a range or a linspace among them stands for its values."""
     for item in written.items:
         value = evaluate(item, lookup)
         inner = item.inner if isinstance(item, WithUnit) else item
-        if isinstance(value, Values) and isinstance(inner, Range | Call):
+        if isinstance(value, ValueList) and isinstance(inner, Range | Call):
             yield from value.items
         else:
             yield value
@@ -288,7 +288,7 @@ def _items(written: List, lookup: Lookup) -> Iterable[Value | Values]:
 # Functions
 
 
-def _call(call: Call, lookup: Lookup) -> Value | Values:
+def _call(call: Call, lookup: Lookup) -> Value | ValueList:
     name = call.name.text
     if name not in FUNCTIONS:
         raise Problem(

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from ic.grammar.syntax import Expression, Name
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, evaluate
-from ic.meaning.expressions.quantity import Value, Values
+from ic.meaning.expressions.quantity import Value, ValueList
 from ic.text.complaints import MOST, known_words
 from ic.text.lexer import COMMAND_LINE
 from met import other_units, units
@@ -38,17 +38,17 @@ class Names:
         self.varied = varied
         self.watched = watched
         self.followed: dict[str, None] = {}  # coordinates that an expression named
-        self._worth: dict[str, Value | Values | Problem] = {}
+        self._worth: dict[str, Value | ValueList | Problem] = {}
         self._open: dict[str, Place] = {}
 
-    def evaluate(self, expression: Expression) -> Value | Values:
+    def evaluate(self, expression: Expression) -> Value | ValueList:
         return evaluate(expression, self.find)
 
     def knows(self, text: str) -> bool:
         """Whether a single word has a value."""
         return text in self.varied or text in self.definitions.lets or text in CONSTANTS
 
-    def find(self, name: Name) -> Value | Values:
+    def find(self, name: Name) -> Value | ValueList:
         """The value of a name. Raises Problem D065 where there is none, D073 where it needs itself."""
         text = self._reached(name)
         if text in self.varied:

@@ -34,10 +34,10 @@ class Value:
 
 
 @frozen
-class Values:
+class ValueList:
     """A list of quantities."""
 
-    items: tuple[Value | Values, ...]
+    items: tuple[Value | ValueList, ...]
     place: Place
     unit: Unit | None = None
 

@@ -9,7 +9,7 @@ from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Call, Number, Range
 from ic.meaning.expressions import series
-from ic.meaning.expressions.quantity import Value, Values, in_words, measure_of
+from ic.meaning.expressions.quantity import Value, ValueList, in_words, measure_of
 from met import units
 from met.diagnostic import Label, Problem, error
 from met.trace import Scalar
@@ -18,7 +18,7 @@ from met.units import PURE
 MOST_POINTS = 100_000
 
 
-def range_of(expression: Range, first: Value, last: Value, step: Value) -> Values:
+def range_of(expression: Range, first: Value, last: Value, step: Value) -> ValueList:
     """`first .. last by step`: steps from the first, as far as the last."""
     place = place_of(expression)
     for other in (last, step):
@@ -56,7 +56,7 @@ def range_of(expression: Range, first: Value, last: Value, step: Value) -> Value
         points = _steps(a, b, by, expression, first)
     bare = first.bare and last.bare and step.bare
     made = (Value(x, first.dimension, place, bare, first.unit, hertz=first.hertz) for x in points)
-    return Values(tuple(made), place, first.unit)
+    return ValueList(tuple(made), place, first.unit)
 
 
 def _steps(a: float, b: float, step: float, expression: Range, first: Value, scale: float = 1.0) -> Iterable[float]:
@@ -103,7 +103,7 @@ def _steps(a: float, b: float, step: float, expression: Range, first: Value, sca
     return found.points
 
 
-def spaced(call: Call, start: Value, end: Value, count: Value) -> Values:
+def spaced(call: Call, start: Value, end: Value, count: Value) -> ValueList:
     """Points from `from` to `to`, both included: evenly (of the decimal numbers as written), or by one ratio."""
     name = call.name.text
     if count.dimension != PURE or isinstance(count.number, Scalar) or not float(count.number).is_integer():
@@ -149,7 +149,7 @@ def spaced(call: Call, start: Value, end: Value, count: Value) -> Values:
     points = series.even(a, b, n) if name == "linspace" else series.by_ratio(a, b, n)
     bare = start.bare and end.bare
     made = (Value(x, start.dimension, call.place, bare, start.unit, hertz=start.hertz) for x in points)
-    return Values(tuple(made), call.place, start.unit)
+    return ValueList(tuple(made), call.place, start.unit)
 
 
 def _not_exponents(start: Value, end: Value, count: int) -> list[str]:

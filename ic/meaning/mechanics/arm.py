@@ -9,7 +9,7 @@ from dataclasses import replace
 from ic.grammar.syntax import Call, Expression, Name, Unary
 from ic.language import HEADS
 from ic.language.bodies import ARM, AT, AXIS, JOINT, JOINT_KINDS, LINK, RPY
-from ic.meaning.definitions.merge import Block, Item, as_meant
+from ic.meaning.definitions.merge import Item, MergedBlock, as_meant
 from ic.meaning.definitions.resolve import Definition
 from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.dh import use_dh
@@ -32,7 +32,7 @@ NOT_OF_A_JOINT = dict.fromkeys(("limit", "limits", "range", "stops"), NO_STOPS)
 
 
 @frozen
-class Arm:
+class ResolvedArm:
     """lost: names of joints and links that failed, which was told;  whole: nothing at all was wrong before."""
 
     name: str
@@ -49,7 +49,7 @@ class Arm:
         return tuple(joint for joint in self.joints if joint.kind != "fixed")
 
 
-def resolve_arm(scope: Scope, definition: Definition) -> Arm | None:
+def resolve_arm(scope: Scope, definition: Definition) -> ResolvedArm | None:
     """The arm, with its numbers entered as parameters; None where its definition could not be merged."""
     block = scope.definitions.block(definition)
     if block is None:
@@ -80,7 +80,7 @@ def resolve_arm(scope: Scope, definition: Definition) -> Arm | None:
     whole = not scope.complaints.errors
     written = {item.name for kind in ARM.named for item in block.of_kind(kind)}
     lost = frozenset(written - {link.name for link in links} - {joint.name for joint in joints})
-    return Arm(definition.name, tuple(links), tuple(joints), lost, whole)
+    return ResolvedArm(definition.name, tuple(links), tuple(joints), lost, whole)
 
 
 def check_arm(scope: Scope, definition: Definition) -> None:
@@ -90,7 +90,7 @@ def check_arm(scope: Scope, definition: Definition) -> None:
         check_moved(scope, arm.links, arm.joints)
 
 
-def _stray(scope: Scope, item: Item, block: Block) -> None:
+def _stray(scope: Scope, item: Item, block: MergedBlock) -> None:
     known = [other.name for other in block.items.values() if other.kind in ARM.named]
     if item.kind:
         scope.complaints.error(
@@ -183,7 +183,7 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str,
     return Joint(item.name, kind, parent, child, item.place)  # type: ignore[arg-type]
 
 
-def _frame(scope: Scope, owner: Owner, kind: str, body: Block) -> None:
+def _frame(scope: Scope, owner: Owner, kind: str, body: MergedBlock) -> None:
     """The joint's frame as `at`, `rpy` and `axis` say."""
     for wanted in (AT, RPY):
         scope.vector(owner, wanted, body.get(wanted.name))

@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call
-from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import check_keys, word_of
 from ic.meaning.parameters.owner import XYZ, Owner
@@ -82,7 +82,7 @@ def _turn(angle: Real) -> tuple[Real, Real]:
     return (0.0 if abs(parts[0]) < NOISE else parts[0]), (0.0 if abs(parts[1]) < NOISE else parts[1])
 
 
-def use_dh(scope: Scope, owner: Owner, kind: str, item: Item, body: Block) -> None:
+def use_dh(scope: Scope, owner: Owner, kind: str, item: Item, body: MergedBlock) -> None:
     """Enters the joint's frame from its Denavit-Hartenberg numbers, which are reached as `JOINT.dh.a`."""
     _refuse_others(scope, owner, item, body)
     convention = _convention(scope, item)
@@ -90,7 +90,7 @@ def use_dh(scope: Scope, owner: Owner, kind: str, item: Item, body: Block) -> No
         scope.checks.fail(owner.join("dh"))
         return
     inner = Owner(f"the dh of {owner.label}", item.place, owner.join("dh"), homes=owner.homes, call=True)
-    numbers = item.body or Block()
+    numbers = item.body or MergedBlock()
     check_keys(scope, numbers, [wanted.name for wanted in NUMBERS], inner)
     scope.unvaried[owner.join("dh")] = unvaried.several(_numbers(owner))
     found = [scope.number(inner, wanted, numbers.get(wanted.name), record=False) for wanted in NUMBERS]
@@ -108,7 +108,7 @@ def use_dh(scope: Scope, owner: Owner, kind: str, item: Item, body: Block) -> No
             scope.follows(owner.join(f"{part}.{axis}"), value, unit, item, f"Denavit-Hartenberg, {convention}")
 
 
-def _refuse_others(scope: Scope, owner: Owner, item: Item, body: Block) -> None:
+def _refuse_others(scope: Scope, owner: Owner, item: Item, body: MergedBlock) -> None:
     """Tells what says the joint's frame beside `dh`, and why what `dh` makes of it cannot vary by itself."""
     for name in INSTEAD:
         other = body.get(name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ic.language.bodies import COM, INERTIA, MASS
-from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.bodies import check_body
 from ic.meaning.mechanics.shapes import SHAPES, Solid
 from ic.meaning.parameters import unvaried
@@ -22,7 +22,7 @@ Shape = tuple[str, tuple[tuple[str, float], ...]]
 """A shape as a plan has it: kind, and numbers in SI."""
 
 
-def use_matter(scope: Scope, owner: Owner, kind: str, name: str, body: Block) -> Shape | None:
+def use_matter(scope: Scope, owner: Owner, kind: str, name: str, body: MergedBlock) -> Shape | None:
     """Mass, centre and inertia, entered as parameters and checked to be a body's; its shape, where it has one.
 
     kind  what it is in words: "link" or "payload"
@@ -64,7 +64,7 @@ def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
         scope.checks.fail(f"{owner.path}.shape")
         return None
     inner = Owner(f"the {name} of {owner.label}", item.place, f"{owner.path}.shape", homes=owner.homes, call=True)
-    body = item.body or Block()
+    body = item.body or MergedBlock()
     check_keys(scope, body, [p.name for p in kind.parameters], inner)
     numbers: dict[str, Real] = {}
     along, good = "x", True

@@ -9,8 +9,8 @@ import numpy as np
 
 from ic.grammar.syntax import Name
 from ic.language.bodies import ATTITUDE, GRAPPLE, PAYLOAD, PAYLOAD_AT, PAYLOAD_RPY, POSITION, RATE, RELEASE, VELOCITY
-from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.mechanics.arm import Arm
+from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.mechanics.matter import use_matter
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import check_keys, value_at
@@ -29,7 +29,7 @@ FLIGHT = (POSITION, ATTITUDE, VELOCITY, RATE)
 USAGE = "write `payload NAME { mass = 20 kg;  shape = sphere(radius = 0.2 m);  on = LINK; }`"
 
 
-def resolve_payloads(scope: Scope, block: Block, arm: Arm) -> tuple[Payload, ...]:
+def resolve_payloads(scope: Scope, block: MergedBlock, arm: ResolvedArm) -> tuple[Payload, ...]:
     """The payloads of a run, in the deck's order, their numbers entered as parameters; what is wrong is told."""
     found: list[Payload] = []
     for item in block.of_kind("payload"):
@@ -39,7 +39,7 @@ def resolve_payloads(scope: Scope, block: Block, arm: Arm) -> tuple[Payload, ...
     return tuple(found)
 
 
-def check_payloads(scope: Scope, block: Block, structure: Structure) -> None:
+def check_payloads(scope: Scope, block: MergedBlock, structure: Structure) -> None:
     """What a run says of payloads together with the rest: that they may fly, and when what happens to them happens."""
     items = {item.name: item for item in block.of_kind("payload")}
     for payload in structure.payloads:
@@ -52,13 +52,13 @@ def check_payloads(scope: Scope, block: Block, structure: Structure) -> None:
                 help="leave `velocity_products = off` out",
             )
         for wanted in EVENTS:
-            written = (item.body or Block()).get(wanted.name)
+            written = (item.body or MergedBlock()).get(wanted.name)
             settled = scope.parameters.get(f"payloads.{payload.name}.{wanted.name}")
             if written is not None and settled is not None and isinstance(settled.value, float):
                 _remark_time(scope, payload, wanted.name, settled.value, structure, value_at(written))
 
 
-def _payload(scope: Scope, item: Item, arm: Arm, taken: Collection[str]) -> Payload:
+def _payload(scope: Scope, item: Item, arm: ResolvedArm, taken: Collection[str]) -> Payload:
     owner = Owner(f"payload `{item.name}`", item.place, f"payloads.{item.name}", homes=item.homes)
     if item.detail or item.value is not None or item.body is None:
         place = item.detail[0].place if item.detail else value_at(item)
@@ -101,7 +101,7 @@ def _payload(scope: Scope, item: Item, arm: Arm, taken: Collection[str]) -> Payl
     return payload
 
 
-def _link(scope: Scope, owner: Owner, item: Item | None, arm: Arm) -> str | None:
+def _link(scope: Scope, owner: Owner, item: Item | None, arm: ResolvedArm) -> str | None:
     """The link that carries it, as written; None where it is none of the arm's, which was told."""
     known = [BASE, *(link.name for link in arm.links if link.name != BASE)]
     if item is None:
@@ -123,7 +123,7 @@ def _link(scope: Scope, owner: Owner, item: Item | None, arm: Arm) -> str | None
     return None
 
 
-def _check_unused(scope: Scope, item: Item, body: Block, grappled: bool) -> None:
+def _check_unused(scope: Scope, item: Item, body: MergedBlock, grappled: bool) -> None:
     """Tells of what has no meaning for a payload that is held from the start, or that is caught where it flies."""
     for name in ("rpy",) if grappled else tuple(each.name for each in FLIGHT):
         written = body.get(name)
@@ -172,7 +172,7 @@ def _check_solid(scope: Scope, owner: Owner, payload: Payload, item: Item) -> No
     settled = [scope.parameters.get(path) for path in paths]
     if any(each is None or isinstance(each.value, str | tuple) for each in settled):
         return
-    body = item.body or Block()
+    body = item.body or MergedBlock()
     given = next((part for name in ("inertia", "shape", "mass") if (part := body.get(name)) is not None), item)
     helps = (
         "what flies has mass, and resists a turn about every axis: a box, a cylinder or a sphere does",

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from ic.grammar.spell import spell
 from ic.language.bodies import JOINT, LINK
-from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.parameters.models import word_of
 
 OF_JOINT = (*JOINT.keys, "pivot")
 
 
-def in_run(definitions: Definitions, block: Block, item: Item, rates: tuple[str, ...]) -> list[str]:
+def in_run(definitions: Definitions, block: MergedBlock, item: Item, rates: tuple[str, ...]) -> list[str]:
     """The remedy for a path that stands in a run's block as an entry; none where it names nothing that is known.
 
     block  the run's;  rates: the names of those that a run has
@@ -53,7 +53,7 @@ def _in_arm(arm: str, thing: str, key: str, value: str) -> list[str]:
     return [f"it is the arm's: `arm OTHER like {arm} {{ {thing} {{ {key} = {value}; }} }}`, and `arm = OTHER;` here"]
 
 
-def _of_arm(definitions: Definitions, block: Block) -> tuple[list[str], list[str], str]:
+def _of_arm(definitions: Definitions, block: MergedBlock) -> tuple[list[str], list[str], str]:
     """The joints, the links and the name of the run's arm; nothing where it has none."""
     named = block.get("arm")
     arm = definitions.of_kind("arm").get(word_of(named.value) or "") if named is not None else None

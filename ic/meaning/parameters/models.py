@@ -9,7 +9,7 @@ from typing import Any
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression, Name
-from ic.meaning.definitions.merge import Block, Item, refuse_pending
+from ic.meaning.definitions.merge import Item, MergedBlock, refuse_pending
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_relations
 from ic.meaning.parameters.scope import Scope
@@ -39,14 +39,14 @@ def upon(item: Item) -> Place | None:
     return next((each.place for each in item.body.items.values()), None) if item.body is not None else None
 
 
-def words_chosen(parameters: Sequence[Parameter], body: Block) -> tuple[tuple[str, str], ...]:
+def words_chosen(parameters: Sequence[Parameter], body: MergedBlock) -> tuple[tuple[str, str], ...]:
     """The words that a body writes for these parameters, defaults left out."""
     found = ((each.name, word_written(each, body)) for each in parameters)
     defaults = {each.name: each.default for each in parameters}
     return tuple((name, word) for name, word in found if word != defaults[name])
 
 
-def word_written(wanted: Parameter, body: Block) -> str:
+def word_written(wanted: Parameter, body: MergedBlock) -> str:
     """The word that a body writes for a parameter, else its default."""
     item = body.get(wanted.name)
     written = word_of(item.value) if item is not None else wanted.default
@@ -54,7 +54,7 @@ def word_written(wanted: Parameter, body: Block) -> str:
 
 
 def _check_unused(
-    scope: Scope, owner: Owner, wanted: Parameter, only: Only, body: Block, words: Mapping[str, str]
+    scope: Scope, owner: Owner, wanted: Parameter, only: Only, body: MergedBlock, words: Mapping[str, str]
 ) -> None:
     """Tells a parameter that its word leaves out, unless that word was written over another, which may have had it."""
     item, word = body.get(wanted.name), body.get(only[0])
@@ -84,7 +84,11 @@ def refuse_values(scope: Scope, expression: Expression | None, names: Iterable[s
 
 
 def check_keys(
-    scope: Scope, body: Block, known: Iterable[str], owner: Owner, others: Mapping[str, str] = MappingProxyType({})
+    scope: Scope,
+    body: MergedBlock,
+    known: Iterable[str],
+    owner: Owner,
+    others: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
     """Tells every entry of the body that is none of the known plain keys, and notes what it was meant for.
 
@@ -155,7 +159,7 @@ def find_model(scope: Scope, kind: models.Kind, name: str | None, place: Place) 
 
 
 def use_model(
-    scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: Block, extra: Iterable[str] = ()
+    scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: MergedBlock, extra: Iterable[str] = ()
 ) -> dict[str, Any] | None:
     """Every parameter of a model used with this body, entered in the scope; None where one is missing or wrong.
 
@@ -198,13 +202,13 @@ def use_model(
     return values
 
 
-def body_of(scope: Scope, item: Item | None) -> Block:
+def body_of(scope: Scope, item: Item | None) -> MergedBlock:
     """The block of an entry; an empty one where there is none, or a value in its place, which is told."""
     if item is None:
-        return Block()
+        return MergedBlock()
     if item.body is None or item.value is not None:
         scope.complaints.error(
             "D111", f"`{item.name}` is a block, not a value", item.place, help=f"write `{item.name} {{ ... }}`"
         )
-        return Block()
+        return MergedBlock()
     return item.body

@@ -10,7 +10,7 @@ import numpy as np
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Name
-from ic.meaning.definitions.merge import Block
+from ic.meaning.definitions.merge import MergedBlock
 from ic.meaning.parameters.owner import XYZ, Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
@@ -20,7 +20,7 @@ from met.plan import BASE
 
 
 def check_relations(
-    scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: Block, values: Mapping[str, Any]
+    scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: MergedBlock, values: Mapping[str, Any]
 ) -> None:
     """Tells of parameters that do not go together; names of the arm apart, which `check_names` looks up."""
     for wanted in parameters:
@@ -56,7 +56,7 @@ def check_names(
     scope: Scope,
     owner: Owner,
     parameters: Iterable[Parameter],
-    body: Block,
+    body: MergedBlock,
     *,
     arm: str,
     known: Mapping[str, list[str]],
@@ -108,7 +108,7 @@ def _not_less(pairs: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 
 def _check_list(
-    scope: Scope, owner: Owner, wanted: Parameter, body: Block, values: Mapping[str, Any], place: Place
+    scope: Scope, owner: Owner, wanted: Parameter, body: MergedBlock, values: Mapping[str, Any], place: Place
 ) -> None:
     numbers = values[wanted.name]
     if wanted.as_many_as and (numbers or wanted.default is None) and len(numbers) != len(values[wanted.as_many_as]):
@@ -138,7 +138,7 @@ def _count(numbers: tuple[float, ...]) -> str:
     return f"{len(numbers)} number{'s' * (len(numbers) != 1)}"
 
 
-def _place(owner: Owner, body: Block, name: str) -> Place:
+def _place(owner: Owner, body: MergedBlock, name: str) -> Place:
     item = body.get(name)
     if item is None:
         return owner.place

@@ -17,10 +17,16 @@ from ic.grammar.syntax import Call, Expression, Name, Setting, String
 from ic.language.unit_words import either, in_degrees
 from ic.meaning.definitions.merge import Item
 from ic.meaning.definitions.resolve import Definitions
-from ic.meaning.expressions.conditions import Checks, Varied
-from ic.meaning.expressions.given import GIVEN, Given, evaluated, is_given, written_origin
+from ic.meaning.expressions.command_line import (
+    ON_COMMAND_LINE,
+    CommandLineValue,
+    evaluate_setting,
+    is_on_command_line,
+    written_origin,
+)
+from ic.meaning.expressions.conditions import Checks, VariedPath
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Value, Values
+from ic.meaning.expressions.quantity import Value, ValueList
 from ic.meaning.expressions.remedies import components
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.owner import XYZ, Owner, Settled
@@ -43,7 +49,7 @@ class Scope:
 
     definitions: Definitions
     complaints: Complaints
-    varied: dict[str, Varied] = field(default_factory=dict)
+    varied: dict[str, VariedPath] = field(default_factory=dict)
     graph: Graph = field(default_factory=Graph)
     parameters: dict[str, Settled] = field(default_factory=dict)
     beside: dict[str, Settled] = field(default_factory=dict)  # what parameters are made of, and settings of the run
@@ -63,7 +69,8 @@ class Scope:
         self.checks = Checks(self.complaints, self.graph, self.varied)
         self.names = Names(self.definitions, {path: varied.value for path, varied in self.varied.items()})
         self.value_checks = ValueChecks(self.complaints, self.definitions, self.names, self.checks, self.moved)
-        self.given: dict[str, Given | None] = {}  # of the settings, as they are asked for; None for no number
+        # the settings that are evaluated so far, by path; None for one that is no number
+        self.evaluated_settings: dict[str, CommandLineValue | None] = {}
 
     def settled(self, path: str) -> Settled | None:
         """What is settled under a path, whether the plan has it as a parameter or not."""
@@ -97,7 +104,7 @@ class Scope:
         if item is not None and value is None:
             with self.complaints.gather():
                 found = self.written(item, expression)
-                if isinstance(found, Values):
+                if isinstance(found, ValueList):
                     raise Problem(
                         error(
                             "D071",
@@ -178,7 +185,7 @@ class Scope:
             )
         numbers = []
         for value in found.items:
-            if isinstance(value, Values):
+            if isinstance(value, ValueList):
                 raise Problem(error("D071", "a list inside a list", value.place))
             numbers.append(value)
         if dimension != PURE and len(numbers) > 1 and all(value.bare for value in numbers):
@@ -205,7 +212,7 @@ class Scope:
         number = None
         with self.complaints.gather():
             found = self.written(item)
-            if isinstance(found, Values):
+            if isinstance(found, ValueList):
                 raise Problem(
                     error(
                         "D071",
@@ -275,7 +282,7 @@ class Scope:
                 )
             made = []
             for value in found.items:
-                if isinstance(value, Values):
+                if isinstance(value, ValueList):
                     raise Problem(error("D071", "a list inside a list", value.place))
                 self.value_checks.dimension(owner, wanted, value)
                 if isinstance(value.number, Scalar):
@@ -341,7 +348,7 @@ class Scope:
         for path, value in values.items():
             settled = self.parameters[path]
             settled.value = self._plain(value)
-            if settled.origin.note == GIVEN:
+            if settled.origin.note == ON_COMMAND_LINE:
                 continue
             settled.expression = item.value
             if settled.origin.kind == "deck" and item.value is not None:
@@ -387,7 +394,7 @@ class Scope:
         place = item.place if item.value is None else place_of(item.value)
         self.parameters[path] = Settled(self._plain(value), unit, Origin("derived", place, item.overrides, note), note)
 
-    def written(self, item: Item, expression: Expression | None = None) -> Value | Values:
+    def written(self, item: Item, expression: Expression | None = None) -> Value | ValueList:
         """What the item's expression is worth, lists with what `+=` appended. Raises Problem."""
         expression = item.value if expression is None else expression
         if expression is None or (item.body is not None and not isinstance(expression, Call)):
@@ -409,8 +416,8 @@ class Scope:
         items = list(found.items)
         for more in item.appended:
             value = self.names.evaluate(more)
-            items.extend(value.items if isinstance(value, Values) else (value,))
-        return Values(tuple(items), found.place, found.unit)
+            items.extend(value.items if isinstance(value, ValueList) else (value,))
+        return ValueList(tuple(items), found.place, found.unit)
 
     def _missing(self, owner: Owner, wanted: Parameter) -> None:
         self.checks.fail(owner.join(wanted.name))
@@ -486,7 +493,7 @@ class Scope:
         for known in owner.paths(name, homes):
             self.known.setdefault(known, []).append(path)
         for given in self._given(owner, name, homes):
-            if origin.note == GIVEN:
+            if origin.note == ON_COMMAND_LINE:
                 self.complaints.error(
                     "D232",
                     f"this sets `{path}`, which is set already",
@@ -500,7 +507,7 @@ class Scope:
             origin = given.over(origin)
         coordinate = self._coordinate(owner, name, homes)
         if coordinate is not None:
-            if origin.note == GIVEN and not is_given(coordinate.place):
+            if origin.note == ON_COMMAND_LINE and not is_on_command_line(coordinate.place):
                 self.complaints.error(
                     "D233",
                     f"this sets `{path}`, which the sweep varies",
@@ -531,17 +538,17 @@ class Scope:
             self.complaints.add(*problem.diagnostics)
             self.checks.fail(path)
 
-    def _given(self, owner: Owner, name: str, homes: Iterable[str]) -> list[Given]:
+    def _given(self, owner: Owner, name: str, homes: Iterable[str]) -> list[CommandLineValue]:
         """What is given for this parameter; more than one where paths are set that mean the same."""
         found = [path for path in owner.paths(name, homes) if path in self.settings] if self.settings else []
         for path in found:
-            if path not in self.given:
-                self.given[path] = None
+            if path not in self.evaluated_settings:
+                self.evaluated_settings[path] = None
                 with self.complaints.gather():
-                    self.given[path] = evaluated(self.settings[path], path, self.names)
-        return [given for path in found if (given := self.given[path]) is not None]
+                    self.evaluated_settings[path] = evaluate_setting(self.settings[path], path, self.names)
+        return [given for path in found if (given := self.evaluated_settings[path]) is not None]
 
-    def _coordinate(self, owner: Owner, name: str, homes: tuple[str, ...]) -> Varied | None:
+    def _coordinate(self, owner: Owner, name: str, homes: tuple[str, ...]) -> VariedPath | None:
         if not self.varied:
             return None
         paths = owner.paths(name, homes)
@@ -557,7 +564,7 @@ class Scope:
             )
         return found[0] if found else None
 
-    def _own(self, owner: Owner, name: str, homes: tuple[str, ...], both: tuple[Varied, ...]) -> list[str]:
+    def _own(self, owner: Owner, name: str, homes: tuple[str, ...], both: tuple[VariedPath, ...]) -> list[str]:
         """What parts two coordinates of a servo's definition and of its base, where they are that."""
         by_path = {owner.join_local(home, name): home for home in homes}
         named = [home for path, home in by_path.items() if path in (both[0].path, both[1].path)]

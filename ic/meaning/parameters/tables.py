@@ -8,8 +8,8 @@ from typing import Any
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Name, String
-from ic.meaning.definitions.csv_files import Column, Table, missing_column
-from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.definitions.csv_files import CsvColumn, CsvTable, missing_column
+from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import check_keys, use_model
 from ic.meaning.parameters.owner import Owner, Settled
@@ -24,7 +24,7 @@ from met.plan import Origin
 TIME = "time"
 
 
-def use_table(scope: Scope, owner: Owner, environment: Environment, body: Block) -> dict[str, Any] | None:
+def use_table(scope: Scope, owner: Owner, environment: Environment, body: MergedBlock) -> dict[str, Any] | None:
     """Every parameter of a model whose body names a file, entered in the scope; None where one is missing or wrong."""
     lists = [each for each in environment.parameters if each.shape == "list"]
     check_keys(scope, body, [each.name for each in environment.written], owner)
@@ -43,7 +43,7 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Block)
         scope,
         owner,
         [each for each in environment.parameters if each.shape != "list"],
-        Block({key: item for key, item in body.items.items() if key in own}),
+        MergedBlock({key: item for key, item in body.items.items() if key in own}),
     )
     for name in (FILE.name, *(each.name for each in lists)):
         scope.unvaried[owner.join(name)] = unvaried.FILE
@@ -56,7 +56,7 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Block)
     return None if values is None or columns is None else {**values, **columns}
 
 
-def tell_named_lists(scope: Scope, owner: Owner, lists: list[Parameter], body: Block) -> bool:
+def tell_named_lists(scope: Scope, owner: Owner, lists: list[Parameter], body: MergedBlock) -> bool:
     """Tells of a file's name that stands where a list does; whether one does."""
     found = False
     for each in lists:
@@ -88,7 +88,7 @@ def named_file(owner: Owner, item: Item) -> String:
 
 
 def keep_column(
-    scope: Scope, owner: Owner, wanted: Parameter, table: Table, column: Column, label: Label
+    scope: Scope, owner: Owner, wanted: Parameter, table: CsvTable, column: CsvColumn, label: Label
 ) -> tuple[float, ...]:
     """A column as the model's list, entered in the scope. Raises Problem D193, D194, D195. label: who wants it."""
     text, dimension = owner.unit(wanted)
@@ -102,7 +102,7 @@ def keep_column(
     return numbers
 
 
-def _alike(scope: Scope, owner: Owner, column: Column, by_column: Mapping[str, Parameter]) -> list[str]:
+def _alike(scope: Scope, owner: Owner, column: CsvColumn, by_column: Mapping[str, Parameter]) -> list[str]:
     """The columns that this one could be by its unit; all of them where it has none, or one that cannot be read."""
     try:
         meant = units.parse_unit(column.unit or "").dimension

@@ -11,8 +11,8 @@ from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression
 from ic.language.runs import BASE_KINDS
 from ic.meaning.control.servos import course_named, use_course
-from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.mechanics.arm import Arm
+from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.mechanics.bodies import carried_loads
 from ic.meaning.parameters import unvaried
 from ic.meaning.parameters.models import check_keys, refuse_values, word_of
@@ -39,7 +39,7 @@ OTHERS = ("rate", "position", "acceleration", "torque", "force")
 NOTHING = (0.0, 0.0, 0.0)
 
 
-def resolve_base(scope: Scope, item: Item | None, arm: Arm) -> tuple[Base | None, Arm]:
+def resolve_base(scope: Scope, item: Item | None, arm: ResolvedArm) -> tuple[Base | None, ResolvedArm]:
     """The base, None where it is fixed or something failed, which was told; and the arm, which has it for a link where
     it moves."""
     scope.unvaried[BASE] = unvaried.chosen("write `vary base = [fixed, free];`")
@@ -55,7 +55,7 @@ def resolve_base(scope: Scope, item: Item | None, arm: Arm) -> tuple[Base | None
         scope.complaints.error("D250", told, place, help=[*meant, USAGE])
         return None, arm
     scope.setting(BASE, kind, item=item)
-    body = item.body or Block()
+    body = item.body or MergedBlock()
     if kind != "prescribed":
         if item.body is not None or (isinstance(item.value, Call) and item.value.positional):
             help = "leave the block out"
@@ -67,7 +67,9 @@ def resolve_base(scope: Scope, item: Item | None, arm: Arm) -> tuple[Base | None
     return Base("prescribed", courses, item.place), _standing(scope, item, arm)
 
 
-def check_base(scope: Scope, base: Base | None, structure: Structure, environment: Block, item: Item | None) -> None:
+def check_base(
+    scope: Scope, base: Base | None, structure: Structure, environment: MergedBlock, item: Item | None
+) -> None:
     """What does not go with the base: a turn without velocity products, a free base without mass."""
     off = environment.get("velocity_products")
     if base is not None and base.turns and not structure.velocity_products and off is not None and item is not None:
@@ -104,7 +106,7 @@ def check_base(scope: Scope, base: Base | None, structure: Structure, environmen
     )
 
 
-def initial_base(scope: Scope, body: Block, base: Base | None) -> None:
+def initial_base(scope: Scope, body: MergedBlock, base: Base | None) -> None:
     """What `initial` says of the base."""
     for name, unit in OF_FREE_BASE:
         item = body.get(f"{BASE}.{name}")
@@ -122,7 +124,7 @@ def initial_base(scope: Scope, body: Block, base: Base | None) -> None:
             scope.complaints.error("D255", f"{told}, so `{item.name}` has no effect", item.place, help=help)
 
 
-def held_by(arm: Arm, payloads: Sequence[Payload]) -> dict[str, str]:
+def held_by(arm: ResolvedArm, payloads: Sequence[Payload]) -> dict[str, str]:
     """What each link and payload is fixed to for good, down to a link that moves against it, or the base."""
     held = {joint.child: joint.parent for joint in arm.joints if joint.kind == "fixed"}
     held |= {payload.name: payload.link for payload in payloads if not payload.flies}
@@ -138,7 +140,7 @@ def held_by(arm: Arm, payloads: Sequence[Payload]) -> dict[str, str]:
 def remark_ground(
     scope: Scope,
     item: Item,
-    arm: Arm,
+    arm: ResolvedArm,
     base: Base | None,
     environment: Any,
     values: Mapping[str, Any],
@@ -154,7 +156,7 @@ def remark_ground(
     if any(link not in still for link in links):
         return
     key, link = next((key, link) for key, link in zip(keys, links, strict=True) if link != WORLD)
-    given = (item.body or Block()).get(key)
+    given = (item.body or MergedBlock()).get(key)
     place = place_of(given.value) if given is not None and given.value is not None else item.place
     is_base = f"link `{link}`" + ("" if link == BASE else ", which is fixed to the base,")
     is_base += " with all that it acts upon" if len(set(links) - {link, WORLD}) else ""
@@ -167,7 +169,7 @@ def remark_ground(
     )
 
 
-def _standing(scope: Scope, item: Item, arm: Arm) -> Arm:
+def _standing(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:
     """The arm with its base among the links: without matter, where the arm does not say more."""
     if any(link.name == BASE for link in arm.links) or BASE in arm.lost:
         return arm
@@ -183,7 +185,7 @@ def _standing(scope: Scope, item: Item, arm: Arm) -> Arm:
 # A prescribed base
 
 
-def _courses(scope: Scope, item: Item, body: Block) -> tuple[Course, ...]:
+def _courses(scope: Scope, item: Item, body: MergedBlock) -> tuple[Course, ...]:
     """The courses of the components that are written, in order; what is wrong is told."""
     owner = Owner("a prescribed base", item.place, BASE)
     check_keys(scope, body, COMPONENTS, owner)

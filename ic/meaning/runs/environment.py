@@ -7,9 +7,9 @@ from dataclasses import replace
 from ic.grammar.places import place_of
 from ic.language.runs import VELOCITY_PRODUCTS
 from ic.meaning.checks.idle import remark_idle, remark_kinds
-from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.quantity import Value
-from ic.meaning.mechanics.arm import Arm
+from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_names
@@ -24,7 +24,12 @@ from met.trace import Scalar
 
 
 def resolve_environment(
-    scope: Scope, body: Block, arm: Arm, base: Base | None, payloads: tuple[Payload, ...], duration: float | None
+    scope: Scope,
+    body: MergedBlock,
+    arm: ResolvedArm,
+    base: Base | None,
+    payloads: tuple[Payload, ...],
+    duration: float | None,
 ) -> tuple[tuple[EnvironmentUse, ...], bool]:
     uses = []
     products = True
@@ -52,7 +57,7 @@ def resolve_environment(
 
 
 def _environment_use(
-    scope: Scope, item: Item, arm: Arm, base: Base | None, payloads: tuple[Payload, ...], duration: float | None
+    scope: Scope, item: Item, arm: ResolvedArm, base: Base | None, payloads: tuple[Payload, ...], duration: float | None
 ) -> EnvironmentUse | None:
     owner = Owner(f"environment `{item.name}`", item.place, f"environment.{item.name}", homes=item.homes)
     name = word_of(item.value)
@@ -88,7 +93,7 @@ def _environment_use(
     environment = find_model(scope, "environment", name, place_of(item.value))
     if environment is None or refuse_values(scope, item.value, [p.name for p in environment.written]):
         return None
-    body = item.body or Block()
+    body = item.body or MergedBlock()
     # a payload called `world` was told of, and is no reason to tell of those that mean the ground
     bodies = [*(link.name for link in arm.links), *(each.name for each in payloads if each.name != WORLD)]
     lost = (*arm.lost, *(each.name for each in payloads if each.name == WORLD))

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from ic.language.runs import BALANCED
 from ic.meaning.control.servos import Use
-from ic.meaning.definitions.merge import Block, Item
-from ic.meaning.expressions.quantity import Value, Values
-from ic.meaning.mechanics.arm import Arm
+from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.expressions.quantity import Value, ValueList
+from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.base import INITIAL_OF_BASE
@@ -20,7 +20,7 @@ from met.plan import BASE
 from met.units import PURE
 
 
-def resolve_initial(scope: Scope, body: Block, arm: Arm, uses: Sequence[Use]) -> bool:
+def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Sequence[Use]) -> bool:
     """What a run says of its start; whether its servos begin balanced."""
     known = dict.fromkeys(("q", "qd"), "")
     known |= {f"{joint.name}.{name}": "" for joint in arm.moving for name in ("q", "qd")}
@@ -40,11 +40,11 @@ def resolve_initial(scope: Scope, body: Block, arm: Arm, uses: Sequence[Use]) ->
     for name, unit in (("q", "joint"), ("qd", "joint/s")):
         wanted = Parameter(name=name, unit=unit, default=0.0, doc=f"initial {name}")
         general = body.get(name)
-        listed: Values | None = None
+        listed: ValueList | None = None
         if general is not None:
             with scope.complaints.gather():
                 found = scope.written(general)
-                listed = found if isinstance(found, Values) else None
+                listed = found if isinstance(found, ValueList) else None
             if listed is not None and arm.lost:
                 continue
             if listed is not None and len(listed.items) != len(arm.moving):
@@ -63,7 +63,7 @@ def resolve_initial(scope: Scope, body: Block, arm: Arm, uses: Sequence[Use]) ->
                 joint=joint.kind,
             )
             value = listed.items[n] if listed is not None and own is None else None
-            if isinstance(value, Values):
+            if isinstance(value, ValueList):
                 scope.complaints.error("D071", "a list inside a list", value.place)
                 continue
             if general is not None and own is None and listed is None and _mixed(scope, owner, wanted, general, arm):
@@ -88,7 +88,7 @@ def _balanced(scope: Scope, item: Item | None, uses: Sequence[Use]) -> bool:
     return balanced
 
 
-def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: Arm) -> bool:
+def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: ResolvedArm) -> bool:
     """Whether one value for all joints has not this joint's unit, since others move otherwise; tells that."""
     if len({joint.kind for joint in arm.moving}) < 2:
         return False

@@ -11,7 +11,7 @@ from ic.meaning.control.guides import Guiding, check_period
 from ic.meaning.control.schedule import CONTINUOUS, Rate, Ticks, base_rate, divisor, make_schedule
 from ic.meaning.control.servos import Use, fixed_rate
 from ic.meaning.control.ticking import Ticking, check_instants, rate_of
-from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import body_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
@@ -59,7 +59,7 @@ def resolve_rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate
 def resolve_schedule(
     scope: Scope,
     run: Owner,
-    block: Block,
+    block: MergedBlock,
     rates: dict[str, Rate],
     uses: list[Use],
     ticking: Sequence[Ticking],

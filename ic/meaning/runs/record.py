@@ -9,7 +9,7 @@ from typing import Literal
 from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Binary, Expression, List, Name, Statement
-from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
@@ -173,7 +173,7 @@ def _under_a_word(words: list[str], structure: Structure) -> str:
 # Metrics
 
 
-def resolve_metrics(scope: Scope, block: Block, structure: Structure) -> tuple[MetricUse, ...]:
+def resolve_metrics(scope: Scope, block: MergedBlock, structure: Structure) -> tuple[MetricUse, ...]:
     watched = [item.body.get("of") for item in block.of_kind("metric") if item.body is not None]
     known = channels(structure, [of.value.text for of in watched if of is not None and isinstance(of.value, Name)])
     found = (_metric(scope, item, structure, known) for item in block.of_kind("metric"))
@@ -202,7 +202,7 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
     metric = find_model(scope, "metric", word_of(item.value), place_of(item.value))
     if metric is None or refuse_values(scope, item.value, ["of", *(p.name for p in metric.parameters)]):
         return None
-    body = item.body or Block()
+    body = item.body or MergedBlock()
     owner = Owner(f"metric `{item.name}`", item.place, f"metrics.{item.name}")
     of = body.get("of")
     channel = None
@@ -247,7 +247,7 @@ def _not_one(name: Name, structure: Structure) -> tuple[str, list[str]]:
 
 
 @frozen
-class Comparison:
+class WrittenRequirement:
     """A `require` with its metric on the left."""
 
     statement: Statement
@@ -256,7 +256,7 @@ class Comparison:
     limit: Expression
 
 
-def read_requirements(scope: Scope, block: Block) -> list[Comparison]:
+def read_requirements(scope: Scope, block: MergedBlock) -> list[WrittenRequirement]:
     """Every `require` that compares a metric of the run with a limit; tells of the others."""
     written = {item.name for item in block.of_kind("metric")}
     found = []
@@ -296,7 +296,7 @@ def read_requirements(scope: Scope, block: Block) -> list[Comparison]:
                 f"`require {spell(comparison)}` went with the metric `{spell(metric)}`, which is removed"
             )
         else:
-            found.append(Comparison(statement, spell(metric), operator, limit))  # type: ignore[arg-type]
+            found.append(WrittenRequirement(statement, spell(metric), operator, limit))  # type: ignore[arg-type]
     return found
 
 
@@ -309,7 +309,7 @@ def share_metrics(structure: Structure) -> set[str]:
     return {use.name for use in structure.metrics if models.find("metric", use.model, use.place).share}
 
 
-def resolve_requirements(scope: Scope, read: list[Comparison], structure: Structure) -> tuple[Requirement, ...]:
+def resolve_requirements(scope: Scope, read: list[WrittenRequirement], structure: Structure) -> tuple[Requirement, ...]:
     """The requirements with their limits in SI."""
     metrics = metric_units(structure)
     shares = share_metrics(structure)

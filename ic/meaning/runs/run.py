@@ -19,9 +19,9 @@ from ic.meaning.control.link_sensors import resolve_link_sensors
 from ic.meaning.control.schedule import Rate, check_stability, fastest_rate
 from ic.meaning.control.servos import check_rest, check_start, resolve_servos
 from ic.meaning.control.substitution import check_brakes, check_ticks, resolve_substitutions
-from ic.meaning.definitions.merge import Block, Item, as_meant
+from ic.meaning.definitions.merge import Item, MergedBlock, as_meant
 from ic.meaning.definitions.resolve import Definition
-from ic.meaning.mechanics.arm import Arm, resolve_arm
+from ic.meaning.mechanics.arm import ResolvedArm, resolve_arm
 from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.payloads import check_payloads, resolve_payloads
 from ic.meaning.parameters.addresses import in_run
@@ -164,7 +164,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
 
 
 def _keep_settings(
-    scope: Scope, block: Block, arm: Arm, integrator: Any, rates: Mapping[str, Rate], schedule: Schedule
+    scope: Scope, block: MergedBlock, arm: ResolvedArm, integrator: Any, rates: Mapping[str, Rate], schedule: Schedule
 ) -> None:
     """What the run says besides parameters, for who asks; `Scope.constant` and `Scope.word` have kept some."""
     scope.setting("arm", arm.name, item=block.get("arm"))
@@ -181,7 +181,7 @@ def _keep_settings(
         scope.setting("seed", 0.0, "1")
 
 
-def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
+def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> None:
     metrics = [item.name for kind in RUN.named for item in block.of_kind(kind)]
     for item in block.items.values():
         if item.kind in RUN.named or (not item.kind and item.name in RUN.keys):
@@ -238,14 +238,16 @@ def _check_entries(scope: Scope, block: Block, definition: Definition) -> None:
             )
 
 
-def _inside(block: Block, key: str) -> list[str]:
+def _inside(block: MergedBlock, key: str) -> list[str]:
     """Names of the entries of a run's block that are blocks, or take one."""
     item = block.get(key)
     body = item.body if item is not None and item.value is None else None
-    return [each.name for each in (body or Block()).items.values() if isinstance(each.value, Call | Name) or each.body]
+    return [
+        each.name for each in (body or MergedBlock()).items.values() if isinstance(each.value, Call | Name) or each.body
+    ]
 
 
-def _arm(scope: Scope, run: Owner, item: Item | None) -> Arm | None:
+def _arm(scope: Scope, run: Owner, item: Item | None) -> ResolvedArm | None:
     if item is None:
         known = known_words("arms of this deck", scope.definitions.of_kind("arm"))
         scope.complaints.missing(

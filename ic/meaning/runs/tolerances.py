@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ic.grammar.places import place_of
 from ic.grammar.spell import spell
-from ic.meaning.definitions.merge import Block, Item
+from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.record import share_metrics
@@ -19,7 +19,7 @@ from met.trace import Scalar
 WRITE = "write `NAME = SIZE;`: `qd = 1e-6 rad/s;`, `elbow.q = 0.01 deg;`, `rel = 1e-9;`, `time = 1 ms;`"
 
 
-def resolve_tolerances(scope: Scope, body: Block, structure: Structure) -> tuple[Tolerance, ...]:
+def resolve_tolerances(scope: Scope, body: MergedBlock, structure: Structure) -> tuple[Tolerance, ...]:
     """In SI, in the order in which they are written. structure: with its metrics and record."""
     for statement in body.statements:
         scope.complaints.error(

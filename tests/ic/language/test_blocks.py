@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import ic
-from ic.language import BLOCKS, DEFINITIONS, HEADS, Block, Entry, choices
+from ic.language import BLOCKS, DEFINITIONS, HEADS, BlockDeclaration, Entry, choices
 from met import cli
 from met.plan import Experiment
 from tests.ic.small_decks import ARM, RUN, SERVO
@@ -16,7 +16,7 @@ from tests.ic.small_decks import ARM, RUN, SERVO
 ENTRIES = [(block, entry) for block in BLOCKS.values() for entry in block.entries]
 
 
-def named(value: tuple[Block, Entry]) -> str:
+def named(value: tuple[BlockDeclaration, Entry]) -> str:
     return f"{value[0].name}-{value[1].name}"
 
 
@@ -38,7 +38,7 @@ def test_programs_are_told_the_same(name: str, capsys: pytest.CaptureFixture[str
 
 
 @pytest.mark.parametrize("of", ENTRIES, ids=named)
-def test_an_entry_is_declared_whole(of: tuple[Block, Entry]) -> None:
+def test_an_entry_is_declared_whole(of: tuple[BlockDeclaration, Entry]) -> None:
     block, entry = of
     assert entry.doc and entry.default and entry.written.startswith(entry.name.split()[0])
     assert (entry.varies == "never") or entry.path
@@ -56,7 +56,7 @@ def experiment(tmp_path: Path, more: str = "") -> Experiment:
 @pytest.mark.parametrize(
     "of", [each for each in ENTRIES if each[1].varies == "number" and each[0].name in ("link", "joint")], ids=named
 )
-def test_numbers_of_arms_vary_by_their_declared_paths(of: tuple[Block, Entry], tmp_path: Path) -> None:
+def test_numbers_of_arms_vary_by_their_declared_paths(of: tuple[BlockDeclaration, Entry], tmp_path: Path) -> None:
     _, entry = of
     known = experiment(tmp_path).parameters
     structure = experiment(tmp_path).structure

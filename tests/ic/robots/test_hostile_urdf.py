@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from ic.robots.entries import body
+from ic.robots.entries import arm_entries
 from ic.robots.urdf import read
 from met.diagnostic import Problem
 from met.render import render
@@ -45,7 +45,7 @@ LONGEST = "<robot><link name='l0'/>" + "".join(
 def outcome(text: str) -> str | None:
     """The codes of what is said, None where the file is a robot."""
     try:
-        body(read("a.urdf", text))
+        arm_entries(read("a.urdf", text))
     except Problem as problem:
         assert render(problem.diagnostics, {"a.urdf": text})
         return " ".join(sorted({diagnostic.code for diagnostic in problem.diagnostics}))

@@ -12,7 +12,7 @@ import pytest
 from ic.grammar.syntax import Setting
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Values
+from ic.meaning.expressions.quantity import ValueList
 from ic.read import read
 from ic.text.complaints import Complaints
 from met import units
@@ -36,7 +36,7 @@ def lists(folder: Path, written: list[str]) -> list[tuple[float, ...]]:
     for let in syntax.entries:
         assert not isinstance(let, Setting)
         values = names.evaluate(let.value)  # type: ignore[union-attr]
-        assert isinstance(values, Values)
+        assert isinstance(values, ValueList)
         found.append(tuple(float(each.number) for each in values.items))  # type: ignore[union-attr, arg-type]
     return found
 

@@ -10,7 +10,7 @@ import pytest
 from ic.grammar.syntax import Name, Word
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Value, Values
+from ic.meaning.expressions.quantity import Value, ValueList
 from ic.read import read
 from ic.text.complaints import Complaints
 from met import units
@@ -19,7 +19,7 @@ from met.diagnostic import Place, Problem
 SOMEWHERE = Place("test", 1, 1)
 
 
-def value(folder: Path, expression: str, before: str = "") -> Value | Values:
+def value(folder: Path, expression: str, before: str = "") -> Value | ValueList:
     """What `let it = <expression>;` is worth."""
     path = folder / "deck.ic"
     path.write_text(f"{before}\nlet it = {expression};\n", encoding="utf-8")
@@ -37,7 +37,7 @@ def number(folder: Path, expression: str, before: str = "") -> float:
 
 def numbers(folder: Path, expression: str) -> list[float]:
     found = value(folder, expression)
-    assert isinstance(found, Values)
+    assert isinstance(found, ValueList)
     return [float(item.number) for item in found.items if isinstance(item, Value)]
 
 
@@ -199,7 +199,7 @@ def test_no_let_may_bear_the_name_of_a_unit_or_function(tmp_path: Path, name: st
 ])  # fmt: skip
 def test_a_number_in_a_unit_is_rounded_once_however_the_unit_comes_to_it(tmp_path: Path, written: str) -> None:
     found = value(tmp_path, written, "let half = 32.05;")
-    assert (found.items[0] if isinstance(found, Values) else found).number == 64100.0  # type: ignore[union-attr]
+    assert (found.items[0] if isinstance(found, ValueList) else found).number == 64100.0  # type: ignore[union-attr]
 
 
 def test_a_number_below_zero_in_a_unit_is_rounded_once_too(tmp_path: Path) -> None:
