@@ -27,9 +27,14 @@ DECK = click.argument("deck")
 @format_option
 @loudness_options
 def check(
-    deck: str, defines: tuple[str, ...], include_dirs: tuple[str, ...], settings: tuple[str, ...], form: str,
-    quiet: bool, verbose: bool,
-) -> int:  # fmt: skip
+    deck: str,
+    defines: tuple[str, ...],
+    include_dirs: tuple[str, ...],
+    settings: tuple[str, ...],
+    form: str,
+    quiet: bool,
+    verbose: bool,
+) -> int:
     """Find all that is wrong with a deck.
 
     Every run and sweep of it is compiled to its plan; nothing is run. A plan file is read, and what it holds is said.
@@ -250,9 +255,13 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @deck_options
 def dump(
-    stage: str, deck: str, names: tuple[str, ...], defines: tuple[str, ...], include_dirs: tuple[str, ...],
+    stage: str,
+    deck: str,
+    names: tuple[str, ...],
+    defines: tuple[str, ...],
+    include_dirs: tuple[str, ...],
     settings: tuple[str, ...],
-) -> None:  # fmt: skip
+) -> None:
     """Show what one stage of the way hands to the next.
 
     STAGE is tokens, syntax, model, plan, program, kernel or assembly.
@@ -286,9 +295,12 @@ def _plan(
 
 
 def _compiled(
-    deck: str, include_dirs: tuple[str, ...], defines: tuple[str, ...], settings: tuple[str, ...],
+    deck: str,
+    include_dirs: tuple[str, ...],
+    defines: tuple[str, ...],
+    settings: tuple[str, ...],
     select: tuple[str, ...] | Literal["all"] | None,
-) -> Compiled:  # fmt: skip
+) -> Compiled:
     """A deck with its plan. Raises Problem where it has none."""
     import ic
     from ic.find import find

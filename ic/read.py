@@ -50,9 +50,15 @@ def read(
     if not seen.whole or (findings.errors and not sound):
         raise Problem(found, {source.name: source.text for source in seen.sources})
     return Deck(
-        seen.sources[0].name, entries, seen.sources, found, tuple(os.fspath(each) for each in include_dirs),
-        os.fspath(path), tuple(defines), wrecks,
-    )  # fmt: skip
+        seen.sources[0].name,
+        entries,
+        seen.sources,
+        found,
+        tuple(os.fspath(each) for each in include_dirs),
+        os.fspath(path),
+        tuple(defines),
+        wrecks,
+    )
 
 
 def read_again(deck: Deck, defines: Sequence[str], *, library: Path = LIBRARY) -> Deck:

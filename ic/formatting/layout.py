@@ -91,8 +91,11 @@ def _settled(found: Sequence[Row], groups: Groups) -> list[list[int]] | None:
     columns = [_as_written(row) for row in found]
     reached: dict[Node, int] = {}  # by group: the column of its anchors
     positions = {id(row): at for at, row in enumerate(found)}
-    free = [(at, row, stands_below(row), TAB * goes_on(row)) for at, row in enumerate(found)
-            if row.kind in (CODE, REMARK) and not row.exact]  # fmt: skip
+    free = [
+        (at, row, stands_below(row), TAB * goes_on(row))
+        for at, row in enumerate(found)
+        if row.kind in (CODE, REMARK) and not row.exact
+    ]
     steps = {at: _steps(at, row, groups) for at, row, _, _ in free}
     for at, _, _, _ in free:
         columns[at] = [0] * max(1, len(steps[at]))

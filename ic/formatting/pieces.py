@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Kind = Literal[
     "name", "word", "number", "unit", "string", "open", "close", "stop", "operator", "sign", "comment", "other"
-]  # fmt: skip
+]
 
 WORDS = ("and", "or", "not", "when", "require", "by")
 """Behind these a value begins."""

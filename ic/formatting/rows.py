@@ -46,9 +46,23 @@ class Row:
     """
 
     __slots__ = (
-        "_lines", "_tabs", "behind", "closes", "exact", "kind", "opaque", "parent", "pieces", "raw", "start", "tab",
-        "tabbed", "tail", "tokens", "whole",
-    )  # fmt: skip
+        "_lines",
+        "_tabs",
+        "behind",
+        "closes",
+        "exact",
+        "kind",
+        "opaque",
+        "parent",
+        "pieces",
+        "raw",
+        "start",
+        "tab",
+        "tabbed",
+        "tail",
+        "tokens",
+        "whole",
+    )
 
     def __init__(self, source: Text, start: int, line: Sequence[Token], tab: int) -> None:
         self.start = start

@@ -76,12 +76,26 @@ class Cursor:
 
     # complaints
 
-    def tell(self, code: str, message: str, at: Token | Place | Label, *, also: Iterable[Label] = (),
-             help: str | Iterable[str] = ()) -> None:  # fmt: skip
+    def tell(
+        self,
+        code: str,
+        message: str,
+        at: Token | Place | Label,
+        *,
+        also: Iterable[Label] = (),
+        help: str | Iterable[str] = (),
+    ) -> None:
         self.findings.error(code, message, at.place if isinstance(at, Token) else at, also=also, help=help or ())
 
-    def fail(self, code: str, message: str, at: Token | Place | Label, *, also: Iterable[Label] = (),
-             help: str | Iterable[str] = ()) -> NoReturn:  # fmt: skip
+    def fail(
+        self,
+        code: str,
+        message: str,
+        at: Token | Place | Label,
+        *,
+        also: Iterable[Label] = (),
+        help: str | Iterable[str] = (),
+    ) -> NoReturn:
         if self.token.kind != BAD:  # of such a token enough has been said
             self.tell(code, message, at, also=also, help=help)
         raise Unreadable

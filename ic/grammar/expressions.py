@@ -128,9 +128,11 @@ class Expressions(Quantities):
             return self.with_unit(inner, opening)
         helps = {
             "{": "a block needs a name before it, as in `settling_time { ... }`",
-            ";": "the value is missing", "}": "the value is missing", "%": "`%` follows its number: `2 %`",
+            ";": "the value is missing",
+            "}": "the value is missing",
+            "%": "`%` follows its number: `2 %`",
             "..": "a range is written `first .. last by step`",
-        }  # fmt: skip
+        }
         self.unexpected("a value", help=helps.get(token.text, ()))
 
     def with_unit(self, inner: Expression, opening: Token) -> Expression:
@@ -189,8 +191,12 @@ class Expressions(Quantities):
             text = token.text if unit is None else unit.text
             if name.text == "pi":
                 turn = f"; a whole turn is `1 cycle{text.removeprefix('rad')}`" if token.text == "rad" else ""
-                self.fail("D030", "a unit follows a number or brackets, and `pi` is neither", token,
-                          help=f"put brackets around the number, as in `(2*pi) {text}`{turn}")  # fmt: skip
+                self.fail(
+                    "D030",
+                    "a unit follows a number or brackets, and `pi` is neither",
+                    token,
+                    help=f"put brackets around the number, as in `(2*pi) {text}`{turn}",
+                )
             known = name.text[:LONGEST_NUMBER]
             helps = ("what it names has its unit already", f"if it is a bare number, write `({known}) {text}`")
             self.fail("D030", f"`{known}` is a name, and only a number takes a unit", token, help=helps)
@@ -216,9 +222,14 @@ class Expressions(Quantities):
         ):
             number = self.tokens[self.at - 2]
             factor = before == "*" and number.kind in NUMBERS  # `2 * m`
-            self.fail("D025", f"`{token.text}` is the unit {word}, and stands here without a number", token,
-                      help=f"write `{number.text} {token.text}`" if factor
-                      else f"write `1 {token.text}`; behind a unit, as in `2 m/s`, it needs none")  # fmt: skip
+            self.fail(
+                "D025",
+                f"`{token.text}` is the unit {word}, and stands here without a number",
+                token,
+                help=f"write `{number.text} {token.text}`"
+                if factor
+                else f"write `1 {token.text}`; behind a unit, as in `2 m/s`, it needs none",
+            )
 
     def call(self, name: Name, first: Token) -> Expression:
         self.enter()
@@ -234,9 +245,13 @@ class Expressions(Quantities):
                 start = self.token
                 positional.append(self.value())
                 if named:
-                    self.tell("D034", "an argument without a name stands behind one with a name", start,
-                              also=(Label(named[-1][0].place, "this one has a name"),),
-                              help="give it a name, too: `NAME = VALUE`")  # fmt: skip
+                    self.tell(
+                        "D034",
+                        "an argument without a name stands behind one with a name",
+                        start,
+                        also=(Label(named[-1][0].place, "this one has a name"),),
+                        help="give it a name, too: `NAME = VALUE`",
+                    )
             if not self.another(")"):
                 break
         closing = self.leave("`,` or ")

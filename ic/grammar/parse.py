@@ -99,8 +99,9 @@ class _Parser(Expressions):
         if len(names) == 1 and behind == 1 and tokens[behind:] and tokens[behind].text == "(":  # likewise, misspelt
             known += [token.text for token in tokens if token.kind == NAME]
         if any(token.kind == BAD for token in tokens):  # a macro's use, perhaps: its arguments may be names
-            known += re.findall(r"[A-Za-z_]\w*", last.source.rest_of_line(first.offset if first.source is last.source
-                                                                         else last.offset))  # fmt: skip
+            known += re.findall(
+                r"[A-Za-z_]\w*", last.source.rest_of_line(first.offset if first.source is last.source else last.offset)
+            )
         self.wrecks.append(Wreck(at, (end.line, end.column + end.length), tuple(known), None if sets else self.within))
         if not sets:
             return []
@@ -132,8 +133,13 @@ class _Parser(Expressions):
                 Label(inner.place, f"perhaps this one: the `}}` on line {closing.line} that closes it is indented less")
             ]
         self.unbalanced = True
-        self.tell("D022", f"this `{opening.text}` is not closed", opening, also=also,
-                  help=f"write the `{OPENING[opening.text]}` where it ends")  # fmt: skip
+        self.tell(
+            "D022",
+            f"this `{opening.text}` is not closed",
+            opening,
+            also=also,
+            help=f"write the `{OPENING[opening.text]}` where it ends",
+        )
         raise EndedInsideBlock
 
     def closes_nothing(self) -> None:
@@ -169,8 +175,12 @@ class _Parser(Expressions):
         if text == "(" and _made_from(names, tail):
             return self.group_from(names)
         if self.token.kind == STRING and names[0].text == "arm" and names[-1].text == "from":
-            self.fail("D020", "a file is named by what it is", self.token,
-                      help=f"write `from urdf({self.token.text[:SHOWN]})`")  # fmt: skip
+            self.fail(
+                "D020",
+                "a file is named by what it is",
+                self.token,
+                help=f"write `from urdf({self.token.text[:SHOWN]})`",
+            )
         if text == "," and _base_at(names) is not None:
             self.fail("D032", "there is one base only", self.token, help="a definition takes after one other")
         if text in ("-=", "*=", "/="):
@@ -194,8 +204,12 @@ class _Parser(Expressions):
         ):
             last += 1
         file = "".join(token.text for token in self.tokens[first : last + 1])
-        self.fail("D020", "the name of a file stands in quotes", span(self.tokens[first], self.tokens[last]),
-                  help=f'write `from urdf("{file[:SHOWN]}")`')  # fmt: skip
+        self.fail(
+            "D020",
+            "the name of a file stands in quotes",
+            span(self.tokens[first], self.tokens[last]),
+            help=f'write `from urdf("{file[:SHOWN]}")`',
+        )
 
     def line_break_in(self, names: list[Token]) -> bool:
         """Whether a new line breaks a run of names that cannot be one entry: `q` and, below it, `mass = 3;`."""
@@ -215,8 +229,12 @@ class _Parser(Expressions):
 
     def no_brace(self, names: list[Token]) -> None:
         """`servo light like strong` without the `{` of its block; its entries are skipped where they follow."""
-        self.tell("D020", f"expected `{{` after `{names[-1].text[:40]}`", self.behind(names[-1]),
-                  help="a definition has a block, `... like BASE { ... }`; `;` stands for an empty one")  # fmt: skip
+        self.tell(
+            "D020",
+            f"expected `{{` after `{names[-1].text[:40]}`",
+            self.behind(names[-1]),
+            help="a definition has a block, `... like BASE { ... }`; `;` stands for an empty one",
+        )
         inside = self.token.kind == NAME and self.following.text in ("=", "+=")
         inside = inside or (self.token.text == "}" and not self.open)
         depth = 0
@@ -265,8 +283,12 @@ class _Parser(Expressions):
     def group(self, names: list[Token], tail: list[Token]) -> Group:
         base = _base_at(names)
         if tail and (base is None or base + 2 != len(names)):
-            self.fail("D020", "a block's name has no points", span(names[-1], tail[-1]),
-                      help=f"write `{names[-1].text} {{ {tail[0].text} {{ ... }} }}`")  # fmt: skip
+            self.fail(
+                "D020",
+                "a block's name has no points",
+                span(names[-1], tail[-1]),
+                help=f"write `{names[-1].text} {{ {tail[0].text} {{ ... }} }}`",
+            )
         like = of = None
         words = names
         while base is not None:
@@ -294,8 +316,9 @@ class _Parser(Expressions):
         """`arm NAME from urdf("FILE") { ... }`: the block that follows is the group's, not the call's."""
         words, called = names[:-2], names[-1]
         if _base_at(words) is not None:
-            self.fail("D032", f"`{words[-2].text}` and `from` both name a base", names[-2],
-                      help="there is one base only")  # fmt: skip
+            self.fail(
+                "D032", f"`{words[-2].text}` and `from` both name a base", names[-2], help="there is one base only"
+            )
         closing, depth = self.at + 1, 1
         while depth and self.tokens[closing].kind != END:
             depth += {"(": 1, ")": -1}.get(self.tokens[closing].text, 0)

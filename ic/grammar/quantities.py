@@ -59,8 +59,12 @@ class Quantities(Cursor):
             over = self.unit_factor(self.at + 2, -1, 0)
             named = self.tokens[self.at + 2]
             if over is None and named.kind == NAME and not units.is_unit(named.text) and not self.on_new_line(self.at):
-                self.fail("D028", f"`{named.text}` is not a unit", named,
-                          help=other_units.remedy(named.text) or _units_known())  # fmt: skip
+                self.fail(
+                    "D028",
+                    f"`{named.text}` is not a unit",
+                    named,
+                    help=other_units.remedy(named.text) or _units_known(),
+                )
         if token.kind != NAME and token.text not in ("%", "(") and over is None:
             return None
         if self.begins_entry(self.at):
@@ -75,8 +79,12 @@ class Quantities(Cursor):
             return None
         factors, self.at = product
         if self.token.text == "^":
-            self.fail("D030", "a unit's exponent is a whole number from -9 to 9", self.following,
-                      help=f"for a power of the quantity write `(... {self.previous.text})^n`")  # fmt: skip
+            self.fail(
+                "D030",
+                "a unit's exponent is a whole number from -9 to 9",
+                self.following,
+                help=f"for a power of the quantity write `(... {self.previous.text})^n`",
+            )
         if len(factors) > MOST_FACTORS:
             self.fail("D030", f"a unit has at most {MOST_FACTORS} factors", token)
         self.not_a_second_unit(start)
@@ -165,8 +173,9 @@ class Quantities(Cursor):
         if more.kind == NAME and near is not None:
             self.fail("D030", "units are multiplied with `*`", more, help=f"write `{before}*{near}`")
         if more.kind == WHOLE and sign.text == "-" and len(more.text) == 1 and at + 3 < len(self.tokens):
-            self.fail("D030", "a unit's exponent stands behind `^`", span(sign, more),
-                      help=f"write `{before}^-{more.text}`")  # fmt: skip
+            self.fail(
+                "D030", "a unit's exponent stands behind `^`", span(sign, more), help=f"write `{before}^-{more.text}`"
+            )
 
     def unknown_unit(self) -> None:
         """A name behind a number that is no unit: says so, and takes it for one."""

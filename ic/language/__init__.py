@@ -25,9 +25,13 @@ DEFINITIONS = tuple(block.name for block in BLOCKS.values() if not block.within)
 NAMED = ("JOINT", "SERVO")
 """What stands in declared paths for a name of the deck's with which a path begins."""
 
-HEADS = tuple(sorted({
-    entry.path.partition(".")[0] for block in BLOCKS.values() for entry in block.entries if "." in entry.path
-}.difference(NAMED)))  # fmt: skip
+HEADS = tuple(
+    sorted(
+        {
+            entry.path.partition(".")[0] for block in BLOCKS.values() for entry in block.entries if "." in entry.path
+        }.difference(NAMED)
+    )
+)
 """The first words of paths in a run, which are no names of joints, arms or servos."""
 
 

@@ -54,27 +54,45 @@ JOINT = BlockDeclaration(
 )  # fmt: skip
 
 PAYLOAD_AT = Parameter(name="at", unit="m", shape="vector", default=ZEROS, doc="the payload's frame in the link's")
-PAYLOAD_RPY = Parameter(name="rpy", unit="rad", shape="vector", default=ZEROS,
-                        doc="turns of the payload's frame about fixed x, y, z of the link's")  # fmt: skip
+PAYLOAD_RPY = Parameter(
+    name="rpy",
+    unit="rad",
+    shape="vector",
+    default=ZEROS,
+    doc="turns of the payload's frame about fixed x, y, z of the link's",
+)
 GRAPPLE = Parameter(name="grapple", unit="s", at_least=0.0, doc="time at which the link grapples it")
 RELEASE = Parameter(name="release", unit="s", at_least=0.0, doc="time at which the link releases it")
 POSITION = Parameter(name="position", unit="m", shape="vector", doc="the payload's frame at the start, world axes")
-ATTITUDE = Parameter(name="attitude", unit="rad", shape="vector", default=ZEROS,
-                     doc="its turns about fixed x, y, z")  # fmt: skip
+ATTITUDE = Parameter(name="attitude", unit="rad", shape="vector", default=ZEROS, doc="its turns about fixed x, y, z")
 VELOCITY = Parameter(name="velocity", unit="m/s", shape="vector", default=ZEROS, doc="of its frame, world axes")
 RATE = Parameter(name="rate", unit="rad/s", shape="vector", default=ZEROS, doc="its angular velocity, world axes")
 
 
 def _as_of_a_link(entry: Entry) -> Entry:
-    return Entry(name=entry.name, written=entry.written, doc=entry.doc.replace("link frame", "its own frame").replace(
-                     "link axes", "its own axes").replace("; `0 kg` makes the link a frame, without inertia", ""),
-                 default=entry.default, parameter=entry.parameter, varies=entry.varies,
-                 path=entry.path.replace("links.LINK", "payloads.PAYLOAD"))  # fmt: skip
+    return Entry(
+        name=entry.name,
+        written=entry.written,
+        doc=entry.doc.replace("link frame", "its own frame")
+        .replace("link axes", "its own axes")
+        .replace("; `0 kg` makes the link a frame, without inertia", ""),
+        default=entry.default,
+        parameter=entry.parameter,
+        varies=entry.varies,
+        path=entry.path.replace("links.LINK", "payloads.PAYLOAD"),
+    )
 
 
 def _of_flight(wanted: Parameter, doc: str, default: str, written: str) -> Entry:
-    return Entry(name=wanted.name, written=written, parameter=wanted, varies="number",
-                 path=f"payloads.PAYLOAD.{wanted.name}", default=default, doc=doc)  # fmt: skip
+    return Entry(
+        name=wanted.name,
+        written=written,
+        parameter=wanted,
+        varies="number",
+        path=f"payloads.PAYLOAD.{wanted.name}",
+        default=default,
+        doc=doc,
+    )
 
 
 PAYLOAD = BlockDeclaration(

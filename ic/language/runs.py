@@ -7,18 +7,35 @@ from met.parameter import Parameter
 
 DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
 SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")
-VELOCITY_PRODUCTS = Parameter(name="velocity_products", shape="word", words=("on", "off"), default="on",
-                              doc="Coriolis, centrifugal and gyroscopic torques")  # fmt: skip
-BALANCED = Parameter(name="servos", shape="word", words=("unloaded", "balanced"), default="unloaded",
-                     doc="whether servos begin with what keeps their joints from accelerating")  # fmt: skip
+VELOCITY_PRODUCTS = Parameter(
+    name="velocity_products",
+    shape="word",
+    words=("on", "off"),
+    default="on",
+    doc="Coriolis, centrifugal and gyroscopic torques",
+)
+BALANCED = Parameter(
+    name="servos",
+    shape="word",
+    words=("unloaded", "balanced"),
+    default="unloaded",
+    doc="whether servos begin with what keeps their joints from accelerating",
+)
 BASE_KINDS = ("fixed", "prescribed", "free")
 BED, LAW = "emulated", "velocity_tracking"
 """The models of a bed and of its law where a deck names none."""
 
 
 def _rate(name: str, doc: str, default: str) -> Entry:
-    return Entry(name=name, written=f"{name} = 500 Hz;", default=default, varies="choice", path=f"rates.{name}",
-                 parameter=Parameter(name=name, unit="Hz", above=0.0, doc=doc), doc=doc)  # fmt: skip
+    return Entry(
+        name=name,
+        written=f"{name} = 500 Hz;",
+        default=default,
+        varies="choice",
+        path=f"rates.{name}",
+        parameter=Parameter(name=name, unit="Hz", above=0.0, doc=doc),
+        doc=doc,
+    )
 
 
 RATES = BlockDeclaration(

@@ -47,11 +47,18 @@ def block_json(block: BlockDeclaration) -> list[dict[str, Any]]:
     """The entries of a block, for programs."""
     return [
         {
-            "name": each.name, "form": each.form, "written": each.written, "doc": each.doc, "default": each.default,
-            "type": type_of(each), "unit": each.unit, "varies": each.varies, "path": each.path,
+            "name": each.name,
+            "form": each.form,
+            "written": each.written,
+            "doc": each.doc,
+            "default": each.default,
+            "type": type_of(each),
+            "unit": each.unit,
+            "varies": each.varies,
+            "path": each.path,
         }
         for each in block.entries
-    ]  # fmt: skip
+    ]
 
 
 def table(block: BlockDeclaration) -> Iterator[str]:

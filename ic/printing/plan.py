@@ -159,9 +159,14 @@ def _bodies(experiment: Experiment) -> Iterator[str]:
     for link in experiment.structure.links:
         com = values.numbers(f"links.{link.name}.com", ("x", "y", "z"))
         moments = values.numbers(f"links.{link.name}.inertia", ("xx", "yy", "zz", "xy", "xz", "yz"))
-        rows.append((link.name, values.shown(f"links.{link.name}.mass"),
-                     "varies" if com is None else vector(com, "m"),
-                     "varies" if moments is None else vector(moments, "kg*m^2")))  # fmt: skip
+        rows.append(
+            (
+                link.name,
+                values.shown(f"links.{link.name}.mass"),
+                "varies" if com is None else vector(com, "m"),
+                "varies" if moments is None else vector(moments, "kg*m^2"),
+            )
+        )
     yield from columns(rows)
 
 
@@ -179,11 +184,18 @@ def _base(experiment: Experiment, base: Base) -> Iterator[str]:
         yield from columns(rows)
         return
     yield "Base: moves as it is told; its other components stay 0"
-    yield from columns([
-        (course.component, course.model,
-         ", ".join(_given(experiment, f"{BASE}.{course.component}", models.find("command", course.model).parameters)))
-        for course in base.courses
-    ])  # fmt: skip
+    yield from columns(
+        [
+            (
+                course.component,
+                course.model,
+                ", ".join(
+                    _given(experiment, f"{BASE}.{course.component}", models.find("command", course.model).parameters)
+                ),
+            )
+            for course in base.courses
+        ]
+    )
 
 
 def _payloads(experiment: Experiment) -> Iterator[str]:
@@ -278,8 +290,10 @@ def _substitutions(experiment: Experiment) -> Iterator[str]:
     yield f"On a bed: the {motors} of {joints}; what is not told here is the servo's, or the default"
     rows = []
     for use in experiment.structure.substitutions:
-        for joint, kind, model in ((use.joint, "bed", models.find("bed", use.bed)),
-                                   ("", "law", models.find("law", use.law))):  # fmt: skip
+        for joint, kind, model in (
+            (use.joint, "bed", models.find("bed", use.bed)),
+            ("", "law", models.find("law", use.law)),
+        ):
             chosen = []
             for parameter in model.parameters:
                 path, of_servo = f"{use.joint}.{kind}.{parameter.name}", f"{use.joint}.servo.{parameter.of_servo}"
@@ -287,8 +301,9 @@ def _substitutions(experiment: Experiment) -> Iterator[str]:
                 if found is None or found.origin.kind == "default":
                     continue
                 if servos is None or (found.origin.place, values.shown(path)) != (
-                    servos.origin.place, values.shown(of_servo)
-                ):  # fmt: skip
+                    servos.origin.place,
+                    values.shown(of_servo),
+                ):
                     chosen.append(f"{parameter.name} = {values.shown(path)}")
             whole = ", ".join(each.replace(" ", FIXED_SPACE) for each in chosen)
             first, *more = textwrap.wrap(whole, CHOSEN, break_on_hyphens=False) or [""]

@@ -124,8 +124,12 @@ def _dh() -> Iterator[str]:
     yield ""
     yield from _prose(dh.__doc__ or "")
     yield ""
-    yield from _table([("name", "unit", "default", "meaning"),
-                       *((each.name, each.unit, default(each), each.doc) for each in dh.NUMBERS)])  # fmt: skip
+    yield from _table(
+        [
+            ("name", "unit", "default", "meaning"),
+            *((each.name, each.unit, default(each), each.doc) for each in dh.NUMBERS),
+        ]
+    )
 
 
 def _channels() -> Iterator[str]:
@@ -136,8 +140,10 @@ def _channels() -> Iterator[str]:
     yield "`.x`, one component of a vector."
     yield ""
     found = subjects.channels()
-    told = [(each["path"], unit_in_words(each["unit"]), each["components"], each["meaning"], each["frame"])
-            for each in found]  # fmt: skip
+    told = [
+        (each["path"], unit_in_words(each["unit"]), each["components"], each["meaning"], each["frame"])
+        for each in found
+    ]
     yield from _table([("channel", "unit", "components", "meaning", "axes"), *told])
     yield ""
     yield from _table([("channel", "is"), *subjects.OF_ANY])

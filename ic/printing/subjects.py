@@ -116,8 +116,10 @@ BEGIN = (shapes.__doc__ or "").strip().split("\n\n", 1)[1]
 
 
 def shapes_json() -> list[dict[str, Any]]:
-    return [{"name": name, "parameters": [{field: getattr(p, field) for field in FIELDS} for p in shape.parameters]}
-            for name, shape in shapes.SHAPES.items()]  # fmt: skip
+    return [
+        {"name": name, "parameters": [{field: getattr(p, field) for field in FIELDS} for p in shape.parameters]}
+        for name, shape in shapes.SHAPES.items()
+    ]
 
 
 def print_substitute() -> Iterator[str]:
@@ -142,8 +144,10 @@ def print_substitute() -> Iterator[str]:
 
 def unit_table() -> list[dict[str, Any]]:
     """Every unit: its name, its word, and what one of it is in SI."""
-    return [{"name": name, "word": unit.word, "scale": unit.measure.scale, "si": units.text(unit.measure.dimension)}
-            for name, unit in units.UNITS.items()]  # fmt: skip
+    return [
+        {"name": name, "word": unit.word, "scale": unit.measure.scale, "si": units.text(unit.measure.dimension)}
+        for name, unit in units.UNITS.items()
+    ]
 
 
 def print_units() -> Iterator[str]:

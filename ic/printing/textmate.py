@@ -31,9 +31,11 @@ SCOPE = "source.met"
 FOLDER = Path(__file__).parents[2] / "docs" / "editors"
 NAMES = ("met.tmLanguage.json", "met.tmLanguage")
 
-STATEMENTS = (*dict.fromkeys(
-    word for block in BLOCKS.values() for statement in block.statements for word in statement.split()
-), "remove", "macro")  # fmt: skip
+STATEMENTS = (
+    *dict.fromkeys(word for block in BLOCKS.values() for statement in block.statements for word in statement.split()),
+    "remove",
+    "macro",
+)
 """Words that begin an entry, or stand in one, and name nothing."""
 
 PARTS = tuple(dict.fromkeys(word for block in BLOCKS.values() for word in block.named))
@@ -61,14 +63,16 @@ def grammar() -> dict[str, Any]:
                 {"name": _named("comment.block"), "begin": r"/\*", "end": r"\*/"},
             ),
             "string": {
-                "name": _named("string.quoted.double"), "begin": '"', "end": r'"|$',
+                "name": _named("string.quoted.double"),
+                "begin": '"',
+                "end": r'"|$',
                 "patterns": [_match("constant.character.escape", r"\\.")],
             },
             "number": _numbers(),
             "entry": _entries(),
             "value": _values(),
         },
-    }  # fmt: skip
+    }
 
 
 def _named(scope: str) -> str:
@@ -98,23 +102,40 @@ def _preprocessor() -> dict[str, Any]:
     """A directive up to the end of its line, and of those that a backslash joins to it."""
     named = ("define", "undef", "ifdef", "ifndef")
     end = r"(?<!\\)(?=\n)|(?=//|/\*)"
-    keyword = {"1": {"name": _named("punctuation.definition.directive")},
-               "2": {"name": _named("keyword.control.directive")}}  # fmt: skip
+    keyword = {
+        "1": {"name": _named("punctuation.definition.directive")},
+        "2": {"name": _named("keyword.control.directive")},
+    }
     shared = {"name": _named("meta.preprocessor"), "end": end}
     inside = [
         _match("constant.character.escape.line-continuation", r"\\$"),
         _match("keyword.operator.preprocessor", r"\bdefined\b|##?"),
-        {"include": "#string"}, {"include": "#number"}, {"include": "#entry"}, {"include": "#value"},
-    ]  # fmt: skip
+        {"include": "#string"},
+        {"include": "#number"},
+        {"include": "#entry"},
+        {"include": "#value"},
+    ]
     return _patterns(
-        {**shared, "begin": r"^\s*(#)\s*(include)\b", "beginCaptures": keyword,
-         "patterns": [_match("string.quoted.other.lt-gt.include", r"<[^>]*>"), {"include": "#string"}]},
-        {**shared, "begin": rf"^\s*(#)\s*({_any(named)})\s+({NAME})",
-         "beginCaptures": {**keyword, "3": {"name": _named("entity.name.function.preprocessor")}}, "patterns": inside},
-        {**shared, "begin": r"^\s*(#)\s*(error|warning)\b", "beginCaptures": keyword,
-         "patterns": [_match("string.unquoted", r".+$")]},
+        {
+            **shared,
+            "begin": r"^\s*(#)\s*(include)\b",
+            "beginCaptures": keyword,
+            "patterns": [_match("string.quoted.other.lt-gt.include", r"<[^>]*>"), {"include": "#string"}],
+        },
+        {
+            **shared,
+            "begin": rf"^\s*(#)\s*({_any(named)})\s+({NAME})",
+            "beginCaptures": {**keyword, "3": {"name": _named("entity.name.function.preprocessor")}},
+            "patterns": inside,
+        },
+        {
+            **shared,
+            "begin": r"^\s*(#)\s*(error|warning)\b",
+            "beginCaptures": keyword,
+            "patterns": [_match("string.unquoted", r".+$")],
+        },
         {**shared, "begin": rf"^\s*(#)\s*({_any(DIRECTIVES)})\b", "beginCaptures": keyword, "patterns": inside},
-    )  # fmt: skip
+    )
 
 
 def _unit() -> str:
@@ -142,13 +163,17 @@ def _entries() -> dict[str, Any]:
         _groups(rf"\b({kinds})\s+({NAME})(?=\s+(?:like|of|from)\b|\s*[{{=;])", "storage.type", "entity.name.type"),
         _groups(rf"\b(like|of)\s+({PATH})(?=\s*(?:[{{;]|\bof\b))", "keyword.other", "entity.other.inherited-class"),
         _groups(rf"\b(let)\s+({NAME})(?=\s*=)", "storage.type", "variable.other.constant"),
-        _groups(rf"\b(joint)\s+({NAME})\s+({_any(JOINT_KINDS)})\b",
-                "storage.type.part", "entity.name.section", "storage.modifier.joint"),
+        _groups(
+            rf"\b(joint)\s+({NAME})\s+({_any(JOINT_KINDS)})\b",
+            "storage.type.part",
+            "entity.name.section",
+            "storage.modifier.joint",
+        ),
         _groups(rf"\b({_any(PARTS)})\s+({NAME})(?=\s*[={{;])", "storage.type.part", "entity.name.section"),
         _groups(rf"\b({_any(STATEMENTS)})\b(?=\s+[^=\s]|\s*\{{|\s*\(|\s*\")(?!\s*\+=)", "keyword.control"),
         _groups(rf"\b({_any(_keys())})(?=\s*(?:\+=|=(?!=)|\{{))", "support.type.property-name"),
         _groups(rf"\b({PATH})(?=\s*(?:\+=|=(?!=)))", "variable.other.property"),
-    )  # fmt: skip
+    )
 
 
 def _values() -> dict[str, Any]:
@@ -169,8 +194,12 @@ def _values() -> dict[str, Any]:
 
 def _keys() -> set[str]:
     """Every key that the language or a model of MET's own knows."""
-    declared = {parameter.name for kind in models.GROUPS for model in models.find_own(kind).values()
-                for parameter in models.written(model)}  # fmt: skip
+    declared = {
+        parameter.name
+        for kind in models.GROUPS
+        for model in models.find_own(kind).values()
+        for parameter in models.written(model)
+    }
     shaped = {parameter.name for shape in SHAPES.values() for parameter in shape.parameters}
     numbered = {number.name for number in dh.NUMBERS}
     return declared | shaped | numbered | {key for block in BLOCKS.values() for key in block.keys}

@@ -122,8 +122,11 @@ def _called(part: RobotEntry, kind: str, changed: Mapping[tuple[str, str], str])
 
 
 def _runs(body: ArmEntries, arm: str) -> Iterator[str]:
-    joints = {part.entry.words[1].text: part.of for part in body.joints
-              if isinstance(part.of, Joint) and part.of.type.text in MOVING}  # fmt: skip
+    joints = {
+        part.entry.words[1].text: part.of
+        for part in body.joints
+        if isinstance(part.of, Joint) and part.of.type.text in MOVING
+    }
     if not joints:
         return
     taken = {*joints, *(part.entry.words[1].text for part in body.links)}

@@ -145,12 +145,20 @@ def _joint(element: Element, dropped: dict[str, list[Place]]) -> Joint:
         given = mimic.attributes
         law = ", ".join(f"{each} {shown(given[each])}" for each in ("multiplier", "offset") if each in given)
     return Joint(
-        name, kind, parent, child, at, rpy,
+        name,
+        kind,
+        parent,
+        child,
+        at,
+        rpy,
         None if axis is None or kind.text not in TYPES[:3] else numbers(axis, "xyz", 3),
-        {name: value for name, value in limits.items() if value is not None}, None if limit is None else limit.place,
-        friction, None if dynamics is None or not any(friction.values()) else dynamics.place,
-        None if mimic is None else word(mimic, "joint", '<mimic joint="..."/>'), law,
-    )  # fmt: skip
+        {name: value for name, value in limits.items() if value is not None},
+        None if limit is None else limit.place,
+        friction,
+        None if dynamics is None or not any(friction.values()) else dynamics.place,
+        None if mimic is None else word(mimic, "joint", '<mimic joint="..."/>'),
+        law,
+    )
 
 
 def _friction(dynamics: Element | None) -> dict[str, float]:

@@ -17,17 +17,30 @@ def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
     """named: where the deck names the file."""
     labels = list(_left_out(body))
     if labels:
-        yield Diagnostic("D210", f"not all that `{body.robot.file}` says is in this arm", Label(named), tuple(labels),
-                         ("`met import` makes a deck of such a file, with limits and friction beside each joint",),
-                         "warning")  # fmt: skip
+        yield Diagnostic(
+            "D210",
+            f"not all that `{body.robot.file}` says is in this arm",
+            Label(named),
+            tuple(labels),
+            ("`met import` makes a deck of such a file, with limits and friction beside each joint",),
+            "warning",
+        )
     changed = body.names.changed
     if changed:
-        also = tuple(Label(each.written.place, f"{each.kind} `{shown(each.written.text)}` is `{each.name}`")
-                     for each in changed[:MOST_NAMED])  # fmt: skip
+        also = tuple(
+            Label(each.written.place, f"{each.kind} `{shown(each.written.text)}` is `{each.name}`")
+            for each in changed[:MOST_NAMED]
+        )
         more = f", and {len(changed) - MOST_NAMED} more" if len(changed) > MOST_NAMED else ""
         what = f"{_count(len(changed), 'name')} of `{body.robot.file}`"
-        yield Diagnostic("D211", f"{what} {'is' if len(changed) == 1 else 'are'} another in decks{more}", Label(named),
-                         also, ("a deck's names are letters, digits and `_`, each once",), "warning")  # fmt: skip
+        yield Diagnostic(
+            "D211",
+            f"{what} {'is' if len(changed) == 1 else 'are'} another in decks{more}",
+            Label(named),
+            also,
+            ("a deck's names are letters, digits and `_`, each once",),
+            "warning",
+        )
 
 
 def _left_out(body: ArmEntries) -> Iterator[Label]:
@@ -40,8 +53,10 @@ def _left_out(body: ArmEntries) -> Iterator[Label]:
         yield Label(limited[0].limits_at, f"limits of {_joints(body, limited)}: an arm has none")
     rubbing = [joint for joint in robot.joints if joint.friction_at is not None and joint.type.text in MOVING]
     if rubbing and rubbing[0].friction_at is not None:
-        yield Label(rubbing[0].friction_at, f"damping and friction of {_joints(body, rubbing)}: a servo has these, "
-                    "such as `passive`")  # fmt: skip
+        yield Label(
+            rubbing[0].friction_at,
+            f"damping and friction of {_joints(body, rubbing)}: a servo has these, such as `passive`",
+        )
     if robot.dropped:
         kinds = sorted(robot.dropped.items(), key=lambda kind: (-len(kind[1]), kind[0]))
         told = [f"{len(places)} `{shown(tag)}`" for tag, places in kinds[:MOST_NAMED]]

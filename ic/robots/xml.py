@@ -138,18 +138,19 @@ def _not_xml(source: XmlSource, at: int, code: int, open_: list[Element]) -> Dia
     why = expat.ErrorString(code) or "it cannot be read"
     name = f"`{open_[-1].tag[:SHOWN]}`" if open_ else ""
     helps = {
-        "XML or text declaration not at start of entity":
-            "`<?xml ... ?>` stands at the very beginning of a file, with nothing before it, or not at all",
+        "XML or text declaration not at start of entity": "`<?xml ... ?>` stands at the very beginning of a file, with "
+        "nothing before it, or not at all",
         "no element found": f"the file ends inside {name}: its end is missing" if open_ else "the file is empty",
         "mismatched tag": f"{name} is open here: it is to be closed first",
         "junk after document element": "a file has one outermost element, `<robot>`",
-        "unclosed token": "`<!--` begins a comment, which `-->` ends" if source.data.startswith(b"<!--", at)
-                          else "a `<` begins a tag, which `>` ends",
+        "unclosed token": "`<!--` begins a comment, which `-->` ends"
+        if source.data.startswith(b"<!--", at)
+        else "a `<` begins a tag, which `>` ends",
         "not well-formed (invalid token)": _of_token(source.data, at),
         "duplicate attribute": "an attribute stands once in a tag",
         "undefined entity": "five have a meaning: &lt; &gt; &amp; &quot; &apos;",
-        "unbound prefix": "declare it in `<robot xmlns:PREFIX=\"...\">`",
-    }  # fmt: skip
+        "unbound prefix": 'declare it in `<robot xmlns:PREFIX="...">`',
+    }
     left_open = bool(open_) and why in ("mismatched tag", "no element found")
     return error(
         "D200",

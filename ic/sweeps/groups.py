@@ -182,12 +182,13 @@ class _Sweep:
         count = int(np.count_nonzero(keep))
         scope.checks.run(values, count)
         cases = Cases(
-            count, coordinates(scope, there, values, _dependents(scope)),
+            count,
+            coordinates(scope, there, values, _dependents(scope)),
             resolved.seed if there.seed is None else there.seed,
             "independent" if there.independent is not None else "common",
             tuple(Choice(column.path, option.text, option.place) for column, option in choices),
             repeats(there, rows[keep]),
-        )  # fmt: skip
+        )
         made = experiment(scope, sweep.name, sweep.place, resolved, cases)
         made = replace(made, notes=(*(axis.note for axis in there.axes if axis.note), *made.notes))
         if not self.complaints.errors:

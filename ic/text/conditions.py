@@ -53,8 +53,12 @@ def well_formed(directive: Token, args: Sequence[Token], findings: Findings) -> 
     """Whether there is a condition, and each `defined` in it is followed by a name."""
     written = [token for token in args if token.kind != SPACE]
     if not written:
-        findings.error("D009", f"`#{directive.text}` needs a condition", directive.place,
-                       help=f"write `#{directive.text} NAME == 1`, or another condition")  # fmt: skip
+        findings.error(
+            "D009",
+            f"`#{directive.text}` needs a condition",
+            directive.place,
+            help=f"write `#{directive.text} NAME == 1`, or another condition",
+        )
         return False
     if len(written) > MOST_TERMS:
         findings.error("D018", f"a condition has at most {MOST_TERMS} tokens", directive.place)
@@ -155,8 +159,9 @@ class _Condition:
             after = self.tokens[self.at]
             if after.source is token.source and after.offset == token.end:
                 both = token.source.place(token.offset, 2, token.expansions)
-                self.refuse(f"`{token.text * 2}` has no meaning in a condition", both,
-                            f"write `{token.text} {token.text}`")  # fmt: skip
+                self.refuse(
+                    f"`{token.text * 2}` has no meaning in a condition", both, f"write `{token.text} {token.text}`"
+                )
 
     # reading
 
@@ -222,8 +227,11 @@ class _Condition:
             if not live:
                 return left
             if not 0 <= right.number <= 63:
-                self.refuse(f"`{text}` shifts by a number from 0 to 63 here, and this is {right.number}", operator,
-                            "C does not say what another number means")  # fmt: skip
+                self.refuse(
+                    f"`{text}` shifts by a number from 0 to 63 here, and this is {right.number}",
+                    operator,
+                    "C does not say what another number means",
+                )
             return _wrapped(left.number << right.number if text == "<<" else left.number >> right.number, left.plain)
         a, b = _wrapped(left.number, plain).number, _wrapped(right.number, plain).number
         if text in _COMPARED:
@@ -274,12 +282,16 @@ class _Condition:
             return self.character(token)
         if token.kind == DECIMAL:
             self.refuse(
-                f"`#if` compares whole numbers only, as in C, and `{token.text[:LONGEST_NUMBER]}` is not whole", token,
+                f"`#if` compares whole numbers only, as in C, and `{token.text[:LONGEST_NUMBER]}` is not whole",
+                token,
                 "give the switch whole values, or choose by `#ifdef`",
-            )  # fmt: skip
+            )
         if token.kind == STRING:
-            self.refuse("`#if` compares whole numbers only, as in C: a string has no value here", token,
-                        "define each choice as a number, `#define RIGID 1`, and compare with its name")  # fmt: skip
+            self.refuse(
+                "`#if` compares whole numbers only, as in C: a string has no value here",
+                token,
+                "define each choice as a number, `#define RIGID 1`, and compare with its name",
+            )
         self.not_understood(f"expected a value, found `{token.text[:LONGEST_NUMBER]}`", token)
 
     def number(self, token: Token) -> _Value:
@@ -287,8 +299,11 @@ class _Condition:
         text = token.text
         found = _NUMBER.fullmatch(text)
         if len(text) > LONGEST_NUMBER or found is None:
-            self.refuse(f"`{text[:LONGEST_NUMBER]}` is not a whole number that C knows", token,
-                        "a number that begins with 0 is octal" if text.startswith("0") else "")  # fmt: skip
+            self.refuse(
+                f"`{text[:LONGEST_NUMBER]}` is not a whole number that C knows",
+                token,
+                "a number that begins with 0 is octal" if text.startswith("0") else "",
+            )
         base = 16 if found["hex"] else 10 if found["decimal"] else 8
         value = int(found["hex"] or found["decimal"] or found["octal"] or "0", base)
         if value >= 1 << 64:
@@ -298,8 +313,11 @@ class _Condition:
         if after is not None and after.kind == NAME and after.source is token.source and after.offset == token.end:
             if not _SUFFIX.fullmatch(after.text):
                 written = f"{text}{after.text}"[:LONGEST_NUMBER]
-                self.refuse(f"`{written}` is not a whole number that C knows", token,
-                            "write it in decimal, or in hexadecimal as in `0x1F`")  # fmt: skip
+                self.refuse(
+                    f"`{written}` is not a whole number that C knows",
+                    token,
+                    "write it in decimal, or in hexadecimal as in `0x1F`",
+                )
             plain = plain or "u" in after.text.lower()
             self.at += 1
         return _Value(value, plain)
@@ -314,8 +332,11 @@ class _Condition:
         elif len(inner) == 1 and inner.isascii():
             code = ord(inner)
         else:
-            self.refuse(f"`{token.text[:LONGEST_NUMBER]}` has no value here", token,
-                        "between the quotes stands one character, of ASCII, or one escape such as `\\n`")  # fmt: skip
+            self.refuse(
+                f"`{token.text[:LONGEST_NUMBER]}` has no value here",
+                token,
+                "between the quotes stands one character, of ASCII, or one escape such as `\\n`",
+            )
         return _Value(code - 256 if 127 < code < 256 else code)
 
 

@@ -21,8 +21,12 @@ def checked(tokens: list[Token], is_macro: Callable[[str], bool], findings: Find
     """The body of a sound definition; None, and a message, for another. is_macro: whether there is one of a name."""
     name, tell = tokens[0], findings.error
     if name.kind != NAME:
-        tell("D007", f"a macro's name cannot be `{name.text[:LONGEST_NAME]}`", name.place,
-             help="a name is letters, digits and `_`, and begins with no digit")  # fmt: skip
+        tell(
+            "D007",
+            f"a macro's name cannot be `{name.text[:LONGEST_NAME]}`",
+            name.place,
+            help="a name is letters, digits and `_`, and begins with no digit",
+        )
         return None
     if name.text in PREDEFINED:
         tell("D007", f"`{name.text}` cannot be a macro of yours", name.place, help="choose another name")
@@ -37,8 +41,12 @@ def checked(tokens: list[Token], is_macro: Callable[[str], bool], findings: Find
     if body and body[0].text == "(":
         close = next((i for i, token in enumerate(body) if token.text == ")"), None)
         if close is None:
-            tell("D007", f"the parameters of macro `{name.text}` have no `)`", body[0].place,
-                 help=f"write `#define {name.text[:LONGEST_NAME]}(A, B) ...` on one line")  # fmt: skip
+            tell(
+                "D007",
+                f"the parameters of macro `{name.text}` have no `)`",
+                body[0].place,
+                help=f"write `#define {name.text[:LONGEST_NAME]}(A, B) ...` on one line",
+            )
             return None
         parameters = [token for token in body[1:close] if token.kind != SPACE]
         if not _checked_parameters(name, parameters, findings):
@@ -46,9 +54,11 @@ def checked(tokens: list[Token], is_macro: Callable[[str], bool], findings: Find
         body = body[close + 1 :]
     elif body and body[0].kind != SPACE:
         tell(
-            "D007", f"a space is needed between the macro's name and `{body[0].text[:LONGEST_NAME]}`",
-            body[0].place, help=f"write `#define {name.text[:LONGEST_NAME]} {body[0].text[:LONGEST_NAME]}`",
-        )  # fmt: skip
+            "D007",
+            f"a space is needed between the macro's name and `{body[0].text[:LONGEST_NAME]}`",
+            body[0].place,
+            help=f"write `#define {name.text[:LONGEST_NAME]} {body[0].text[:LONGEST_NAME]}`",
+        )
         return None
     if len(body) > MOST_MACRO_BODY:
         tell("D018", f"the body of macro `{name.text}` has more than {MOST_MACRO_BODY} tokens", name.place)
@@ -66,8 +76,12 @@ def checked(tokens: list[Token], is_macro: Callable[[str], bool], findings: Find
         return None
     for token in (*written[:1], *written[-1:]):
         if token.kind == PASTE:
-            tell("D019", "`##` joins two tokens, so it cannot stand at an end", token.place,
-                 help="write what it joins on both sides of it")  # fmt: skip
+            tell(
+                "D019",
+                "`##` joins two tokens, so it cannot stand at an end",
+                token.place,
+                help="write what it joins on both sides of it",
+            )
             return None
     return body
 
@@ -80,8 +94,9 @@ def _checked_parameters(name: Token, written: list[Token], findings: Findings) -
             if token.text != "," or last:
                 more = token.text == "..."
                 help = f"write `...` alone, and `{REST}` in the body" if more else "write `(A, B)`: names, and commas"
-                findings.error("D007", f"expected `,` and a parameter, or `)`, not `{token.text}`", token.place,
-                               help=help)  # fmt: skip
+                findings.error(
+                    "D007", f"expected `,` and a parameter, or `)`, not `{token.text}`", token.place, help=help
+                )
                 return False
         elif token.text == "..." and last:
             pass
@@ -100,8 +115,12 @@ def _checked_strings(written: list[Token], parameters: set[str], findings: Findi
     known = parameters - {"...", ","} | ({REST, OPTIONAL} if "..." in parameters else set())
     for i, token in enumerate(written):
         if token.text == "#" and (i + 1 == len(written) or written[i + 1].text not in known):
-            findings.error("D019", "`#` makes a string of a parameter, and none follows", token.place,
-                           help="a macro cannot make directives")  # fmt: skip
+            findings.error(
+                "D019",
+                "`#` makes a string of a parameter, and none follows",
+                token.place,
+                help="a macro cannot make directives",
+            )
             return False
     return True
 
@@ -115,8 +134,12 @@ def _checked_rest(written: list[Token], parameters: Sequence[Token], findings: F
         if token.kind != NAME or token.text not in (REST, OPTIONAL):
             continue
         if not variadic:
-            tell("D007", f"`{token.text}` stands in the body of a macro that takes `...` only", token.place,
-                 help="`...` as the last parameter takes all further arguments")  # fmt: skip
+            tell(
+                "D007",
+                f"`{token.text}` stands in the body of a macro that takes `...` only",
+                token.place,
+                help="`...` as the last parameter takes all further arguments",
+            )
             return False
         if token.text == REST:
             continue
@@ -126,20 +149,28 @@ def _checked_rest(written: list[Token], parameters: Sequence[Token], findings: F
         opens = i + 1 < len(written) and written[i + 1].text == "("
         end = closing(written, i + 1) if opens else len(written)
         if end == len(written):
-            tell("D007", f"`{OPTIONAL}` needs parentheses around what it is about", token.place,
-                 help=f"write `{OPTIONAL}(, {REST})`: what stands there is left out where no more arguments are given",
-                 )  # fmt: skip
+            tell(
+                "D007",
+                f"`{OPTIONAL}` needs parentheses around what it is about",
+                token.place,
+                help=f"write `{OPTIONAL}(, {REST})`: what stands there is left out where no more arguments are given",
+            )
             return False
         for piece in (written[i + 2], written[end - 1]):
             if piece.kind == PASTE:
-                tell("D019", "`##` joins two tokens, so it cannot stand at an end", piece.place,
-                     help="write what it joins on both sides of it")  # fmt: skip
+                tell(
+                    "D019",
+                    "`##` joins two tokens, so it cannot stand at an end",
+                    piece.place,
+                    help="write what it joins on both sides of it",
+                )
                 return False
     return True
 
 
-def _checked_units(parameters: Sequence[Token], written: list[Token], is_macro: Callable[[str], bool],
-                   findings: Findings) -> bool:  # fmt: skip
+def _checked_units(
+    parameters: Sequence[Token], written: list[Token], is_macro: Callable[[str], bool], findings: Findings
+) -> bool:
     """Whether no parameter with a unit's name stands where the body may have that unit."""
     names = {token.text: token for token in parameters}
     for i, token in enumerate(written):

@@ -207,9 +207,11 @@ def decode(data: bytes, name: str, kind: str) -> tuple[str, Diagnostic | None]:
     if found is not None:
         place = _place_of_byte(data, found.start(), name)
         complaint = error(
-            "D002", f"`{name}` is not text: it holds the byte 0x{data[found.start()]:02x}", place,
+            "D002",
+            f"`{name}` is not text: it holds the byte 0x{data[found.start()]:02x}",
+            place,
             help=f"is this an archive or a program? A {kind} is plain text in UTF-8",
-        )  # fmt: skip
+        )
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as reason:

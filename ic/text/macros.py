@@ -73,11 +73,15 @@ class Macros(Pcpp):
         self.macros[name.text] = macro
         if old is not None and definitions.spelling(old) != definitions.spelling(macro):
             self.findings.error(
-                "D010", f"macro `{name.text}` is defined again, differently", name.place,
+                "D010",
+                f"macro `{name.text}` is defined again, differently",
+                name.place,
                 also=(Label(old.name_token.place, "first defined here"),),
-                help=(f"`#undef {name.text}` first; or, if this is a default, write it between "
-                      f"`#ifndef {name.text}` and `#endif`",),
-            )  # fmt: skip
+                help=(
+                    f"`#undef {name.text}` first; or, if this is a default, write it between "
+                    f"`#ifndef {name.text}` and `#endif`",
+                ),
+            )
         elif old is None and macro.parameters is None:
             definitions.warn_of_quantity(name, macro.body, self.findings)
 
@@ -174,8 +178,12 @@ class Macros(Pcpp):
         if token.text == "__LINE__":
             made.kind, made.text = WHOLE, str(outermost.line)
         elif token.text == COUNTER and self.in_condition:
-            self.findings.error("D009", f"`{COUNTER}` has no value in a condition", token.place,
-                                help="it counts its uses in the text; `#define` a macro to choose by")  # fmt: skip
+            self.findings.error(
+                "D009",
+                f"`{COUNTER}` has no value in a condition",
+                token.place,
+                help="it counts its uses in the text; `#define` a macro to choose by",
+            )
             made.kind, made.text = BAD, ""
         elif token.text == COUNTER:
             made.kind, made.text = WHOLE, str(self._counted)
@@ -184,9 +192,11 @@ class Macros(Pcpp):
             made.kind, made.text = STRING, f'"{outermost.file}"'
         elif token.text in CLOCK:
             self.findings.error(
-                "D016", f"`{token.text}` is not available: a deck must mean the same whenever it is read", token.place,
+                "D016",
+                f"`{token.text}` is not available: a deck must mean the same whenever it is read",
+                token.place,
                 help="leave it out: beside an archive, `.run.json` says when it was made",
-            )  # fmt: skip
+            )
             made.kind, made.text = BAD, ""
         return made
 
@@ -264,9 +274,12 @@ class Macros(Pcpp):
             arguments[-1].append(piece)
         else:
             self._give_up(
-                "D012", f"the call of macro `{token.text}` is not closed", token.place,
-                also=(self._defined_at(macro),), help="its `)` is missing, or a directive stands in between",
-            )  # fmt: skip
+                "D012",
+                f"the call of macro `{token.text}` is not closed",
+                token.place,
+                also=(self._defined_at(macro),),
+                help="its `)` is missing, or a directive stands in between",
+            )
         for argument in arguments:
             first = argument[0] if argument else None
             self.tokenstrip(argument)
@@ -323,8 +336,13 @@ class Macros(Pcpp):
             return substituted(macro, arguments)
         except NotOneToken as reason:
             message = f"`##` makes `{reason.text[:LONGEST_NAME]}`, which is not one token"
-            self.findings.error("D019", message, token.place, also=(self._defined_at(macro),),
-                                help="what it joins must be one name, one number or one sign")  # fmt: skip
+            self.findings.error(
+                "D019",
+                message,
+                token.place,
+                also=(self._defined_at(macro),),
+                help="what it joins must be one name, one number or one sign",
+            )
             return [Token(BAD, "", token.source, token.offset, token.length)]
 
     def is_macro(self, name: str) -> bool:
@@ -349,8 +367,13 @@ class Macros(Pcpp):
 
     def _endless(self, token: Token, message: str) -> None:
         macro = self.macros.get(token.text)
-        self._give_up("D013", message, token.place, also=(self._defined_at(macro),) if macro else (),
-                      help="do these macros use each other without end?")  # fmt: skip
+        self._give_up(
+            "D013",
+            message,
+            token.place,
+            also=(self._defined_at(macro),) if macro else (),
+            help="do these macros use each other without end?",
+        )
 
     def _nothing_after(self, rest: Iterable[Token], what: str) -> None:
         extra = next((token for token in rest if token.kind != SPACE), None)

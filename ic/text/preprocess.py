@@ -143,8 +143,9 @@ class _Preprocessor(Macros):
             help = f"ask `defined({name})`, or define it before: `#define {name} 1`, `-D {name}=1`"
             if name in lets:
                 label = Label(lets[name].place, "this `let` is a value; a condition sees macros alone")
-                self.findings.warn("D036", told, place, also=(label,),
-                                   help="define a macro for it, `#define NAME ...`, and ask that")  # fmt: skip
+                self.findings.warn(
+                    "D036", told, place, also=(label,), help="define a macro for it, `#define NAME ...`, and ask that"
+                )
             else:
                 self.findings.warn("D036", told, place, help=[*did_you_mean(name, self.macros), help])
         for name, token in self.given.items():
@@ -152,8 +153,12 @@ class _Preprocessor(Macros):
                 near = did_you_mean(name, [*self.asked, *self._zeros])
                 let = nearest(name, lets)
                 values = [] if let is None else [f"a `let` is set by `--set '{let}=VALUE'`"]
-                self.findings.warn("D037", f"`-D {name}` has no effect: nothing in the deck asks for a macro `{name}`",
-                                   token.place, help=[*near, *values])  # fmt: skip
+                self.findings.warn(
+                    "D037",
+                    f"`-D {name}` has no effect: nothing in the deck asks for a macro `{name}`",
+                    token.place,
+                    help=[*near, *values],
+                )
 
     def _read(self, file: FoundFile, source: Text, at: Place) -> None:
         self._including.append((file, source))
@@ -171,9 +176,11 @@ class _Preprocessor(Macros):
             self.output.append(token)
         for left in self._ifs.pop():
             self.findings.error(
-                "D008", f"`#{left.token.text}` is not closed", left.token.place,
+                "D008",
+                f"`#{left.token.text}` is not closed",
+                left.token.place,
                 help=f"`{source.name}` ends without its `#endif`",
-            )  # fmt: skip
+            )
         self._including.pop()
         self._entered.pop()
 
@@ -213,9 +220,11 @@ class _Preprocessor(Macros):
             written = token.source.text[token.offset : token.end]
             if token.kind == SPACE and written.startswith("//") and "\n" in written:
                 self.findings.warn(
-                    "D003", "this comment goes on in the next line", token.place,
+                    "D003",
+                    "this comment goes on in the next line",
+                    token.place,
                     help="its line ends with `\\`, which joins the next to it; write `/* ... */` for several lines",
-                )  # fmt: skip
+                )
 
     def include(self, tokens: list[Token], _line: object) -> Iterable[Token]:
         """Reads an included file. Its tokens go straight to the output: pcpp has handed over all before them."""
@@ -232,9 +241,10 @@ class _Preprocessor(Macros):
             quoted = f"<{name}>" if angled else f'"{name}"'
             link = self.files.dangling(name, directories)
             near = (
-                did_you_mean(name, self.files.listed(directories)) if link is None
+                did_you_mean(name, self.files.listed(directories))
+                if link is None
                 else (f"`{link}` is a link to a file that is not there",)
-            )  # fmt: skip
+            )
             looked = f"looked in {', '.join(dict.fromkeys(d.said for d in directories))}"
             self.findings.error("D005", f"cannot find {quoted}", at, help=(*near, looked))
             return ()
@@ -272,9 +282,11 @@ class _Preprocessor(Macros):
             rest = tokens[close + 1 :] if close is not None else []
         else:
             self.findings.error(
-                "D005", "`#include` needs a file", tokens[0].place if tokens else directive.place,
+                "D005",
+                "`#include` needs a file",
+                tokens[0].place if tokens else directive.place,
                 help=_INCLUDES,
-            )  # fmt: skip
+            )
             return None
         if not name.strip():
             self.findings.error("D005", "`#include` needs a file, and this name is empty", at, help=_INCLUDES)
@@ -319,9 +331,11 @@ class _Preprocessor(Macros):
             self.findings.error("D007", "the only `#pragma` is `once`", directive.place, help="leave it out")
         elif name == "line":
             self.findings.error(
-                "D007", "a deck cannot have `#line`: messages say where a thing really stands", directive.place,
+                "D007",
+                "a deck cannot have `#line`: messages say where a thing really stands",
+                directive.place,
                 help="leave it out",
-            )  # fmt: skip
+            )
         else:
             meant = "elif" if name in ("elseif", "elsif") else name
             near = did_you_mean(meant, CONDITIONALS if name.startswith(("if", "el", "end")) else DIRECTIVES)
@@ -358,8 +372,12 @@ class _Preprocessor(Macros):
             self._misspelt_ifs -= name == "endif"
             raise OutputDirective(Action.IgnoreAndRemove)
         if not ifs:
-            self.findings.error("D007", f"`#{_shown(directive)}` without an `#if`", directive.place,
-                                help="leave it out, or write the `#if` that it belongs to")  # fmt: skip
+            self.findings.error(
+                "D007",
+                f"`#{_shown(directive)}` without an `#if`",
+                directive.place,
+                help="leave it out, or write the `#if` that it belongs to",
+            )
             raise OutputDirective(Action.IgnoreAndRemove)
         opened = ifs[-1]
         if name == "endif":
@@ -367,8 +385,13 @@ class _Preprocessor(Macros):
             self._nothing_after(args, "#endif")
         elif opened.otherwise is not None:
             label = Label(opened.otherwise.place, "the `#else` is here")
-            self.findings.error("D007", f"`#{_shown(directive)}` after `#else`", directive.place, also=(label,),
-                                help="`#elif` comes before the one `#else`")  # fmt: skip
+            self.findings.error(
+                "D007",
+                f"`#{_shown(directive)}` after `#else`",
+                directive.place,
+                also=(label,),
+                help="`#elif` comes before the one `#else`",
+            )
             raise OutputDirective(Action.IgnoreAndRemove)
         elif name == "else":
             opened.otherwise = directive
@@ -386,8 +409,12 @@ class _Preprocessor(Macros):
 
     def _known(self, name: str, directive: Token, args: list[Token]) -> bool:
         if not args or args[0].kind != NAME:
-            self.findings.error("D007", f"`#{name}` needs a name", args[0].place if args else directive.place,
-                                help=f"write `#{name} NAME`")  # fmt: skip
+            self.findings.error(
+                "D007",
+                f"`#{name}` needs a name",
+                args[0].place if args else directive.place,
+                help=f"write `#{name} NAME`",
+            )
             args[:] = [Token(NAME, "__nothing__", directive.source, directive.offset, directive.length)]
             return False
         self._nothing_after(args[1:], f"#{name} {args[0].text}")

@@ -42,8 +42,12 @@ def complain_of_unseen(source: Text, findings: Findings) -> None:
 
         known = unicodedata.name(match[0], "no name").lower()
         tell = findings.warn if soft else findings.error
-        tell("D038", f"U+{ord(match[0]):04X} ({known}) is not seen, so this may not say what it seems to say", place,
-             help="leave it out")  # fmt: skip
+        tell(
+            "D038",
+            f"U+{ord(match[0]):04X} ({known}) is not seen, so this may not say what it seems to say",
+            place,
+            help="leave it out",
+        )
 
 
 def complain_of_stray(token: Token, findings: Findings) -> None:

@@ -89,8 +89,15 @@ run second like first {{ duration = 10 s; }}
 sweep masses of first {{ vary links.upper.mass = [40, 60] kg;  exclude when links.upper.mass > {most}; }}
 sweep all = masses + {part};
 """
-SOUND = {"integrator": "rk4", "extra": "", "metric": "max", "channel": "elbow.qd", "limit": "1 rad/s", "most": "50 kg",
-         "part": "second"}  # fmt: skip
+SOUND = {
+    "integrator": "rk4",
+    "extra": "",
+    "metric": "max",
+    "channel": "elbow.qd",
+    "limit": "1 rad/s",
+    "most": "50 kg",
+    "part": "second",
+}
 
 
 @pytest.mark.slow

@@ -33,9 +33,13 @@ class ServoFailure:
 
 
 def check_failures(
-    scope: Scope, uses: Iterable[Use], ticks: Mapping[str, Ticks], found: Iterable[Substitution],
-    environment: Sequence[EnvironmentUse], schedule: Schedule,
-) -> None:  # fmt: skip
+    scope: Scope,
+    uses: Iterable[Use],
+    ticks: Mapping[str, Ticks],
+    found: Iterable[Substitution],
+    environment: Sequence[EnvironmentUse],
+    schedule: Schedule,
+) -> None:
     """Tells of models about servos that are not there, have not what the model is about, or are on a bed."""
     servos = {use.joint: use for use in uses}
     beds = {each.joint: each.place for each in found}

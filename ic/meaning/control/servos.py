@@ -99,8 +99,12 @@ def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[l
             if use is not None:
                 uses[use.joint] = use
     moving = [joint.name for joint in arm.moving]
-    lost = frozenset(name for item in body.items.values() for name in (item.name, meant(item.name, moving))
-                     if name is not None and name not in uses)  # fmt: skip
+    lost = frozenset(
+        name
+        for item in body.items.values()
+        for name in (item.name, meant(item.name, moving))
+        if name is not None and name not in uses
+    )
     return [uses[joint.name] for joint in arm.joints if joint.name in uses], lost
 
 

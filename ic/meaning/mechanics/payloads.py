@@ -199,8 +199,10 @@ def _not_solid(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
     mass, xx, yy, zz, xy, xz, yz = values.T
     least, _, most = np.linalg.eigvalsh(np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=-1).reshape(-1, 3, 3)).T
     bad = ~((mass > 0.0) & (least > 1e-9 * most))
-    causes = ["it has no mass" if not mass[row] > 0.0 else f"its smallest principal moment is {least[row]:.6g} kg*m^2"
-              for row in np.flatnonzero(bad)[:1]]  # fmt: skip
+    causes = [
+        "it has no mass" if not mass[row] > 0.0 else f"its smallest principal moment is {least[row]:.6g} kg*m^2"
+        for row in np.flatnonzero(bad)[:1]
+    ]
     return bad, causes
 
 

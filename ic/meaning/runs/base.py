@@ -30,10 +30,11 @@ INITIAL_OF_BASE = tuple(f"{BASE}.{name}" for name, _ in OF_FREE_BASE)
 """What `initial` may say of a free base."""
 
 DOCS = {
-    "position": "origin of the base at the start, world axes", "rpy": "turn of the base at the start, fixed x-y-z",
+    "position": "origin of the base at the start, world axes",
+    "rpy": "turn of the base at the start, fixed x-y-z",
     "velocity": "velocity of the base's origin at the start, world axes",
     "rate": "angular velocity of the base at the start, world axes",
-}  # fmt: skip
+}
 OTHERS = ("rate", "position", "acceleration", "torque", "force")
 """Kinds of command, which stand in servos."""
 NOTHING = (0.0, 0.0, 0.0)

@@ -140,13 +140,38 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
             )
     for use in uses if known else ():
         check_circuits(scope, use, schedule, integrator, rates["dynamics"], on_bed=use.joint in on_beds)
-    servos = tuple(ServoUse(use.joint, use.definition, use.servo.name, use.command, ticks[use.joint].divisor, use.place,
-                            use.words, ticks[use.joint].continuous, use.sensors) for use in uses)  # fmt: skip
+    servos = tuple(
+        ServoUse(
+            use.joint,
+            use.definition,
+            use.servo.name,
+            use.command,
+            ticks[use.joint].divisor,
+            use.place,
+            use.words,
+            ticks[use.joint].continuous,
+            use.sensors,
+        )
+        for use in uses
+    )
     structure = Structure(
-        arm.name, arm.links, arm.joints, servos, environment, (), products, integrator.name, schedule, (),
-        substitutions, base, payloads, tuple(guide.use(others[guide.path]) for guide in guides),
-        tuple(sensor.use(others[sensor.path]) for sensor in sensors), balanced,
-    )  # fmt: skip
+        arm.name,
+        arm.links,
+        arm.joints,
+        servos,
+        environment,
+        (),
+        products,
+        integrator.name,
+        schedule,
+        (),
+        substitutions,
+        base,
+        payloads,
+        tuple(guide.use(others[guide.path]) for guide in guides),
+        tuple(sensor.use(others[sensor.path]) for sensor in sensors),
+        balanced,
+    )
     check_base(scope, base, structure, body_of(scope, block.get("environment")), block.get("base"))
     check_payloads(scope, block, structure)
     if known:

@@ -67,12 +67,16 @@ def new(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]
 
 
 def test_a_deck_is_written_and_what_to_do_next_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    assert new(capsys, "deck", "my_arm") == (0, """\
+    assert new(capsys, "deck", "my_arm") == (
+        0,
+        """\
 wrote my_arm.ic
 
   met check my_arm.ic  says what is wrong with it, if anything is
   met run my_arm.ic    simulates it and shows what came of it
-""", "")  # fmt: skip
+""",
+        "",
+    )
     text = Path("my_arm.ic").read_text()
     assert formatted("my_arm.ic", text) == text
     assert cli.main(["check", "my_arm.ic"]) == 0
@@ -169,24 +173,45 @@ def test_its_file_passes_the_projects_own_linter(kind: str, folder: Path) -> Non
 def test_pip_installs_what_is_written_and_met_finds_it(folder: Path) -> None:
     for kind in MODELS:
         cli.main(["new", kind, f"my_{kind}", "-q"])
-    command = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index",
-               "--disable-pip-version-check", "--target", "site", *(f"./my_{kind}" for kind in MODELS)]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "--no-index",
+        "--disable-pip-version-check",
+        "--target",
+        "site",
+        *(f"./my_{kind}" for kind in MODELS),
+    ]
     subprocess.run(command, check=True, capture_output=True, text=True)
     surroundings = os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{folder / 'site'}"}
-    listed = subprocess.run([sys.executable, "-m", "met.cli", "doc", "--format", "json"], env=surroundings,
-                            capture_output=True, text=True, check=True)  # fmt: skip
+    listed = subprocess.run(
+        [sys.executable, "-m", "met.cli", "doc", "--format", "json"],
+        env=surroundings,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     found = {(model["kind"], model["name"]) for model in json.loads(listed.stdout)}
     assert {(kind, f"my_{kind}") for kind in MODELS} <= found
 
 
 def test_what_is_there_is_not_written_over_without_force(capsys: pytest.CaptureFixture[str]) -> None:
     Path("my_arm.ic").write_text("mine")
-    assert new(capsys, "deck", "my_arm") == (2, "", """\
+    assert new(capsys, "deck", "my_arm") == (
+        2,
+        "",
+        """\
 error[E344]: `my_arm.ic` is there already
  = help: --force writes over it; -o writes to another place
 
 1 error
-""")  # fmt: skip
+""",
+    )
     assert Path("my_arm.ic").read_text() == "mine"
     assert new(capsys, "deck", "my_arm", "--force", "-q") == (0, "", "")
     assert Path("my_arm.ic").read_text().startswith("// my_arm.ic")
@@ -194,11 +219,15 @@ error[E344]: `my_arm.ic` is there already
 
 def test_what_is_no_file_is_not_written_into_and_a_link_is_not_followed(capsys: pytest.CaptureFixture[str]) -> None:
     os.mkfifo("pipe.ic")
-    assert new(capsys, "deck", "my_arm", "-o", "pipe.ic", "--force") == (2, "", """\
+    assert new(capsys, "deck", "my_arm", "-o", "pipe.ic", "--force") == (
+        2,
+        "",
+        """\
 error[E338]: cannot write `pipe.ic`: it is not a regular file
 
 1 error
-""")  # fmt: skip
+""",
+    )
     Path("mine").write_text("mine")
     Path("my_arm.ic").symlink_to("mine")
     assert new(capsys, "deck", "my_arm", "--force", "-q") == (0, "", "")
@@ -249,11 +278,15 @@ def test_what_cannot_be_written_leaves_nothing(
         return Full()
 
     monkeypatch.setattr(files, "new_file", new_full)
-    assert new(capsys, "deck", "bars") == (2, "", """\
+    assert new(capsys, "deck", "bars") == (
+        2,
+        "",
+        """\
 error[E338]: cannot write `bars.ic`: No space left on device
 
 1 error
-""")  # fmt: skip
+""",
+    )
     assert os.listdir() == []
 
 

@@ -73,12 +73,16 @@ def test_of_a_folder_all_decks_are_taken_but_for_hidden_folders(capsys: pytest.C
 
 def test_a_folder_without_decks_is_a_mistake(capsys: pytest.CaptureFixture[str]) -> None:
     Path("empty").mkdir()
-    assert fmt(capsys, "empty") == (2, "", """\
+    assert fmt(capsys, "empty") == (
+        2,
+        "",
+        """\
 error[E341]: there is no deck in the folder `empty`
  = help: a deck's name ends in `.ic`; a file of another name is formatted where it is named
 
 1 error
-""")  # fmt: skip
+""",
+    )
 
 
 def test_a_broken_deck_stays_and_the_others_are_laid_out(capsys: pytest.CaptureFixture[str]) -> None:
@@ -175,12 +179,16 @@ def test_a_deck_that_cannot_be_written_stays_and_the_others_are_laid_out(
         replace(made, target)
 
     monkeypatch.setattr("os.replace", no_space_for_a)
-    assert fmt(capsys, ".") == (2, "b.ic: formatted\n", """\
+    assert fmt(capsys, ".") == (
+        2,
+        "b.ic: formatted\n",
+        """\
 error[E338]: cannot write `a.ic`: No space left on device
  = help: it is as it was; what takes its place is written beside it, so its folder must allow that
 
 1 error
-""")  # fmt: skip
+""",
+    )
     assert Path("a.ic").read_text() == LOOSE and sorted(os.listdir()) == ["a.ic", "b.ic"]
 
 
@@ -211,9 +219,13 @@ def test_standard_input_that_is_closed_is_told(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sys.stdin", None)
-    assert fmt(capsys, "-") == (2, "", """\
+    assert fmt(capsys, "-") == (
+        2,
+        "",
+        """\
 error[D001]: cannot read standard input: it is closed
  = help: name a deck, or pipe one in
 
 1 error
-""")  # fmt: skip
+""",
+    )

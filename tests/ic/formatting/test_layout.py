@@ -20,7 +20,8 @@ def told(text: str) -> str:
 
 
 def test_a_line_is_indented_by_the_brackets_it_stands_in() -> None:
-    assert fmt("""\
+    assert (
+        fmt("""\
 run hold {
 arm=bar;
     servos {
@@ -33,7 +34,8 @@ arm=bar;
   }
     }
 }
-""") == """\
+""")
+        == """\
 run hold {
     arm = bar;
     servos {
@@ -46,7 +48,8 @@ run hold {
         }
     }
 }
-"""  # fmt: skip
+"""
+    )
 
 
 def test_brackets_that_open_on_one_line_indent_once() -> None:
@@ -149,16 +152,19 @@ def test_tab_stops_are_where_most_columns_meet(written: str, laid: str) -> None:
     assert fmt(written) == laid
 
 
-@pytest.mark.parametrize(("written", "laid"), [
-    (  # with stops of four, the last `<` is below the number above it
-        "a {\n\trequire t_shoulder < 0.8 s;\n\trequire t_z\t\t< 1.1 s;\n\trequire over1\t  < 2 %;\n}\n",
-        "a {\n    require t_shoulder < 0.8 s;\n    require t_z < 1.1 s;\n    require over1 < 2 %;\n}\n",
-    ),
-    (  # and here `mass` is below the brace
-        "a {\n\tlink upper   {mass=6.5 kg;}\n\tlink fore\t{mass=5.2 kg;}\n}\n",
-        "a {\n    link upper { mass = 6.5 kg; }\n    link fore { mass = 5.2 kg; }\n}\n",
-    ),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("written", "laid"),
+    [
+        (  # with stops of four, the last `<` is below the number above it
+            "a {\n\trequire t_shoulder < 0.8 s;\n\trequire t_z\t\t< 1.1 s;\n\trequire over1\t  < 2 %;\n}\n",
+            "a {\n    require t_shoulder < 0.8 s;\n    require t_z < 1.1 s;\n    require over1 < 2 %;\n}\n",
+        ),
+        (  # and here `mass` is below the brace
+            "a {\n\tlink upper   {mass=6.5 kg;}\n\tlink fore\t{mass=5.2 kg;}\n}\n",
+            "a {\n    link upper { mass = 6.5 kg; }\n    link fore { mass = 5.2 kg; }\n}\n",
+        ),
+    ],
+)
 def test_tabs_with_which_nothing_meets_are_blanks(written: str, laid: str) -> None:
     assert fmt(written) == laid
 

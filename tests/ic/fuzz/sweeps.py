@@ -45,13 +45,22 @@ def runs(decks: tuple[str, ...]) -> tuple[tuple[str, str, tuple[tuple[str, float
         for experiment in compiled.plan.experiments:
             if experiment.cases.coordinates or experiment.cases.choices:
                 continue
-            numbers = [(path, float(each.value), each.unit) for path, each in experiment.parameters.items()
-                       if isinstance(each.value, (float, int))]  # fmt: skip
-            numbers += [(path, 1.0, each.unit) for path, each in experiment.parameters.items()
-                        if isinstance(each.value, Formula)]  # fmt: skip
-            numbers += [(f"{use.definition}.{path.removeprefix(f'{use.joint}.servo.')}", value, unit)
-                        for use in experiment.structure.servos for path, value, unit in tuple(numbers)
-                        if path.startswith(f"{use.joint}.servo.")]  # fmt: skip
+            numbers = [
+                (path, float(each.value), each.unit)
+                for path, each in experiment.parameters.items()
+                if isinstance(each.value, (float, int))
+            ]
+            numbers += [
+                (path, 1.0, each.unit)
+                for path, each in experiment.parameters.items()
+                if isinstance(each.value, Formula)
+            ]
+            numbers += [
+                (f"{use.definition}.{path.removeprefix(f'{use.joint}.servo.')}", value, unit)
+                for use in experiment.structure.servos
+                for path, value, unit in tuple(numbers)
+                if path.startswith(f"{use.joint}.servo.")
+            ]
             words = sorted({use.definition for use in experiment.structure.servos})
             found.append((deck, experiment.name, tuple(numbers), ",".join(words)))
     return tuple(found)

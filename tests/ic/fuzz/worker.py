@@ -89,8 +89,10 @@ def shortened(data: bytes, shows: Callable[[bytes], bool]) -> bytes:
 
 
 def _in_pieces(data: bytes) -> list[bytes]:
-    return [piece.encode("utf-8", "surrogateescape") for piece in
-            mutations.pieces_of(data.decode("utf-8", "surrogateescape"))]  # fmt: skip
+    return [
+        piece.encode("utf-8", "surrogateescape")
+        for piece in mutations.pieces_of(data.decode("utf-8", "surrogateescape"))
+    ]
 
 
 def _say(**what: object) -> None:

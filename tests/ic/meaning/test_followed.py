@@ -102,16 +102,18 @@ def test_a_course_in_the_units_of_another_kind_of_command_is_not_mended_to_a_fas
 def test_a_word_of_a_macro_of_the_command_line_is_told_of_that(tmp_path: Path) -> None:
     text = "let long = SIZE;\n"
     (found,) = check(tmp_path, text, ARM, SERVO, RUN, defines=("SIZE=tall",)).diagnostics
-    assert found.help == ("it comes from `-D`: write a number there, as in `-D SIZE=2`, or define `let tall = ...;` in "
-                          "the deck",)  # fmt: skip
+    assert found.help == (
+        "it comes from `-D`: write a number there, as in `-D SIZE=2`, or define `let tall = ...;` in the deck",
+    )
     assert check(tmp_path, text, ARM, SERVO, RUN, defines=("SIZE=2",)).diagnostics == ()
 
 
 def test_a_word_that_set_gives_is_told_of_set(tmp_path: Path) -> None:
     (found,) = check(tmp_path, "let long = 2;\n", ARM, SERVO, RUN, set=("long=VALUE",)).diagnostics
     assert (found.code, found.help) == (
-        "D065", ("`--set` takes a value as the deck would write it: a number with its unit, or a name of the deck",)
-    )  # fmt: skip
+        "D065",
+        ("`--set` takes a value as the deck would write it: a number with its unit, or a name of the deck",),
+    )
 
 
 @pytest.mark.parametrize("word", ["nan", "NaN", "inf", "infinity"])

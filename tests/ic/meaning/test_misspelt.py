@@ -28,8 +28,9 @@ PAYLOAD = changed(RUN, ("duration", "payload box { on = bar; mass = 1 kg; inerti
 TABLE = changed(
     RUN, ("duration", 'environment { push = wrench_table { link = bar; file = "loads.csv"; } }\n    duration')
 )
-BED = changed(RUN, ("[q]", "[hinge.servo.voltage]"),
-              ("duration", "substitute hinge { law = torque_balance; }\n    duration"))  # fmt: skip
+BED = changed(
+    RUN, ("[q]", "[hinge.servo.voltage]"), ("duration", "substitute hinge { law = torque_balance; }\n    duration")
+)
 GUIDED = changed(SERVO, ("command = rate(0.1 rad/s)", "k_position = 5 1/s; command = position(home)"))
 GUIDE = changed(
     RUN,

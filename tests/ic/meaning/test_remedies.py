@@ -9,15 +9,25 @@ import pytest
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes
 
 BESIDE = changed(  # a run that names the joint and the link in every way there is
-    RUN, ("record = [q];", "record = [q, hinge.qd, hinge.servo.voltage]; initial { hinge.q = 3 deg; }\n"
-          "    metric top = max { of = hinge.qd; } require top < 3 rad/s;"))  # fmt: skip
+    RUN,
+    (
+        "record = [q];",
+        "record = [q, hinge.qd, hinge.servo.voltage]; initial { hinge.q = 3 deg; }\n"
+        "    metric top = max { of = hinge.qd; } require top < 3 rad/s;",
+    ),
+)
 SWEEP = (
     "sweep it of hold { vary links.bar.mass = [1, 2] kg; vary links.bar.com.x = [0, 1] m; "
     "vary drive.kp = [0.1, 0.2] V*s/rad; }\n"
 )
 RAIL = changed(
-    ARM, ("axis = z; }", "axis = z; }\n    link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n"
-          "    joint rail prismatic { parent = bar; child = tip; axis = x; }"))  # fmt: skip
+    ARM,
+    (
+        "axis = z; }",
+        "axis = z; }\n    link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n"
+        "    joint rail prismatic { parent = bar; child = tip; axis = x; }",
+    ),
+)
 
 
 def only_help(folder: Path, *parts: str) -> tuple[str, tuple[str, ...]]:
@@ -52,8 +62,11 @@ def only_help(folder: Path, *parts: str) -> tuple[str, tuple[str, ...]]:
 def test_a_mistake_is_told_with_what_to_write(
     tmp_path: Path, arm: tuple[str, str], servo: tuple[str, str], run: tuple[str, str], help: str
 ) -> None:
-    parts = (changed(ARM, *([arm] if arm else [])), changed(SERVO, *([servo] if servo else [])),
-             changed(RUN, *([run] if run else [])))  # fmt: skip
+    parts = (
+        changed(ARM, *([arm] if arm else [])),
+        changed(SERVO, *([servo] if servo else [])),
+        changed(RUN, *([run] if run else [])),
+    )
     assert only_help(tmp_path, *parts)[1] == (help,)
 
 
@@ -61,8 +74,7 @@ def test_one_initial_value_for_joints_that_move_differently_is_told_once(tmp_pat
     run = changed(RUN, ("    record =", "    initial { q = 0 rad; }\n    record ="))
     message, helps = only_help(tmp_path, RAIL, SERVO, run)
     assert message == "`q` of joint `rail`, which is prismatic, is in m, and this is in rad"
-    assert helps == ("write it joint by joint: `rail.q = 0 m;`",
-                     "or leave it out: without it all joints begin at 0")  # fmt: skip
+    assert helps == ("write it joint by joint: `rail.q = 0 m;`", "or leave it out: without it all joints begin at 0")
     assert codes(tmp_path, RAIL, SERVO, changed(run, ("q = 0 rad", "q = 0 rad; rail.q = 0 m"))) == []
 
 

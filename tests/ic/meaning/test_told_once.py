@@ -89,8 +89,9 @@ def test_two_missing_parameters_of_one_definition_are_two_mistakes(tmp_path: Pat
     servo = changed(SERVO, ("v_max = 24 V;", ""), ("ki = 1 V/rad;", ""))
     compiled = check(tmp_path, ARM, servo, changed(RUN, ("lift = slide;", "")))
     assert [each.message for each in compiled.diagnostics] == [
-        "servo `drive` has no `ki`", "servo `drive` has no `v_max`",
-    ]  # fmt: skip
+        "servo `drive` has no `ki`",
+        "servo `drive` has no `v_max`",
+    ]
 
 
 def test_a_channel_that_is_none_of_a_run_and_of_its_sweep(tmp_path: Path) -> None:

@@ -59,8 +59,9 @@ def test_a_metric_is_written_where_its_model_and_its_channel_are(capsys: pytest.
     run = changed(RUN, ("record = [q];", "record = [q];\n    metric top = max {\n        of = hinge.qd;\n    }"))
     Path("b.ic").write_text(ARM + SERVO + run)
     assert explained(capsys, "b.ic", "metrics.top") == {
-        "metrics.top.model": ("max", "", 17), "metrics.top.of": ("hinge.qd", "", 18),
-    }  # fmt: skip
+        "metrics.top.model": ("max", "", 17),
+        "metrics.top.of": ("hinge.qd", "", 18),
+    }
 
 
 def test_explain_shows_a_setting_as_it_shows_a_parameter(capsys: pytest.CaptureFixture[str]) -> None:

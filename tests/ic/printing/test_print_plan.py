@@ -438,8 +438,9 @@ def test_plan_that_is_asked_for_more_shows_centres_of_mass_and_inertias(capsys: 
     assert lines[at].endswith("inertia about it: xx, yy, zz, xy, xz, yz")
     # a rod of 2 kg and 1 m: m l^2 / 12
     assert lines[at + 1].split(maxsplit=1) == [
-        "first", "2 kg    [0.5, 0, 0] m   [0, 0.166667, 0.166667, 0, 0, 0] kg*m^2"
-    ]  # fmt: skip
+        "first",
+        "2 kg    [0.5, 0, 0] m   [0, 0.166667, 0.166667, 0, 0, 0] kg*m^2",
+    ]
 
 
 def test_check_that_is_asked_for_more_names_the_joints_without_a_servo(capsys: pytest.CaptureFixture[str]) -> None:
@@ -562,8 +563,11 @@ def test_doc_says_what_denavit_hartenberg_numbers_are(capsys: pytest.CaptureFixt
     out = printed(capsys, "doc", "dh")
     assert "classic     Rz(theta) Tz(d) Tx(a) Rx(alpha)" in out
     assert [each["name"] for each in json.loads(printed(capsys, "doc", "dh", "--format", "json"))] == [
-        "a", "alpha", "d", "theta",
-    ]  # fmt: skip
+        "a",
+        "alpha",
+        "d",
+        "theta",
+    ]
 
 
 def test_a_base_that_moves_is_told(tmp_path: Path) -> None:

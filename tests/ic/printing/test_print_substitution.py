@@ -77,8 +77,10 @@ def test_the_model_of_a_deck_shows_the_block(capsys: pytest.CaptureFixture[str])
 
 @pytest.mark.parametrize("kind", ["bed", "law"])
 def test_models_of_beds_and_laws_can_be_asked_for(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
-    names = {"bed": ["emulated"], "law": ["bare", "measured_acceleration", "torque_balance", "torque_balance_observer",
-                                          "velocity_tracking"]}[kind]  # fmt: skip
+    names = {
+        "bed": ["emulated"],
+        "law": ["bare", "measured_acceleration", "torque_balance", "torque_balance_observer", "velocity_tracking"],
+    }[kind]
     lines = printed(capsys, "doc", f"{kind}s").splitlines()
     assert lines[0] == f"{kind}: substitute JOINT {{ {kind} = MODEL(...); ... }}, in a run"
     assert sorted(line.split()[0] for line in lines[1:] if line.startswith("  ")) == names

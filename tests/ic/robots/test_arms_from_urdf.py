@@ -42,8 +42,10 @@ def values(experiment: Experiment) -> dict[str, object]:
 def bare(experiment: Experiment) -> object:
     """The structure without places."""
     arm = experiment.structure
-    return ([(link.name, link.shape) for link in arm.links],
-            [(joint.name, joint.kind, joint.parent, joint.child) for joint in arm.joints])  # fmt: skip
+    return (
+        [(link.name, link.shape) for link in arm.links],
+        [(joint.name, joint.kind, joint.parent, joint.child) for joint in arm.joints],
+    )
 
 
 # What the file says
@@ -307,8 +309,10 @@ warning[D211]: 2 names of `two.urdf` are another in decks
 def named(links: list[str], joints: list[str]) -> tuple[list[str], list[str]]:
     """Deck's names of links behind a root, each on a joint."""
     text = '<robot name="x"><link name="root"/>' + "".join(f'<link name="{name}"/>' for name in links)
-    text += "".join(f'<joint name="{joint}" type="fixed"><parent link="root"/><child link="{link}"/></joint>'
-                    for joint, link in zip(joints, links, strict=True))  # fmt: skip
+    text += "".join(
+        f'<joint name="{joint}" type="fixed"><parent link="root"/><child link="{link}"/></joint>'
+        for joint, link in zip(joints, links, strict=True)
+    )
     names = deck_names(read("x.urdf", text + "</robot>"))
     return [names.links[name] for name in links], [names.joints[name] for name in joints]
 
@@ -318,9 +322,19 @@ def test_names_become_a_decks_and_no_two_the_same() -> None:
     joints = ["links", "initial", "kg", "arm_1", "j 1", "j_1", "__LINE__", "x" * 300, "x" * 301, "shoulder"]
     assert named(links, joints) == (
         ["arm_1_2", "arm_1_3", "arm_1", "arm_1_4", "_1", "base_link", "m_link", "rate", "_", "__2"],
-        ["links_joint", "initial_joint", "kg_joint", "arm_1_joint", "j_1_2", "j_1", "__LINE___joint", "x" * 200,
-         "x" * 200 + "_2", "shoulder"],
-    )  # fmt: skip
+        [
+            "links_joint",
+            "initial_joint",
+            "kg_joint",
+            "arm_1_joint",
+            "j_1_2",
+            "j_1",
+            "__LINE___joint",
+            "x" * 200,
+            "x" * 200 + "_2",
+            "shoulder",
+        ],
+    )
 
 
 def test_names_that_need_no_change_are_not_told(tmp_path: Path) -> None:

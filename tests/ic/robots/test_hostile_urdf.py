@@ -37,9 +37,14 @@ HOSTILE = {
         for i in range(10_000)) + "</robot>",
 }  # fmt: skip
 
-LONGEST = "<robot><link name='l0'/>" + "".join(
-    f"<link name='l{i}'/><joint name='j{i}' type='revolute'><parent link='l{i - 1}'/><child link='l{i}'/></joint>"
-    for i in range(1, 1_000)) + "</robot>"  # fmt: skip
+LONGEST = (
+    "<robot><link name='l0'/>"
+    + "".join(
+        f"<link name='l{i}'/><joint name='j{i}' type='revolute'><parent link='l{i - 1}'/><child link='l{i}'/></joint>"
+        for i in range(1, 1_000)
+    )
+    + "</robot>"
+)
 
 
 def outcome(text: str) -> str | None:

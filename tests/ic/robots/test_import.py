@@ -225,8 +225,14 @@ error[D001]: cannot read `leg.urdf`: No such file or directory
 
 
 def test_comments_hold_whatever_a_file_says() -> None:
-    nasty = changed(TWO, ('"two"', '"a&#10;b"'), ('"ground"', '"x &#10; } \\"'), ('"ground"', '"x &#10; } \\"'),
-                    ('<link name="bar">', '<link name="bar\\"> <sensor/>'), ('"bar"', '"bar\\"'))  # fmt: skip
+    nasty = changed(
+        TWO,
+        ('"two"', '"a&#10;b"'),
+        ('"ground"', '"x &#10; } \\"'),
+        ('"ground"', '"x &#10; } \\"'),
+        ('<link name="bar">', '<link name="bar\\"> <sensor/>'),
+        ('"bar"', '"bar\\"'),
+    )
     Path("two.urdf").write_text(nasty, encoding="utf-8")
     Path("two.ic").write_text(imported("two.urdf"), encoding="utf-8")
     compiled = ic.check("two.ic")

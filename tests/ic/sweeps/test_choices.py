@@ -58,8 +58,10 @@ def test_choices_of_one_model_with_other_numbers_are_apart(tmp_path: Path) -> No
     found = groups(tmp_path, f"vary hinge.servo = {servos};")
     assert [each.name for each in found] == ["it.drive-1", "it.drive-2", "it.drive-3"]
     assert [each["hinge.servo"] for each in choices(found)] == [
-        "drive", "drive { kp = 0.2 V*s/rad; }", "drive { remove ki; ki = 2 V/rad; }",
-    ]  # fmt: skip
+        "drive",
+        "drive { kp = 0.2 V*s/rad; }",
+        "drive { remove ki; ki = 2 V/rad; }",
+    ]
 
 
 def test_rates_and_the_duration_may_vary(tmp_path: Path) -> None:
@@ -84,7 +86,9 @@ def test_a_definitions_command_may_vary(tmp_path: Path) -> None:
         tmp_path, "vary drive.command = [rate(0.1 rad/s), rate(sine(amplitude = 1 rad/s, frequency = 1 Hz))];"
     )
     assert [each.structure.servos[0].command.model for each in found if each.structure.servos[0].command] == [
-        "constant", "sine"]  # fmt: skip
+        "constant",
+        "sine",
+    ]
     body = "vary hinge.servo.command = [rate(0.1 rad/s), rate(sine(amplitude = 1 rad/s, frequency = 1 Hz))];"
     assert [each.structure.servos for each in groups(tmp_path, body)] == [each.structure.servos for each in found]
 
@@ -207,7 +211,7 @@ LOADED = """\
 #ifndef PAYLOAD
 #define PAYLOAD 5
 #endif
-""" + changed(ARM, ("mass = 2 kg", "mass = (2 + PAYLOAD) * 1 kg"))  # fmt: skip
+""" + changed(ARM, ("mass = 2 kg", "mass = (2 + PAYLOAD) * 1 kg"))
 
 
 def loaded(folder: Path, body: str, defines: tuple[str, ...] = ()) -> tuple[Experiment, ...]:

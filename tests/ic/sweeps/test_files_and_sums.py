@@ -144,7 +144,11 @@ def summed(folder: Path, *more: str) -> tuple[Experiment, ...]:
 def test_a_sum_has_the_cases_of_its_parts_one_after_the_other(tmp_path: Path) -> None:
     found = summed(tmp_path, "sweep all_of_it = gains + masses + hold;")
     assert [each.name for each in found] == [
-        "all_of_it.gains.rk4", "all_of_it.gains.midpoint", "all_of_it.masses", "all_of_it.hold"]  # fmt: skip
+        "all_of_it.gains.rk4",
+        "all_of_it.gains.midpoint",
+        "all_of_it.masses",
+        "all_of_it.hold",
+    ]
     assert {each.asked for each in found} == {"all_of_it"}
     assert [each.cases.table.tolist() for each in found] == [[0, 2], [1, 3], [4, 5, 6], [7]]
 

@@ -56,8 +56,12 @@ def test_samples_are_in_the_unit_that_is_written_with_twelve_digits(tmp_path: Pa
     assert own.tolist() == found.values.tolist()
 
 
-BOUNDED = [("initial.hinge.q", ("deg", "arcmin", "arcsec", "cycle", "rad")), ("links.bar.mass", ("g", "kg", "t")),
-           ("initial.hinge.qd", ("rpm", "deg/s", "cycle/min", "rad/h")), ("drive.v_max", ("mV", "kV"))]  # fmt: skip
+BOUNDED = [
+    ("initial.hinge.q", ("deg", "arcmin", "arcsec", "cycle", "rad")),
+    ("links.bar.mass", ("g", "kg", "t")),
+    ("initial.hinge.qd", ("rpm", "deg/s", "cycle/min", "rad/h")),
+    ("drive.v_max", ("mV", "kV")),
+]
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -78,9 +82,14 @@ def test_samples_stay_within_the_bounds_that_the_deck_writes_to_the_last_bit(
     for kind, numbers in kinds.items():
         behind = f"{kind}({', '.join(map(repr, map(float, numbers)))}) {unit}"
         inside = f"{kind}({', '.join(f'{float(x)!r} {unit}' for x in numbers)})"
-        ends, values, same = (drawn(tmp_path, each)[0] for each in (
-            f"vary {path} = [{low!r}, {high!r}] {unit};", f"sample random(5) {{ {path} = {behind}; }}",
-            f"sample random(5) {{ {path} = {inside}; }}"))  # fmt: skip
+        ends, values, same = (
+            drawn(tmp_path, each)[0]
+            for each in (
+                f"vary {path} = [{low!r}, {high!r}] {unit};",
+                f"sample random(5) {{ {path} = {behind}; }}",
+                f"sample random(5) {{ {path} = {inside}; }}",
+            )
+        )
         assert ends[0] <= values.min() < values.max() <= ends[1], behind
         assert values.tolist() == same.tolist()
 

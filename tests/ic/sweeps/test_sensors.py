@@ -31,13 +31,18 @@ def test_a_sensor_may_vary_over_models_however_they_are_written(path: str, tmp_p
     assert models_of(found) == [["qd tachometer"], ["qd tachometer"], ["qd low_pass"]]
     assert [each.parameters["hinge.servo.sensor.qd.delay"].value for each in found[:2]] == [1.0, 2.0]
     assert [choice.value for each in found for choice in each.cases.choices] == [
-        "tachometer { delay = 1; }", "tachometer { delay = 2; }", "low_pass(cutoff = 20 Hz)"]  # fmt: skip
+        "tachometer { delay = 1; }",
+        "tachometer { delay = 2; }",
+        "low_pass(cutoff = 20 Hz)",
+    ]
 
 
 def test_so_may_one_that_the_use_writes_and_one_that_nobody_does(tmp_path: Path) -> None:
     body = "vary hinge.servo.sensor.qd = [tachometer { delay = 1; }, low_pass { cutoff = 20 Hz; }];"
     assert models_of(groups(tmp_path, body, NOISY, changed(OWN, ("step = 0.1 rad;", "step = 0.1 rad/s;")))) == [
-        ["qd tachometer"], ["qd low_pass"]]  # fmt: skip
+        ["qd tachometer"],
+        ["qd low_pass"],
+    ]
     assert models_of(groups(tmp_path, body, SERVO)) == [["qd tachometer"], ["qd low_pass"]]
 
 
@@ -72,5 +77,6 @@ def test_a_sensor_that_the_servo_cannot_have_is_told_at_the_path(tmp_path: Path)
 def test_repeats_without_noise_say_that_a_sensor_has_it(tmp_path: Path) -> None:
     (diagnostic,) = check(tmp_path, ARM, SERVO, RUN, "sweep it of hold { repeat 2; }\n", select=["it"]).diagnostics
     assert diagnostic.code == "D230" and diagnostic.help[1] == (
-        "a sensor may be noisy: `sensor qd = tachometer { noise = 0.1 rad/s; }` in a servo")  # fmt: skip
+        "a sensor may be noisy: `sensor qd = tachometer { noise = 0.1 rad/s; }` in a servo"
+    )
     assert codes(tmp_path, ARM, NOISY, RUN, "sweep it of hold { repeat 2; }\n", select=["it"]) == []

@@ -150,8 +150,10 @@ def test_a_set_value_is_what_a_sweep_over_it_alone_has(tmp_path: Path) -> None:
         (found,) = made(tmp_path, text, settings=[f"{path}={value}"])
         at = {coordinate.path: coordinate.values for coordinate in swept.cases.coordinates}
         outputs = swept.formulas.replay(at)
-        by_case = {name: float(outputs[q.value.output][0]) if isinstance(q.value, Formula) else q.value
-                   for name, q in swept.parameters.items()}  # fmt: skip
+        by_case = {
+            name: float(outputs[q.value.output][0]) if isinstance(q.value, Formula) else q.value
+            for name, q in swept.parameters.items()
+        }
         assert by_case == {name: q.value for name, q in found.parameters.items()}, path
 
 
@@ -262,7 +264,11 @@ def test_what_is_set_stands_behind_the_macros_of_the_command_line(
     assert cli.main(["explain", deck, "duration", *options]) == 0
     (said,) = json.loads(capsys.readouterr().out)
     assert (said["origin"], said["note"], said["place"]["file"], said["place"]["line"]) == (
-        "deck", "set on the command line", "<command line>", 3)  # fmt: skip
+        "deck",
+        "set on the command line",
+        "<command line>",
+        3,
+    )
     plan = ic.compile(deck, defines=["ONE=1", "TWO"], set=["duration=2 s"], select=["hold"])
     assert plan.sources[-1].text == "ONE 1\nTWO 1\nduration=2 s\n"
 
@@ -319,7 +325,9 @@ def test_what_sets_nothing_is_refused(setting: str, message: str, help: str, tmp
 
 
 def test_a_value_that_cannot_be_read_is_told_as_a_decks_is(tmp_path: Path) -> None:
-    assert refused(tmp_path, "slow=1 rad/s", "duration=3 kg kg", "drive.kp=(1 +") == """\
+    assert (
+        refused(tmp_path, "slow=1 rad/s", "duration=3 kg kg", "drive.kp=(1 +")
+        == """\
 error[D030]: units are multiplied with `*`
  --> <command line>:2:15
   |
@@ -334,11 +342,14 @@ error[D020]: expected a value, found the end of the line
   |              ^
 
 2 errors
-"""  # fmt: skip
+"""
+    )
 
 
 def test_a_path_is_set_once(tmp_path: Path) -> None:
-    assert refused(tmp_path, "drive.kp=0.2 V*s/rad", "drive.kp=0.3 V*s/rad") == """\
+    assert (
+        refused(tmp_path, "drive.kp=0.2 V*s/rad", "drive.kp=0.3 V*s/rad")
+        == """\
 error[D232]: `drive.kp` is set twice
  --> <command line>:2:1
   |
@@ -347,11 +358,14 @@ error[D232]: `drive.kp` is set twice
   = help: leave one of the two out
 
 1 error
-"""  # fmt: skip
+"""
+    )
 
 
 def test_two_paths_to_one_parameter_are_told(tmp_path: Path) -> None:
-    assert refused(tmp_path, "drive.kp=0.2 V*s/rad", "hinge.servo.kp=0.3 V*s/rad") == """\
+    assert (
+        refused(tmp_path, "drive.kp=0.2 V*s/rad", "hinge.servo.kp=0.3 V*s/rad")
+        == """\
 error[D232]: this sets `hinge.servo.kp`, which is set already
  --> <command line>:2:16
   |
@@ -361,25 +375,32 @@ error[D232]: this sets `hinge.servo.kp`, which is set already
   = help: leave one of the two out
 
 1 error
-"""  # fmt: skip
+"""
+    )
 
 
-@pytest.mark.parametrize(("setting", "varied", "at", "value"), [
-    ("drive.ki=3 V/rad", "drive.ki", 1, "drive.ki"),
-    ("hinge.servo.ki=3 V/rad", "drive.ki", 16, "3 V/rad"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("setting", "varied", "at", "value"),
+    [
+        ("drive.ki=3 V/rad", "drive.ki", 1, "drive.ki"),
+        ("hinge.servo.ki=3 V/rad", "drive.ki", 16, "3 V/rad"),
+    ],
+)
 def test_what_a_sweep_varies_is_not_set(setting: str, varied: str, at: int, value: str, tmp_path: Path) -> None:
-    assert refused(tmp_path, setting, text=ARM + SERVO + RUN + GAINS, select=["it"]) == f"""\
-error[D233]: this sets `{setting.partition('=')[0]}`, which the sweep varies
+    assert (
+        refused(tmp_path, setting, text=ARM + SERVO + RUN + GAINS, select=["it"])
+        == f"""\
+error[D233]: this sets `{setting.partition("=")[0]}`, which the sweep varies
  --> <command line>:1:{at}
   |
 1 | {setting}
-  | {' ' * (at - 1)}{'^' * len(value)}
+  | {" " * (at - 1)}{"^" * len(value)}
  ::: deck.ic:18:25  `{varied}` varies here
   = help: leave it out here, or name runs and sweeps that do not vary this
 
 1 error
-"""  # fmt: skip
+"""
+    )
 
 
 @pytest.mark.parametrize(("setting", "body", "said"), [
@@ -400,7 +421,9 @@ def test_however_a_sweep_varies_it(setting: str, body: str, said: str, tmp_path:
 
 
 def test_a_path_that_no_run_has_is_told_with_the_one_that_was_meant(tmp_path: Path) -> None:
-    assert refused(tmp_path, "links.bra.mass=3 kg", "integratr=rk4", "FAST=1", "hinge.law=bare") == """\
+    assert (
+        refused(tmp_path, "links.bra.mass=3 kg", "integratr=rk4", "FAST=1", "hinge.law=bare")
+        == """\
 error[D234]: nothing in `hold` is called `links.bra.mass`
  --> <command line>:1:1
   |
@@ -431,7 +454,8 @@ error[D234]: nothing in `hold` is called `hinge.law`
   = help: its motor is on no bed there: `substitute hinge { }` puts it on one
 
 4 errors
-"""  # fmt: skip
+"""
+    )
 
 
 @pytest.mark.parametrize(("setting", "helps"), [
@@ -451,7 +475,9 @@ def test_what_cannot_be_set_is_told_with_what_can(setting: str, helps: str, tmp_
 
 
 def test_what_changes_nothing_in_any_run_that_is_asked_for_is_told(tmp_path: Path) -> None:
-    assert refused(tmp_path, "slow=1 rad/s", "brisk.kp=1 V*s/rad", "hinge.at.x=1 m", "seed=3") == """\
+    assert (
+        refused(tmp_path, "slow=1 rad/s", "brisk.kp=1 V*s/rad", "hinge.at.x=1 m", "seed=3")
+        == """\
 error[D236]: `slow` changes nothing in `hold`
  --> <command line>:1:1
   |
@@ -461,7 +487,8 @@ error[D236]: `slow` changes nothing in `hold`
   = help: nothing that is computed depends on it: leave it out, or name a run that uses it
 
 1 error
-"""  # fmt: skip
+"""
+    )
     for setting in ("brisk.kp=1 V*s/rad", "brisk.rate=1 kHz", "hinge.at.x=1 m", "seed=3", "times_of=[0, 2] s"):
         assert refused(tmp_path, setting).startswith(
             f"error[D236]: `{setting.partition('=')[0]}` changes nothing in `hold`\n"

@@ -99,10 +99,13 @@ def test_a_metric_has_no_value_before_a_case_has_run(tmp_path: Path) -> None:
     assert one.startswith("D065 [top] `top` is a metric, which has no value before a case has run")
 
 
-@pytest.mark.parametrize("condition", [
-    "hinge.at.x >= 0 m and sqrt(hinge.at.x * 1 m) > 1 m",
-    "not (hinge.at.x < 0 m or sqrt(hinge.at.x * 1 m) <= 1 m)",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "condition",
+    [
+        "hinge.at.x >= 0 m and sqrt(hinge.at.x * 1 m) > 1 m",
+        "not (hinge.at.x < 0 m or sqrt(hinge.at.x * 1 m) <= 1 m)",
+    ],
+)
 def test_a_root_that_is_asked_for_where_there_is_one_is_one(tmp_path: Path, condition: str) -> None:
     turned = changed(RUN, ("record = [q]", "record = [q, links.bar.position]"))
     body = f"vary hinge.at.x = [-1, 2, 0.5] m; exclude when {condition};"

@@ -72,8 +72,10 @@ def test_defines_from_the_command_line(desk: Desk, name: str):
 
 def test_a_token_knows_where_it_was_written_and_every_macro_it_came_through(desk: Desk):
     text = "#define INNER(y) y + 1\n#define OUTER(x) INNER(x) x\n  OUTER(a)"
-    came = [(token.text, str(token.place), [(e.macro, str(e.use)) for e in token.place.expansions])
-            for token in desk.tokens(text).tokens[:-1]]  # fmt: skip
+    came = [
+        (token.text, str(token.place), [(e.macro, str(e.use)) for e in token.place.expansions])
+        for token in desk.tokens(text).tokens[:-1]
+    ]
     inner, outer = ("INNER", "a.ic:2:18"), ("OUTER", "a.ic:3:3")
     assert came == [
         ("a", "a.ic:3:9", [inner, outer]),
@@ -167,9 +169,10 @@ def test_byte_order_mark_and_foreign_line_ends_are_forgiven(desk: Desk):
 
 def test_a_missing_include_says_where_it_looked_and_what_there_is(desk: Desk):
     told = desk.told(
-        '#include "sub/b.ic"\n', ["extra"],
+        '#include "sub/b.ic"\n',
+        ["extra"],
         {"sub/b.ic": "\n#include <servos/rigid_gearbx.ic>  // table 1\n", "library/servos/rigid_gearbox.ic": ""},
-    )  # fmt: skip
+    )
     assert (
         told
         == """\
@@ -325,11 +328,19 @@ def test_a_macro_on_the_command_line_that_nothing_asks_for_gets_a_warning(desk: 
     asked = "#ifdef LINKS\n#endif\n#if RODS > 1 && defined(BARS)\n#endif\nlet mass = MASS * 1 kg;\n"
     made = desk.tokens(asked, defines=["LINKS", "RODS=2", "BARS", "MASS=3", "LINK=2", "mas=1"])
     assert [(d.severity, d.code, d.message, d.help) for d in made.diagnostics] == [
-        ("warning", "D037", "`-D LINK` has no effect: nothing in the deck asks for a macro `LINK`",
-         ("did you mean `LINKS`?",)),
-        ("warning", "D037", "`-D mas` has no effect: nothing in the deck asks for a macro `mas`",
-         ("did you mean `MASS`?", "a `let` is set by `--set 'mass=VALUE'`")),
-    ]  # fmt: skip
+        (
+            "warning",
+            "D037",
+            "`-D LINK` has no effect: nothing in the deck asks for a macro `LINK`",
+            ("did you mean `LINKS`?",),
+        ),
+        (
+            "warning",
+            "D037",
+            "`-D mas` has no effect: nothing in the deck asks for a macro `mas`",
+            ("did you mean `MASS`?", "a `let` is set by `--set 'mass=VALUE'`"),
+        ),
+    ]
 
 
 @pytest.mark.parametrize("mark", ["\u202e", "\u2066", "\u200b", "\u2028", "\U000e0041", "\ufeff"])

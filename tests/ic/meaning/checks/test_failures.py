@@ -48,8 +48,10 @@ def test_one_that_holds_a_tick_or_needs_none_is_not(failure: str, tmp_path: Path
 
 
 def test_nor_is_one_on_a_law_that_is_continuous(tmp_path: Path) -> None:
-    run = changed(run_with("fault = runaway { joint = hinge;  from = 0.501 s;  until = 0.5015 s; }"),
-                  ("servos = 1 kHz", "servos = continuous"))  # fmt: skip
+    run = changed(
+        run_with("fault = runaway { joint = hinge;  from = 0.501 s;  until = 0.5015 s; }"),
+        ("servos = 1 kHz", "servos = continuous"),
+    )
     assert codes(tmp_path, ARM, SERVO, run) == []
 
 
@@ -74,8 +76,10 @@ warning[D293]: `up` does nothing from 0.4 s on: `down` acts on the same of joint
 @pytest.mark.parametrize(("second", "said"), [("qd", ["D293"]), ("q", [])])
 def test_of_two_sensors_that_are_dead_those_of_one_quantity_alone(second: str, said: list[str], tmp_path: Path) -> None:
     position = changed(SERVO, ("rate(0.1 rad/s)", "position(0.1 rad);  k_position = 2 1/s"))
-    run = run_with("one = dead_sensor { joint = hinge;  of = qd;  until = 0.5 s; }"
-                   f"  two = dead_sensor {{ joint = hinge;  of = {second};  from = 0.4 s; }}")  # fmt: skip
+    run = run_with(
+        "one = dead_sensor { joint = hinge;  of = qd;  until = 0.5 s; }"
+        f"  two = dead_sensor {{ joint = hinge;  of = {second};  from = 0.4 s; }}"
+    )
     assert codes(tmp_path, ARM, position, run) == said
 
 
@@ -120,12 +124,21 @@ error[D291]: `stay` puts friction on joint `hinge`, which servo `drive` (locked)
 def test_a_plan_by_hand_that_has_one_still_stops_before_it_runs(tmp_path: Path) -> None:
     from dataclasses import replace
 
-    run = experiment(tmp_path, ARM, "servo drive { model = passive; }\n",
-                     run_with("stay = brake { joint = hinge;  torque = 4 N*m; }"))  # fmt: skip
+    run = experiment(
+        tmp_path,
+        ARM,
+        "servo drive { model = passive; }\n",
+        run_with("stay = brake { joint = hinge;  torque = 4 N*m; }"),
+    )
     lock = experiment(tmp_path, ARM, LOCKED, RUN)
     with pytest.raises(Problem) as caught:
-        engine.run(replace(run, structure=replace(run.structure, servos=lock.structure.servos),
-                           parameters={**run.parameters, **lock.parameters}))  # fmt: skip
+        engine.run(
+            replace(
+                run,
+                structure=replace(run.structure, servos=lock.structure.servos),
+                parameters={**run.parameters, **lock.parameters},
+            )
+        )
     assert caught.value.diagnostics[0].code == "E219"
 
 

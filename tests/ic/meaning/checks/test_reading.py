@@ -80,9 +80,12 @@ def test_it_is_told_where_no_output_is_made_of_it(servo: str, of: str, read: boo
     assert said == ([] if read else ["D168"])
 
 
-@pytest.mark.parametrize("change", [
-    ("record = [q]", "record = [hinge.servo.sensor.q]"),
-    ("record = [q]", "record = [qd];  metric m = max { of = hinge.servo.sensor.q; }"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "change",
+    [
+        ("record = [q]", "record = [hinge.servo.sensor.q]"),
+        ("record = [q]", "record = [qd];  metric m = max { of = hinge.servo.sensor.q; }"),
+    ],
+)
 def test_a_sensor_whose_reading_is_kept_does_something(change: tuple[str, str], tmp_path: Path) -> None:
     assert codes(tmp_path, ARM, sensed(SERVO, "q"), changed(RUN, change)) == []

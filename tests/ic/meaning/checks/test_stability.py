@@ -146,8 +146,11 @@ warning[D249]: the gear of servo `drive` swings, and this step of modified_euler
 ])  # fmt: skip
 def test_the_growth_that_is_told_is_the_growth_of_a_run(integrator: str, hz: int, tmp_path: Path) -> None:
     """Against an arm so heavy that it stands still, the winding swings about what the torque holds."""
-    deck = changed(GEAR, ("modified_euler", integrator), ("dynamics = 300 Hz;  servos = 300 Hz",
-                   f"dynamics = {hz} Hz;  servos = {hz} Hz")).replace("HEAVY", "1e6")  # fmt: skip
+    deck = changed(
+        GEAR,
+        ("modified_euler", integrator),
+        ("dynamics = 300 Hz;  servos = 300 Hz", f"dynamics = {hz} Hz;  servos = {hz} Hz"),
+    ).replace("HEAVY", "1e6")
     run = engine.run(experiment(tmp_path, deck))
     winding = run.signals["servo.deflection"][0, :, 0] - 1.0 / 2000.0
     size = [np.abs(part).max() for part in np.array_split(winding, 4)]

@@ -37,13 +37,13 @@ def test_below_ten_steps_it_is_warned_and_of_rk4_below_four(tmp_path: Path) -> N
     text = told(check(tmp_path, ARM, SERVO, deck(stiffness(5.0))))
     assert text.startswith("""\
 warning[D295]: `end` is stiff for the dynamics' step: joint `hinge` touches it for 5 steps
-"""), text  # fmt: skip
+"""), text
     assert text.endswith("""\
    = help: with modified_euler a contact of fewer than 10 steps gives energy that nobody put in
    = help: quicken the dynamics to 2000 Hz, or make the stop softer: the joint feels 1.67 kg m^2 at the start
 
 1 warning
-"""), text  # fmt: skip
+"""), text
 
 
 def test_of_a_sweep_the_stiffest_case_counts_and_a_stop_without_ends_does_not(tmp_path: Path) -> None:
@@ -63,8 +63,7 @@ def test_with_numbers_at_their_ends_it_is_no_fault(tmp_path: Path) -> None:
     """A mass whose inverse is infinite leaves nothing to feel; such a rotor is sent back in no step of any rate."""
     nothing = changed(ARM, ("mass = 2 kg", "mass = 1e-308 kg"))
     assert contacts(experiment(tmp_path, nothing, deck(500.0, ("servos { hinge = drive; }", "servos { }")))) == ()
-    rotor = changed(SERVO, ("ratio = 100", "ratio = 1"), ("j_m = 1e-4", "j_m = 1e-308"),
-                    ("kt = 0.05", "kt = 1e-308"))  # fmt: skip
+    rotor = changed(SERVO, ("ratio = 100", "ratio = 1"), ("j_m = 1e-4", "j_m = 1e-308"), ("kt = 0.05", "kt = 1e-308"))
     text = told(check(tmp_path, nothing, rotor, deck(1e308)))
     assert "touches it for 0 steps" in text and "no rate is so high: make the stop softer" in text
 
@@ -73,8 +72,11 @@ def test_with_numbers_at_their_ends_it_is_no_fault(tmp_path: Path) -> None:
 def test_what_is_warned_of_is_true(steps: float, least: float, most: float, tmp_path: Path) -> None:
     """The energy that a bounce gains, at the worst of twenty places of the first step in it."""
     inertia = 2.0 / 3.0
-    run = deck(float(inertia * (np.pi / (steps * 1e-3)) ** 2), ("servos { hinge = drive; }", "servos { }"),
-               ("duration = 1 s", "initial { hinge.qd = 1 rad/s; }  duration = 0.1 s"))  # fmt: skip
+    run = deck(
+        float(inertia * (np.pi / (steps * 1e-3)) ** 2),
+        ("servos { hinge = drive; }", "servos { }"),
+        ("duration = 1 s", "initial { hinge.qd = 1 rad/s; }  duration = 0.1 s"),
+    )
     sweep = "sweep places of hold { vary initial.hinge.q = linspace(0, 1, 20) mrad; }"
     qd = engine.run(experiment(tmp_path, ARM, run, sweep, select=["places"])).signals["qd"][:, -1, 0]
     assert least < (qd**2).max() - 1.0 < most

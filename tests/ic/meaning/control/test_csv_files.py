@@ -609,8 +609,14 @@ def test_what_is_no_file_of_text_is_not_read(tmp_path: Path, named: str, message
 
 
 def test_one_mistake_of_a_file_is_told_once_however_many_joints_read_it(tmp_path: Path) -> None:
-    arm = changed(ARM, ("axis = z; }", "axis = z; }\n    link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n"
-                        "    joint other revolute { parent = bar; child = tip; axis = x; }"))  # fmt: skip
+    arm = changed(
+        ARM,
+        (
+            "axis = z; }",
+            "axis = z; }\n    link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }\n"
+            "    joint other revolute { parent = bar; child = tip; axis = x; }",
+        ),
+    )
     (tmp_path / "moves.csv").write_text(MOVES.replace("0.5,", "1.5,"))
     said = check(tmp_path, arm, servo(), changed(RUN, ("hinge = drive;", "hinge = drive; other = drive;")))
     assert [d.code for d in said.diagnostics] == ["D195"]

@@ -42,8 +42,11 @@ def test_it_is_in_the_plan_with_its_parameters_and_its_ticks(tmp_path: Path) -> 
 
 
 def test_a_run_without_sensors_keeps_its_key(tmp_path: Path) -> None:
-    bare = changed(DECK, ("    sensor up = accelerometer { link = bar; along = [0, 0, 1]; cutoff = 20 Hz; }\n", ""),
-                   (", sensors.up]", "]"))  # fmt: skip
+    bare = changed(
+        DECK,
+        ("    sensor up = accelerometer { link = bar; along = [0, 0, 1]; cutoff = 20 Hz; }\n", ""),
+        (", sensors.up]", "]"),
+    )
     # as it was before there were sensors of links
     assert structure_key(experiment(tmp_path, bare).structure) == "b9e50f89a5bb9478"
 
@@ -64,8 +67,11 @@ run bare like hold { remove up; record = [q]; }
 
 
 def test_sensors_stands_for_what_all_of_them_read(tmp_path: Path) -> None:
-    deck = changed(DECK, ("    rates", "    sensor spin = gyroscope { link = bar; along = [0, 0, 1]; }\n    rates"),
-                   ("sensors.up]", "sensors]; tolerances { sensors.spin = 1 rad/s; }"))  # fmt: skip
+    deck = changed(
+        DECK,
+        ("    rates", "    sensor spin = gyroscope { link = bar; along = [0, 0, 1]; }\n    rates"),
+        ("sensors.up]", "sensors]; tolerances { sensors.spin = 1 rad/s; }"),
+    )
     assert [each.name for each in experiment(tmp_path, deck).structure.record] == ["q", "sensors.up", "sensors.spin"]
 
 
@@ -102,9 +108,12 @@ def test_a_metric_and_a_requirement_watch_a_reading(tmp_path: Path) -> None:
     assert run.metrics["most"].tolist() == [0.0] and [each.tolist() for each in run.met.values()] == [[True]]
 
 
-@pytest.mark.parametrize(("sweep", "said"), [
-    ("sensors.up = [1, 2]", "it is a sensor: vary a parameter of it, `sensors.up.PARAMETER`"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("sweep", "said"),
+    [
+        ("sensors.up = [1, 2]", "it is a sensor: vary a parameter of it, `sensors.up.PARAMETER`"),
+    ],
+)
 def test_what_cannot_vary_is_told(sweep: str, said: str, tmp_path: Path) -> None:
     (found,) = check(tmp_path, DECK, f"sweep cases of hold {{ vary {sweep}; }}\n", select=["cases"]).diagnostics
     assert (found.code, found.help) == ("D122", (said,))

@@ -8,7 +8,13 @@ import pytest
 
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told
 
-SENSED = changed(SERVO, ("command", "sensor qd = tachometer { noise = 0.02 rad/s; }\n    sensor q = encoder { step = 1 deg; }\n    command"))  # fmt: skip
+SENSED = changed(
+    SERVO,
+    (
+        "command",
+        "sensor qd = tachometer { noise = 0.02 rad/s; }\n    sensor q = encoder { step = 1 deg; }\n    command",
+    ),
+)
 
 
 def sensors(folder: Path, upon: str) -> dict[str, str]:

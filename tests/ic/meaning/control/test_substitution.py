@@ -155,9 +155,13 @@ def test_channels_of_a_joint_on_a_bed_tick_with_its_servo(tmp_path: Path) -> Non
     }
     assert {path: channel.unit for path, channel in found.items()} == {
         **{f"one.bed.{memory.name}": memory.unit for memory in BEDS[0].memory},
-        "one.bed.drive_voltage": "V", "one.bed.load_current": "A", "one.law.torque": "N*m", "one.law.rate": "rad/s",
-        "one.law.unknown_torque": "N*m", "one.law.reference_rate": "rad/s",
-    }  # fmt: skip
+        "one.bed.drive_voltage": "V",
+        "one.bed.load_current": "A",
+        "one.law.torque": "N*m",
+        "one.law.rate": "rad/s",
+        "one.law.unknown_torque": "N*m",
+        "one.law.reference_rate": "rad/s",
+    }
     assert {channel.divisor for channel in found.values()} == {hybrid.structure.servos[0].divisor} == {1}
     bare = channels(compiled(tmp_path, HYBRID).structure)
     assert "one.law.rate" in bare and "one.law.unknown_torque" not in bare
@@ -210,8 +214,11 @@ sweep s of hybrid {
     assert swept.cases.count == 16 - 4
     assert swept.parameters["one.servo.kt"].value == 0.05 and swept.parameters["one.servo.j_m"].value == 1e-4
     assert [coordinate.sets for coordinate in swept.cases.coordinates] == [
-        ("one.bed.kt",), ("one.bed.inertia",), ("one.bed.once",), ("one.law.band",)
-    ]  # fmt: skip
+        ("one.bed.kt",),
+        ("one.bed.inertia",),
+        ("one.bed.once",),
+        ("one.law.band",),
+    ]
     assert swept.parameters["one.bed.inertia"].origin.kind == "case"
     assert swept.parameters["one.bed.inertia"].origin.note == ""
 

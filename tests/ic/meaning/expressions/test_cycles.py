@@ -85,9 +85,13 @@ DOUBTS = {
     "a quotient": (("ratio = 10 cycle/m", "ratio = {}"), "1/(10 mm)", "", (100.0, 200 * math.pi)),
     "an integral gain of a corner in Hz": (("ki = 1 V/rad", "ki = {}"), "0.1 V*s/rad * 2 Hz", "", (0.2,)),
 }
-PATHS = {"ki": "lift.servo.ki",
-         "bandwidth": "hinge.servo.bandwidth", "frequency": "hinge.servo.command.frequency", "kp": "lift.servo.kp",
-         "ratio": "lift.servo.ratio"}  # fmt: skip
+PATHS = {
+    "ki": "lift.servo.ki",
+    "bandwidth": "hinge.servo.bandwidth",
+    "frequency": "hinge.servo.command.frequency",
+    "kp": "lift.servo.kp",
+    "ratio": "lift.servo.ratio",
+}
 
 
 @pytest.mark.slow
@@ -139,9 +143,13 @@ def test_what_is_not_pi_makes_no_cycles_of_hertz(tmp_path: Path, written: str) -
 
 
 def test_damping_of_stiffness_and_inertia_is_plain(tmp_path: Path) -> None:
-    text = deck(("arm swing", "let k = 100 N*m/rad;\nlet j = 0.64 kg*m^2;\nlet w0 = 20 rad/s;\narm swing"),
-                ("model = ideal; bandwidth = 5 s^-1; command = position(sine(amplitude = 1 rad, frequency = 1 Hz))",
-                 "model = passive; stiffness = j*w0^2; damping = 2*sqrt(k*j)"))  # fmt: skip
+    text = deck(
+        ("arm swing", "let k = 100 N*m/rad;\nlet j = 0.64 kg*m^2;\nlet w0 = 20 rad/s;\narm swing"),
+        (
+            "model = ideal; bandwidth = 5 s^-1; command = position(sine(amplitude = 1 rad, frequency = 1 Hz))",
+            "model = passive; stiffness = j*w0^2; damping = 2*sqrt(k*j)",
+        ),
+    )
     compiled = check(tmp_path, text)
     assert compiled.plan is not None, told(compiled)
     assert not [each.code for each in compiled.diagnostics if each.code == "D305"]

@@ -141,9 +141,14 @@ def test_both_conventions_end_at_one_point(tmp_path: Path, rows: tuple[dh.Row, .
 
 def bodies(count: int) -> tuple[dh.Body, ...]:
     rng = np.random.default_rng(SEED + 1)
-    return tuple((float(rng.uniform(0.5, 9.0)), tuple(rng.uniform(-0.3, 0.3, 3).tolist()),
-                  tuple(rng.uniform(0.3, 0.5, 3).tolist()))
-                 for _ in range(count))  # fmt: skip
+    return tuple(
+        (
+            float(rng.uniform(0.5, 9.0)),
+            tuple(rng.uniform(-0.3, 0.3, 3).tolist()),
+            tuple(rng.uniform(0.3, 0.5, 3).tolist()),
+        )
+        for _ in range(count)
+    )
 
 
 @pytest.mark.oracle
@@ -162,8 +167,13 @@ def test_accelerations_are_those_of_pinocchio_by_the_same_table(
         for what, values, rate in (("q", q, ""), ("qd", qd, "/s"))
     )
     columns += f"j1.dh.a = {a.tolist()} m; j2.dh.alpha = {alpha.tolist()} rad;"
-    made = experiment(tmp_path, arm(convention, rows, kinds, given), RUN, f"sweep states of fall {{ zip {{ {columns} }} }}",
-                      select=["states"])  # fmt: skip
+    made = experiment(
+        tmp_path,
+        arm(convention, rows, kinds, given),
+        RUN,
+        f"sweep states of fall {{ zip {{ {columns} }} }}",
+        select=["states"],
+    )
     found = engine.run(made).signals["qdd"][:, 0]
     for case in range(5):
         own = list(rows)

@@ -57,8 +57,11 @@ def test_only_what_has_no_mass_needs_no_inertia_and_has_none(tmp_path: Path, pie
 
 
 def test_a_joint_that_moves_nothing_with_mass_is_told_and_not_those_behind_it(tmp_path: Path) -> None:
-    arm = changed(YOKE, ("mass = 2 kg; com = [0.1, 0.2, 0.3] m; inertia = [0.2, 0.3, 0.4] kg*m^2;", "mass = 0 kg;"),
-                  ("mass = 0.1 kg; inertia = [0, 0, 0] kg*m^2;", "mass = 0 kg;"))  # fmt: skip
+    arm = changed(
+        YOKE,
+        ("mass = 2 kg; com = [0.1, 0.2, 0.3] m; inertia = [0.2, 0.3, 0.4] kg*m^2;", "mass = 0 kg;"),
+        ("mass = 0.1 kg; inertia = [0, 0, 0] kg*m^2;", "mass = 0 kg;"),
+    )
     assert (
         told(check(tmp_path, arm, FALL))
         == """\

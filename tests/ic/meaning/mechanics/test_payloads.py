@@ -380,11 +380,19 @@ def test_a_payload_is_held_from_the_start_unless_it_is_grappled(tmp_path: Path) 
     assert one == {
         "payloads.box.mass": 5.0,
         **{f"payloads.box.com.{axis}": x for axis, x in zip("xyz", (0.1, 0.0, 0.0), strict=True)},
-        **{f"payloads.box.inertia.{name}": pytest.approx(x) for name, x in zip(
-            ("xx", "yy", "zz", "xy", "xz", "yz"), (0.104166666, 0.083333333, 0.054166666, 0, 0, 0), strict=True)},
-        "payloads.box.at.x": 0.0, "payloads.box.at.y": 0.0, "payloads.box.at.z": 0.1,
-        "payloads.box.rpy.x": pytest.approx(3.141592653589793), "payloads.box.rpy.y": 0.0, "payloads.box.rpy.z": 0.0,
-    }  # fmt: skip
+        **{
+            f"payloads.box.inertia.{name}": pytest.approx(x)
+            for name, x in zip(
+                ("xx", "yy", "zz", "xy", "xz", "yz"), (0.104166666, 0.083333333, 0.054166666, 0, 0, 0), strict=True
+            )
+        },
+        "payloads.box.at.x": 0.0,
+        "payloads.box.at.y": 0.0,
+        "payloads.box.at.z": 0.1,
+        "payloads.box.rpy.x": pytest.approx(3.141592653589793),
+        "payloads.box.rpy.y": 0.0,
+        "payloads.box.rpy.z": 0.0,
+    }
     (box,) = experiment(tmp_path, ARM, RUN).structure.payloads
     assert (box.name, box.link, box.grappled, box.released, box.flies) == ("box", "hand", False, False, False)
     assert box.shape == ("box", (("size_x", 0.2), ("size_y", 0.3), ("size_z", 0.4), ("along", 0.0)))
@@ -439,7 +447,9 @@ def test_a_sweep_varies_what_a_payload_is_and_when(tmp_path: Path) -> None:
     (heavy,) = (each for each in made.cases.coordinates if each.path == "payloads.box.mass")
     assert heavy.sets == ("payloads.box.mass",)
     assert {path for path, each in made.parameters.items() if each.origin.kind == "case"} == {
-        "payloads.box.mass", "payloads.box.grapple"}  # fmt: skip
+        "payloads.box.mass",
+        "payloads.box.grapple",
+    }
 
 
 @pytest.mark.parametrize(

@@ -62,10 +62,17 @@ def test_names_of_one_number_of_a_vector_and_of_all_joints(tmp_path: Path) -> No
 def test_a_name_that_stands_for_several_variables(tmp_path: Path) -> None:
     found = recorded(tmp_path, "reaction, energy, momentum, links.hook.jacobian, hinge.reaction")
     assert [each.name for each in found] == [
-        "reaction.moment", "reaction.force", "energy.kinetic", "energy.potential", "momentum.linear",
-        "momentum.angular", "links.hook.jacobian.angular", "links.hook.jacobian.linear", "hinge.reaction.moment",
+        "reaction.moment",
+        "reaction.force",
+        "energy.kinetic",
+        "energy.potential",
+        "momentum.linear",
+        "momentum.angular",
+        "links.hook.jacobian.angular",
+        "links.hook.jacobian.linear",
+        "hinge.reaction.moment",
         "hinge.reaction.force",
-    ]  # fmt: skip
+    ]
 
 
 def test_a_jacobian_has_the_joints_that_carry_its_link(tmp_path: Path) -> None:

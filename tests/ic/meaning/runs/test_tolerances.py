@@ -66,21 +66,28 @@ def found(plan: Plan) -> dict[str, tuple[float, str]]:
 
 
 def test_each_is_in_si_and_as_the_deck_wrote_it(compiled: Callable[..., Plan]) -> None:
-    text = deck("one.q = 0.5 deg;  two.q = 20 um;  one.qd = 1 mrad/s;  links.b.position = 1 mm;  reach = 2 * 1 mm;  "
-                "rel = 2 %;  time = 1 ms;")  # fmt: skip
+    text = deck(
+        "one.q = 0.5 deg;  two.q = 20 um;  one.qd = 1 mrad/s;  links.b.position = 1 mm;  reach = 2 * 1 mm;  "
+        "rel = 2 %;  time = 1 ms;"
+    )
     assert found(compiled(text)) == {
-        "one.q": (pytest.approx(0.5 * 3.14159265358979 / 180), "0.5 deg"), "two.q": (pytest.approx(20e-6), "20 um"),
-        "one.qd": (1e-3, "1 mrad/s"), "links.b.position": (1e-3, "1 mm"), "reach": (2e-3, "2 * 1 mm"),
-        "rel": (0.02, "2 %"), "time": (1e-3, "1 ms"),
-    }  # fmt: skip
+        "one.q": (pytest.approx(0.5 * 3.14159265358979 / 180), "0.5 deg"),
+        "two.q": (pytest.approx(20e-6), "20 um"),
+        "one.qd": (1e-3, "1 mrad/s"),
+        "links.b.position": (1e-3, "1 mm"),
+        "reach": (2e-3, "2 * 1 mm"),
+        "rel": (0.02, "2 %"),
+        "time": (1e-3, "1 ms"),
+    }
 
 
 def test_of_a_joint_in_a_jacobian_and_of_a_metric_that_is_called_as_a_signal(compiled: Callable[..., Plan]) -> None:
     text = deck("links.b.jacobian.linear.one = 1 mm/rad;  metrics.tau_load = 2 N*m;  one.tau_load = 1 N*m;")
     assert found(compiled(text)) == {
-        "links.b.jacobian.linear.one": (1e-3, "1 mm/rad"), "metrics.tau_load": (2.0, "2 N*m"),
+        "links.b.jacobian.linear.one": (1e-3, "1 mm/rad"),
+        "metrics.tau_load": (2.0, "2 N*m"),
         "one.tau_load": (1.0, "1 N*m"),
-    }  # fmt: skip
+    }
 
 
 def test_a_run_takes_over_and_overrides(compiled: Callable[..., Plan]) -> None:
