@@ -12,7 +12,7 @@ from ic.grammar.syntax import Deck, Entry
 from ic.text.files import LIBRARY
 from ic.text.limits import Findings, GiveUp
 from ic.text.preprocess import preprocess
-from ic.text.source import SourceText, Wreck
+from ic.text.source import SourceText, UnreadableStretch
 from met.diagnostic import Diagnostic, Problem
 from met.render import shown_place
 
@@ -32,19 +32,19 @@ def read(
 
     include_dirs  further directories for `#include`, and for other files that the deck names
     defines       macros, `NAME` or `NAME=VALUE`
-    despite_errors  also where errors are found, as long as what is not wrong could be read: `Deck.wrecks`
+    despite_errors  also where errors are found, as long as what is not wrong could be read: `Deck.unreadable`
 
     Raises Problem with every error and warning found, in the order of the text, and the text of every file read.
     """
     seen = preprocess(path, include_dirs, defines, library=library)
     findings = Findings()
     entries: tuple[Entry, ...] = ()
-    wrecks: tuple[Wreck, ...] = ()
+    unreadable: tuple[UnreadableStretch, ...] = ()
     sound = False
     with suppress(GiveUp):
         findings.add(*seen.diagnostics)
         if seen.whole:
-            entries, wrecks, sound = parse_on(seen.tokens, findings)
+            entries, unreadable, sound = parse_on(seen.tokens, findings)
     found = in_order(findings.all, seen.sources)
     sound = sound and despite_errors and not any(each.code in UNKNOWN_TEXT for each in findings.errors)
     if not seen.whole or (findings.errors and not sound):
@@ -57,7 +57,7 @@ def read(
         tuple(os.fspath(each) for each in include_dirs),
         os.fspath(path),
         tuple(defines),
-        wrecks,
+        unreadable,
     )
 
 

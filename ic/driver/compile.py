@@ -69,7 +69,7 @@ def compile_deck(
     settings  `PATH=VALUE`, each as if the deck said so
     """
     complaints = complaints if complaints is not None else Complaints(deck.warnings)
-    complaints.after(deck.wrecks)
+    complaints.note_unreadable(deck.unreadable)
     deck, entries = _with_settings(deck, settings, complaints)
     definitions = Definitions(deck, complaints)
     given = Settings(entries)

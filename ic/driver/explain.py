@@ -72,7 +72,7 @@ def explain(
     if not found:
         known = list(
             dict.fromkeys(
-                path for scope in compiled.scopes for path in (*scope.parameters, *scope.beside, *scope.known)
+                path for scope in compiled.scopes for path in (*scope.parameters, *scope.auxiliary, *scope.known)
             )
         )
         inside = [path for path in known if path.startswith(target + ".")]
@@ -86,7 +86,7 @@ def in_full(compiled: Compiled, number: int = 0) -> Experiment:
     """An experiment of a deck, with settings and what parameters are made of as if these were parameters."""
     assert compiled.plan is not None
     experiment, scope = compiled.plan.experiments[number], compiled.scopes[number]
-    parameters, outputs = scope.quantities(beside=True)
+    parameters, outputs = scope.quantities(auxiliary=True)
     for name in scope.definitions.lets:
         let = _let(scope, name)
         if let is None or name in parameters or any(path.startswith(f"{name}.") for path in parameters):
@@ -107,7 +107,7 @@ def explained(compiled: Compiled, target: str) -> Iterator[Explanation]:
         paths = dict.fromkeys((target, *scope.known.get(target, ())))
         vector = [
             path
-            for path in (*scope.parameters, *scope.beside)
+            for path in (*scope.parameters, *scope.auxiliary)
             if path.startswith(target + ".")
             and path.count(".") == target.count(".") + 1
             and path.rpartition(".")[2] in ("x", "y", "z", "xx", "yy", "zz", "xy", "xz", "yz")

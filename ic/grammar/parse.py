@@ -21,7 +21,7 @@ from ic.grammar.expressions import Expressions
 from ic.grammar.syntax import Broken, Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import Findings, GiveUp, without_collection
-from ic.text.source import Wreck
+from ic.text.source import UnreadableStretch
 from met import units
 from met.diagnostic import Diagnostic, Label, Place
 
@@ -38,7 +38,9 @@ def parse(
     return parse_on(tokens, findings)[0], findings.all
 
 
-def parse_on(tokens: Sequence[Token], findings: Findings) -> tuple[tuple[Entry, ...], tuple[Wreck, ...], bool]:
+def parse_on(
+    tokens: Sequence[Token], findings: Findings
+) -> tuple[tuple[Entry, ...], tuple[UnreadableStretch, ...], bool]:
     """The entries of a deck, the stretches of it that could not be read, and whether the rest is where it belongs: not
     where a brace is missing or too many."""
     parser = _Parser(tokens, findings)
@@ -47,13 +49,13 @@ def parse_on(tokens: Sequence[Token], findings: Findings) -> tuple[tuple[Entry, 
     with without_collection(), suppress(GiveUp, EndedInsideBlock):
         parser.entries(entries)
         sound = not parser.unbalanced
-    return tuple(entries), tuple(parser.wrecks), sound
+    return tuple(entries), tuple(parser.unreadable), sound
 
 
 class _Parser(Expressions):
     def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
         super().__init__(tokens, findings)
-        self.wrecks: list[Wreck] = []
+        self.unreadable: list[UnreadableStretch] = []
         self.within: Place | None = None
 
     def entries(self, into: list[Entry]) -> None:
@@ -81,9 +83,9 @@ class _Parser(Expressions):
             except Unreadable:
                 self.operators = operators
                 self.recover(start, depth)
-                into += self.wreck(start)
+                into += self.note_unreadable(start)
 
-    def wreck(self, start: int) -> list[Entry]:
+    def note_unreadable(self, start: int) -> list[Entry]:
         """Notes that an entry could not be read; what of it is known: what it sets, to a value that nobody knows."""
         tokens = self.tokens[start : max(self.at, start + 1)]
         names = list(takewhile(lambda token: token.kind == NAME, tokens))
@@ -102,7 +104,9 @@ class _Parser(Expressions):
             known += re.findall(
                 r"[A-Za-z_]\w*", last.source.rest_of_line(first.offset if first.source is last.source else last.offset)
             )
-        self.wrecks.append(Wreck(at, (end.line, end.column + end.length), tuple(known), None if sets else self.within))
+        self.unreadable.append(
+            UnreadableStretch(at, (end.line, end.column + end.length), tuple(known), None if sets else self.within)
+        )
         if not sets:
             return []
         value = Broken(first.place)

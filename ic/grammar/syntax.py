@@ -22,7 +22,7 @@ what may stand where is decided when the tree is resolved. So a joint may be cal
 
 from __future__ import annotations
 
-from ic.text.source import SourceText, Wreck
+from ic.text.source import SourceText, UnreadableStretch
 from met.diagnostic import Diagnostic, Place
 from met.frozen import frozen
 
@@ -197,7 +197,7 @@ class Deck:
 
     include_dirs: further directories in which files that the deck names are looked for.
     path, defines: what it was read from and with, to read it again.
-    wrecks: what could not be read; where there are some, `warnings` holds errors too.
+    unreadable: what could not be read; where there are some, `warnings` holds errors too.
     """
 
     file: str
@@ -207,4 +207,4 @@ class Deck:
     include_dirs: tuple[str, ...] = ()
     path: str = ""
     defines: tuple[str, ...] = ()
-    wrecks: tuple[Wreck, ...] = ()
+    unreadable: tuple[UnreadableStretch, ...] = ()

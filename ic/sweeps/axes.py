@@ -188,7 +188,7 @@ class _SweepReader:
 
     def zip(self, group: Group) -> None:
         columns: list[Column] = []
-        before = self.complaints.faults
+        before = self.complaints.error_count
         for entry in group.body:
             with self.complaints.gather():
                 words = [word.text for word in entry.words] if isinstance(entry, Setting) else None
@@ -216,7 +216,7 @@ class _SweepReader:
                         help="what is zipped goes in step: as many values each",
                     )
                 )
-        if columns and self.complaints.faults == before:
+        if columns and self.complaints.error_count == before:
             check_equal(columns, self.places.get(columns[0].path, ()))
             self.axes.append(SweepAxis(tuple(columns)))
 

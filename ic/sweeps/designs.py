@@ -181,7 +181,7 @@ def read_sample(
     names = Names(definitions, {}, watched=set(paths))
     count = _count(evaluate_number(call.positional[0], names.find))
     parts = []
-    before = complaints.faults
+    before = complaints.error_count
     for entry in call.body:
         with complaints.gather():
             if not isinstance(entry, Setting) or entry.words or entry.operator != "=":
@@ -195,7 +195,7 @@ def read_sample(
                     )
                 )
             parts.append(_part(entry, names, paths))
-    if complaints.faults > before:
+    if complaints.error_count > before:
         raise Problem(())
     if not parts:
         raise Problem(

@@ -59,7 +59,7 @@ class Effects:
             kind = goes(scope.definitions, entry)
             if path == SEED_PATH:
                 used = _has_noise(scope, made)
-            elif kind == "number" and path not in scope.sets:
+            elif kind == "number" and path not in scope.targets:
                 used = False
             elif kind != "run" and not _decides(kind, entry) and _is_number(scope, entry):
                 numbers[path], used = entry, False
@@ -80,12 +80,15 @@ class Effects:
                 self._tell(complaints, path, entry, where)
 
     def _tell(self, complaints: Complaints, path: str, entry: Setting, where: str) -> None:
-        scope = next((each for each in self.scopes if path in each.known or path in each.unvaried), self.scopes[0])
+        scope = next((each for each in self.scopes if path in each.known or path in each.not_sweepable), self.scopes[0])
         kind = goes(scope.definitions, entry)
         inside = sorted(known for known in scope.known if known.startswith(f"{path}."))
-        if any((path in each.given and each.given[path] is None) or each.hangs(path) for each in self.scopes):
+        if any(
+            (path in each.evaluated_settings and each.evaluated_settings[path] is None) or each.depends_on_failed(path)
+            for each in self.scopes
+        ):
             return  # which was told
-        if kind in ("let", "servo") or path in self.met or any(path in each.sets for each in self.scopes):
+        if kind in ("let", "servo") or path in self.met or any(path in each.targets for each in self.scopes):
             self._tell_idle(complaints, scope, path, entry, where)
         elif path in (*BLOCKS, "record"):
             complaints.error(
@@ -94,8 +97,8 @@ class Effects:
                 entry.place,
                 help="one value is set, not a block or a list: such as `rates.dynamics=1 kHz`",
             )
-        elif path in scope.unvaried:
-            complaints.error("D235", f"`{path}` cannot be set", entry.place, help=scope.unvaried[path].to_set())
+        elif path in scope.not_sweepable:
+            complaints.error("D235", f"`{path}` cannot be set", entry.place, help=scope.not_sweepable[path].to_set())
         elif inside:
             complaints.error("D235", f"`{path}` cannot be set", entry.place, help=known_words("set one of", inside))
         elif self.complete:
@@ -130,7 +133,7 @@ class Effects:
         elif servo is not None and not any(path.startswith(f"{first}.") for each in self.scopes for path in each.known):
             helps, also = ("no joint has this servo there",), [Label(servo.place, "defined here")]
         else:
-            known = [each for one in self.scopes for each in (*one.known, *one.unvaried)]
+            known = [each for one in self.scopes for each in (*one.known, *one.not_sweepable)]
             known += [*scope.definitions.lets, *OF_RUN, *(f"{joint}.servo" for joint in joints)]
             helps = did_you_mean(path, known) or continued(scope, path) or ends(scope, path)
             macro = [] if rest else [f"a macro is defined by `-D {path}=VALUE`"]
@@ -160,7 +163,7 @@ def _used(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> lis
     there = {
         path: entry
         for path, entry in settings.items()
-        if path in scope.sets or goes(scope.definitions, entry) != "number"
+        if path in scope.targets or goes(scope.definitions, entry) != "number"
     }
     if not there:
         return []

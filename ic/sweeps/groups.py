@@ -86,10 +86,10 @@ class _Sweep:
         self.read_so_far: dict[tuple[str, ...], _Read] = {}
 
     def groups(self) -> list[ScopedExperiment]:
-        before = self.complaints.faults
+        before = self.complaints.error_count
         read = self._read(self.definitions, self.definition)
         sweep = read.sweep
-        if self.complaints.faults > before:
+        if self.complaints.error_count > before:
             self._tell_the_rest(read)
             return []
         self.read_so_far[()] = read
@@ -109,7 +109,7 @@ class _Sweep:
         made: list[tuple[ScopedExperiment, np.ndarray]] = []
         dropped: dict[Place, int] = {}  # by each `exclude when`, of which a macro may bring other ones
         for choices, rows in found:
-            faults = self.complaints.faults
+            faults = self.complaints.error_count
             noted = len(self.complaints.all)
             with self.complaints.gather():
                 one = self._group(sweep, choices, rows)
@@ -118,7 +118,7 @@ class _Sweep:
                         dropped[place] = dropped.get(place, 0) + count
                     if one[0] is not None:
                         made.append(one[0])
-            if self.complaints.faults > faults:
+            if self.complaints.error_count > faults:
                 self.complaints.mark(
                     noted,
                     *(Label(option.place, f"where `{column.path}` is `{option.text}`") for column, option in choices),
@@ -142,7 +142,7 @@ class _Sweep:
         check_coordinates(scope, complete=resolved is not None)
         lost = paths_of(read.definitions, self.definition) - set(varied)
         excludes = [each for each in sweep.excludes if not names_in(each.value) & lost]
-        if resolved is not None and excludes and not self.complaints.lacks(read.base.place):
+        if resolved is not None and excludes and not self.complaints.is_known_to_lack(read.base.place):
             first = np.zeros(1, dtype=np.int64)
             kept(scope, replace(sweep, excludes=tuple(excludes)), columns(sweep, first), (), 1, resolved.structure)
 

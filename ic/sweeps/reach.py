@@ -19,14 +19,14 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
     complete  all of the run was resolved; else nothing is said of what hangs on the rest, since that was told
     """
     for path, varied in scope.varied.items():
-        if path in scope.sets or path in scope.names.followed or scope.hangs(path):
+        if path in scope.targets or path in scope.names.followed or scope.depends_on_failed(path):
             continue
         unknown = path in scope.definitions.lets or path.startswith("metrics.") or not scope.known
-        if unknown and (not complete or scope.gone or scope.lost):
+        if unknown and (not complete or scope.failed_parts or scope.failed_servos):
             continue
         place = varied.place
-        if path in scope.unvaried:
-            why = scope.unvaried[path]
+        if path in scope.not_sweepable:
+            why = scope.not_sweepable[path]
             scope.complaints.error(
                 "D122", f"`{path}` cannot vary{' like this' if why.is_choice else ''}", place, help=why.to_vary(path)
             )
@@ -58,7 +58,7 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
                 "D128",
                 f"no parameter `{path}` in this run",
                 place,
-                help=did_you_mean(path, (*scope.known, *scope.unvaried, *scope.definitions.lets))
+                help=did_you_mean(path, (*scope.known, *scope.not_sweepable, *scope.definitions.lets))
                 or continued(scope, path)
                 or ends(scope, path)
                 or beginnings(scope),
@@ -107,7 +107,7 @@ def coordinates(
     """The coordinates as a plan holds them. dependents: parameters whose formulas need each coordinate."""
     made = []
     for varied in sweep.varied:
-        direct = [path for path in scope.sets.get(varied.path, ()) if path in scope.parameters]
+        direct = [path for path in scope.targets.get(varied.path, ()) if path in scope.parameters]
         unit = varied.unit.text if varied.unit is not None else units.text(varied.value.dimension)
         made.append(
             Coordinate(

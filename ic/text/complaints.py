@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
-from ic.text.source import Wreck
+from ic.text.source import UnreadableStretch
 from met.diagnostic import Diagnostic, Label, Place, Problem, error, meant
 
 MOST = 200  # a deck with more mistakes than this is told the first ones: the rest seldom say more
@@ -25,12 +25,12 @@ class Complaints:
     def __init__(self, found: Iterable[Diagnostic] = ()) -> None:
         self._found: dict[Diagnostic, None] = dict.fromkeys(found)
         self._remarks: dict[Diagnostic, None] = {}
-        self.faults = 0  # errors so far, with those that are not told again: to see whether something brought one
-        self._wrecks: list[Wreck] = []
+        self.error_count = 0  # errors so far, with those that are not told again: to see whether something brought one
+        self._unreadable: list[UnreadableStretch] = []
         self._torn: set[Place] = set()  # definitions and blocks of which an entry could not be read
         self._lost: set[str] = set()  # names that what could not be read may have defined
         self._spots: set[tuple[str, int, int]] = set()  # where errors of syntax are told
-        self.lacking: set[tuple[Place, str]] = set()  # definitions, and entries that they lack, as was told
+        self.known_missing: set[tuple[Place, str]] = set()  # definitions, and entries that they lack, as was told
 
     @property
     def all(self) -> tuple[Diagnostic, ...]:
@@ -46,41 +46,45 @@ class Complaints:
 
     def add(self, *diagnostics: Diagnostic) -> None:
         for diagnostic in diagnostics:
-            self.faults += diagnostic.severity == "error"
-            if len(self._found) < MOST and not self._told_of_another_user(diagnostic) and not self._follows(diagnostic):
+            self.error_count += diagnostic.severity == "error"
+            if (
+                len(self._found) < MOST
+                and not self._is_known_at_this_place(diagnostic)
+                and not self._follows_from_unreadable(diagnostic)
+            ):
                 self._found.setdefault(diagnostic)
 
-    def after(self, wrecks: Sequence[Wreck]) -> None:
+    def note_unreadable(self, stretches: Sequence[UnreadableStretch]) -> None:
         """Notes what could not be read, so that nothing is told that follows from it, nor from the errors so far."""
         self._spots.update(_spot(each.at.place) for each in self.errors if each.at is not None)
-        self._wrecks += wrecks
-        self._torn.update(each.within for each in wrecks if each.within is not None)
-        self.lost(*(name for each in wrecks for name in each.names))
+        self._unreadable += stretches
+        self._torn.update(each.within for each in stretches if each.within is not None)
+        self.note_lost_names(*(name for each in stretches for name in each.names))
 
-    def lost(self, *names: str) -> None:
+    def note_lost_names(self, *names: str) -> None:
         """Notes names that something may have defined which could not be taken in, as was told."""
         self._lost.update(names)
 
-    def inherits(self, of: Place, base: Place) -> None:
+    def note_base(self, of: Place, base: Place) -> None:
         """Notes that what is defined at `of` has what its base has, and may lack what that lacks."""
         if base in self._torn:
             self._torn.add(of)
 
-    def _follows(self, diagnostic: Diagnostic) -> bool:
+    def _follows_from_unreadable(self, diagnostic: Diagnostic) -> bool:
         """Whether this is about something that could not be read, or about a name that this may have defined."""
         if diagnostic.code not in UNKNOWN_WORDS and diagnostic.message.startswith("no "):
             path = diagnostic.message.split("`")[1:2]
             if any(word in self._lost for text in path for word in text.split(".")):
                 return True
-        if diagnostic.at is None or not (self._wrecks or self._spots):
+        if diagnostic.at is None or not (self._unreadable or self._spots):
             return False
         file, line, column = _spot(diagnostic.at.place)
         return (file, line, column) in self._spots or any(
             each.place.file == file and (each.place.line, each.place.column) <= (line, column) < each.end
-            for each in self._wrecks
+            for each in self._unreadable
         )
 
-    def _told_of_another_user(self, diagnostic: Diagnostic) -> bool:
+    def _is_known_at_this_place(self, diagnostic: Diagnostic) -> bool:
         """Whether this value's mistake is known: what a base or a `let` writes is found wrong at each of its users."""
         if diagnostic.at is None or diagnostic.code not in ONCE:
             return False
@@ -100,19 +104,19 @@ class Complaints:
     ) -> None:
         self.add(error(code, message, at, also=also, help=help))
 
-    def taken_for(self, of: Place, word: str, known: Iterable[str]) -> None:
+    def note_misspelling(self, of: Place, word: str, known: Iterable[str]) -> None:
         """Notes what an unknown entry of what is defined at `of` may have been meant for: that is not missing
         besides."""
         near = meant(word, known)
         if near is not None:
-            self.lacking.add((of, near.rpartition(".")[2]))
+            self.known_missing.add((of, near.rpartition(".")[2]))
 
-    def lacks(self, of: Place, *names: str) -> bool:
+    def is_known_to_lack(self, of: Place, *names: str) -> bool:
         """Whether it was told that what is defined at `of` lacks one of these entries, or has another word for it; or
         whether one of its entries could not be read."""
         if of in self._torn:
             return True
-        return any((of, name) in self.lacking for name in names)
+        return any((of, name) in self.known_missing for name in names)
 
     def missing(
         self,
@@ -126,7 +130,7 @@ class Complaints:
         help: Iterable[str] | str = (),
     ) -> None:
         """An error about what is defined at `of`, which has none of these entries, unless `lacks` says so."""
-        if not self.lacks(of, *names):
+        if not self.is_known_to_lack(of, *names):
             self.error(code, message, at or of, also=also, help=help)
 
     def warn(

@@ -7,7 +7,7 @@ from met.frozen import frozen
 
 
 @frozen
-class Wreck:
+class UnreadableStretch:
     """A stretch of text that could not be read, which has been told: what else is wrong there follows from it.
 
     place   its first token; the line and column of its end

@@ -85,7 +85,7 @@ def _about(scope: Scope, environment: Iterable[EnvironmentUse], which: str) -> I
         model = models.find("environment", use.model)
         named = getattr(model, which)
         settled = scope.parameters.get(f"environment.{use.name}.{named}") if named else None
-        if settled is not None and use.place is not None and str(settled.value) not in scope.lost:
+        if settled is not None and use.place is not None and str(settled.value) not in scope.failed_servos:
             yield ServoFailure(use, model, str(settled.value), settled.origin.place or use.place)
 
 

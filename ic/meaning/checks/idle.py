@@ -45,7 +45,7 @@ def remark_kinds(scope: Scope, environment: Any, item: Item, arm: ResolvedArm) -
     kinds = {joint.kind for joint in arm.moving}
     for parameter in environment.parameters:
         written = (item.body or MergedBlock()).get(parameter.name)
-        if parameter.joints and parameter.joints not in kinds and written is not None and not arm.lost:
+        if parameter.joints and parameter.joints not in kinds and written is not None and not arm.failed:
             scope.complaints.remark(
                 "D168",
                 f"`{parameter.name}` of environment `{item.name}` changes nothing: no "

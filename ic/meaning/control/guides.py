@@ -17,7 +17,7 @@ from ic.meaning.control.servos import Use, course_named, fixed_rate, use_course
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.remedies import components
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters import unvaried
+from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, value_at, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_names
@@ -171,7 +171,7 @@ def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration
         return None
     body = item.body or MergedBlock()
     follow = [use for use in uses if use.command is not None and use.command.guide == item.name]
-    whole = not scope.lost and all(use.command is not None or not use.servo.commands for use in uses)
+    whole = not scope.failed_servos and all(use.command is not None or not use.servo.commands for use in uses)
     if not follow and whole and not _meaning(scope, item.name):
         kind = guide.commands[0]
         scope.complaints.error(
@@ -193,9 +193,9 @@ def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration
             )
     joints = tuple(use.joint for use in follow)
     owner = Owner(f"guide `{item.name}`", item.place, f"guides.{item.name}", homes=item.homes)
-    scope.setting(f"{owner.path}.model", guide.name, item=item)
+    scope.keep_setting(f"{owner.path}.model", guide.name, item=item)
     known = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
-    named = check_names(scope, owner, guide.parameters, body, arm=arm.name, known=known, lost=arm.lost)
+    named = check_names(scope, owner, guide.parameters, body, arm=arm.name, known=known, failed=arm.failed)
     paths = list(COMPONENTS) if guide.components is not None else []
     of_joint = [p.name for p in guide.of_joint]
     extra = [
@@ -209,10 +209,10 @@ def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration
     guided = guide.components(SimpleNamespace(**values)) if values is not None and paths else ()
     courses = _courses(scope, owner, body, paths, guided if values is not None else COMPONENTS, joints)
     rate = None
-    scope.unvaried[owner.path] = unvaried.model("a guide", owner.path)
+    scope.not_sweepable[owner.path] = not_sweepable.model("a guide", owner.path)
     if guide.steer is not None and body.get("rate") is not None:
         rate = fixed_rate(scope, owner, body.items["rate"], owner.label)
-    scope.unvaried[owner.join("rate")] = unvaried.COMPILED_ALONE
+    scope.not_sweepable[owner.join("rate")] = not_sweepable.COMPILED_ALONE
     fastest = None
     if guide.fastest is not None and values is not None:
         with scope.complaints.gather():
@@ -337,8 +337,8 @@ def _course(scope: Scope, owner: Owner, item: Item) -> str | None:
     inner = course_named(scope, item.value)
     model = use_course(scope, spot, inner, item, doc=f"{item.name} of the path", column=item.name, body=item.body)
     if model is not None:
-        scope.setting(f"{path}.model", model, item=item)
-        scope.unvaried[path] = unvaried.model("a course in time", path)
+        scope.keep_setting(f"{path}.model", model, item=item)
+        scope.not_sweepable[path] = not_sweepable.model("a course in time", path)
     return model
 
 

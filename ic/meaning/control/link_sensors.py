@@ -10,7 +10,7 @@ from ic.meaning.control.schedule import Rate
 from ic.meaning.control.servos import fixed_rate
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters import unvaried
+from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of, words_chosen
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_names
@@ -93,12 +93,12 @@ def _sensor(scope: Scope, item: Item, arm: ResolvedArm, payloads: tuple[Payload,
         return None
     body = item.body or MergedBlock()
     owner = Owner(f"sensor `{item.name}`", item.place, f"sensors.{item.name}", homes=item.homes, of=sensor.unit)
-    scope.setting(f"{owner.path}.model", sensor.name, item=item)
+    scope.keep_setting(f"{owner.path}.model", sensor.name, item=item)
     bodies = [*(link.name for link in arm.links), *(payload.name for payload in payloads)]
     known = {"joint": [joint.name for joint in arm.moving], "link": bodies}
-    check_names(scope, owner, sensor.parameters, body, arm=arm.name, known=known, lost=arm.lost)
+    check_names(scope, owner, sensor.parameters, body, arm=arm.name, known=known, failed=arm.failed)
     values = use_model(scope, owner, sensor.parameters, body, ["rate"])
-    scope.unvaried[owner.path] = unvaried.model("a sensor", owner.path)
+    scope.not_sweepable[owner.path] = not_sweepable.model("a sensor", owner.path)
     rate = fixed_rate(scope, owner, body.items["rate"], owner.label) if body.get("rate") is not None else None
     words = [each for each in sensor.parameters if each.shape == "word" and not each.names]
     return Sensing(item.name, sensor.name, words_chosen(words, body), rate, values or {}, item.place)

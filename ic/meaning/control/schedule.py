@@ -116,7 +116,7 @@ def make_schedule(
     base_written: bool,
 ) -> Schedule:
     """The schedule. Tells what does not fit. duration: of the run, s; None: unknown, which was told."""
-    all_rates, before = [dynamics, record, *others], complaints.faults
+    all_rates, before = [dynamics, record, *others], complaints.error_count
     step = divisor(complaints, dynamics, base, all_rates, written=base_written)
     row = step if record == dynamics else divisor(complaints, record, base, all_rates, written=base_written)
     if duration is None:
@@ -132,7 +132,7 @@ def make_schedule(
         )
         return Schedule(base.hz, step, row, 1)
     in_whole = duration.is_integer() and base.hz.is_integer()
-    refused = complaints.faults > before  # and so are the steps that a duration would be made of
+    refused = complaints.error_count > before  # and so are the steps that a duration would be made of
     ticks = int(duration) * int(base.hz) if in_whole else exact(duration) * exact(base.hz)
     whole = round(ticks)
     if refused:

@@ -76,6 +76,6 @@ def use_sensor(scope: Scope, servo: Owner, use: ServoUse, item: Item) -> SensorU
     )
     body = item.body or MergedBlock()
     use_model(scope, owner, sensor.parameters, body)
-    scope.setting(f"{owner.path}.model", sensor.name, item=item)
+    scope.keep_setting(f"{owner.path}.model", sensor.name, item=item)
     words = [each for each in sensor.parameters if each.shape == "word"]
     return SensorUse(item.name, sensor.name, words_chosen(words, body), item.place)

@@ -17,7 +17,7 @@ from ic.meaning.control.trajectories import use_file, with_file_named
 from ic.meaning.definitions.merge import Item, MergedBlock, open_call, overlay
 from ic.meaning.expressions.quantity import measure_of
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters import unvaried
+from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import (
     check_keys,
     find_bare_model,
@@ -114,11 +114,11 @@ def _note_kinds(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> None:
         kind, definition = arm.kind(item.name), scope.definitions.of_kind("servo").get(word_of(item.value) or "")
         if kind is not None and kind != "fixed" and definition is not None:
             for home in scope.definitions.homes(definition):
-                scope.moved.setdefault(home, set()).add(kind)
+                scope.joint_kinds.setdefault(home, set()).add(kind)
 
 
 def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
-    if item.name in arm.lost and not item.kind:
+    if item.name in arm.failed and not item.kind:
         return None
     kind = moving_kind(scope, item, arm, "so no servo can move it")
     if kind is None:
@@ -184,8 +184,8 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
         rate = fixed_rate(
             scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`", continuous=True
         )
-    scope.setting(f"{item.name}.servo.model", servo.name, item=model)
-    scope.unvaried[f"{item.name}.servo.model"] = unvaried.chosen(f"vary `{item.name}.servo` over definitions")
+    scope.keep_setting(f"{item.name}.servo.model", servo.name, item=model)
+    scope.not_sweepable[f"{item.name}.servo.model"] = not_sweepable.chosen(f"vary `{item.name}.servo` over definitions")
     words = words_chosen([each for each in servo.parameters if each.name in servo.deciding], block)
     bare = ServoUse(item.name, name, servo.name, command, 1, words=words)
     sensors = tuple(use for each in sensed if (use := use_sensor(scope, owner, bare, each)) is not None)
@@ -212,7 +212,7 @@ def moving_kind(scope: Scope, item: Item, arm: ResolvedArm, so: str) -> str | No
     """The kind of the joint that an entry names; None where it is none or fixed, which was told. so: if it is fixed."""
     kind = arm.kind(item.name) if item.kind in ("", "substitute") else None
     definition = scope.definitions.of_kind("arm").get(arm.name)
-    if kind is None and definition is not None and scope.complaints.lacks(definition.place):
+    if kind is None and definition is not None and scope.complaints.is_known_to_lack(definition.place):
         return None  # an entry of the arm could not be read, which may have been this joint
     if kind is None:
         moving = [joint.name for joint in arm.moving]
@@ -566,7 +566,7 @@ def check_servo_definition(scope: Scope, name: str) -> None:
                     scope.word(owner, words[key], item)
                     continue
                 try:
-                    scope.written(item)
+                    scope.evaluate(item)
                 except Problem as problem:
                     if not (isinstance(item.value, Name) and servo.parameters):
                         scope.complaints.add(*problem.diagnostics)

@@ -13,7 +13,7 @@ from ic.meaning.control.schedule import Ticks
 from ic.meaning.control.servos import Use, moving_kind
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters import unvaried
+from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
@@ -30,7 +30,7 @@ USAGE = "write `substitute JOINT { bed = BED(...);  law = LAW(...); }`"
 def resolve_substitutions(
     scope: Scope, block: MergedBlock, arm: ResolvedArm, uses: list[Use]
 ) -> tuple[Substitution, ...]:
-    """Every joint whose motor is on a bed, in the order of the arm's joints; those that failed join `scope.lost`."""
+    """Every joint whose motor is on a bed, in the arm's order; those that failed join `scope.failed_servos`."""
     servos = {use.joint: use for use in uses}
     found: dict[str, tuple[Substitution, Place]] = {}
     for item in block.of_kind("substitute"):
@@ -41,7 +41,7 @@ def resolve_substitutions(
                 continue
         scope.checks.fail(f"{item.name}.bed")
         scope.checks.fail(f"{item.name}.law")
-        scope.lost |= {item.name}
+        scope.failed_servos |= {item.name}
     in_order = [found[joint.name] for joint in arm.joints if joint.name in found]
     for use, place in in_order[1:]:
         first, also = in_order[0]
@@ -106,14 +106,14 @@ def _substitution(
     scope: Scope, item: Item, arm: ResolvedArm, servos: Mapping[str, Use]
 ) -> tuple[Substitution, Place] | None:
     """The joint's bed and law, and the place that names the law; None where something failed, which was told."""
-    if item.name in arm.lost:
+    if item.name in arm.failed:
         return None
     if item.value is not None or item.detail:
         place = item.detail[0].place if item.detail else place_of(item.value) if item.value is not None else item.place
         scope.complaints.error("D179", "`substitute` takes the name of one joint, and a block", place, help=USAGE)
         return None
     kind = moving_kind(scope, item, arm, "so it has no motor")
-    if kind is None or item.name in scope.lost:
+    if kind is None or item.name in scope.failed_servos:
         return None
     use = servos.get(item.name)
     if use is None:
@@ -176,7 +176,7 @@ def _substitution(
             joint=kind,  # type: ignore[arg-type]
             call=True,
         )
-        scope.unvaried[f"{owner.path}.model"] = unvaried.chosen(f"vary `{owner.path}` over models")
+        scope.not_sweepable[f"{owner.path}.model"] = not_sweepable.chosen(f"vary `{owner.path}` over models")
         body = (part.body if part is not None else None) or MergedBlock()
         if each == "bed":
             _use_bed(scope, owner, model, body, use)
@@ -218,7 +218,7 @@ def _use_bed(scope: Scope, owner: Owner, bed: Any, body: MergedBlock, use: Use) 
         if wanted.shape == "text":
             continue
         if item is None and wanted.of_servo and models.parameter(use.servo, wanted.of_servo) is not None:
-            scope.taken(owner, wanted, f"{use.joint}.servo.{wanted.of_servo}")
+            scope.copied(owner, wanted, f"{use.joint}.servo.{wanted.of_servo}")
         elif item is None and wanted.name in preset:
             _preset(scope, owner, replace(wanted, default=preset[wanted.name]), faults)
         else:

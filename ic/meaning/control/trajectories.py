@@ -10,7 +10,7 @@ from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Name, String, Word
 from ic.meaning.definitions.csv_files import missing_column
 from ic.meaning.definitions.merge import Item, MergedBlock
-from ic.meaning.parameters import unvaried
+from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, use_model
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
@@ -47,7 +47,7 @@ def use_file(
         MergedBlock({key: item for key, item in body.items.items() if key in [each.name for each in others]}),
     )
     for each in (FILE.name, COLUMN.name, *LISTS):
-        scope.unvaried[owner.join(each)] = unvaried.FILE
+        scope.not_sweepable[owner.join(each)] = not_sweepable.FILE
     columns: dict[str, tuple[float, ...]] | None = None
     file = body.get(FILE.name)
     if file is None:
@@ -95,8 +95,8 @@ def _columns(
                 help=f"a trajectory has {FEWEST} at least; `table` takes a single point",
             )
         )
-    scope.setting(owner.join(FILE.name), table.file, item=file)
-    scope.setting(owner.join(COLUMN.name), wanted, item=body.get(COLUMN.name), note=f"the {kind}'s name")
+    scope.keep_setting(owner.join(FILE.name), table.file, item=file)
+    scope.keep_setting(owner.join(COLUMN.name), wanted, item=body.get(COLUMN.name), note=f"the {kind}'s name")
     return columns
 
 

@@ -66,7 +66,7 @@ class Definitions:
                 self._enter(entry)
             except Problem as problem:
                 complaints.add(*problem.diagnostics)
-                complaints.lost(*(word.text for word in getattr(entry, "words", ())[1:]))
+                complaints.note_lost_names(*(word.text for word in getattr(entry, "words", ())[1:]))
         self._check_defaults()
 
     def instead(self, *changed: Definition, lets: Sequence[Let] = ()) -> Definitions:
@@ -179,7 +179,7 @@ class Definitions:
                     self._failed.update((d.kind, d.name) for d in chain)
                     return None
             if above is not None:
-                self._complaints.inherits(each.place, above.place)
+                self._complaints.note_base(each.place, above.place)
             block = merge(block, each.group.body, home=each.home, base_name=base_name, complaints=self._complaints)
             for entry in each.upon:
                 block = merge(block, (entry,), home=each.home, base_name=base_name, complaints=self._complaints)

@@ -22,7 +22,7 @@ class CommandLineValue:
     value: Value
     expression: Expression
 
-    def over(self, origin: Origin) -> Origin:
+    def overriding(self, origin: Origin) -> Origin:
         """The origin of a value that this one overrides, made its own."""
         places = (origin.place,) if origin.place is not None else ()
         return Origin("deck", self.value.place, (*places, *origin.overrides), ON_COMMAND_LINE)

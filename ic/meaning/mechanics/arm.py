@@ -33,13 +33,17 @@ NOT_OF_A_JOINT = dict.fromkeys(("limit", "limits", "range", "stops"), NO_STOPS)
 
 @frozen
 class ResolvedArm:
-    """lost: names of joints and links that failed, which was told;  whole: nothing at all was wrong before."""
+    """An arm of a run: its links and joints, in the deck's order.
+
+    failed          names of joints and links that could not be resolved (already reported)
+    free_of_errors  whether nothing at all of the deck was wrong so far
+    """
 
     name: str
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
-    lost: frozenset[str] = frozenset()
-    whole: bool = True
+    failed: frozenset[str] = frozenset()
+    free_of_errors: bool = True
 
     def kind(self, joint: str) -> str | None:
         return next((j.kind for j in self.joints if j.name == joint), None)
@@ -75,18 +79,18 @@ def resolve_arm(scope: Scope, definition: Definition) -> ResolvedArm | None:
             f"arm `{definition.name}` has no links",
             help="write `link NAME { ... }` and a joint to hold it",
         )
-    complete = len(joints) == len(made) and not scope.complaints.lacks(definition.place, "joint")
+    complete = len(joints) == len(made) and not scope.complaints.is_known_to_lack(definition.place, "joint")
     check_tree(scope, definition.name, links, joints, complete=complete)
-    whole = not scope.complaints.errors
+    free_of_errors = not scope.complaints.errors
     written = {item.name for kind in ARM.named for item in block.of_kind(kind)}
-    lost = frozenset(written - {link.name for link in links} - {joint.name for joint in joints})
-    return ResolvedArm(definition.name, tuple(links), tuple(joints), lost, whole)
+    failed = frozenset(written - {link.name for link in links} - {joint.name for joint in joints})
+    return ResolvedArm(definition.name, tuple(links), tuple(joints), failed, free_of_errors)
 
 
 def check_arm(scope: Scope, definition: Definition) -> None:
     """Tells what is wrong with an arm by itself, without payloads."""
     arm = resolve_arm(scope, definition)
-    if arm is not None and arm.whole:
+    if arm is not None and arm.free_of_errors:
         check_moved(scope, arm.links, arm.joints)
 
 
@@ -257,7 +261,7 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
     length = sqrt(x * x + y * y + z * z)
     if isinstance(length, Scalar) or 0.0 < length < math.inf:
         parts = zip("xyz", written, strict=True)
-        scope.remake({owner.join(f"axis.{name}"): part / length for name, part in parts}, item)
+        scope.replace_values({owner.join(f"axis.{name}"): part / length for name, part in parts}, item)
 
 
 def _named_axis(value: Expression | None) -> tuple[float, float, float] | None:

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call
 from ic.meaning.definitions.merge import Item, MergedBlock
-from ic.meaning.parameters import unvaried
+from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, word_of
 from ic.meaning.parameters.owner import XYZ, Owner
 from ic.meaning.parameters.scope import Scope
@@ -92,7 +92,7 @@ def use_dh(scope: Scope, owner: Owner, kind: str, item: Item, body: MergedBlock)
     inner = Owner(f"the dh of {owner.label}", item.place, owner.join("dh"), homes=owner.homes, call=True)
     numbers = item.body or MergedBlock()
     check_keys(scope, numbers, [wanted.name for wanted in NUMBERS], inner)
-    scope.unvaried[owner.join("dh")] = unvaried.several(_numbers(owner))
+    scope.not_sweepable[owner.join("dh")] = not_sweepable.several(_numbers(owner))
     found = [scope.number(inner, wanted, numbers.get(wanted.name), record=False) for wanted in NUMBERS]
     values = [value for value in found if value is not None]
     if len(values) < len(NUMBERS):
@@ -105,7 +105,7 @@ def use_dh(scope: Scope, owner: Owner, kind: str, item: Item, body: MergedBlock)
         parts.append(("pivot", frame.pivot, "m"))
     for part, three, unit in parts:
         for axis, value in zip(XYZ, three, strict=True):
-            scope.follows(owner.join(f"{part}.{axis}"), value, unit, item, f"Denavit-Hartenberg, {convention}")
+            scope.keep_derived(owner.join(f"{part}.{axis}"), value, unit, item, f"Denavit-Hartenberg, {convention}")
 
 
 def _refuse_others(scope: Scope, owner: Owner, item: Item, body: MergedBlock) -> None:
@@ -121,7 +121,7 @@ def _refuse_others(scope: Scope, owner: Owner, item: Item, body: MergedBlock) ->
                 help=f"`dh` says all of the joint's frame: leave `{name}` out (`remove {name};` where a base has it)",
             )
         for path in (name, *(f"{name}.{axis}" for axis in XYZ)):
-            scope.unvaried[owner.join(path)] = unvaried.follows(owner.join("dh"), _numbers(owner))
+            scope.not_sweepable[owner.join(path)] = not_sweepable.follows(owner.join("dh"), _numbers(owner))
 
 
 def _numbers(owner: Owner) -> list[str]:

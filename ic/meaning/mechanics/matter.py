@@ -8,7 +8,7 @@ from ic.language.bodies import COM, INERTIA, MASS
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.bodies import check_body
 from ic.meaning.mechanics.shapes import SHAPES, Solid
-from ic.meaning.parameters import unvaried
+from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, refuse_values, value_at, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
@@ -89,7 +89,7 @@ def _com(scope: Scope, owner: Owner, kind: str, item: Item | None, solid: Solid 
     if item is not None or solid is None:
         scope.vector(owner, replace(_of(COM, kind), default=(0.0, 0.0, 0.0)), item)
         return
-    scope.unvaried[owner.join("com")] = unvaried.several([owner.join(f"com.{axis}") for axis in "xyz"])
+    scope.not_sweepable[owner.join("com")] = not_sweepable.several([owner.join(f"com.{axis}") for axis in "xyz"])
     for axis, value in zip("xyz", solid.com, strict=True):
         scope.derived(owner, f"com.{axis}", value, "m", f"middle of the {solid.kind}")
 
@@ -117,7 +117,9 @@ def _inertia(
     if mass is None:
         scope.checks.fail(owner.join("inertia"))
         return None
-    scope.unvaried[owner.join("inertia")] = unvaried.several([owner.join(f"inertia.{each}") for each in MOMENTS])
+    scope.not_sweepable[owner.join("inertia")] = not_sweepable.several(
+        [owner.join(f"inertia.{each}") for each in MOMENTS]
+    )
     return tuple(
         scope.derived(owner, f"inertia.{name}", value, "kg*m^2", f"uniform {solid.kind} of the {kind}'s mass")
         for name, value in zip(MOMENTS, solid.inertia(mass), strict=True)

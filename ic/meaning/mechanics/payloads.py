@@ -12,11 +12,11 @@ from ic.language.bodies import ATTITUDE, GRAPPLE, PAYLOAD, PAYLOAD_AT, PAYLOAD_R
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.mechanics.matter import use_matter
-from ic.meaning.parameters import unvaried
+from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, value_at
+from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
-from ic.meaning.parameters.unvaried import Unvaried
 from ic.text.complaints import known_words
 from met.diagnostic import Label, Place, did_you_mean
 from met.parameter import WORLD
@@ -87,7 +87,7 @@ def _payload(scope: Scope, item: Item, arm: ResolvedArm, taken: Collection[str])
     times = [scope.number(owner, wanted, given) for wanted in EVENTS if (given := body.get(wanted.name)) is not None]
     for wanted in EVENTS:
         if body.get(wanted.name) is None:
-            scope.unvaried[owner.join(wanted.name)] = Unvaried(
+            scope.not_sweepable[owner.join(wanted.name)] = NotSweepable(
                 "is not written, and so decides the program",
                 f"write `{wanted.name} = ...;` in the payload, and it varies",
             )
@@ -96,8 +96,8 @@ def _payload(scope: Scope, item: Item, arm: ResolvedArm, taken: Collection[str])
         _check_order(scope, item, times, value_at(body.items["release"]))
     if payload.flies:
         _check_solid(scope, owner, payload, item)
-    scope.setting(owner.join("on"), link or BASE, item=body.get("on"))
-    scope.unvaried[owner.join("on")] = unvaried.COMPILED_ALONE
+    scope.keep_setting(owner.join("on"), link or BASE, item=body.get("on"))
+    scope.not_sweepable[owner.join("on")] = not_sweepable.COMPILED_ALONE
     return payload
 
 
@@ -114,7 +114,7 @@ def _link(scope: Scope, owner: Owner, item: Item | None, arm: ResolvedArm) -> st
         )
         return None
     name = item.value.text if isinstance(item.value, Name) else None
-    if name in known or name in arm.lost:
+    if name in known or name in arm.failed:
         return name if name in known else None
     told = f"no link `{name}` in arm `{arm.name}`" if name is not None else f"a link's name is needed for {owner.label}"
     scope.complaints.error(

@@ -105,7 +105,7 @@ def check_keys(
             )
         elif item.name not in known:
             if item.name not in others:
-                scope.complaints.taken_for(owner.place, item.name, known)
+                scope.complaints.note_misspelling(owner.place, item.name, known)
             scope.complaints.error(
                 "D141",
                 f"{owner.label} has no `{item.name}`",
@@ -172,8 +172,8 @@ def use_model(
     known = [p.name for p in parameters if there(p, words) or body.get(p.name) is not None]
     extra = list(extra)
     check_keys(scope, body, [*known, *extra], owner)
-    if FILE.name in extra and scope.complaints.lacks(owner.place, FILE.name):  # which would have the lists
-        scope.complaints.lacking |= {(owner.place, each.name) for each in parameters if each.shape == "list"}
+    if FILE.name in extra and scope.complaints.is_known_to_lack(owner.place, FILE.name):  # which would have the lists
+        scope.complaints.known_missing |= {(owner.place, each.name) for each in parameters if each.shape == "list"}
     here = [p.name for p in parameters if there(p, words)]
     owner = replace(owner, others=parameters)
     values: dict[str, Any] = {}
@@ -189,11 +189,11 @@ def use_model(
         if wanted.shape == "vector":
             values[wanted.name] = scope.vector(owner, wanted, item)
         elif wanted.shape == "list":
-            values[wanted.name] = scope.numbers(owner, wanted, item)
+            values[wanted.name] = scope.number_list(owner, wanted, item)
         elif wanted.shape == "word":
             values[wanted.name] = scope.word(owner, wanted, item, record=True)
         elif wanted.decides:
-            values[wanted.name] = scope.decisive(owner, wanted, item)
+            values[wanted.name] = scope.model_constant(owner, wanted, item)
         else:
             values[wanted.name] = scope.number(owner, wanted, item)
     if any(value is None for value in values.values()):

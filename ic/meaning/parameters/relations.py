@@ -60,11 +60,11 @@ def check_names(
     *,
     arm: str,
     known: Mapping[str, list[str]],
-    lost: Iterable[str],
+    failed: Iterable[str],
 ) -> dict[str, str]:
     """Tells of words that should name a link or joint of the arm; the words, as written or by default.
 
-    known  what there is, by kind;  lost  what failed, of which nothing can be said
+    known  what there is, by kind;  failed  names of which nothing can be said
     """
     words: dict[str, str] = {}
     for wanted in parameters:
@@ -81,7 +81,7 @@ def check_names(
                 place,
                 help="give the link another name",
             )
-        elif word not in (*names, *lost):
+        elif word not in (*names, *failed):
             others = [f"or {' or '.join(f'`{each}`' for each in wanted.words)}"] if wanted.words else []
             if word == BASE:
                 others.append("the base is a link where it moves: `base = free;` in the run")

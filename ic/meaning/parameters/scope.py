@@ -28,9 +28,9 @@ from ic.meaning.expressions.conditions import Checks, VariedPath
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, ValueList
 from ic.meaning.expressions.remedies import components
-from ic.meaning.parameters import unvaried
+from ic.meaning.parameters import not_sweepable
+from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import XYZ, Owner, Settled
-from ic.meaning.parameters.unvaried import Unvaried
 from ic.meaning.parameters.value_checks import ValueChecks
 from ic.text.complaints import Complaints
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
@@ -45,44 +45,57 @@ VARIES = "leave it out here, or name runs and sweeps that do not vary this"
 
 @dataclass
 class Scope:
-    """The definitions of a deck, and the parameters of one run as they are settled."""
+    """The definitions of a deck, and the parameters of one run as they are settled.
+
+    auxiliary       settled values that are no parameters of the plan: what parameters are made of, settings of the run
+    known           every path that would set something -> the parameters it sets
+    targets         coordinate -> parameters that took their value from it directly
+    not_sweepable   known paths that do not vary over numbers -> why
+    joint_kinds     servo definition -> kinds of the joints it moves
+    failed_servos   joints whose servo failed: nothing can be said of its channels
+    failed_parts    joints and links that failed: nothing can be said of paths that begin with them
+    guides          the run's guides, by name: what commands may follow
+    sensors         names of the run's sensors on links
+    removed         path of a parameter -> where `remove` took it away
+    settings        path -> a number set on the command line
+    """
 
     definitions: Definitions
     complaints: Complaints
     varied: dict[str, VariedPath] = field(default_factory=dict)
     graph: Graph = field(default_factory=Graph)
     parameters: dict[str, Settled] = field(default_factory=dict)
-    beside: dict[str, Settled] = field(default_factory=dict)  # what parameters are made of, and settings of the run
-    known: dict[str, list[str]] = field(default_factory=dict)  # every path that would set something -> parameters
-    sets: dict[str, list[str]] = field(default_factory=dict)  # coordinate -> parameters that took it directly
-    unvaried: dict[str, Unvaried] = field(default_factory=dict)  # known paths that do not vary over numbers
+    auxiliary: dict[str, Settled] = field(default_factory=dict)
+    known: dict[str, list[str]] = field(default_factory=dict)
+    targets: dict[str, list[str]] = field(default_factory=dict)
+    not_sweepable: dict[str, NotSweepable] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
-    moved: dict[str, set[str]] = field(default_factory=dict)  # servo definition -> kinds of joints it moves
-    lost: frozenset[str] = frozenset()  # joints whose servo failed: nothing can be said of its channels
-    gone: frozenset[str] = frozenset()  # joints and links that failed: nothing can be said of what begins with them
-    guides: Mapping[str, Item] = field(default_factory=dict)  # of the run, by name: what commands may follow
-    sensors: frozenset[str] = frozenset()  # of links, in the run, by name
-    removed: dict[str, Place] = field(default_factory=dict)  # by path of a parameter, where `remove` took it away
-    settings: Mapping[str, Setting] = field(default_factory=dict)  # by path, numbers given from outside of the deck
+    joint_kinds: dict[str, set[str]] = field(default_factory=dict)
+    failed_servos: frozenset[str] = frozenset()
+    failed_parts: frozenset[str] = frozenset()
+    guides: Mapping[str, Item] = field(default_factory=dict)
+    sensors: frozenset[str] = frozenset()
+    removed: dict[str, Place] = field(default_factory=dict)
+    settings: Mapping[str, Setting] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.checks = Checks(self.complaints, self.graph, self.varied)
         self.names = Names(self.definitions, {path: varied.value for path, varied in self.varied.items()})
-        self.value_checks = ValueChecks(self.complaints, self.definitions, self.names, self.checks, self.moved)
+        self.value_checks = ValueChecks(self.complaints, self.definitions, self.names, self.checks, self.joint_kinds)
         # the settings that are evaluated so far, by path; None for one that is no number
         self.evaluated_settings: dict[str, CommandLineValue | None] = {}
 
     def settled(self, path: str) -> Settled | None:
         """What is settled under a path, whether the plan has it as a parameter or not."""
-        return self.parameters.get(path) or self.beside.get(path)
+        return self.parameters.get(path) or self.auxiliary.get(path)
 
-    def hangs(self, path: str) -> bool:
+    def depends_on_failed(self, path: str) -> bool:
         """Whether nothing can be said of this path, because what it leads to has failed, which was told."""
         first, _, rest = path.partition(".")
         thing = rest.partition(".")[0] if first in ("links", "payloads") else first
-        if self.checks.touches(path) or thing in self.gone:
+        if self.checks.touches(path) or thing in self.failed_parts:
             return True
-        return bool(self.lost) and (first in self.lost or first in self.definitions.of_kind("servo"))
+        return bool(self.failed_servos) and (first in self.failed_servos or first in self.definitions.of_kind("servo"))
 
     # Numbers
 
@@ -103,7 +116,7 @@ class Scope:
         written = value
         if item is not None and value is None:
             with self.complaints.gather():
-                found = self.written(item, expression)
+                found = self.evaluate(item, expression)
                 if isinstance(found, ValueList):
                     raise Problem(
                         error(
@@ -134,7 +147,7 @@ class Scope:
         """
         heads = [owner.path] * (wanted.name == owner.short) + [owner.join(wanted.name)]
         for head in heads:
-            self.unvaried.setdefault(head, unvaried.several([f"{heads[0]}.{name}" for name in names]))
+            self.not_sweepable.setdefault(head, not_sweepable.several([f"{heads[0]}.{name}" for name in names]))
         values: list[Value | None] = [None] * len(names)
         if item is not None and given is None:
             with self.complaints.gather():
@@ -160,7 +173,7 @@ class Scope:
         self, owner: Owner, wanted: Parameter, item: Item, names: Sequence[str], short: int
     ) -> Iterable[Value]:
         count = len(names)
-        found = self.written(item)
+        found = self.evaluate(item)
         text, dimension = owner.unit(wanted)
         expected = f"{short} or {count}" if short else f"{count}"
         if isinstance(found, Value):
@@ -208,10 +221,10 @@ class Scope:
         """A compile-time constant: another value is another program."""
         path = owner.join(wanted.name)
         for known in owner.paths(wanted.name, item.homes):
-            self.unvaried[known] = unvaried.COMPILED
+            self.not_sweepable[known] = not_sweepable.COMPILED
         number = None
         with self.complaints.gather():
-            found = self.written(item)
+            found = self.evaluate(item)
             if isinstance(found, ValueList):
                 raise Problem(
                     error(
@@ -231,37 +244,37 @@ class Scope:
                         help=f"it decides the program: vary `{path}` itself",
                     )
                 )
-            before = self.complaints.faults
+            before = self.complaints.error_count
             self.value_checks.range(owner, wanted, found.number, found.place)
-            number = float(found.number) if self.complaints.faults == before else None
+            number = float(found.number) if self.complaints.error_count == before else None
             if number is not None:
-                self.beside[path] = Settled(
+                self.auxiliary[path] = Settled(
                     number, owner.unit(wanted)[0], _origin(item, found.place), wanted.doc, item.value
                 )
         if number is None:
             self.checks.fail(path)
         return number
 
-    def decisive(self, owner: Owner, wanted: Parameter, item: Item | None) -> float | None:
+    def model_constant(self, owner: Owner, wanted: Parameter, item: Item | None) -> float | None:
         """A model's number that decides the program, the same in all cases."""
         path = owner.join(wanted.name)
         if item is None and isinstance(wanted.default, (int, float)):
             unit = owner.unit(wanted)[0]
-            self.beside[path] = Settled(float(wanted.default), unit, Origin("default"), wanted.doc)
+            self.auxiliary[path] = Settled(float(wanted.default), unit, Origin("default"), wanted.doc)
         elif item is None:
             self._missing(owner, wanted)
         elif self.constant(owner, wanted, item) is None:
-            self.beside.pop(path, None)
-        self.unvaried[path] = unvaried.COMPILED_ALONE
-        if path not in self.beside:
+            self.auxiliary.pop(path, None)
+        self.not_sweepable[path] = not_sweepable.COMPILED_ALONE
+        if path not in self.auxiliary:
             return None
-        self.parameters[path] = self.beside.pop(path)
+        self.parameters[path] = self.auxiliary.pop(path)
         return self.parameters[path].value  # type: ignore[return-value]  # a number, by the two lines above
 
-    def numbers(self, owner: Owner, wanted: Parameter, item: Item | None) -> tuple[float, ...] | None:
+    def number_list(self, owner: Owner, wanted: Parameter, item: Item | None) -> tuple[float, ...] | None:
         """A list of any length, the same in all cases."""
         path = owner.join(wanted.name)
-        self.unvaried[path] = unvaried.LIST
+        self.not_sweepable[path] = not_sweepable.LIST
         if item is None and isinstance(wanted.default, tuple):
             self.parameters[path] = Settled(wanted.default, owner.unit(wanted)[0], Origin("default"), wanted.doc)
             return wanted.default
@@ -270,7 +283,7 @@ class Scope:
             return None
         numbers: tuple[float, ...] | None = None
         with self.complaints.gather():
-            found = self.written(item)
+            found = self.evaluate(item)
             if isinstance(found, Value):
                 raise Problem(
                     error(
@@ -305,7 +318,7 @@ class Scope:
     def word(self, owner: Owner, wanted: Parameter, item: Item | None, *, record: bool = False) -> str | None:
         """A word, one of `wanted.words` where it has any."""
         path = owner.join(wanted.name)
-        self.unvaried[path] = unvaried.WORD
+        self.not_sweepable[path] = not_sweepable.WORD
         if item is None:
             if not isinstance(wanted.default, str):
                 self._missing(owner, wanted)
@@ -330,19 +343,21 @@ class Scope:
             word = named
             place = place_of(item.value) if item.value else item.place
             origin = written_origin(place, item.overrides)  # a word is no name that stands for something
-        kept = self.parameters if record else self.beside
+        kept = self.parameters if record else self.auxiliary
         kept[path] = Settled(word, "", origin, wanted.doc, item.value if item else None)
         return word
 
-    def setting(self, path: str, value: Real | str, unit: str = "", item: Item | None = None, note: str = "") -> None:
+    def keep_setting(
+        self, path: str, value: Real | str, unit: str = "", item: Item | None = None, note: str = ""
+    ) -> None:
         """Keeps, for who asks where it comes from, what decides the program; item: who wrote it, None for a default."""
         origin = Origin("default", note=note)
         if item is not None:
             place = item.place if item.value is None else place_of(item.value)
             origin = written_origin(place, item.overrides)
-        self.beside[path] = Settled(value, unit, origin, "", item.value if item is not None else None)
+        self.auxiliary[path] = Settled(value, unit, origin, "", item.value if item is not None else None)
 
-    def remake(self, values: Mapping[str, Real], item: Item) -> None:
+    def replace_values(self, values: Mapping[str, Real], item: Item) -> None:
         """Puts values in the stead of settled ones, each made of all that the item writes: what varies one, varies
         all."""
         for path, value in values.items():
@@ -353,7 +368,7 @@ class Scope:
             settled.expression = item.value
             if settled.origin.kind == "deck" and item.value is not None:
                 settled.origin = replace(settled.origin, place=place_of(item.value))
-        for taken in self.sets.values():
+        for taken in self.targets.values():
             if any(path in values for path in taken):
                 taken += [path for path in values if path not in taken]
 
@@ -363,7 +378,7 @@ class Scope:
         origin = Origin("derived", owner.place, (), note)
         return self._finish(owner, wanted, name, owner.homes, self._plain(value), origin, owner.place, True)
 
-    def taken(self, owner: Owner, wanted: Parameter, of: str) -> Real | None:
+    def copied(self, owner: Owner, wanted: Parameter, of: str) -> Real | None:
         """A parameter that is another's, of this path, unless a sweep varies it itself; None where the other failed."""
         other = self.parameters.get(of)
         if other is None or isinstance(other.value, str | tuple) or self.checks.failed(of):
@@ -384,17 +399,17 @@ class Scope:
             other.expression,
             needs=(of,),
         )
-        for paths in self.sets.values():
+        for paths in self.targets.values():
             if not own and of in paths:
                 paths.append(owner.join(wanted.name))
         return value
 
-    def follows(self, path: str, value: Real, unit: str, item: Item, note: str) -> None:
+    def keep_derived(self, path: str, value: Real, unit: str, item: Item, note: str) -> None:
         """Keeps a parameter that an item makes of numbers of its own, which are varied in its stead."""
         place = item.place if item.value is None else place_of(item.value)
         self.parameters[path] = Settled(self._plain(value), unit, Origin("derived", place, item.overrides, note), note)
 
-    def written(self, item: Item, expression: Expression | None = None) -> Value | ValueList:
+    def evaluate(self, item: Item, expression: Expression | None = None) -> Value | ValueList:
         """What the item's expression is worth, lists with what `+=` appended. Raises Problem."""
         expression = item.value if expression is None else expression
         if expression is None or (item.body is not None and not isinstance(expression, Call)):
@@ -425,9 +440,9 @@ class Scope:
         bases = [servos[home].place for home in owner.homes if home in servos]
         removed = self.removed.get(owner.join(wanted.name))
         lacks = removed or owner.place
-        if any(self.complaints.lacks(place, wanted.name) for place in (lacks, *bases)):
+        if any(self.complaints.is_known_to_lack(place, wanted.name) for place in (lacks, *bases)):
             return  # which was told: of another use, or of a base, or another word was taken for it
-        self.complaints.lacking.add((lacks, wanted.name))
+        self.complaints.known_missing.add((lacks, wanted.name))
         unit = owner.unit(wanted)[0]
         shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
         shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {unit}"
@@ -501,10 +516,10 @@ class Scope:
                     also=[Label(origin.place, "here")] if origin.place is not None else [],
                     help="leave one of the two out",
                 )
-            self.sets.setdefault(given.path, []).append(path)
+            self.targets.setdefault(given.path, []).append(path)
             value, expression, place = self._plain(given.value.number), given.expression, given.value.place
             self._check_instead(owner, wanted, given.value, path)
-            origin = given.over(origin)
+            origin = given.overriding(origin)
         coordinate = self._coordinate(owner, name, homes)
         if coordinate is not None:
             if origin.note == ON_COMMAND_LINE and not is_on_command_line(coordinate.place):
@@ -518,14 +533,14 @@ class Scope:
             places = (origin.place,) if origin.place is not None else ()
             origin = Origin("case", coordinate.place, (*places, *origin.overrides), origin.note)
             place = coordinate.place
-            self.sets.setdefault(coordinate.path, []).append(path)
+            self.targets.setdefault(coordinate.path, []).append(path)
             value = coordinate.value.number
             self._check_instead(owner, wanted, coordinate.value, coordinate.path)
         assert value is not None
         endless = not isinstance(value, Scalar) and math.isinf(value)
         if origin.kind != "default" or not endless:  # a model's own default may be: never
             self.value_checks.range(owner, wanted, value, place, path, needs)
-        kept = self.parameters if record else self.beside
+        kept = self.parameters if record else self.auxiliary
         if record or owner.called is None:
             kept[path] = Settled(value, owner.unit(wanted)[0], origin, wanted.doc, expression)
         return value
@@ -554,7 +569,7 @@ class Scope:
         paths = owner.paths(name, homes)
         found = [varied for path, varied in self.varied.items() if path in paths]
         for other in found[1:]:
-            self.sets.setdefault(other.path, [])
+            self.targets.setdefault(other.path, [])
             self.complaints.error(
                 "D123",
                 f"`{found[0].path}` and `{other.path}` both set `{owner.join(name)}`",
@@ -577,13 +592,13 @@ class Scope:
             return number if known is None else known
         return float(number)
 
-    def quantities(self, *, beside: bool = False) -> tuple[dict[str, Any], list[Scalar]]:
-        """The parameters as a plan holds them, and the scalars of its formulas, in order. beside: the others too."""
+    def quantities(self, *, auxiliary: bool = False) -> tuple[dict[str, Any], list[Scalar]]:
+        """The parameters as a plan holds them, and the scalars of its formulas, in order. auxiliary: the others too."""
         from met.plan import Formula
 
         outputs: list[Scalar] = []
         made = {}
-        for path, settled in {**self.parameters, **(self.beside if beside else {})}.items():
+        for path, settled in {**self.parameters, **(self.auxiliary if auxiliary else {})}.items():
             value: Any = settled.value
             if isinstance(value, Scalar):
                 outputs.append(value)

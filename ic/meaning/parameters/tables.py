@@ -10,7 +10,7 @@ from ic.grammar.places import place_of
 from ic.grammar.syntax import Name, String
 from ic.meaning.definitions.csv_files import CsvColumn, CsvTable, missing_column
 from ic.meaning.definitions.merge import Item, MergedBlock
-from ic.meaning.parameters import unvaried
+from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, use_model
 from ic.meaning.parameters.owner import Owner, Settled
 from ic.meaning.parameters.scope import Scope
@@ -46,7 +46,7 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Merged
         MergedBlock({key: item for key, item in body.items.items() if key in own}),
     )
     for name in (FILE.name, *(each.name for each in lists)):
-        scope.unvaried[owner.join(name)] = unvaried.FILE
+        scope.not_sweepable[owner.join(name)] = not_sweepable.FILE
     columns: dict[str, tuple[float, ...]] | None = None
     with scope.complaints.gather():
         columns = _columns(scope, owner, lists, body.items[FILE.name])
@@ -150,5 +150,5 @@ def _columns(scope: Scope, owner: Owner, lists: list[Parameter], item: Item) -> 
                 "D196", f"`{table.file}` has no rows", table.columns[0].place, also=[label], help="it has one at least"
             )
         )
-    scope.setting(owner.join(FILE.name), table.file, item=item)
+    scope.keep_setting(owner.join(FILE.name), table.file, item=item)
     return columns

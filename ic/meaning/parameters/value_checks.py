@@ -28,14 +28,14 @@ from met.units import PURE
 class ValueChecks:
     """The checks of each single value of a run.
 
-    moved  servo definition -> kinds of joints that it moves; filled in while servos are resolved
+    joint_kinds  servo definition -> kinds of joints that it moves; filled in while servos are resolved
     """
 
     complaints: Complaints
     definitions: Definitions
     names: Names
     checks: Checks
-    moved: Mapping[str, set[str]]
+    joint_kinds: Mapping[str, set[str]]
 
     def dimension(self, owner: Owner, wanted: Parameter, value: Value) -> None:
         """Raises D060 for a bare number where there is a dimension, D061 for a wrong one."""
@@ -183,7 +183,7 @@ class ValueChecks:
     def _of_its_own(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> str:
         """The remedy where a value is right for the other joints of its servo definition, which move otherwise."""
         other: JointKind = "revolute" if owner.joint == "prismatic" else "prismatic"
-        both = [home for home in owner.homes if other in self.moved.get(home, ())]
+        both = [home for home in owner.homes if other in self.joint_kinds.get(home, ())]
         if not both or not units.same(value.dimension, unit_here(wanted.unit, other, owner.command, owner.of)[1]):
             return ""
         joint = owner.path.partition(".servo")[0]

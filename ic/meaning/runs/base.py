@@ -14,7 +14,7 @@ from ic.meaning.control.servos import course_named, use_course
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.mechanics.bodies import carried_loads
-from ic.meaning.parameters import unvaried
+from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, refuse_values, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
@@ -43,10 +43,10 @@ NOTHING = (0.0, 0.0, 0.0)
 def resolve_base(scope: Scope, item: Item | None, arm: ResolvedArm) -> tuple[Base | None, ResolvedArm]:
     """The base, None where it is fixed or something failed, which was told; and the arm, which has it for a link where
     it moves."""
-    scope.unvaried[BASE] = unvaried.chosen("write `vary base = [fixed, free];`")
+    scope.not_sweepable[BASE] = not_sweepable.chosen("write `vary base = [fixed, free];`")
     kind = word_of(item.value) if item is not None and item.value is not None else None
     if item is None:
-        scope.setting(BASE, "fixed")
+        scope.keep_setting(BASE, "fixed")
         return None, arm
     if kind not in BASE_KINDS or item.appended:
         wrong = item.appended[0] if item.appended else item.value
@@ -55,7 +55,7 @@ def resolve_base(scope: Scope, item: Item | None, arm: ResolvedArm) -> tuple[Bas
         meant = did_you_mean(kind, BASE_KINDS) if kind is not None and kind not in BASE_KINDS else ()
         scope.complaints.error("D250", told, place, help=[*meant, USAGE])
         return None, arm
-    scope.setting(BASE, kind, item=item)
+    scope.keep_setting(BASE, kind, item=item)
     body = item.body or MergedBlock()
     if kind != "prescribed":
         if item.body is not None or (isinstance(item.value, Call) and item.value.positional):
@@ -172,7 +172,7 @@ def remark_ground(
 
 def _standing(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:
     """The arm with its base among the links: without matter, where the arm does not say more."""
-    if any(link.name == BASE for link in arm.links) or BASE in arm.lost:
+    if any(link.name == BASE for link in arm.links) or BASE in arm.failed:
         return arm
     owner = Owner(f"link `{BASE}`", item.place, f"links.{BASE}")
     scope.number(owner, Parameter(name="mass", unit="kg", default=0.0, at_least=0.0, doc="mass of the link"), None)
@@ -237,9 +237,9 @@ def _course(scope: Scope, item: Item) -> str | None:
         scope, spot, inner, item, doc=f"{item.name} of the base", column=item.name, kind="component", body=item.body
     )
     if model is not None:
-        scope.setting(f"{BASE}.{item.name}.model", model, item=item)
+        scope.keep_setting(f"{BASE}.{item.name}.model", model, item=item)
         path = f"{BASE}.{item.name}"
-        scope.unvaried[path] = unvaried.model("a course in time", path)
+        scope.not_sweepable[path] = not_sweepable.model("a course in time", path)
         _check_jumps(scope, item, model, place_of(item.value))
     return model
 

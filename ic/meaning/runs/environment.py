@@ -67,7 +67,7 @@ def _environment_use(
     if item.value is not None and is_value:
         gravity = models.find_own("environment")["gravity"]
         with scope.complaints.gather():
-            found = scope.written(item)
+            found = scope.evaluate(item)
             if isinstance(found, Value):
                 size = "9.81" if isinstance(found.number, Scalar) else f"{abs(found.number):g}"
                 scope.complaints.error(
@@ -96,9 +96,9 @@ def _environment_use(
     body = item.body or MergedBlock()
     # a payload called `world` was told of, and is no reason to tell of those that mean the ground
     bodies = [*(link.name for link in arm.links), *(each.name for each in payloads if each.name != WORLD)]
-    lost = (*arm.lost, *(each.name for each in payloads if each.name == WORLD))
+    failed = (*arm.failed, *(each.name for each in payloads if each.name == WORLD))
     known = {"joint": [joint.name for joint in arm.moving], "link": bodies}
-    named = check_names(scope, owner, environment.parameters, body, arm=arm.name, known=known, lost=lost)
+    named = check_names(scope, owner, environment.parameters, body, arm=arm.name, known=known, failed=failed)
     about = next((named[p.name] for p in environment.parameters if p.names == "joint" and p.name in named), None)
     if about is not None:  # what the unit words `joint` and `effort` mean
         kinds = {joint.name: joint.kind for joint in arm.moving}

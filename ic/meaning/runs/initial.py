@@ -27,7 +27,7 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
     known["servos"] = ""
     of_base = dict.fromkeys(INITIAL_OF_BASE if any(link.name == BASE for link in arm.links) else (), "")
     for item in body.items.values():
-        if not item.kind and item.name.partition(".")[0] in arm.lost:
+        if not item.kind and item.name.partition(".")[0] in arm.failed:
             continue
         if item.kind or item.name not in (*known, *INITIAL_OF_BASE):
             there = (*known, *of_base)
@@ -43,9 +43,9 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
         listed: ValueList | None = None
         if general is not None:
             with scope.complaints.gather():
-                found = scope.written(general)
+                found = scope.evaluate(general)
                 listed = found if isinstance(found, ValueList) else None
-            if listed is not None and arm.lost:
+            if listed is not None and arm.failed:
                 continue
             if listed is not None and len(listed.items) != len(arm.moving):
                 given, moving = len(listed.items), len(arm.moving)
@@ -93,7 +93,7 @@ def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: Re
     if len({joint.kind for joint in arm.moving}) < 2:
         return False
     with scope.complaints.gather():
-        found = scope.written(general)
+        found = scope.evaluate(general)
         unit, dimension = owner.unit(wanted)
         if isinstance(found, Value) and found.dimension != PURE and not units.same(found.dimension, dimension):
             scope.complaints.error(

@@ -38,7 +38,7 @@ def resolve_rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate
     owner = Owner("`rates`", item.place, "rates")
     for part in body.items.values():
         if part.kind or part.name not in RATES.keys:
-            scope.complaints.taken_for(item.place, part.name, RATES.keys)
+            scope.complaints.note_misspelling(item.place, part.name, RATES.keys)
             scope.complaints.error(
                 "D116",
                 f"no rate `{part.name}`",

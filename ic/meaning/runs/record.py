@@ -11,9 +11,9 @@ from ic.grammar.spell import spell
 from ic.grammar.syntax import Binary, Expression, List, Name, Statement
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
+from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
-from ic.meaning.parameters.unvaried import Unvaried
 from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import Label, Place, did_you_mean, nearest
@@ -35,7 +35,7 @@ FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
 def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Structure) -> tuple[Recorded, ...]:
     """The variables that are recorded, in the deck's order."""
-    scope.unvaried["record"] = Unvaried("is one for the whole sweep", "record all that any case needs")
+    scope.not_sweepable["record"] = NotSweepable("is one for the whole sweep", "record all that any case needs")
     if item is None:
         scope.complaints.missing(
             run.place,
@@ -50,11 +50,11 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
     found: dict[str, tuple[Recorded, Place]] = {}
     for name in asked:
         made = known.get(name.text)
-        if made is None and scope.lost and not OF_SERVO.isdisjoint(word.text for word in name.path):
+        if made is None and scope.failed_servos and not OF_SERVO.isdisjoint(word.text for word in name.path):
             continue
         if made is None and _of_lost(scope, name, structure):
             continue
-        if made is None and scope.gone and (name.path[0].text in scope.gone or not structure.moving):
+        if made is None and scope.failed_parts and (name.path[0].text in scope.failed_parts or not structure.moving):
             continue
         if made is None:
             scope.complaints.error(
@@ -217,7 +217,9 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
         )
     elif not isinstance(of.value, Name) or of.value.text not in known:
         name = of.value if isinstance(of.value, Name) else None
-        if name is not None and (name.path[0].text in scope.lost | scope.gone or _of_lost(scope, name, structure)):
+        if name is not None and (
+            name.path[0].text in scope.failed_servos | scope.failed_parts or _of_lost(scope, name, structure)
+        ):
             return None
         message, helps = "a channel is needed here", ["write `of = CHANNEL;`, such as `of = shoulder.qd;`"]
         if name is not None:
@@ -227,8 +229,8 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
         channel = known[of.value.text]
     if channel is None:
         return None
-    scope.setting(f"metrics.{item.name}.model", metric.name, item=item)
-    scope.setting(f"metrics.{item.name}.of", channel.path, item=of)
+    scope.keep_setting(f"metrics.{item.name}.model", metric.name, item=item)
+    scope.keep_setting(f"metrics.{item.name}.of", channel.path, item=of)
     use_model(scope, replace(owner, of=channel.unit), metric.parameters, body, ("of",))
     return MetricUse(item.name, metric.name, channel.path, item.place)
 

@@ -26,9 +26,9 @@ from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.payloads import check_payloads, resolve_payloads
 from ic.meaning.parameters.addresses import in_run
 from ic.meaning.parameters.models import body_of, find_bare_model, upon, word_of
+from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
-from ic.meaning.parameters.unvaried import Unvaried
 from ic.meaning.runs.base import check_base, initial_base, resolve_base
 from ic.meaning.runs.environment import resolve_environment
 from ic.meaning.runs.initial import resolve_initial
@@ -80,16 +80,16 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         scope.complaints.missing(run.place, ("duration",), "D107", told, help="write `duration = 10 s;`")
     if arm is None:
         return None
-    scope.gone = arm.lost
+    scope.failed_parts = arm.failed
     base, arm = resolve_base(scope, block.get("base"), arm)
     name_guides(scope, block)
-    uses, scope.lost = resolve_servos(scope, body_of(scope, block.get("servos")), arm)
-    if block.get("servos") is None and scope.complaints.lacks(run.place, "servos"):
-        scope.lost = frozenset(joint.name for joint in arm.moving)
+    uses, scope.failed_servos = resolve_servos(scope, body_of(scope, block.get("servos")), arm)
+    if block.get("servos") is None and scope.complaints.is_known_to_lack(run.place, "servos"):
+        scope.failed_servos = frozenset(joint.name for joint in arm.moving)
     guides = resolve_guides(scope, block, arm, uses, duration)
     substitutions = resolve_substitutions(scope, block, arm, uses)
     payloads = resolve_payloads(scope, block, arm)
-    if arm.whole:
+    if arm.free_of_errors:
         check_moved(scope, arm.links, arm.joints, payloads)
     sensors = resolve_link_sensors(scope, block, arm, payloads)
     environment, products = resolve_environment(
@@ -181,7 +181,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     record = resolve_record(scope, run, block.get("record"), structure)
     structure = replace(structure, metrics=metrics, record=record)
     remark_unread(scope, uses, structure)
-    scope.setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
+    scope.keep_setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure)
     tolerances = resolve_tolerances(scope, body_of(scope, block.get("tolerances")), structure)
     in_order = tuple((joint, stability[joint]) for joint in fastest if joint in stability)
@@ -192,18 +192,18 @@ def _keep_settings(
     scope: Scope, block: MergedBlock, arm: ResolvedArm, integrator: Any, rates: Mapping[str, Rate], schedule: Schedule
 ) -> None:
     """What the run says besides parameters, for who asks; `Scope.constant` and `Scope.word` have kept some."""
-    scope.setting("arm", arm.name, item=block.get("arm"))
-    scope.setting("integrator", integrator.name, item=block.get("integrator"))
-    if "rates.base" not in scope.beside:
-        scope.setting("rates.base", schedule.base_hz, "Hz", note="the fastest of the rates")
-    if "rates.record" not in scope.beside:
-        scope.setting("rates.record", schedule.base_hz / schedule.dynamics, "Hz", note="that of the dynamics")
-    if "environment.velocity_products" not in scope.beside:
-        scope.setting("environment.velocity_products", "on")
-    if "initial.servos" not in scope.beside:
-        scope.setting("initial.servos", str(BALANCED.default))
-    if "seed" not in scope.beside:
-        scope.setting("seed", 0.0, "1")
+    scope.keep_setting("arm", arm.name, item=block.get("arm"))
+    scope.keep_setting("integrator", integrator.name, item=block.get("integrator"))
+    if "rates.base" not in scope.auxiliary:
+        scope.keep_setting("rates.base", schedule.base_hz, "Hz", note="the fastest of the rates")
+    if "rates.record" not in scope.auxiliary:
+        scope.keep_setting("rates.record", schedule.base_hz / schedule.dynamics, "Hz", note="that of the dynamics")
+    if "environment.velocity_products" not in scope.auxiliary:
+        scope.keep_setting("environment.velocity_products", "on")
+    if "initial.servos" not in scope.auxiliary:
+        scope.keep_setting("initial.servos", str(BALANCED.default))
+    if "seed" not in scope.auxiliary:
+        scope.keep_setting("seed", 0.0, "1")
 
 
 def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> None:
@@ -235,7 +235,7 @@ def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> 
                 adds = f"`substitute {item.name} {{ ... }}` would put this joint's motor on a bed"
             if not {"on", "mass", "grapple", "release"}.isdisjoint(item.body.items):
                 adds = f"`payload {item.name} {{ ... }}` would add a payload"
-            scope.complaints.taken_for(definition.place, item.name, (*metrics, *RUN.keys))
+            scope.complaints.note_misspelling(definition.place, item.name, (*metrics, *RUN.keys))
             scope.complaints.error(
                 "D109",
                 f"nothing named `{item.name}` in run `{definition.name}` to change",
@@ -245,7 +245,7 @@ def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> 
         else:
             near = did_you_mean(item.name, (*RUN.keys, *metrics)) if "." not in item.name else ()
             helps = in_run(scope.definitions, block, item, RATES.keys) or [*near, known_words("a run has", RUN.keys)]
-            scope.complaints.taken_for(definition.place, item.name, (*RUN.keys, *metrics))
+            scope.complaints.note_misspelling(definition.place, item.name, (*RUN.keys, *metrics))
             scope.complaints.error("D109", f"a run has no `{item.name}`", item.place, help=helps)
     for statement in block.statements:
         words = " ".join(word.text for word in statement.words)
@@ -306,7 +306,9 @@ def _integrator(scope: Scope, item: Item | None):  # type: ignore[no-untyped-def
 
 def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
     number = scope.constant(run, SEED, item) if item is not None else 0.0
-    scope.unvaried["seed"] = Unvaried("is one for the whole sweep", "`repeat 5;` runs each case with other noise")
+    scope.not_sweepable["seed"] = NotSweepable(
+        "is one for the whole sweep", "`repeat 5;` runs each case with other noise"
+    )
     if item is None:
         return 0
     if number is not None and not number.is_integer():

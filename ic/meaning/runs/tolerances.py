@@ -39,7 +39,7 @@ def _tolerance(scope: Scope, item: Item, structure: Structure, known: dict[str, 
         scope.complaints.error("D239", f"`{item.kind or name}` is no tolerance", item.place, help=WRITE)
         return None
     if name not in known:
-        if not scope.hangs(name):
+        if not scope.depends_on_failed(name):
             scope.complaints.error(
                 "D237",
                 f"no signal or metric `{name}` here that could differ",
@@ -77,10 +77,10 @@ def _tolerance(scope: Scope, item: Item, structure: Structure, known: dict[str, 
         return None
     if size is None:
         return None
-    scope.setting(path, float(size), known[name][0], item=item)
-    given = scope.given.get(path)
+    scope.keep_setting(path, float(size), known[name][0], item=item)
+    given = scope.evaluated_settings.get(path)
     if given is not None:
-        scope.beside[path].origin = given.over(scope.beside[path].origin)
+        scope.auxiliary[path].origin = given.overriding(scope.auxiliary[path].origin)
     return Tolerance(name, float(size), spell(given.expression if given else item.value), item.place)
 
 

@@ -10,15 +10,15 @@ A_RUN_FOR_EACH = "write a run for each, `like` the first, and `sweep NAME = ONE 
 
 
 @frozen
-class Unvaried:
+class NotSweepable:
     """A path that is known and cannot vary over numbers.
 
-    is_     what it is, to go on after "it"
+    reason  what it is, to go on after "it"
     sweep   what a sweep writes instead; "" where it varies over choices, by its own path
     one_of  the numbers that it is made of, any of which varies and can be set, in words; "" of what has none
     """
 
-    is_: str
+    reason: str
     sweep: str = ""
     one_of: str = ""
 
@@ -30,47 +30,47 @@ class Unvaried:
     def to_vary(self, path: str) -> str:
         """The help for who would vary it."""
         if self.one_of:
-            return f"it {self.is_}; vary {self.one_of}"
-        return f"it {self.is_}: {self.sweep or f'write `vary {path} = [...];`'}"
+            return f"it {self.reason}; vary {self.one_of}"
+        return f"it {self.reason}: {self.sweep or f'write `vary {path} = [...];`'}"
 
     def to_set(self) -> str:
         """The help for who would set it from the command line."""
         if self.one_of:
-            return f"it {self.is_}; set {self.one_of}"
-        return f"it {self.is_}: write it in the deck, with a `let` that can be set"
+            return f"it {self.reason}; set {self.one_of}"
+        return f"it {self.reason}: write it in the deck, with a `let` that can be set"
 
 
 DECIDES = "decides the program"
 
-COMPILED = Unvaried(DECIDES)
+COMPILED = NotSweepable(DECIDES)
 """A compile-time constant: another value is another program."""
 
-COMPILED_ALONE = Unvaried(DECIDES, A_RUN_FOR_EACH)
+COMPILED_ALONE = NotSweepable(DECIDES, A_RUN_FOR_EACH)
 """A compile-time constant that no sweep can choose."""
 
-LIST = Unvaried("is a list", A_RUN_FOR_EACH)
-WORD = Unvaried("is a word", "vary it over words")
-FILE = Unvaried("is read from a file", "it is one for the whole sweep")
+LIST = NotSweepable("is a list", A_RUN_FOR_EACH)
+WORD = NotSweepable("is a word", "vary it over words")
+FILE = NotSweepable("is read from a file", "it is one for the whole sweep")
 
 
-def several(paths: Sequence[str]) -> Unvaried:
+def several(paths: Sequence[str]) -> NotSweepable:
     """What is made of several numbers, which have these paths."""
-    return Unvaried(f"is made of {len(paths)} numbers", one_of=_one_of_them(paths))
+    return NotSweepable(f"is made of {len(paths)} numbers", one_of=_one_of_them(paths))
 
 
-def follows(other: str, paths: Sequence[str]) -> Unvaried:
+def follows(other: str, paths: Sequence[str]) -> NotSweepable:
     """What follows from what is written elsewhere, which is made of numbers that have these paths."""
-    return Unvaried(f"follows from `{other}`", one_of=f"one of: {_listed(paths)}")
+    return NotSweepable(f"follows from `{other}`", one_of=f"one of: {_listed(paths)}")
 
 
-def model(kind: str, path: str) -> Unvaried:
+def model(kind: str, path: str) -> NotSweepable:
     """A model, `kind` in words, whose parameters vary."""
-    return Unvaried(f"is {kind}", f"vary a parameter of it, `{path}.PARAMETER`")
+    return NotSweepable(f"is {kind}", f"vary a parameter of it, `{path}.PARAMETER`")
 
 
-def chosen(instead: str) -> Unvaried:
+def chosen(instead: str) -> NotSweepable:
     """What a sweep chooses by another path, or in words of its own."""
-    return Unvaried(DECIDES, instead)
+    return NotSweepable(DECIDES, instead)
 
 
 def _one_of_them(paths: Sequence[str]) -> str:
