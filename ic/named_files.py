@@ -37,11 +37,11 @@ class NamedFiles(Generic[T]):
 
     @property
     def loaded(self) -> Iterable[T]:
-        """What was made of the files in which nothing is wrong."""
+        """The contents of the files in which nothing is wrong."""
         return (each for each in self._read.values() if not isinstance(each, Problem))
 
     def get(self, named: String) -> T:
-        """What is in the file of this name. Raises Problem; where that is the file's own fault, the same each time."""
+        """The content of the file of this name. Raises Problem, the same each time for a fault of the file."""
         found = self._find(named)
         if found.name not in self._read:
             try:

@@ -59,7 +59,7 @@ def check_name(what: str, name: str) -> None:
 
 
 def _meaning(what: str, name: str) -> str:
-    """What else a name means, so that it cannot be given; nothing where it can."""
+    """The thing that already has this name, in words, so that nothing new may take it; "" where the name is free."""
     if units.is_unit(name):
         return f"that is the unit {units.UNITS[name].word}"
     return "with that word paths of a run begin" if what == "an arm" and name in HEADS else ""

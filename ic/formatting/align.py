@@ -61,7 +61,7 @@ class Groups:
 
 
 def offset(piece: RowPiece, anchor: Anchor) -> int:
-    """How far behind the piece's first character its anchor is."""
+    """The distance, in characters, from the start of a piece to its anchor."""
     if anchor == "start":
         return 0
     return len(piece.text) if anchor == "end" else len(piece.text.partition(".")[0])
@@ -94,7 +94,7 @@ def aligned(found: Sequence[Row], *, paragraphs: bool) -> Groups:
 
 
 class AlignedLine:
-    """What alignment asks of the pieces of a row.
+    """A row's pieces, and their possible alignments with pieces of other rows.
 
     wide      those that are set apart
     entries   those that begin an entry within the line
@@ -126,7 +126,7 @@ class AlignedLine:
 
 
 def lines_of(found: Sequence[Row]) -> dict[int, AlignedLine]:
-    """What there is to align, by the position of its row."""
+    """The lines whose pieces may be aligned, by the position of their row."""
     return {at: AlignedLine(row.pieces) for at, row in enumerate(found) if row.kind == CODE and not row.exact}
 
 
@@ -154,7 +154,7 @@ def _begins_list(pieces: Sequence[RowPiece], at: int) -> bool:
 
 
 def _unsigned(lists: Sequence[tuple[str, int, RowPiece]], others: Sequence[tuple[str, int, RowPiece]]) -> Iterator[int]:
-    """Of the other lists, numbers with a blank before them where one of these lists, of the same name, has a sign."""
+    """Numbers of `others` with a blank before them, where a list of the same name in `lists` has a sign."""
     signed = {name for name, _, number in lists if number.text[0] in "+-"}
     for name, at, number in others:
         if name in signed and number.gap == 1 and number.text[0] not in "+-":
@@ -180,7 +180,7 @@ def meeting(one: AlignedLine, other: AlignedLine, anchor: Anchor) -> Iterator[tu
 
 
 def _is_one_entry(one: AlignedLine, first: int, other: AlignedLine, second: int) -> bool:
-    """Whether two pieces begin entries of one name, with blanks before them that differ."""
+    """Return True if two pieces begin entries of one name, with different blanks before them."""
     above, below = one.pieces[first], other.pieces[second]
     entries = first in one.entries and second in other.entries
     return entries and above.text == below.text and above.gap != below.gap
@@ -191,7 +191,7 @@ def _side(piece: int, separator: int) -> int:
 
 
 def _separator(row: Row) -> int | None:
-    """Which piece of an entry stands between its name and the rest, if one does."""
+    """The position of the piece that stands between an entry's name and the rest; None where there is none."""
     if row.kind != CODE or row.exact or row.closes is not None:
         return None
     for at, piece in enumerate(row.pieces):
@@ -240,7 +240,7 @@ def neighbours(found: Sequence[Row]) -> Iterator[tuple[int, int]]:
 
 
 def _is_wide(pieces: Sequence[RowPiece], at: int) -> bool:
-    """Whether this piece is set apart. Behind a `[` one blank does that, as in `[ 90, 5]` below `[-90, 5]`."""
+    """Return True if this piece is set apart. Behind a `[` one blank does that, as in `[ 90, 5]` below `[-90, 5]`."""
     before, piece = pieces[at - 1], pieces[at]
     needed = gap(before, piece)
     least = 1 if before.text == "[" or (before.kind == "open" and piece.kind == "number") else 2

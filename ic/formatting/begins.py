@@ -10,7 +10,7 @@ _LEFT_OPEN = _JOINING | {"not", "when", "like", "of"}
 
 
 def stands_below(row: Row) -> bool:
-    """Whether a row was written below what follows the bracket that it stands in."""
+    """Return True if a row was written below what follows the bracket that it stands in."""
     if row.parent is None or row.closes is not None:
         return False
     outer, opener = row.parent
@@ -21,7 +21,7 @@ def stands_below(row: Row) -> bool:
 
 
 def goes_on(row: Row) -> bool:
-    """Whether a row goes on with what the row before has begun, where no bracket says so."""
+    """Return True if a row continues what the row before has begun, where no bracket says so."""
     behind = row.behind
     if row.closes is not None or stands_below(row):
         return False

@@ -39,7 +39,7 @@ class LaidOut:
     ends: bool
 
     def diff(self) -> Iterator[str]:
-        """What is to change, as `diff -u` says it."""
+        """The changes, as `diff -u` prints them."""
         old, new = (list(io.StringIO(text)) for text in (self.before, self.after))
         for line in difflib.unified_diff(old, new, self.name, f"{self.name} (formatted)"):
             yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"

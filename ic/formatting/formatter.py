@@ -47,7 +47,7 @@ def _characters(text: str) -> str:
 
 
 def _lines(source: Text) -> list[tuple[list[str], Place]]:
-    """What stands on each line that is not blank, comments included, and where the line begins."""
+    """The words of each line that is not blank, comments included, and where the line begins."""
     found = []
     for line in logical_lines(source):
         said = [each for token in line if (each := _said(token))]

@@ -40,7 +40,7 @@ def laid_out(found: Sequence[Row]) -> str:
 
 
 def _most_blank(above: Row | None, row: Row) -> int:
-    """How many blank lines may stand between two rows: none at the edges of a block and of the file."""
+    """The number of blank lines that may stand between two rows: none at the edges of a block and of the file."""
     if above is None or row.closes is not None or (above.pieces and above.pieces[-1].kind == "open"):
         return 0
     return 1 if row.parent else MOST_BLANK
@@ -141,7 +141,7 @@ def _as_written(row: Row) -> list[int]:
 
 
 def _indentation(row: Row, positions: dict[int, int], columns: Sequence[Sequence[int]], below: bool) -> int:
-    """Where a row begins that begins anew."""
+    """The column, from 0, at which a row begins that does not continue another."""
     if row.closes is not None:
         return columns[positions[id(row.closes)]][0]
     if row.parent is None:

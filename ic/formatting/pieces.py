@@ -95,7 +95,7 @@ def _ends_operand(token: Token) -> bool:
 
 
 def _piece(parser: Expressions, at: int, free: int, before: RowPiece | None, operand: bool) -> tuple[Kind, int]:
-    """What begins at the parser's token `at`, and how many tokens it has, at most `free`."""
+    """The kind of the piece at the parser's token `at`, and its number of tokens, at most `free`."""
     token = parser.tokens[at]
     text = token.text
     if before is not None and operand and (length := _unit(parser, at, before)) and length <= free:
@@ -123,7 +123,7 @@ def _piece(parser: Expressions, at: int, free: int, before: RowPiece | None, ope
 
 
 def _path(parser: Expressions, at: int, free: int) -> int:
-    """How many tokens the path has that begins here."""
+    """The number of tokens of the path that begins here."""
     length = 1
     while length + 2 <= free and parser.tokens[at + length].text == "." and parser.tokens[at + length + 1].kind == NAME:
         length += 2
@@ -131,14 +131,14 @@ def _path(parser: Expressions, at: int, free: int) -> int:
 
 
 def _number(parser: Expressions, at: int, free: int) -> int:
-    """How many tokens the number has that begins here: three where it is written as a fraction, `1/3`."""
+    """The number of tokens of the number that begins here: three where it is written as a fraction, `1/3`."""
     number, line, below = parser.tokens[at : at + 3]
     fraction = free > 2 and line.text == "/" and below.kind in NUMBERS
     return 3 if fraction and number.end == line.offset and line.end == below.offset else 1
 
 
 def _unit(parser: Expressions, at: int, before: RowPiece) -> int:
-    """How many tokens the unit has that begins behind this piece; 0 where none does."""
+    """The number of tokens of the unit that begins behind this piece; 0 where none does."""
     token, following = parser.tokens[at], parser.tokens[at + 1]
     over = None
     if token.kind == WHOLE and token.text == "1" and following.text == "/":
@@ -152,7 +152,7 @@ def _unit(parser: Expressions, at: int, before: RowPiece) -> int:
 
 
 def gap(before: RowPiece, piece: RowPiece) -> int:
-    """How many blanks stand between two pieces of a line that are not aligned with anything."""
+    """The number of blanks between two pieces of a line that are not aligned with anything."""
     wanted = _wanted(before, piece)
     own = min(piece.gap, 1)
     if before.kind == piece.kind == "number":
@@ -200,7 +200,7 @@ def _around_brace(before: RowPiece, piece: RowPiece) -> int | None:
 
 @lru_cache(maxsize=4096)
 def _stay_apart(before: str, after: str) -> bool:
-    """Whether the lexer still tells two texts apart when nothing stands between them."""
+    """Return True if the lexer still tells two texts apart when nothing stands between them."""
 
     def texts(text: str) -> list[str]:
         return [token.text for line in logical_lines(Text("", text)) for token in line if token.kind != SPACE]

@@ -53,7 +53,7 @@ def _included(text: str, file: FoundFile, files: Files) -> Iterator[FoundFile]:
 
 
 def _text(file: FoundFile) -> str:
-    """What can be read of a file; `met check` says what is wrong with it."""
+    """The readable part of a file; `met check` says what is wrong with it."""
     try:
         with open_regular(file.path) as stream:
             return stream.read(MOST_BYTES).decode("utf-8", "replace")

@@ -24,7 +24,7 @@ def rows_as_seen(source: Text, making_strings: Collection[str] = ()) -> list[Row
 
 
 def _met(found: Sequence[Row]) -> int:
-    """How much stands below what it may have been aligned with."""
+    """A score of tab stops: how many things stand exactly below what they may have been aligned with."""
     lines = lines_of(found)
     met = {
         (one, first, other, second)
@@ -37,7 +37,7 @@ def _met(found: Sequence[Row]) -> int:
 
 
 def _comments_met(found: Sequence[Row]) -> int:
-    """How many comments stand below one that ends a line of the same paragraph."""
+    """The number of comments that stand below one that ends a line of the same paragraph."""
     met, above = 0, -1
     for row in found:
         if row.kind == BLANK:

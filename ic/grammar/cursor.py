@@ -33,7 +33,7 @@ def found(token: Token) -> str:
 
 
 def span(first: Token, last: Token) -> Place:
-    """From the first token to the last where they stand on one line and came the same way; else the first alone."""
+    """The place from the first token to the last if both stand on one line and came the same way; else the first's."""
     together = first.source is last.source and first.expansions == last.expansions
     if first is last:
         return first.place
@@ -163,7 +163,7 @@ class Cursor:
         return at > 0 and self.line_of(self.tokens[at]) != self.line_of(self.tokens[at - 1])
 
     def begins_entry(self, at: int) -> bool:
-        """Whether a new line begins here, and looks like an entry: the one before lacks its semicolon."""
+        """Return True if a new line begins here, and looks like an entry: the one before lacks its semicolon."""
         if self.tokens[at].kind != NAME or not self.on_new_line(at):
             return False
         behind = at + 1

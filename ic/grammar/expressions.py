@@ -108,7 +108,7 @@ class Expressions(Quantities):
         return word
 
     def only_a_name(self) -> bool:
-        """Whether a word that could be an operator is just somebody's name."""
+        """Return True if a word that could be an operator is a name of the deck's."""
         return self.following.text in (";", ",", ")", "]", "}", ".")
 
     def operand(self) -> Expression:
@@ -136,7 +136,7 @@ class Expressions(Quantities):
         self.unexpected("a value", help=helps.get(token.text, ()))
 
     def with_unit(self, inner: Expression, opening: Token) -> Expression:
-        """What has just been closed, with the unit that may follow it."""
+        """The expression whose bracket was just closed, with the unit that may follow it."""
         closing = self.previous
         unit = self.unit()
         return inner if unit is None else WithUnit(inner, unit, span(opening, closing))
@@ -274,7 +274,7 @@ class Expressions(Quantities):
         return List(tuple(items), span(opening, closing))
 
     def another(self, closing: str) -> bool:
-        """Whether a further item follows, its comma taken; a missing or mistaken comma is noted and forgiven."""
+        """Return True if a further item follows, its comma taken; a missing or mistaken comma is reported."""
         token = self.token
         if token.text == ",":
             self.advance()
@@ -293,6 +293,6 @@ class Expressions(Quantities):
         return False
 
     def ends_entry(self) -> bool:
-        """Whether the semicolon here ends the entry, the bracket being the one that is missing."""
+        """Return True if the semicolon here ends the entry, so that the closing bracket is the one that is missing."""
         after = self.following
         return after.text == "}" or after.kind == "END" or self.begins_entry(self.at + 1)

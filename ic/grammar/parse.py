@@ -216,7 +216,7 @@ class _Parser(Expressions):
         )
 
     def line_break_in(self, names: list[Token]) -> bool:
-        """Whether a new line breaks a run of names that cannot be one entry: `q` and, below it, `mass = 3;`."""
+        """Return True if a new line breaks a run of names that cannot be one entry: `q` and, below it, `mass = 3;`."""
         return self.begins_entry(self.at) and self.following.text in ("=", "+=")
 
     def not_an_entry(self) -> None:
@@ -399,7 +399,7 @@ class _Parser(Expressions):
         )
 
     def decimal_comma(self) -> str:
-        """What to say of `0,325`; "" where the comma stands otherwise."""
+        """The remedy for `0,325`; "" where the comma stands otherwise."""
         whole, part = self.previous, self.following
         if not (whole.kind == part.kind == WHOLE and whole.end == self.token.offset and self.token.end == part.offset):
             return ""
@@ -418,23 +418,23 @@ def _words(tokens: Sequence[Token]) -> tuple[Word, ...]:
 
 
 def _base_at(names: Sequence[Token]) -> int | None:
-    """Where `like X` or `of X` stands at the end of a definition's names; kind and name come first."""
+    """The position of `like X` or `of X` at the end of a definition's names, behind kind and name; None without one."""
     at = len(names) - 2
     return at if at >= 2 and names[at].text in ("like", "of") else None
 
 
 def _made_from(names: Sequence[Token], tail: Sequence[Token]) -> bool:
-    """Whether the names of a definition end in `from MODEL`, before the arguments of the model."""
+    """Return True if the names of a definition end in `from MODEL`, before the arguments of the model."""
     return len(names) >= 4 and names[-2].text == "from" and not tail
 
 
 def _arm_from(names: Sequence[Token]) -> bool:
-    """Whether the names begin `arm NAME from`."""
+    """Return True if the names begin `arm NAME from`."""
     return len(names) >= 3 and (names[0].text, names[2].text) == ("arm", "from")
 
 
 def _words_before_value(names: Sequence[Token], dotted: bool, following: Token) -> int:
-    """How many of a statement's names come before its value."""
+    """The number of a statement's names that come before its value."""
     texts = [name.text for name in names]
     for i in range(1, len(texts)):
         if texts[i] == "not":

@@ -28,7 +28,7 @@ def place_of(expression: Expression) -> Place:
 
 
 def spanned(first: Place, last: Place) -> Place:
-    """From the first place to the end of the last, where both are on one line and by one way there."""
+    """The place from the first to the end of the last if both are on one line and came there by one way."""
     if (first.file, first.line, first.expansions) != (last.file, last.line, last.expansions):
         return first
     end = last.column + last.length

@@ -79,7 +79,7 @@ def _read(source: Text, at: int, text: str, findings: Findings) -> Setting:
 
 
 def _remedy(entry: object, place: Place) -> list[str]:
-    """What to write in the stead of another entry of a deck."""
+    """The remedy for an entry that `--set` does not take."""
     words = [word.text for word in getattr(entry, "words", ())]
     if isinstance(entry, Setting) and words[-1:] == ["macro"]:
         return ["a macro is defined by `-D NAME=VALUE`"]

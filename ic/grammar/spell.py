@@ -61,7 +61,7 @@ def spell(expression: Expression, within: int = 0) -> str:
 
 
 def _body(entries: tuple[Entry, ...]) -> str:
-    """What stands in braces, in one line."""
+    """A block's entries with its braces, in one line."""
     return " ".join(["{", *map(_entry, entries), "}"])
 
 

@@ -127,7 +127,7 @@ class Binary:
 
 @frozen
 class Broken:
-    """What stands where an expression should, and could not be read; that has been told."""
+    """An expression that could not be read (already reported)."""
 
     place: Place
 

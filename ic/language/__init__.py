@@ -23,7 +23,7 @@ DEFINITIONS = tuple(block.name for block in BLOCKS.values() if not block.within)
 """The words that definitions of a deck begin with."""
 
 NAMED = ("JOINT", "SERVO")
-"""What stands in declared paths for a name of the deck's with which a path begins."""
+"""Placeholders that stand for a name of the deck's at the start of a declared path."""
 
 HEADS = tuple(
     sorted(
@@ -36,8 +36,8 @@ HEADS = tuple(
 
 
 def choices(head: str) -> tuple[str, ...]:
-    """What a sweep chooses under this first word of a path, such as `JOINT`, `SERVO` or `rates`; under "" whole paths
-    of one word."""
+    """The entries that a sweep chooses under this first word of a path, such as `JOINT`, `SERVO` or `rates`; under ""
+    whole paths of one word."""
     found = (entry for block in BLOCKS.values() for entry in block.entries if entry.varies == "choice")
     split = (entry.path.rpartition(".") for entry in found)
     return tuple(last for first, _, last in split if first == head)

@@ -9,13 +9,13 @@ from met.frozen import frozen
 from met.parameter import Parameter
 
 Varies = Literal["number", "choice", "never"]
-"""What a sweep may do with an entry: vary it over numbers, choose one of several (each makes a program of its own), or
-nothing; what stands inside a block or a model may vary by itself all the same."""
+"""The ways in which a sweep may vary an entry: over numbers, over choices (each makes a program of its own), or not
+at all; entries inside a block or a model may vary by themselves all the same."""
 
 
 @frozen(kw_only=True)
 class Entry:
-    """What may stand in a block: a key (`mass = 2 kg;`, `rates { ... }`), something with a name of the deck's
+    """An entry that a block may have: a key (`mass = 2 kg;`, `rates { ... }`), something with a name of the deck's
     (`payload NAME { ... }`), or a statement (`require ...;`).
 
     name       the word it begins with

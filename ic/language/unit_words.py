@@ -29,7 +29,7 @@ def units_of(dimension: Dimension) -> list[str]:
 
 @lru_cache(maxsize=4096)
 def measure_here(written: str, joint: JointKind, command: str | None, of: str | None) -> units.Measure:
-    """What a declared unit means where `joint`, `effort`, `command` and `of` mean this."""
+    """The SI measure of a declared unit where `joint`, `effort`, `command` and `of` mean this."""
     names = {} if of is None else {"of": units.parse_unit(of)}
     return units.parse_unit(joint_unit(written, Joint("", joint, "", ""), command), names)
 

@@ -48,7 +48,7 @@ def print_cases(groups: Sequence[Experiment], *, everything: bool = False) -> It
 
 
 def _structures(groups: Sequence[Experiment]) -> Iterator[str]:
-    """What each group of a sweep is, how many cases it has, and how much one of them records."""
+    """For each group of a sweep, its choices, its number of cases, and how much one case records."""
     paths = list(dict.fromkeys(choice.path for group in groups for choice in group.cases.choices))
     rows = [["group", *paths, "cases", "a case"]]
     for group in groups:
@@ -134,5 +134,5 @@ def prefixes(names: list[str]) -> list[str]:
 
 
 def _shared(a: str, b: str) -> int:
-    """How many characters both begin with."""
+    """The number of characters that both begin with."""
     return next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))

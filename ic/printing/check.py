@@ -11,7 +11,7 @@ from met.plan import Plan
 
 
 def notes(plan: Plan) -> Iterator[str]:
-    """What is no mistake but worth knowing, run by run: `free: no servo on rail, which moves freely`."""
+    """Remarks on a plan, run by run: `free: no servo on rail, which moves freely`."""
     for experiment in plan.experiments:
         free = passive(experiment.structure)
         if free:

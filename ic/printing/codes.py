@@ -16,7 +16,7 @@ _HIDDEN = re.compile(r"<!-- .*?-->\n?", re.DOTALL)
 
 
 def is_code(word: str) -> bool:
-    """Whether a word looks like the code of a message: `D063`, `d063`, `d63`."""
+    """Return True if a word looks like the code of a message: `D063`, `d063`, `d63`."""
     return re.fullmatch(r"[A-Za-z]\d{2,3}", word) is not None
 
 

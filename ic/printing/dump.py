@@ -26,7 +26,7 @@ WRITTEN = ("tokens", "syntax", "model")  # stages before anything is set from ou
 
 @frozen
 class DumpRequest:
-    """Which deck is to be shown, and of its plan which runs (None: the only one, else the default)."""
+    """A request for a stage of a deck; select: runs of its plan (None: the only one, else the default)."""
 
     deck: str
     include_dirs: tuple[str, ...] = ()

@@ -130,7 +130,7 @@ def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[st
 
 
 def _is_run(path: str, also: Mapping[str, Sequence[str]]) -> bool:
-    """Whether a run has this name, as in `nominal.initial.shoulder.q`, which is `initial.shoulder.q`.
+    """Return True if a run has this name, as in `nominal.initial.shoulder.q`, which is `initial.shoulder.q`.
 
     An arm, too, stands before whole paths, but among them are its links; a servo's `gearbox.kp` is `elbow.servo.kp`.
     """
@@ -209,12 +209,12 @@ def _in_short(experiment: Experiment, name: str) -> tuple[str, ...]:
 
 
 def _note(origin: Origin) -> str:
-    """What else is to say of where a value comes from; a varied one's note is about what the sweep overrides."""
+    """A note on a value's origin; that of a varied value is about the entry that the sweep overrides."""
     return "" if origin.kind == "case" else origin.note
 
 
 def _is_vector(experiment: Experiment, names: list[str]) -> bool:
-    """Whether these are the three parts of a vector that was written at once."""
+    """Return True if these are the three parts of a vector that was written at once."""
     found = [experiment.parameters[name] for name in names]
     together = [name.rpartition(".")[2] for name in names] == ["x", "y", "z"]
     return together and all(isinstance(q.value, float) and q.origin == found[0].origin for q in found)
@@ -263,7 +263,7 @@ def _written_at(place: Place, sources: Mapping[str, str]) -> str:
 
 
 def _end(rest: str) -> int:
-    """Where what was begun ends: before a semicolon, a comment, or the bracket or comma of what holds it."""
+    """The end of an expression in a line: before a semicolon, a comment, or the bracket or comma around it."""
     depth = 0
     for at, character in enumerate(rest):
         if character in "([":
@@ -314,7 +314,7 @@ def _series(values: np.ndarray) -> str:
 
 
 def _declaration(experiment: Experiment, name: str) -> tuple[Parameter | None, str]:
-    """What the model declares of this parameter, and which model that is."""
+    """The model's declaration of a parameter, and the model's name; None and "" where no model declares it."""
     structure = experiment.structure
     words = name.split(".")
     model: Any = None

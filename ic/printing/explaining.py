@@ -17,7 +17,7 @@ Source = tuple[Plan, Compiled | None]
 """A plan, and the deck that it was compiled from; None for that of a plan file."""
 
 Sources = Sequence[Callable[[], Source]]
-"""Where to look: the next is made only where the first know nothing of what is asked."""
+"""Plans in which to look for a path, in order; each is made only where those before do not know the path."""
 
 
 @frozen

@@ -16,7 +16,7 @@ from met.parameter import Parameter
 
 PAGE = Path(__file__).parents[2] / "docs" / "deck.md"
 MARK = "<!-- table of {} -->"
-"""What stands above a table of docs/deck.md that is made here, with the block's name."""
+"""The comment above a table of docs/deck.md that is made here, with the block's name."""
 
 
 def print_block(block: BlockDeclaration) -> Iterator[str]:
@@ -74,7 +74,7 @@ def table(block: BlockDeclaration) -> Iterator[str]:
 
 
 def type_of(entry: Entry) -> str:
-    """What an entry takes, in words: `number, kg`, `3 numbers, m`, `on or off`; "" where it is no value."""
+    """The type of an entry's value, in words: `number, kg`, `3 numbers, m`, `on or off`; "" where it has no value."""
     wanted = entry.parameter
     if wanted is None:
         return ""
@@ -85,7 +85,7 @@ def type_of(entry: Entry) -> str:
 
 
 def default(entry: Entry) -> str:
-    """What holds where an entry is left out, without the marks of Markdown."""
+    """The default of an entry, in words, without the marks of Markdown."""
     return entry.default
 
 
@@ -98,7 +98,7 @@ def _bounds(wanted: Parameter | None) -> str:
 
 
 def _path(entry: Entry) -> str:
-    """What a sweep calls it; of several numbers, one of them."""
+    """The path by which a sweep varies an entry; for several numbers, that of one of them."""
     shape = entry.parameter.shape if entry.parameter is not None else ""
     return entry.path + {"vector": ".x, .y, .z", "list": ".xx, .yy, ..."}.get(shape, "")
 

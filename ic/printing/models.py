@@ -34,13 +34,13 @@ OF_LANGUAGE = tuple(name for name in BLOCKS if name not in KINDS)
 """Blocks of the deck language that have no models."""
 
 OTHERS = (*OF_LANGUAGE, "channels", "designs", "dh", "distributions", "functions", "shapes", "units")
-"""What else `met doc` has a page on (ic/printing/subjects.py)."""
+"""Further subjects of `met doc` (ic/printing/subjects.py)."""
 
 FIELDS = tuple(field.name for field in fields(Parameter))
-"""What a program is told of a parameter."""
+"""The fields of a parameter that `met doc --format json` gives."""
 
 OF = {"metric": "the unit of the channel that the metric watches", "sensor": "the unit of what is sensed"}
-"""What the word `of` in units means for a kind of model."""
+"""The meaning of the word `of` in units, by kind of model."""
 
 WORDS = {
     "joint": "rad, or m on a prismatic joint",
@@ -51,7 +51,7 @@ WORDS = {
 
 
 def chosen(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
-    """What `met doc` is about: all models, those of a kind, one of a kind, or all of one name. Raises Problem D171."""
+    """The models that `met doc` is asked for: all, those of a kind, one of a kind, or all of one name. Raises D171."""
     everything = [(kind, model) for kind in KINDS for model in models.available(kind).values()]
     if not words:
         return everything
@@ -123,14 +123,13 @@ def rows(parameters: Iterable[Parameter]) -> list[tuple[str, str, str, str, str]
 
 
 def how(kind: models.Kind, model: Any) -> str:
-    """Where a deck writes this model."""
+    """The place in a deck where this model is written, in words."""
     usage = ON_LINK if kind == "sensor" and model.measures is not None else HOW[kind]
     return usage.replace("MODEL", model.name)
 
 
 def shown_of(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
-    """What there is of a servo, guide, sensor of a link, bed or law to be recorded: in words, then name, unit and
-    meaning of each."""
+    """Channels of a servo, guide, sensor of a link, bed or law: in words, then name, unit and meaning of each."""
     for words, text in (
         ("outputs", "Given by its law, at its ticks"),
         ("integrals", "Integrated by its law"),
@@ -153,7 +152,7 @@ def shown_of(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[st
 
 
 def facts(kind: models.Kind, model: Any) -> Iterator[str]:
-    """What else a model declares, in a line each."""
+    """Further facts that a model declares, in a line each."""
     for words, text in (
         ("commands", "Commands it takes"),
         ("order", "Order"),
@@ -216,7 +215,7 @@ def range_(parameter: Parameter) -> str:
 
 
 def meaning(parameter: Parameter) -> str:
-    """What it is, where its number comes from, and with which word it is there."""
+    """A parameter's description, where its number comes from, and the word that it depends on."""
     only = "" if parameter.only is None else f"; with {parameter.only[0]} = {' or '.join(parameter.only[1])}"
     shape = {"vector": "three numbers; ", "list": "a list; ", "text": "in quotes; "}.get(parameter.shape, "")
     shape = "the same in all cases; " if parameter.decides else shape

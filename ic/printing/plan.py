@@ -171,7 +171,7 @@ def _bodies(experiment: Experiment) -> Iterator[str]:
 
 
 def _base(experiment: Experiment, base: Base) -> Iterator[str]:
-    """How the base moves: from where, or by which courses."""
+    """The motion of the base: where it begins, or the courses of its components."""
     values = _Values(experiment)
     if base.kind == "free":
         yield "Base: moves freely, at the start with"
@@ -199,7 +199,7 @@ def _base(experiment: Experiment, base: Base) -> Iterator[str]:
 
 
 def _payloads(experiment: Experiment) -> Iterator[str]:
-    """What links carry, and when they grapple and release it."""
+    """The payloads of a run, and when they are grappled and released."""
     values = _Values(experiment)
     yield "Payloads"
     rows: list[tuple[str, ...]] = [("payload", "mass", "link", "grappled", "released")]

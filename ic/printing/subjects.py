@@ -112,7 +112,7 @@ def print_shapes() -> Iterator[str]:
 
 
 BEGIN = (shapes.__doc__ or "").strip().split("\n\n", 1)[1]
-"""Where a shape lies, as the module says it."""
+"""The position of each shape in its link, in the words of the module `shapes`."""
 
 
 def shapes_json() -> list[dict[str, Any]]:

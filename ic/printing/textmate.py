@@ -156,7 +156,7 @@ def _numbers() -> dict[str, Any]:
 
 
 def _entries() -> dict[str, Any]:
-    """What begins an entry: definitions, parts of them, statements, keys."""
+    """Patterns of the words that begin an entry: definitions, parts of them, statements, keys."""
     kinds = _any(DEFINITIONS)
     return _patterns(
         _groups(rf"\b(default)\s+(?={kinds}\b)", "storage.modifier"),

@@ -180,7 +180,7 @@ def _fall(
 
 
 def pose(joint: Joint) -> float:
-    """Where a joint is held: at 0, or in the middle of its range where 0 is not within it."""
+    """The position at which a joint is held: 0, or the middle of its range where 0 is not within it."""
     found = limits(joint)
     lower, upper = found.get("lower", -1.0), found.get("upper", 1.0)
     if lower <= 0.0 <= upper:

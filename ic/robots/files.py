@@ -35,7 +35,7 @@ class RobotFiles(NamedFiles["ArmEntries"]):
         return self.get(_file_named(made_from))
 
     def remarks(self, made_from: Call) -> Iterator[Diagnostic]:
-        """What the arm has not of the file, which was read."""
+        """Warnings of what the arm leaves out of its file, which was read."""
         from ic.robots.warnings import warnings_of
 
         return warnings_of(self.arm_entries(made_from), _file_named(made_from).place)

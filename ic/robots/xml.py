@@ -132,7 +132,7 @@ def parse(name: str, text: str) -> Element:
 
 
 def _not_xml(source: XmlSource, at: int, code: int, open_: list[Element]) -> Diagnostic:
-    """What expat found, in words that say what to do."""
+    """The diagnostic for an error that expat found, with a remedy."""
     at = max(0, min(at, len(source.data) - 1))
     place = source.place(at, at + 1)
     why = expat.ErrorString(code) or "it cannot be read"
@@ -162,7 +162,7 @@ def _not_xml(source: XmlSource, at: int, code: int, open_: list[Element]) -> Dia
 
 
 def _of_token(data: bytes, at: int) -> str:
-    """What to do where something stands that may not stand there."""
+    """The remedy for a token that may not stand where it does."""
     if data.rfind(b"<!--", 0, at) > data.rfind(b"-->", 0, at):
         return "`--` stands in a comment at its end only, as `-->`"
     if re.search(rb"&\w*\Z", data[max(0, at - SHOWN) : at]):

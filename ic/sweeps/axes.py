@@ -39,7 +39,7 @@ Column = VariedPath | Chosen
 
 @frozen
 class SweepAxis:
-    """What varies together: columns of one length. note: what to tell of how they were made."""
+    """Columns of one length that vary together. note: how they were made, for `met cases`."""
 
     columns: tuple[Column, ...]
     note: str = ""
@@ -51,7 +51,7 @@ class SweepAxis:
 
 @frozen
 class Sweep:
-    """What a sweep's block says.
+    """A sweep's block as read.
 
     repeat       how often each case is run; repeated: where that is written, if it is
     independent  where `seeds = independent` is written, if it is
@@ -76,7 +76,7 @@ class Sweep:
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Of the axes, then of the repeats."""
+        """The number of values of each axis, then the number of repeats."""
         return (*(axis.size for axis in self.axes), self.repeat)
 
 

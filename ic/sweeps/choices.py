@@ -29,7 +29,7 @@ from met.frozen import frozen
 from met.trace import Scalar
 
 MACRO = "macro"
-"""What a path of a macro begins with, before a space: `macro PAYLOAD`."""
+"""The first word of a macro's path, before a space: `macro PAYLOAD`."""
 
 OF_RUN, OF_JOINT, OF_SERVO = choices(""), choices("JOINT"), choices("SERVO")
 SENSOR = "sensor"
@@ -68,7 +68,7 @@ Choices = tuple[tuple[Chosen, Option], ...]
 
 
 def decides(definitions: Definitions, path: str, values: Expression, names: Names) -> bool:
-    """Whether what this path names decides the structure; of a model's parameters, words do."""
+    """Return True if this path names something that decides the structure; a model's words do."""
     first, *rest = path.split(".")
     if path in definitions.lets:
         return False
@@ -129,7 +129,7 @@ def refuse_words(path: str, place: Place, values: Expression, names: Names) -> N
 
 
 def _is_word(path: str) -> bool:
-    """Whether a path ends with a key whose value is always a word: of a shape, else of the language and of models."""
+    """Return True if a path ends with a key of a shape, a block or a model whose value is always a word."""
     *_, holder, name = ("", *path.split("."))
     if holder == "shape":
         declared = [p for shape in SHAPES.values() for p in shape.parameters]
@@ -144,7 +144,7 @@ def _is_word(path: str) -> bool:
 
 
 def path_place(entry: Setting) -> Place:
-    """Of the path of a `vary`, without that word."""
+    """The place of the path of a `vary`, without the word `macro`."""
     return spanned(entry.path[0].place, entry.path[-1].place)
 
 
@@ -274,7 +274,7 @@ def put_in(definitions: Definitions, run: Definition, choices: Choices) -> tuple
 
 
 def keys_of(first: str, rest: Sequence[str], run: MergedBlock | None) -> tuple[str, ...]:
-    """Where in a run's block the path's value is written. run: that block, as it is so far."""
+    """The keys in a run's block under which the path's value is written. run: that block, as it is so far."""
     if rest and rest[0] == "servo":
         servos = run.get("servos") if run is not None else None
         use = servos.body.get(first) if servos is not None and servos.body is not None else None
@@ -285,7 +285,8 @@ def keys_of(first: str, rest: Sequence[str], run: MergedBlock | None) -> tuple[s
 
 
 def in_servo(keys: Sequence[str], block: MergedBlock | None) -> tuple[str, ...]:
-    """Where in a servo's block the rest of a path is written; a sensor without its word where the block has it."""
+    """The keys in a servo's block under which the rest of a path is written; a sensor without its word where the block
+    has it."""
     if len(keys) < 2 or keys[0] != SENSOR:
         return tuple(keys)
     there = block is not None and f"{SENSOR} {keys[1]}" in block.items

@@ -67,7 +67,7 @@ class DrawnParameter:
 
 @frozen
 class SampleDesign:
-    """What a `sample` says. warning: message and place of what to tell of it."""
+    """A `sample` statement as read. warning: message and place of a warning about it."""
 
     design: str
     count: int

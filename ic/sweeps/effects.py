@@ -34,7 +34,7 @@ MOST_NAMED = 4
 
 
 class Effects:
-    """What is set, and whether it was found to do something; the runs in which it was looked for."""
+    """The effects of what `--set` sets: whether each setting did something, and the runs in which that was checked."""
 
     def __init__(self, settings: Settings) -> None:
         self.waiting = {path_of(entry): entry for entry in settings.entries}
@@ -145,12 +145,12 @@ class Effects:
 
 
 def _decides(kind: Goes, entry: Setting) -> bool:
-    """Whether it is a number that decides the program: the rate of a servo's definition."""
+    """Return True if this setting is a compile-time number: the rate of a servo's definition."""
     return kind == "servo" and entry.path[-1].text in OF_SERVO
 
 
 def _is_number(scope: Scope, entry: Setting) -> bool:
-    """Whether it is a number, the same in all cases."""
+    """Return True if this setting is a number, the same in all cases."""
     try:
         found = scope.names.evaluate(entry.value)
     except Problem:
@@ -159,7 +159,7 @@ def _is_number(scope: Scope, entry: Setting) -> bool:
 
 
 def _used(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> list[str]:
-    """Those of these numbers, by path, from which something is computed in this run."""
+    """The paths of these settings from which this run computes something."""
     there = {
         path: entry
         for path, entry in settings.items()
@@ -179,7 +179,7 @@ def _used(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> lis
 
 
 def _idle(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> tuple[str, ...] | None:
-    """Those that nothing depends on where they are inputs; None where something takes none."""
+    """The paths of these settings on which no result depends, as inputs; None if one of them cannot be an input."""
     graph = Graph()
     varied = {
         path: replace(each, value=replace(each.value, number=graph.input(path))) for path, each in scope.varied.items()
@@ -210,7 +210,7 @@ def _resolved(trial: Scope, run: Definition) -> Resolved | None:
 
 
 def _is_looked_at(scope: Scope, run: Definition, entry: Setting) -> bool:
-    """Whether nonsense in its place would be told of."""
+    """Return True if this entry is read: an undefined name in its place raises a diagnostic."""
     place = entry.place
     nonsense = Settings((replace(entry, value=Name((Word(NONSENSE, place),), place)),))
     definitions, changed = nonsense.in_run(nonsense.in_definitions(scope.definitions), run)
@@ -219,7 +219,7 @@ def _is_looked_at(scope: Scope, run: Definition, entry: Setting) -> bool:
 
 
 def _has_noise(scope: Scope, made: Experiment) -> bool:
-    """Whether a seed changes something: noise, or what is drawn."""
+    """Return True if a seed changes something: there is noise, or a value is drawn."""
     if any(varied.drawn for varied in scope.varied.values()):
         return True
     return SEED not in without_effect(replace(made, cases=replace(made.cases, seeds="independent")))

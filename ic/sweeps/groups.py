@@ -35,7 +35,7 @@ MOST_STRUCTURES = 256
 
 @frozen
 class DeckSource:
-    """Where definitions come from: what is known of the deck, and how to read it with other macros.
+    """The definitions of a deck, and how to read it again with other macros.
 
     settings, effects  what is set from outside of the deck, and what was found to come of it
     """
@@ -131,7 +131,7 @@ class _Sweep:
         return _numbered(sweep.name, made)
 
     def _tell_the_rest(self, read: _Read) -> None:
-        """What is wrong in the run, and in entries of the sweep that do not hang on one that could not be read."""
+        """Report mistakes in the run, and in entries of the sweep that do not depend on one that could not be read."""
         sweep = read.sweep
         if self.source.settings != Settings():  # of which one may set what varies, as was told
             resolve_run(Scope(read.definitions, self.complaints), read.base)

@@ -77,7 +77,7 @@ def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
 
 
 def beginnings(scope: Scope) -> list[str]:
-    """What the paths of this run begin with."""
+    """The first words of the paths of this run."""
     return [known_words("paths begin with", dict.fromkeys(known.partition(".")[0] for known in scope.known))]
 
 

@@ -108,7 +108,7 @@ class Settings:
 
 
 def goes(definitions: Definitions, entry: Setting) -> Goes:
-    """Where a deck would say what the entry says."""
+    """The part of a deck that would hold this entry."""
     path = path_of(entry)
     if path in definitions.lets:
         return "let"
@@ -123,7 +123,7 @@ def goes(definitions: Definitions, entry: Setting) -> Goes:
 
 
 def concerns(definitions: Definitions, run: Definition, entry: Setting) -> bool:
-    """Whether the run has what the path of its structure names; true where that cannot be said."""
+    """Return True if the run has what the path of its structure names, or if that cannot be said."""
     path, first = path_of(entry), entry.path[0].text
     block = definitions.block(run)
     if block is None or path in (*OF_RUN, *ONE_OF_TWO, SEED) or first == "rates":

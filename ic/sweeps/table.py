@@ -75,7 +75,7 @@ def structures(sweep: Sweep) -> list[tuple[Choices, np.ndarray]]:
 def kept(
     scope: Scope, sweep: Sweep, values: Mapping[str, np.ndarray], choices: Choices, count: int, structure: Structure
 ) -> tuple[np.ndarray, list[int]]:
-    """Which of these rows no `exclude when` drops, and how many each drops; warns where rounding decides.
+    """The rows that no `exclude when` drops, as a mask, and how many each drops; warns where rounding decides.
 
     values, choices  what varies in the `count` rows, and what they have in common
     structure        theirs
@@ -124,7 +124,7 @@ class _Truths:
         return np.full(self.count, word) if word is not None else self._numbers(expression, asked)
 
     def _words(self, expression: Binary) -> bool | None:
-        """Whether a choice is the one that is written; None where no choice is compared, or one that is a number."""
+        """The truth of a comparison of a choice with a word; None if none is compared, or one that is a number."""
         for side, other in ((expression.left, expression.right), (expression.right, expression.left)):
             if isinstance(side, Name) and side.text in self.words:
                 text = self.words[side.text]

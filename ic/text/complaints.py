@@ -11,12 +11,12 @@ from met.diagnostic import Diagnostic, Label, Place, Problem, error, meant
 MOST = 200  # a deck with more mistakes than this is told the first ones: the rest seldom say more
 
 ONCE = ("D060", "D061", "D076", "D077", "D087", "D104", "D109", "D125", "D141", "D305", "D307")
-"""What is told once of a place, whoever finds it: a bare number, a wrong unit, no such word, out of range, no body's
+"""Codes that are reported once for each place: a bare number, a wrong unit, no such word, out of range, no body's
 inertia, a rate too slow, no entry of a run, no channel, no such key, a unit that may mean cycles, a share above 1."""
 
 
 UNKNOWN_WORDS = ("D044", "D045", "D082", "D108", "D136", "D157")
-"""What is told of words of the language, which no deck defines."""
+"""Codes of messages about unknown words of the language, which no deck defines."""
 
 
 class Complaints:
@@ -71,7 +71,7 @@ class Complaints:
             self._torn.add(of)
 
     def _follows_from_unreadable(self, diagnostic: Diagnostic) -> bool:
-        """Whether this is about something that could not be read, or about a name that this may have defined."""
+        """Return True if this is about something that could not be read, or about a name that this may have defined."""
         if diagnostic.code not in UNKNOWN_WORDS and diagnostic.message.startswith("no "):
             path = diagnostic.message.split("`")[1:2]
             if any(word in self._lost for text in path for word in text.split(".")):
@@ -85,7 +85,7 @@ class Complaints:
         )
 
     def _is_known_at_this_place(self, diagnostic: Diagnostic) -> bool:
-        """Whether this value's mistake is known: what a base or a `let` writes is found wrong at each of its users."""
+        """Return True if this mistake is reported here already: one in a base or a `let` is found at every use."""
         if diagnostic.at is None or diagnostic.code not in ONCE:
             return False
         return any(
@@ -112,8 +112,8 @@ class Complaints:
             self.known_missing.add((of, near.rpartition(".")[2]))
 
     def is_known_to_lack(self, of: Place, *names: str) -> bool:
-        """Whether it was told that what is defined at `of` lacks one of these entries, or has another word for it; or
-        whether one of its entries could not be read."""
+        """Return True if one of these entries of the definition at `of` was reported as missing, another word was taken
+        for it, or an entry there could not be read."""
         if of in self._torn:
             return True
         return any((of, name) in self.known_missing for name in names)
@@ -174,7 +174,7 @@ class Complaints:
 
     @contextmanager
     def gather(self) -> Iterator[None]:
-        """What raises `Problem` inside is noted, and the rest of the block skipped."""
+        """Collect every `Problem` raised inside; the rest of the block is skipped."""
         try:
             yield
         except Problem as problem:
@@ -182,13 +182,13 @@ class Complaints:
 
 
 def _spot(place: Place) -> tuple[str, int, int]:
-    """Where the reader of the deck sees it: of what a macro made, at the macro's use."""
+    """The file, line and column that the deck's reader sees; for what a macro made, those of the macro's use."""
     at = place.expansions[-1].use if place.expansions else place
     return at.file, at.line, at.column
 
 
 def belongs(word: str) -> list[str]:
-    """Where a word of the language stands that stands elsewhere only."""
+    """The remedy for a word of the language that stands in another block only."""
     told = {
         "substitute": "`substitute JOINT { ... }`, in a run, puts a joint's motor on a bed",
         "payload": "`payload NAME { ... }`, in a run, is a body that a link carries or grapples",

@@ -50,7 +50,7 @@ class _Value(NamedTuple):
 
 
 def well_formed(directive: Token, args: Sequence[Token], findings: Findings) -> bool:
-    """Whether there is a condition, and each `defined` in it is followed by a name."""
+    """Return True if there is a condition, and each `defined` in it is followed by a name."""
     written = [token for token in args if token.kind != SPACE]
     if not written:
         findings.error(
@@ -83,7 +83,7 @@ def with_defined(tokens: Sequence[Token], is_macro: Callable[[str], bool], findi
 
 
 def _each_defined(written: Sequence[Token], findings: Findings) -> list[tuple[int, int, int]] | None:
-    """Where each `defined` stands, its name, and what comes behind; None, and a message, where it has no name."""
+    """Positions of each `defined`, its name, and the token behind; None, with an error, if one has no name."""
     stretches: list[tuple[int, int, int]] = []
     texts = [token.text for token in written] + ["", "", ""]
     for i, token in enumerate(written):
@@ -100,7 +100,7 @@ def _each_defined(written: Sequence[Token], findings: Findings) -> list[tuple[in
 
 
 def evaluate(tokens: Sequence[Token], findings: Findings, unknown: Callable[[Token], None]) -> bool:
-    """Whether an expanded condition holds; raises Refused, with a message noted, where it has no meaning.
+    """Return True if an expanded condition holds; raises Refused, with the error noted, where it has no meaning.
 
     unknown: is told of each name that is no macro and counts as 0
     """
@@ -108,7 +108,7 @@ def evaluate(tokens: Sequence[Token], findings: Findings, unknown: Callable[[Tok
 
 
 class _Condition:
-    """Where reading stands in the tokens of a condition. `live`: whether what is read counts."""
+    """A reader of the tokens of a condition. `live`: whether what is read counts."""
 
     def __init__(self, tokens: Sequence[Token], findings: Findings, unknown: Callable[[Token], None]) -> None:
         self.tokens = tokens

@@ -111,7 +111,7 @@ def _checked_parameters(name: Token, written: list[Token], findings: Findings) -
 
 
 def _checked_strings(written: list[Token], parameters: set[str], findings: Findings) -> bool:
-    """Whether a parameter follows each `#` of a macro that takes arguments."""
+    """Return True if a parameter follows each `#` of a macro that takes arguments; reports it where none does."""
     known = parameters - {"...", ","} | ({REST, OPTIONAL} if "..." in parameters else set())
     for i, token in enumerate(written):
         if token.text == "#" and (i + 1 == len(written) or written[i + 1].text not in known):
@@ -126,7 +126,7 @@ def _checked_strings(written: list[Token], parameters: set[str], findings: Findi
 
 
 def _checked_rest(written: list[Token], parameters: Sequence[Token], findings: Findings) -> bool:
-    """Whether `__VA_ARGS__` and `__VA_OPT__(...)` stand where a macro takes more arguments, and the latter is whole."""
+    """Return True if `__VA_ARGS__` and whole `__VA_OPT__(...)` stand only where a macro takes more arguments."""
     tell = findings.error
     variadic = any(token.text == "..." for token in parameters)
     end = 0
@@ -171,7 +171,7 @@ def _checked_rest(written: list[Token], parameters: Sequence[Token], findings: F
 def _checked_units(
     parameters: Sequence[Token], written: list[Token], is_macro: Callable[[str], bool], findings: Findings
 ) -> bool:
-    """Whether no parameter with a unit's name stands where the body may have that unit."""
+    """Return True if no parameter with a unit's name stands where the body may have that unit."""
     names = {token.text: token for token in parameters}
     for i, token in enumerate(written):
         if token.text not in names or not units.is_unit(token.text):
@@ -187,8 +187,8 @@ def _checked_units(
 
 
 def _may_be_unit(body: Sequence[Token], parameters: Container[str], is_macro: Callable[[str], bool]) -> bool:
-    """Whether a unit could follow: the body ends in a number or closing bracket, or what may become one, or in `*`, `/`
-    or `(` behind another unit."""
+    """Return True if a unit could follow: the body ends in a number or closing bracket, or what may become one, or in
+    `*`, `/` or `(` behind another unit."""
     at = len(body)
     while at > 0:
         before = body[at - 1]
@@ -248,7 +248,7 @@ def parameters(head: list[Token]) -> tuple[str, ...] | None:
 
 
 def spelling(macro: Macro) -> tuple[object, ...]:
-    """What makes two definitions the same: parameters and body, any white space being as good as another."""
+    """A key that is equal for equal definitions: parameters and body, any white space being as good as another."""
     body: list[str] = []
     for token in macro.body:
         blank = token.kind == SPACE

@@ -91,7 +91,7 @@ class Text:
 
     @cached_property
     def _joints(self) -> tuple[list[int], list[int]]:
-        """Where in the joined text something was taken away, and how much up to there and with it."""
+        """Offsets in the joined text at which something was taken away, and how much up to and with each."""
         at, taken, total = [], [], 0
         for match in _SPLICE.finditer(self.text):
             at.append(match.start() - total)
@@ -100,7 +100,7 @@ class Text:
         return at, taken
 
     def written_at(self, offset: int) -> int:
-        """Where the character at `offset` of the joined text stands in the text."""
+        """The offset in the text as written of the character at `offset` of the joined text."""
         at, taken = self._joints
         before = bisect_right(at, offset)
         return offset + taken[before - 1] if before else offset

@@ -134,7 +134,7 @@ class Macros(Pcpp):
         return out
 
     def _next_solid(self, pending: list[Token]) -> Token | None:
-        """What is next but for white space, which stays; macros whose end is passed on the way are left."""
+        """The next token that is no white space, which stays; macros whose end is passed on the way are left."""
         blanks = []
         while pending and pending[-1].kind in (SPACE, LEFT):
             piece = pending.pop()
@@ -147,7 +147,7 @@ class Macros(Pcpp):
         return found
 
     def _opens(self, pending: list[Token]) -> bool:
-        """Whether a "(" is next, which is then taken."""
+        """Return True if a "(" is next, and take it."""
         following = self._next_solid(pending)
         if following is None or following.text != "(":
             return False
@@ -156,8 +156,8 @@ class Macros(Pcpp):
         return True
 
     def _is_varied(self, pending: list[Token]) -> bool:
-        """Whether a macro's name behind `macro` stands in `vary macro NAME = [...]`, where it is the macro that is
-        meant, not its body."""
+        """Return True if a macro's name behind `macro` stands in `vary macro NAME = [...]`, which means the macro, not
+        its body."""
         following = self._next_solid(pending)
         return following is not None and following.text == "="
 
@@ -201,7 +201,7 @@ class Macros(Pcpp):
         return made
 
     def _use_refused(self, token: Token, pending: list[Token]) -> Token:
-        """Of a macro that was refused nothing is known but that it was meant: no more is said of what it makes."""
+        """Skip the use of a macro that was refused, arguments too; no more is reported of what it makes."""
         if self.refused[token.text]:
             if not self._opens(pending):
                 return token
@@ -310,7 +310,7 @@ class Macros(Pcpp):
         )
 
     def _stretch(self, first: Token, last: Token) -> Place:
-        """From one token to another where both stand on one line, else the first."""
+        """The place from one token to another where both stand on one line, else the first's."""
         together = first.source is last.source and first.expansions == last.expansions and first.line == last.line
         return first.source.place(first.offset, (last.end if together else first.end) - first.offset, first.expansions)
 

@@ -421,7 +421,7 @@ class _Preprocessor(Macros):
         return self.is_macro(args[0].text)
 
     def _condition(self, directive: Token, args: list[Token]) -> bool:
-        """Whether the condition of an `#if` or `#elif` holds; False, and a message, where it has no meaning."""
+        """Return True if the condition of an `#if` or `#elif` holds; False, with an error, where it has no meaning."""
         if not well_formed(directive, args, self.findings):
             return False
         self._conditions += 1
@@ -447,7 +447,7 @@ class _Preprocessor(Macros):
         return False
 
     def evalexpr(self, tokens: list[Token]) -> tuple[Any, Any]:
-        """What pcpp asks for, which `_condition` has found."""
+        """The value that pcpp asks for, found by `_condition`."""
         return (tokens[0].text == "1", None)
 
     def on_error(self, _file: object, _line: object, message: str) -> None:
@@ -469,7 +469,7 @@ def _shown(directive: Token) -> str:
 
 
 def _reached_by(complaint: Diagnostic, at: Place, included: tuple[tuple[str, int], ...]) -> Diagnostic:
-    """What is wrong with an included file, at the include where it has no place of its own."""
+    """The mistake in an included file, moved to the `#include` where it has no place of its own."""
     place = at if complaint.at is None else replace(complaint.at.place, included=included)
     return replace(complaint, at=Label(place))
 

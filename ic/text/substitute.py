@@ -88,7 +88,7 @@ class _Substitution:
         self.optional_depth = 0
 
     def of(self, body: list[Token]) -> list[Token]:
-        """What a body becomes, or a part of one; what is empty beside a `##` is a token of kind NOTHING."""
+        """The tokens that a body, or a part of one, becomes; an empty one beside a `##` is a token of kind NOTHING."""
         made: list[Token] = []
         at, pasting = 0, False
         while at < len(body):
@@ -108,7 +108,7 @@ class _Substitution:
         return [_as_one(token) for token in made] if self.macro.pastes else made
 
     def pieces(self, body: list[Token], at: int, pasting: bool) -> tuple[list[Token], int]:
-        """What the body has from `at` on, up to where it has something else; at least one token beside a `##`."""
+        """The tokens that the element at `at` becomes, and the position behind it; at least one token beside a `##`."""
         token = body[at]
         if self.macro.parameters is None or token.text not in ("#", OPTIONAL, *self.macro.numbers):
             return [token], at + 1
@@ -133,8 +133,7 @@ class _Substitution:
         return at + 1 if body[at].text != OPTIONAL else closing(body, _solid(body, at + 1)) + 1
 
     def optional(self, body: list[Token], at: int, end: int) -> list[Token]:
-        """What `__VA_OPT__(...)` becomes, of which `at` is the beginning: nothing, where the rest of the arguments is
-        nothing."""
+        """The tokens that the `__VA_OPT__(...)` at `at` becomes: none, where the rest of the arguments is empty."""
         if not any(token.kind != SPACE for token in self.arguments[-1].expanded):
             return []
         inside = body[_solid(body, at + 1) + 1 : end - 1]
@@ -161,7 +160,7 @@ class _Substitution:
         return Token(STRING, f'"{text}"', token.source, token.offset, token.length)
 
     def is_comma_of_rest(self, body: list[Token], at: int) -> bool:
-        """Whether `, ## __VA_ARGS__` begins here, gcc's own: a comma and the rest of the arguments, or neither."""
+        """Return True if gcc's `, ## __VA_ARGS__` begins here: a comma and the rest of the arguments, or neither."""
         if not self.macro.variadic or body[at].text != "," or at + 2 >= len(body):
             return False
         after = body[at + 3].kind if at + 3 < len(body) else ""
@@ -181,7 +180,7 @@ class _Substitution:
 
 
 def _joined(left: Token, right: Token) -> Token:
-    """What `##` makes of two tokens, of kind JOINED; that of the one, as it is, where the other is nothing."""
+    """The token, of kind JOINED, that `##` makes of two; the other one as it is, where one of them is nothing."""
     if right.kind == NOTHING:
         return left
     if left.kind == NOTHING:
@@ -202,7 +201,7 @@ def _as_one(token: Token) -> Token:
 
 
 def closing(body: Sequence[Token], opening: int) -> int:
-    """Where the `)` stands that closes the parenthesis at `opening`; the end of the body where none does."""
+    """The position of the `)` that closes the parenthesis at `opening`; the end of the body where none does."""
     depth = 0
     for at in range(opening, len(body)):
         depth += {"(": 1, ")": -1}.get(body[at].text, 0)

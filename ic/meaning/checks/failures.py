@@ -92,7 +92,7 @@ def _about(scope: Scope, environment: Iterable[EnvironmentUse], which: str) -> I
 def _wrong(
     scope: Scope, use: EnvironmentUse, model: Any, joint: str, servo: Use | None, *, continuous: bool
 ) -> tuple[str, str, Place | None] | None:
-    """What is wrong, its remedy, and where, if not at the joint's name; None: nothing."""
+    """The mistake, its remedy, and its place if it is not at the joint's name; None where there is no mistake."""
     if servo is None:
         message = f"joint `{joint}` has no servo to which `{use.name}` could do anything"
         return message, "give the joint a servo, or leave it out", None

@@ -20,7 +20,7 @@ from met.trace import Scalar
 
 
 def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str, Any], duration: float) -> bool:
-    """Whether a model's written constants make it nothing, all through the run, which is told.
+    """Return True, with a warning, if a model does nothing all through the run by its constants as written.
 
     values  with the bodies that links and payloads are parts of, in the place of their names
     """

@@ -44,7 +44,7 @@ def remark_unread(scope: Scope, uses: Iterable[Use], structure: Structure) -> No
 
 
 def _kept(structure: Structure, servo: ServoUse, of: str) -> bool:
-    """Whether a metric or the archive has what this sensor reads."""
+    """Return True if this sensor's reading of `of` is recorded or watched by a metric."""
     path = f"{servo.joint}.servo.sensor.{of}"
     channels = [channel for each in structure.record for channel in each.channels]
     return any(f"{each}.".startswith(f"{path}.") for each in (*channels, *(each.of for each in structure.metrics)))

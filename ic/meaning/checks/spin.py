@@ -61,7 +61,7 @@ def check_spins(scope: Scope, block: MergedBlock, structure: Structure) -> None:
 
 
 def _spinning(block: MergedBlock, structure: Structure) -> Iterator[tuple[str, str, Place]]:
-    """What flies from the start: in words, the path of its angular velocity, and where that is written."""
+    """Free bodies that spin from the start: in words, the path of their angular velocity, and where it is written."""
     if structure.base is not None and structure.free:
         initial = block.get("initial")
         written = initial.body.get(f"{BASE}.rate") if initial is not None and initial.body is not None else None

@@ -127,7 +127,7 @@ def _finer(schedule: Schedule) -> Iterator[tuple[float, int]]:
 def check_circuits(
     scope: Scope, use: Use, schedule: Schedule, integrator: Any, dynamics: Rate, *, on_bed: bool
 ) -> None:
-    """What of a servo and its sensors swings, and the filters of these, at the dynamics' step.
+    """Check the oscillations of a servo and its sensors, and the sensors' filters, at the dynamics' step.
 
     on_bed  whether the motor is on a bed, and so no part of the step
     """
@@ -179,7 +179,7 @@ def check_sensor(
 def asked(
     scope: Scope, function: Callable[..., T] | None, values: Mapping[str, Any], path: str, *more: Any
 ) -> T | None:
-    """What a declaration's function says of these parameters; None of no function, or if one of them is out of range.
+    """The result of a declaration's function for these parameters; None without a function, or if one is out of range.
 
     path  of the parameters
     """

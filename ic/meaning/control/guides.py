@@ -91,7 +91,7 @@ def name_guides(scope: Scope, block: MergedBlock) -> None:
 
 
 def _meaning(scope: Scope, name: str) -> str:
-    """What else a name means where a command's value stands; nothing where it may be a guide's."""
+    """The other meaning of a name where a command's value stands; "" where it may be a guide's name."""
     if name in scope.definitions.lets:
         return "a value"
     return "a unit" if units.is_unit(name) else "a course in time" if name in models.available("command") else ""
@@ -111,7 +111,7 @@ def resolve_guides(
 
 
 def check_guides(scope: Scope, guides: Iterable[Guiding], structure: Structure) -> None:
-    """What is guided can be: the joints carry the link, and are as many as the components."""
+    """Check that each guide can work: its joints carry the link, and are as many as its components."""
     for guide in guides:
         idle = [joint for joint in guide.joints if guide.link and not carries(structure, guide.link, joint)]
         if idle:

@@ -240,7 +240,7 @@ def check_stability(
 
 
 def slowest_that_fits(schedule: Schedule, limit: float) -> Callable[[float], str]:
-    """Of a rate constant (1/s), the slowest rate of the dynamics with which h times it stays below the limit."""
+    """Give a function: rate constant (1/s) -> slowest rate of the dynamics that keeps h times it below the limit."""
 
     def name(fastest: float) -> str:
         if not math.isfinite(fastest):

@@ -54,7 +54,7 @@ ASKED: Mapping[str, Mapping[str, str]] = MappingProxyType(
         "prismatic": {"rate": "0.03 m/s", "position": "0.1 m", "torque": "2 N", "acceleration": "0.1 m/s^2"},
     }
 )
-"""What a command may ask of a joint, to show how one is written."""
+"""Examples of setpoints, by kind of joint and of command, for messages that show how a command is written."""
 
 BESIDE = "write `model = {};`, and its parameters beside it"
 
@@ -109,7 +109,7 @@ def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[l
 
 
 def _note_kinds(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> None:
-    """Of every servo definition and its bases, which kinds of joints it moves in this run."""
+    """Note, for every servo definition and its bases, which kinds of joints it moves in this run."""
     for item in body.items.values():
         kind, definition = arm.kind(item.name), scope.definitions.of_kind("servo").get(word_of(item.value) or "")
         if kind is not None and kind != "fixed" and definition is not None:
@@ -235,7 +235,7 @@ def moving_kind(scope: Scope, item: Item, arm: ResolvedArm, so: str) -> str | No
 
 
 def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, block: MergedBlock, used: Place) -> None:
-    """What this kind of command needs is written, or given by a sweep or on the command line."""
+    """Report each parameter that this kind of command needs and that neither deck, sweep nor command line gives."""
     item = block.get("command")
     place = place_of(item.value) if item is not None and item.value is not None else used
     for parameter in servo.parameters:
@@ -331,7 +331,7 @@ def check_start(scope: Scope, use: Use) -> None:
 
 
 def apart(a: Any, b: Any) -> Any:
-    """Whether two positions, or two arrays of them, are more than rounding apart."""
+    """Return True, for each pair, if two positions or arrays of them differ by more than rounding."""
     return np.abs(a - b) > APART + DIGITS * np.maximum(np.abs(a), np.abs(b))
 
 
@@ -485,7 +485,7 @@ def use_course(
 
 
 def _asked(scope: Scope, command: Call) -> Expression:
-    """What the command is about: the name of a course alone is that course with nothing written. Raises Problem."""
+    """The argument of a command; the name of a course alone is that course with nothing written. Raises Problem."""
     inner = command.positional[0]
     if isinstance(inner, String):
         raise Problem(
@@ -524,13 +524,13 @@ def _check_known(scope: Scope, inner: Name) -> None:
 
 
 def _is_guide(scope: Scope, inner: Expression) -> bool:
-    """Whether this names a guide of one of the deck's runs."""
+    """Return True if this expression names a guide of one of the deck's runs."""
     runs = [scope.definitions.block(run) for run in scope.definitions.of_kind("run").values()]
     return any(run is not None and run.get(f"guide {word_of(inner)}") is not None for run in runs)
 
 
 def check_servo_definition(scope: Scope, name: str) -> None:
-    """What can be told of a definition that no run uses: its model and its keys."""
+    """Check a servo definition that no run uses, as far as that goes: its model and its keys."""
     definition = scope.definitions.of_kind("servo")[name]
     block = scope.definitions.block(definition)
     if block is None:

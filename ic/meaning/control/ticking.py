@@ -38,7 +38,7 @@ class Ticking(Protocol):
 
 
 def rate_of(scope: Scope, each: Ticking, shared: Rate | None) -> Rate | None:
-    """How often it ticks: as it says, else as the servos do; None where that is nothing, which was told."""
+    """Its own rate, else that of the servos; None where there is neither (already reported)."""
     found = each.rate or shared
     if found is None or found.hz == CONTINUOUS:
         told = "the servos are continuous" if found is not None else "the run has no rate of the servos"

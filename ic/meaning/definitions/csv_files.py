@@ -234,7 +234,7 @@ def _stripped(cell: str) -> tuple[str, int]:
 
 
 def _measure(column: CsvColumn, text: str, dimension: Dimension, label: Label) -> Measure:
-    """What the column's unit means. Raises Problem D193 where it has none, or another than is wanted."""
+    """The measure of a column's unit. Raises Problem D193 where it has none, or another than is wanted."""
     shown = " or ".join(f"`{column.name} [{each}]`" for each in in_degrees(text))
     if column.unit is None:
         if dimension == PURE:
@@ -258,7 +258,7 @@ def _measure(column: CsvColumn, text: str, dimension: Dimension, label: Label) -
 
 
 def _meaning(column: CsvColumn, remedy: str, also: Iterable[Label], dimension: Dimension | None = None) -> Measure:
-    """What the column's unit means. remedy: where no unit like it is known; dimension: the one that is needed."""
+    """The measure of a column's unit. remedy: where no unit like it is known; dimension: the one that is needed."""
     assert column.unit is not None
     try:
         return units.parse_unit(column.unit)

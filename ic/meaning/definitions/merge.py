@@ -43,7 +43,7 @@ class Item:
 
 @frozen
 class Removed:
-    """What was taken away: its key, how many statements stood before its `remove`, and where that is written."""
+    """A key that `remove` took away, how many statements stood before that, and where it is written."""
 
     key: str
     before: int
@@ -258,7 +258,7 @@ class _Merger:
 
 
 def _meant(entry: Statement) -> Name:
-    """What a `remove` names."""
+    """The name in a `remove`."""
     assert isinstance(entry.value, Name)
     return entry.value
 

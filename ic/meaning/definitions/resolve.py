@@ -44,7 +44,7 @@ class Definition:
 
     @property
     def home(self) -> str:
-        """What paths that reach its entries begin with; a run with choices of a sweep's in it is called after both."""
+        """The first part of paths that reach its entries; a run with a sweep's choices is called `RUN CHOICES`."""
         return self.name.partition(" ")[0]
 
 
@@ -188,7 +188,7 @@ class Definitions:
         return block
 
     def _made_from(self, definition: Definition, call: Call) -> MergedBlock | None:
-        """What a definition's file says, as its base; None where that failed (and was told)."""
+        """The block made from a definition's file, as its base; None where that failed (already reported)."""
         with self._complaints.gather():
             body = self.robot_files.arm_entries(call)
             for each in self.robot_files.remarks(call):
@@ -389,7 +389,7 @@ class Definitions:
         return [d for kind in ("run", "sweep") for d in self._by_kind[kind].values() if d.default]
 
     def writes(self, definition: Definition) -> bool:
-        """Whether the deck itself writes a definition, and no file that it includes."""
+        """Return True if the deck itself, and no file that it includes, writes this definition."""
         return shown_place(definition.place).file == self._file
 
     def default(self) -> Definition | None:

@@ -16,7 +16,7 @@ ON_COMMAND_LINE = "set on the command line"
 
 @frozen
 class CommandLineValue:
-    """What is settled at a path in the stead of what a deck writes: its value, and the expression as written."""
+    """A number that `--set` puts in place of a deck's: its value, and the expression as written."""
 
     path: str
     value: Value
@@ -29,7 +29,7 @@ class CommandLineValue:
 
 
 def is_on_command_line(place: Place | None) -> bool:
-    """Whether it is written on the command line, but not in the body of a macro of -D."""
+    """Return True if a place is on the command line, but not in the body of a macro of -D."""
     return place is not None and place.file == COMMAND_LINE and not place.expansions
 
 
@@ -39,7 +39,7 @@ def written_origin(place: Place, overrides: tuple[Place, ...], note: str = "") -
 
 
 def evaluate_setting(entry: Setting, path: str, names: Names) -> CommandLineValue:
-    """What is set to one number. Raises Problem where it is none."""
+    """The number that `--set` gives. Raises Problem where it is no number."""
     found = names.evaluate(entry.value)
     if not isinstance(found, Value):
         raise Problem(

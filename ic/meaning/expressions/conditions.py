@@ -21,8 +21,8 @@ PIECE = 1 << 16
 
 
 def in_pieces(test: Test, values: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """What a test of each row by itself says of all of them, in the memory of a few: a million cases take 300 MB where
-    a test needs matrices."""
+    """Apply a test that looks at each row by itself piece by piece, in little memory: a million cases would take 300 MB
+    where a test needs matrices."""
     bad, causes = np.zeros(len(values), bool), list[str]()
     for first in range(0, len(values), PIECE):
         bad[first : first + PIECE], why = test(values[first : first + PIECE])
@@ -78,7 +78,7 @@ class Checks:
         return bool(path) and any(each == path or each.startswith(path + ".") for each in self._failed)
 
     def touches(self, path: str) -> bool:
-        """Whether what failed is this, or inside it, or around it."""
+        """Return True if a failed path is this one, inside it, or around it."""
         return self.failed(path) or any(path.startswith(each + ".") for each in self._failed if each)
 
     def hold(

@@ -19,14 +19,14 @@ _FLUX = units.parse_unit("V*s").dimension  # of a motor's constant: V*s/rad and 
 
 @frozen
 class Doubt:
-    """What a value is taken for, in words, and what to write for each thing that may be meant."""
+    """A unit that may be a mistake: what the value is taken for, and what to write for each possible meaning."""
 
     taken: str
     helps: tuple[str, ...]
 
 
 def doubt(value: Value, text: str, wanted: Measure) -> Doubt | None:
-    """What may be meant otherwise by a value that has the right dimension; None where it is plain.
+    """The other possible meaning of a value whose dimension is right; None where there is none.
 
     text, wanted  the unit that is declared, in SI, as text and as what it means
     """

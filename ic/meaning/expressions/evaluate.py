@@ -50,7 +50,7 @@ Lookup = Callable[[Name], Value | ValueList]
 
 
 def evaluate(expression: Expression, lookup: Lookup) -> Value | ValueList:
-    """What the expression is worth; `lookup` gives names their values. Raises Problem, placed."""
+    """The value of an expression; `lookup` gives names their values. Raises Problem, placed."""
     spine: list[Binary] = []
     while isinstance(expression, Binary):  # a long sum leans to the left: no recursion along it
         spine.append(expression)
@@ -106,7 +106,7 @@ def _number(number: Number) -> Value:
 
 
 def _of_pi(decimal: str) -> bool:
-    """Whether a number is pi or 2 pi to the places that are written, rounded or cut off: `3.14`, `6.2832`."""
+    """Return True if a number is pi or 2 pi to the places that are written, rounded or cut off: `3.14`, `6.2832`."""
     places = decimal.partition(".")[2]
     if len(places) < 2 or not places.isdigit():
         return False
@@ -149,7 +149,7 @@ def _with_unit(expression: WithUnit, lookup: Lookup) -> Value | ValueList:
 
 
 def _written_unit(expression: Expression) -> Place | None:
-    """Where a unit is written inside, None where there is none."""
+    """The place of the first unit inside an expression; None where there is none."""
     stack: list[Expression] = [expression]
     while stack:
         part = stack.pop()
@@ -213,7 +213,7 @@ def _binary(node: Binary, left: Value | ValueList, lookup: Lookup) -> Value:
 
 
 def _made_alike(node: Binary, left: Value, right: Value) -> str:
-    """What to write where a bare number is added to a quantity, or two quantities are."""
+    """The remedy where a bare number is added to a quantity, or quantities of two dimensions are."""
     of_macro = [each.macro for each in node.place.expansions]
     outside = [each for each in (node.left, node.right) if not place_of(each).expansions]
     if of_macro and (outside or any(place_of(each).expansions != node.place.expansions for each in children(node))):

@@ -17,7 +17,7 @@ DEEPEST = 64  # lets that need lets: far more than a deck has, far less than Pyt
 
 
 def _uses(place: Place) -> list[Place]:
-    """Where the macros were used that a place came through."""
+    """The places at which the macros were used that a place came through."""
     return [each.use for each in place.expansions]
 
 
@@ -45,7 +45,7 @@ class Names:
         return evaluate(expression, self.find)
 
     def knows(self, text: str) -> bool:
-        """Whether a single word has a value."""
+        """Return True if a single word has a value."""
         return text in self.varied or text in self.definitions.lets or text in CONSTANTS
 
     def find(self, name: Name) -> Value | ValueList:
@@ -104,7 +104,7 @@ class Names:
         return next((path for path in paths if path in self.varied or path in self.watched), name.text)
 
     def label(self, value: Value) -> list[Label]:
-        """Where the name that was written for this value is defined, for messages about it."""
+        """The place that defines the name written for this value, as a label for messages about it."""
         for text, let in self.definitions.lets.items():
             worth = self._worth.get(text)
             if (
@@ -158,7 +158,7 @@ class Names:
         raise Problem(error("D065", f"no value `{name.text}`", name.place, help=helps))
 
     def check_lets(self) -> list[Problem]:
-        """What is wrong with the deck's lets, used or not."""
+        """Every mistake in the deck's lets, used or not."""
         problems: list[Problem] = []
         for text, let in self.definitions.lets.items():
             if len(problems) >= MOST:  # no more would be told, and each looks at all names for one that is near

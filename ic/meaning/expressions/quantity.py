@@ -43,7 +43,7 @@ class ValueList:
 
 
 def measure_of(unit: Unit) -> units.Measure:
-    """What a unit means. Raises D074 where a factor is no unit."""
+    """The measure of a unit. Raises D074 where a factor is no unit."""
     for word, _ in unit.factors:
         if not units.is_unit(word.text):
             raise Problem(error("D074", f"`{word.text}` is not a unit", word.place, help=other_units.remedy(word.text)))

@@ -14,7 +14,7 @@ from met.units import PURE, Dimension
 
 
 def components(item: Item | None, count: int) -> tuple[Expression | None, ...]:
-    """What each of so many numbers was written as, where the item writes a list of them; None where it does not."""
+    """The expressions of a list's `count` numbers; None for each where the item writes no such list."""
     written = item.value if item is not None and not item.appended else None
     unit = written.unit if isinstance(written, WithUnit) else None
     listed = written.inner if isinstance(written, WithUnit) else written
@@ -29,7 +29,7 @@ def components(item: Item | None, count: int) -> tuple[Expression | None, ...]:
 
 
 def mended(value: Value, text: str, dimension: Dimension) -> str:
-    """What to write where a value of the wrong dimension stands."""
+    """The remedy where a value has the wrong dimension."""
     number = None if isinstance(value.number, Scalar) else float(value.number)
     if dimension == PURE:
         return "leave the unit out; `%` is the only unit of a pure number"

@@ -11,7 +11,7 @@ from met.units import fraction
 
 @frozen
 class Steps:
-    """From one number by equal steps towards another: fractions over `below`. meet: whether they reach it exactly."""
+    """Equal steps from one number towards another, as fractions over `below`. meet: whether they reach it exactly."""
 
     first: int
     by: int
@@ -21,7 +21,7 @@ class Steps:
 
     @classmethod
     def between(cls, a: float, b: float, step: float) -> Steps:
-        """From a to b; the step is not zero, and leads there. 0 to 1 by 0.1 has 0.3 in it."""
+        """The steps from a to b; the step is not zero, and leads there. 0 to 1 by 0.1 has 0.3 in it."""
         made = [_shortest(x) for x in (a, b, step)]
         below = math.prod(under for _, under in made)
         first, last, by = (top * (below // under) for top, under in made)

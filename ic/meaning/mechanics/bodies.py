@@ -51,12 +51,12 @@ def check_body(
 
 
 def written_elsewhere(scope: Scope, place: Place) -> bool:
-    """Whether it stands in a file that an arm is made from, so that a deck overrides it and does not change it."""
+    """Return True if a place is in a file that an arm is made from: a deck can override it there, not change it."""
     return any(source.name == place.file for source in scope.definitions.robot_files.sources)
 
 
 def _not_a_body(values: np.ndarray, kind: str) -> tuple[np.ndarray, list[str]]:
-    """Which rows [n, 7], moments and mass, are no rigid body's, and why, in words.
+    """The rows [n, 7], moments and mass, that are no rigid body's, as a mask, and why in words.
 
     The tolerance, 1e-9 of the largest moment, is for rounding alone: published tables have ten digits at most. With a
     moment of 0 the other two are alike, for neither may be above the sum of 0 and the other.

@@ -16,7 +16,7 @@ OTHER_KINDS = {
 
 
 def refused(scope: Scope, item: Item) -> bool:
-    """Whether the joint is of a kind that MET has not, or follows another, which is told."""
+    """Return True, with an error, if a joint is of a kind that MET does not have, or follows another joint."""
     kind = item.detail[0].text if item.detail else ""
     there = "in the arm's block, " if written_elsewhere(scope, item.place) else ""
     if kind in OTHER_KINDS:

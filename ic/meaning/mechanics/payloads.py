@@ -40,7 +40,7 @@ def resolve_payloads(scope: Scope, block: MergedBlock, arm: ResolvedArm) -> tupl
 
 
 def check_payloads(scope: Scope, block: MergedBlock, structure: Structure) -> None:
-    """What a run says of payloads together with the rest: that they may fly, and when what happens to them happens."""
+    """Check payloads against the rest of the run: whether they may fly, and the times of their events."""
     items = {item.name: item for item in block.of_kind("payload")}
     for payload in structure.payloads:
         item = items[payload.name]
@@ -167,7 +167,7 @@ def _check_order(scope: Scope, item: Item, times: list[Real | None], place: Plac
 
 
 def _check_solid(scope: Scope, owner: Owner, payload: Payload, item: Item) -> None:
-    """What flies has mass, and resists a turn about every axis."""
+    """Check that a payload that flies has mass, and resists a turn about every axis."""
     paths = [owner.join("mass"), *(owner.join(f"inertia.{entry}") for entry in INERTIA)]
     settled = [scope.parameters.get(path) for path in paths]
     if any(each is None or isinstance(each.value, str | tuple) for each in settled):
@@ -195,7 +195,7 @@ def _not_in_order(pairs: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 
 def _not_solid(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """Which rows [n, 7], mass and moments, are no body that can fly, and why, in words."""
+    """The rows [n, 7], mass and moments, of bodies that cannot fly, as a mask, and why in words."""
     mass, xx, yy, zz, xy, xz, yz = values.T
     least, _, most = np.linalg.eigvalsh(np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=-1).reshape(-1, 3, 3)).T
     bad = ~((mass > 0.0) & (least > 1e-9 * most))

@@ -30,12 +30,12 @@ def word_of(expression: Expression | None) -> str | None:
 
 
 def value_at(item: Item) -> Place:
-    """Where an entry's value is; the entry itself, where it has none."""
+    """The place of an entry's value; that of the entry itself where it has none."""
     return place_of(item.value) if item.value is not None else item.place
 
 
 def upon(item: Item) -> Place | None:
-    """Where a block that was put upon an entry's value has its first entry; None where it has none."""
+    """The place of the first entry of a block put upon an entry's value; None where there is none."""
     return next((each.place for each in item.body.items.values()), None) if item.body is not None else None
 
 

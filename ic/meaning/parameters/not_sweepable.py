@@ -24,7 +24,7 @@ class NotSweepable:
 
     @property
     def is_choice(self) -> bool:
-        """Whether a sweep may choose among values of it, each of which makes a program of its own."""
+        """Return True if a sweep may choose among values of it, each of which makes a program of its own."""
         return not self.sweep and not self.one_of
 
     def to_vary(self, path: str) -> str:
@@ -54,12 +54,12 @@ FILE = NotSweepable("is read from a file", "it is one for the whole sweep")
 
 
 def several(paths: Sequence[str]) -> NotSweepable:
-    """What is made of several numbers, which have these paths."""
+    """The reason for a path that is made of several numbers, which have these paths."""
     return NotSweepable(f"is made of {len(paths)} numbers", one_of=_one_of_them(paths))
 
 
 def follows(other: str, paths: Sequence[str]) -> NotSweepable:
-    """What follows from what is written elsewhere, which is made of numbers that have these paths."""
+    """The reason for a path that follows from another, which is made of numbers that have these paths."""
     return NotSweepable(f"follows from `{other}`", one_of=f"one of: {_listed(paths)}")
 
 
@@ -69,7 +69,7 @@ def model(kind: str, path: str) -> NotSweepable:
 
 
 def chosen(instead: str) -> NotSweepable:
-    """What a sweep chooses by another path, or in words of its own."""
+    """The reason for a path that a sweep chooses by another path, or in words of its own."""
     return NotSweepable(DECIDES, instead)
 
 

@@ -19,7 +19,7 @@ XYZ = ("x", "y", "z")
 
 @frozen
 class Owner:
-    """What parameters belong to: in words, where it is, and the first part of their paths.
+    """The thing that parameters belong to: in words, its place, and the first part of its parameters' paths.
 
     homes    definitions under which a parameter that nobody wrote is reached
     local    first part of the path under a definition's name

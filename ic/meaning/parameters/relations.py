@@ -96,7 +96,7 @@ def check_names(
 
 
 def no_direction(parts: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """Which rows [n, 3] point nowhere, or have a length that no double holds."""
+    """The rows [n, 3] that point nowhere, or have a length that no double holds, as a mask, and why in words."""
     with np.errstate(over="ignore", under="ignore"):
         length = np.sqrt((parts * parts).sum(axis=1))
     return ~((length > 0.0) & (length < np.inf)), []

@@ -40,7 +40,7 @@ from met.trace import Graph, Real, Scalar
 from met.units import PURE
 
 VARIES = "leave it out here, or name runs and sweeps that do not vary this"
-"""What to do where a sweep varies what is set from outside of the deck."""
+"""The remedy where a sweep varies a path that `--set` sets."""
 
 
 @dataclass
@@ -86,11 +86,11 @@ class Scope:
         self.evaluated_settings: dict[str, CommandLineValue | None] = {}
 
     def settled(self, path: str) -> Settled | None:
-        """What is settled under a path, whether the plan has it as a parameter or not."""
+        """The settled value of a path, whether or not it is a parameter of the plan."""
         return self.parameters.get(path) or self.auxiliary.get(path)
 
     def depends_on_failed(self, path: str) -> bool:
-        """Whether nothing can be said of this path, because what it leads to has failed, which was told."""
+        """Return True if nothing can be said of this path, because what it leads to has failed (already reported)."""
         first, _, rest = path.partition(".")
         thing = rest.partition(".")[0] if first in ("links", "payloads") else first
         if self.checks.touches(path) or thing in self.failed_parts:
@@ -410,7 +410,7 @@ class Scope:
         self.parameters[path] = Settled(self._plain(value), unit, Origin("derived", place, item.overrides, note), note)
 
     def evaluate(self, item: Item, expression: Expression | None = None) -> Value | ValueList:
-        """What the item's expression is worth, lists with what `+=` appended. Raises Problem."""
+        """The value of the item's expression, lists with what `+=` appended. Raises Problem."""
         expression = item.value if expression is None else expression
         if expression is None or (item.body is not None and not isinstance(expression, Call)):
             raise Problem(
@@ -554,7 +554,7 @@ class Scope:
             self.checks.fail(path)
 
     def _given(self, owner: Owner, name: str, homes: Iterable[str]) -> list[CommandLineValue]:
-        """What is given for this parameter; more than one where paths are set that mean the same."""
+        """The numbers that `--set` gives for this parameter; several where several of its paths are set."""
         found = [path for path in owner.paths(name, homes) if path in self.settings] if self.settings else []
         for path in found:
             if path not in self.evaluated_settings:
@@ -580,7 +580,7 @@ class Scope:
         return found[0] if found else None
 
     def _own(self, owner: Owner, name: str, homes: tuple[str, ...], both: tuple[VariedPath, ...]) -> list[str]:
-        """What parts two coordinates of a servo's definition and of its base, where they are that."""
+        """The remedy for two coordinates that belong to a servo's definition and to its base; none otherwise."""
         by_path = {owner.join_local(home, name): home for home in homes}
         named = [home for path, home in by_path.items() if path in (both[0].path, both[1].path)]
         return [f"or give `{named[1]}` its own `{name}`, which `{named[0]}` does not reach"] if len(named) > 1 else []

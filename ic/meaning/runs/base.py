@@ -27,7 +27,7 @@ from met.plan.defaults import INERTIA, OF_FREE_BASE, component
 
 USAGE = "write `base = fixed;`, `base = free;` or `base = prescribed { x = sine(amplitude = 1 cm, frequency = 2 Hz); }`"
 INITIAL_OF_BASE = tuple(f"{BASE}.{name}" for name, _ in OF_FREE_BASE)
-"""What `initial` may say of a free base."""
+"""The keys of `initial` for a free base."""
 
 DOCS = {
     "position": "origin of the base at the start, world axes",
@@ -71,7 +71,7 @@ def resolve_base(scope: Scope, item: Item | None, arm: ResolvedArm) -> tuple[Bas
 def check_base(
     scope: Scope, base: Base | None, structure: Structure, environment: MergedBlock, item: Item | None
 ) -> None:
-    """What does not go with the base: a turn without velocity products, a free base without mass."""
+    """Report what does not go with the base: a turn without velocity products, a free base without mass."""
     off = environment.get("velocity_products")
     if base is not None and base.turns and not structure.velocity_products and off is not None and item is not None:
         what = "a free base" if base.kind == "free" else "a base that turns"
@@ -108,7 +108,7 @@ def check_base(
 
 
 def initial_base(scope: Scope, body: MergedBlock, base: Base | None) -> None:
-    """What `initial` says of the base."""
+    """Settle the initial state of a free base."""
     for name, unit in OF_FREE_BASE:
         item = body.get(f"{BASE}.{name}")
         wanted = Parameter(name=name, unit=unit, shape="vector", default=NOTHING, doc=DOCS[name])
@@ -126,7 +126,7 @@ def initial_base(scope: Scope, body: MergedBlock, base: Base | None) -> None:
 
 
 def held_by(arm: ResolvedArm, payloads: Sequence[Payload]) -> dict[str, str]:
-    """What each link and payload is fixed to for good, down to a link that moves against it, or the base."""
+    """For each link and payload, the body that it is fixed to for good: a link that moves, or the base."""
     held = {joint.child: joint.parent for joint in arm.joints if joint.kind == "fixed"}
     held |= {payload.name: payload.link for payload in payloads if not payload.flies}
     found = {}

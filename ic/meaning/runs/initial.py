@@ -21,7 +21,7 @@ from met.units import PURE
 
 
 def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Sequence[Use]) -> bool:
-    """What a run says of its start; whether its servos begin balanced."""
+    """Settle the initial state of all joints; return True if servos begin balanced."""
     known = dict.fromkeys(("q", "qd"), "")
     known |= {f"{joint.name}.{name}": "" for joint in arm.moving for name in ("q", "qd")}
     known["servos"] = ""
@@ -73,7 +73,7 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
 
 
 def _balanced(scope: Scope, item: Item | None, uses: Sequence[Use]) -> bool:
-    """Whether servos begin balanced; a remark where none of them can."""
+    """Return True if servos begin balanced, with a warning where none of them can."""
     if item is None:
         return False
     balanced = scope.word(Owner("the initial state", item.place, "initial"), BALANCED, item) == "balanced"
@@ -89,7 +89,7 @@ def _balanced(scope: Scope, item: Item | None, uses: Sequence[Use]) -> bool:
 
 
 def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: ResolvedArm) -> bool:
-    """Whether one value for all joints has not this joint's unit, since others move otherwise; tells that."""
+    """Return True, with an error, if the value for all joints lacks this joint's unit, as others move otherwise."""
     if len({joint.kind for joint in arm.moving}) < 2:
         return False
     with scope.complaints.gather():

@@ -75,7 +75,7 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
 
 
 def _of_lost(scope: Scope, name: Name, structure: Structure) -> bool:
-    """Whether this is a channel of a guide or a link's sensor that failed, which was told."""
+    """Return True if this is a channel of a guide or a link's sensor that failed (already reported)."""
     words = [word.text for word in name.path]
     lost = {
         "guides": set(scope.guides) - {guide.name for guide in structure.guides},
@@ -236,7 +236,7 @@ def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Cha
 
 
 def _not_one(name: Name, structure: Structure) -> tuple[str, list[str]]:
-    """What to say of a name that is no single channel: which ones it stands for, or else what was meant."""
+    """The message and remedies for a name that is no single channel: which ones it stands for, or what was meant."""
     known = recordable(structure, [name.text])
     if name.text not in known:
         return f"no channel `{name.text}`", _nearest(name, known, structure)

@@ -191,7 +191,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
 def _keep_settings(
     scope: Scope, block: MergedBlock, arm: ResolvedArm, integrator: Any, rates: Mapping[str, Rate], schedule: Schedule
 ) -> None:
-    """What the run says besides parameters, for who asks; `Scope.constant` and `Scope.word` have kept some."""
+    """Keep a run's settings for `met explain`; `Scope.constant` and `Scope.word` have kept some."""
     scope.keep_setting("arm", arm.name, item=block.get("arm"))
     scope.keep_setting("integrator", integrator.name, item=block.get("integrator"))
     if "rates.base" not in scope.auxiliary:

@@ -85,7 +85,7 @@ def _tolerance(scope: Scope, item: Item, structure: Structure, known: dict[str, 
 
 
 def _nearest(item: Item, structure: Structure, known: dict[str, tuple[str, ...]]) -> list[str]:
-    """How it could be, or what was meant."""
+    """The remedy for a tolerance of something unknown: how it is written, or what was meant."""
     name = item.name
     found = recordable(structure).get(name, ())
     variables = [each.name for each in found]
