@@ -45,7 +45,7 @@ def compile(
 ) -> Plan:
     """The run plan of a deck.
 
-    set     values in the stead of the deck's, as the deck would write them: `{"gearbox.kp": "0.02 V*s/rad"}`, or
+    set     values in place of the deck's, as the deck would write them: `{"gearbox.kp": "0.02 V*s/rad"}`, or
             texts, `["gearbox.kp=0.02 V*s/rad"]`
     select  names of runs and sweeps, "all", or None: the only one, else the one marked `default`
     Raises `met.diagnostic.Problem` with every error and warning found, and the text of every file read.

@@ -185,7 +185,7 @@ def explain(
     names = (name,) if name else ()
     if deck.endswith(".json"):
         sources: Sources = [lambda: (_plan_in_file(deck, names), None)]
-    else:  # what only another run of the deck knows is told of that one
+    else:  # what only another run of the deck knows is explained for that one
         selections: list[Any] = [names] if names else [None, "all"]
         sources = [partial(_source, deck, include_dirs, defines, settings, selection) for selection in selections]
     if form == "json":
@@ -341,16 +341,16 @@ def _print(lines: Iterable[str]) -> None:
         say(line)
 
 
-def _print_json(told: object) -> None:
+def _print_json(value: object) -> None:
     import json
 
-    click.echo(json.dumps(_spelled(told), indent=1, allow_nan=False))
+    click.echo(json.dumps(_spelled(value), indent=1, allow_nan=False))
 
 
-def _spelled(told: object) -> object:
+def _spelled(value: object) -> object:
     """The same with the words of plan files for numbers that JSON has none for: "inf", "nan"."""
-    if isinstance(told, Mapping):
-        return {key: _spelled(part) for key, part in told.items()}
-    if isinstance(told, list | tuple):
-        return [_spelled(part) for part in told]
-    return repr(told) if isinstance(told, float) and not math.isfinite(told) else told
+    if isinstance(value, Mapping):
+        return {key: _spelled(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_spelled(part) for part in value]
+    return repr(value) if isinstance(value, float) and not math.isfinite(value) else value

@@ -44,9 +44,9 @@ def fmt(paths: tuple[str, ...], check: bool, diff: bool, quiet: bool, verbose: b
         if path == STDIN and not (check or diff):
             say(deck.after, end="", exact=True)
         if path != STDIN and not quiet and (verbose or deck.changes) and (check or not diff):
-            told = "as it should be" if not deck.changes else "would be formatted" if check else "formatted"
+            state = "as it should be" if not deck.changes else "would be formatted" if check else "formatted"
             ends = "; its lines end with a newline alone" if deck.changes and deck.ends else ""
-            say(f"{deck.name}: {told}{ends}", err=diff)
+            say(f"{deck.name}: {state}{ends}", err=diff)
     if broken:
         return BAD_INPUT
     return NO if check and changed else YES

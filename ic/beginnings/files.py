@@ -38,12 +38,12 @@ def model(kind: str, name: str, folder: str | None) -> dict[str, str]:
     begun = MODELS[kind]
     module = f"{name}_for_met"
     parts = {field: Template(getattr(begun, field)).substitute(name=name) for field in PARTS}
-    told = {**parts, "name": name, "kind": kind, "distribution": module.replace("_", "-")}
+    fields = {**parts, "name": name, "kind": kind, "distribution": module.replace("_", "-")}
     folder = folder or name
     return {
         os.path.join(folder, f"{module}.py"): parts["module"],
-        os.path.join(folder, f"{name}.ic"): Template(TRIAL).substitute(told),
-        os.path.join(folder, "pyproject.toml"): Template(PROJECT).substitute({**told, "module": module}),
+        os.path.join(folder, f"{name}.ic"): Template(TRIAL).substitute(fields),
+        os.path.join(folder, "pyproject.toml"): Template(PROJECT).substitute({**fields, "module": module}),
     }
 
 

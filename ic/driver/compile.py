@@ -123,8 +123,7 @@ def compile_deck(
 
 
 def _with_settings(deck: Deck, settings: Sequence[str], complaints: Complaints) -> tuple[Deck, tuple[Setting, ...]]:
-    """The deck with the text of what is set among its sources, and the entries of that; those that are wrong are
-    told."""
+    """The deck with the text of what is set among its sources, and the entries of that; wrong ones are reported."""
     if not settings:
         return deck, ()
     before = "".join(source.text for source in deck.sources if source.name == COMMAND_LINE)

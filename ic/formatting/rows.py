@@ -180,7 +180,7 @@ class _OpenConditional:
 
 
 def _match_all(found: list[Row], findings: Findings) -> None:
-    """Matches the brackets, and makes opaque what `#if` surrounds where they do not match; elsewhere that is told."""
+    """Match the brackets; what `#if` surrounds is made opaque where they do not match, elsewhere that is reported."""
     stack: list[_OpenBracket] = []
     ifs: list[_OpenConditional] = []
     for at, row in enumerate(found):
@@ -263,7 +263,7 @@ def _keep_uses(found: Sequence[Row], names: Collection[str]) -> None:
 
 
 def _nest(found: list[Row]) -> None:
-    """Tells every row the bracket that it begins in. All brackets that count are known to match."""
+    """Tell every row the bracket that it begins in. All brackets that count are known to match."""
     stack: list[_OpenBracket] = []
     ifs: list[tuple[list[_OpenBracket], list[list[_OpenBracket]]]] = []
     behind: Token | None = None

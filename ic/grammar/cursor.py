@@ -1,7 +1,7 @@
 """Where the parser stands in the tokens, how it complains, and how it finds its feet again.
 
 A mistake is noted and raises Unreadable; the list of entries that holds the one in trouble catches it, skips to its
-end and goes on, so that one run tells several mistakes and none of them twice.
+end and goes on, so that one run reports several mistakes, and none twice.
 """
 
 from __future__ import annotations

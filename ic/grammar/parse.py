@@ -251,15 +251,15 @@ class _Parser(Expressions):
     def replaced_name(self) -> None:
         """A macro has put its body where the name of a `let` stands: `-D height=2` and `let height = ...`."""
         step = self.token.expansions[-1]
-        told = f"the macro `{step.macro}` has put {found(self.token)} in the place of this name"
+        message = f"the macro `{step.macro}` has put {found(self.token)} in the place of this name"
         helps: tuple[str, ...] = ("give one of the two another name",)
         if self.token.source.name == COMMAND_LINE:
-            told = f"`-D {step.macro}` has put {found(self.token)} in the place of this name"
+            message = f"`-D {step.macro}` has put {found(self.token)} in the place of this name"
             helps = (
                 "-D defines a macro, as #define does; it does not set a `let`",
                 f"`--set '{step.macro}=VALUE'` does, with its unit",
             )
-        self.fail("D035", told, step.use, help=helps)
+        self.fail("D035", message, step.use, help=helps)
 
     def let(self, names: list[Token], tail: list[Token]) -> Let:
         name = names[1]

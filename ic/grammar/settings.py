@@ -59,8 +59,8 @@ def _read(source: Text, at: int, text: str, findings: Findings) -> Setting:
     place = source.place(at, max(len(text), 1))
     path, equals, value = text.partition("=")
     if not equals or not value.strip():
-        told = f"`{path.strip()[:40]}` is set to nothing"
-        raise Problem(error("D231", told, place, help=EXAMPLE))
+        message = f"`{path.strip()[:40]}` is set to nothing"
+        raise Problem(error("D231", message, place, help=EXAMPLE))
     if not path.strip():
         raise Problem(error("D231", "this sets nothing: no path stands before the `=`", place, help=EXAMPLE))
     before = len(findings.errors)

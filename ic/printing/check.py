@@ -28,5 +28,5 @@ def verdict(plan: Plan, diagnostics: Sequence[Diagnostic]) -> str:
     parts += [count(sweeps, "sweep")] if sweeps else []
     parts.append(count(sum(experiment.cases.count for experiment in plan.experiments), "case"))
     warnings = sum(1 for diagnostic in diagnostics if diagnostic.severity == "warning")
-    told = f", {count(warnings, 'warning')}" if warnings else ""
-    return f"{plan.deck.strip('<>')}: {', '.join(parts)}: no errors{told}"
+    counted = f", {count(warnings, 'warning')}" if warnings else ""
+    return f"{plan.deck.strip('<>')}: {', '.join(parts)}: no errors{counted}"

@@ -180,11 +180,11 @@ def explain_json(
     experiment: Experiment, path: str, also: Mapping[str, Sequence[str]] = NO_MORE
 ) -> list[dict[str, Any]]:
     """The same for programs, values in SI."""
-    told = []
+    records = []
     for name in find_paths(experiment, path, also):
         found = experiment.parameters[name]
         varied = isinstance(found.value, Formula)
-        told.append(
+        records.append(
             {
                 "path": name,
                 "value": _values(experiment, found).tolist() if varied else found.value,
@@ -196,7 +196,7 @@ def explain_json(
                 "overrides": [_place_json(place) for place in found.origin.overrides],
             }
         )
-    return told
+    return records
 
 
 def _in_short(experiment: Experiment, name: str) -> tuple[str, ...]:

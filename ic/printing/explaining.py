@@ -60,9 +60,9 @@ def explained_json(sources: Sources, path: str) -> list[dict[str, Any]]:
     found = _found(sources, path)
     several = len(found) > 1 or not found[0].alone
     return [
-        {"experiment": each.experiment.name, **told} if several else told
+        {"experiment": each.experiment.name, **record} if several else record
         for each in found
-        for told in explain_json(each.experiment, path, each.known)
+        for record in explain_json(each.experiment, path, each.known)
     ]
 
 

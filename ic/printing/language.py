@@ -25,17 +25,17 @@ def print_block(block: BlockDeclaration) -> Iterator[str]:
     yield ""
     yield f"In a deck: {block.written}" + (f", in {_an(block.within)}" if block.within else "")
     yield ""
-    told = [(each.written, default(each), each.doc) for each in block.entries]
-    yield from columns([("written", "default", "meaning"), *told])
+    rows = [(each.written, default(each), each.doc) for each in block.entries]
+    yield from columns([("written", "default", "meaning"), *rows])
     if block.free:
         yield ""
         yield f"Also {block.free}."
     numbers = [each for each in block.entries if each.parameter is not None]
     if numbers:
         yield ""
-        told = [(each.name, type_of(each), _bounds(each.parameter)) for each in numbers]
+        rows = [(each.name, type_of(each), _bounds(each.parameter)) for each in numbers]
         yield "Types, and bounds in SI"
-        yield from columns(told)
+        yield from columns(rows)
     varying = [(_path(each), _varies(each)) for each in block.entries if each.path and each.varies != "never"]
     if varying:
         yield ""

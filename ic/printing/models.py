@@ -106,20 +106,20 @@ def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
 
 def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
     """All that a model declares, for programs."""
-    told: dict[str, Any] = {"kind": kind, "name": model.name, "doc": textwrap.dedent(model.doc).strip()}
-    told["parameters"] = [{field: getattr(p, field) for field in FIELDS} for p in models.written(model)]
+    record: dict[str, Any] = {"kind": kind, "name": model.name, "doc": textwrap.dedent(model.doc).strip()}
+    record["parameters"] = [{field: getattr(p, field) for field in FIELDS} for p in models.written(model)]
     for words in ("commands", "unit", "order", "real_limit"):
         if hasattr(model, words) and (kind != "sensor" or getattr(model, words)):
-            told[words] = getattr(model, words)
+            record[words] = getattr(model, words)
     for words in models.HELD:
-        told[words] = [{"name": p.name, "unit": p.unit, "doc": p.doc} for p in getattr(model, words, ())]
-    return told
+        record[words] = [{"name": p.name, "unit": p.unit, "doc": p.doc} for p in getattr(model, words, ())]
+    return record
 
 
 def rows(parameters: Iterable[Parameter]) -> list[tuple[str, str, str, str, str]]:
     """A table of parameters, its head first."""
-    told = [(p.name, unit_in_words(p.unit), default(p), range_(p), meaning(p)) for p in parameters]
-    return [("name", "unit", "default", "range", "meaning"), *told]
+    rows = [(p.name, unit_in_words(p.unit), default(p), range_(p), meaning(p)) for p in parameters]
+    return [("name", "unit", "default", "range", "meaning"), *rows]
 
 
 def how(kind: models.Kind, model: Any) -> str:
@@ -140,15 +140,15 @@ def shown_of(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[st
         if parts and kind == "servo":
             yield f"{text}; recorded as JOINT.servo.NAME", [(p.name, unit_in_words(p.unit), p.doc) for p in parts]
     if kind == "guide" and model.memory:
-        told = [(p.name, unit_in_words(p.unit), p.doc) for p in model.memory]
-        yield "Given by its law, at its ticks; recorded as guides.NAME.NAME", told
+        rows = [(p.name, unit_in_words(p.unit), p.doc) for p in model.memory]
+        yield "Given by its law, at its ticks; recorded as guides.NAME.NAME", rows
     if kind == "sensor" and model.measures is not None:
-        told = [(p.name, unit_in_words(watched_unit(p.unit, model.unit)), p.doc) for p in model.states]
-        yield "Integrated with the motion; recorded as sensors.NAME.NAME, what it reads as sensors.NAME", told
+        rows = [(p.name, unit_in_words(watched_unit(p.unit, model.unit)), p.doc) for p in model.states]
+        yield "Integrated with the motion; recorded as sensors.NAME.NAME, what it reads as sensors.NAME", rows
     shown = list(of_bed(model) if kind == "bed" else of_law(model) if kind == "law" else ())
     if shown:
-        told = [(name, unit_in_words(unit), doc) for name, unit, doc in shown]
-        yield f"Held from tick to tick; recorded as JOINT.{kind}.NAME", told
+        rows = [(name, unit_in_words(unit), doc) for name, unit, doc in shown]
+        yield f"Held from tick to tick; recorded as JOINT.{kind}.NAME", rows
 
 
 def facts(kind: models.Kind, model: Any) -> Iterator[str]:
@@ -209,9 +209,9 @@ def range_(parameter: Parameter) -> str:
         return " | ".join(parameter.words)
     whole = ["whole"] if parameter.whole else []
     bounds = (("> ", parameter.above), (">= ", parameter.at_least), ("< ", parameter.below), ("<= ", parameter.at_most))
-    told = ", ".join(whole + [f"{sign}{exactly(bound)}" for sign, bound in bounds if bound is not None])
+    bounded = ", ".join(whole + [f"{sign}{exactly(bound)}" for sign, bound in bounds if bound is not None])
     needed = parameter.above_where_needed
-    return told if needed is None else f"{told}; > {exactly(needed)} where needed".removeprefix("; ")
+    return bounded if needed is None else f"{bounded}; > {exactly(needed)} where needed".removeprefix("; ")
 
 
 def meaning(parameter: Parameter) -> str:

@@ -63,8 +63,8 @@ def _blocks() -> Iterator[str]:
         yield ""
         yield f"In a deck: `{block.written}`"
         yield ""
-        told = [(each.written, type_of(each) or "-", each.default, each.doc) for each in block.entries]
-        yield from _table([("written", "type", "default", "meaning"), *told], whole=True)
+        rows = [(each.written, type_of(each) or "-", each.default, each.doc) for each in block.entries]
+        yield from _table([("written", "type", "default", "meaning"), *rows], whole=True)
         if block.free:
             yield ""
             yield f"Also {_escaped(block.free)}."
@@ -140,11 +140,11 @@ def _channels() -> Iterator[str]:
     yield "`.x`, one component of a vector."
     yield ""
     found = subjects.channels()
-    told = [
+    rows = [
         (each["path"], unit_in_words(each["unit"]), each["components"], each["meaning"], each["frame"])
         for each in found
     ]
-    yield from _table([("channel", "unit", "components", "meaning", "axes"), *told])
+    yield from _table([("channel", "unit", "components", "meaning", "axes"), *rows])
     yield ""
     yield from _table([("channel", "is"), *subjects.OF_ANY])
     yield ""
@@ -155,8 +155,8 @@ def _units() -> Iterator[str]:
     yield ""
     yield f"## {TITLES['units']}"
     yield ""
-    told = [(each["name"], each["word"], subjects.in_si(each)) for each in subjects.unit_table()]
-    yield from _table([("unit", "word", "is"), *told])
+    rows = [(each["name"], each["word"], subjects.in_si(each)) for each in subjects.unit_table()]
+    yield from _table([("unit", "word", "is"), *rows])
 
 
 def _words(name: str) -> Iterator[str]:
@@ -173,9 +173,9 @@ def _words(name: str) -> Iterator[str]:
     yield _escaped(subject.more)
 
 
-def _table(told: Sequence[Sequence[str]], *, whole: bool = False) -> Iterator[str]:
+def _table(rows: Sequence[Sequence[str]], *, whole: bool = False) -> Iterator[str]:
     """A table whose first row is its head and whose first column names things, several behind commas; or one, whole."""
-    head, *others = told
+    head, *others = rows
     yield f"| {' | '.join(head)} |"
     yield f"|{'---|' * len(head)}"
     for row in others:

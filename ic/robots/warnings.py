@@ -59,9 +59,9 @@ def _left_out(body: ArmEntries) -> Iterator[Label]:
         )
     if robot.dropped:
         kinds = sorted(robot.dropped.items(), key=lambda kind: (-len(kind[1]), kind[0]))
-        told = [f"{len(places)} `{shown(tag)}`" for tag, places in kinds[:MOST_NAMED]]
+        counts = [f"{len(places)} `{shown(tag)}`" for tag, places in kinds[:MOST_NAMED]]
         more = f" and {len(kinds) - MOST_NAMED} kinds more" if len(kinds) > MOST_NAMED else ""
-        yield Label(kinds[0][1][0], f"not read: {', '.join(told)}{more}")
+        yield Label(kinds[0][1][0], f"not read: {', '.join(counts)}{more}")
 
 
 def limits(joint: Joint) -> dict[str, float]:

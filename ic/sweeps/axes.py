@@ -83,7 +83,7 @@ class Sweep:
 def read_sweep(
     definitions: Definitions, complaints: Complaints, definition: Definition, graph: Graph, *, seed: int = 0
 ) -> Sweep:
-    """The sweep's axes with their values; tells what is wrong with them. seed: the run's, for what is drawn."""
+    """The sweep's axes with their values; reports mistakes in them. seed: the run's, for what is drawn."""
     reader = _SweepReader(definitions, complaints, definition, graph, seed)
     for entry in definition.group.body:
         with complaints.gather():
@@ -386,7 +386,7 @@ def _paths(definitions: Definitions, entry: object) -> list[tuple[str, Place]]:
     if isinstance(entry, Statement) and isinstance(entry.value, Call) and entry.value.body is not None:
         return [path for inner in entry.value.body for path in _paths(definitions, inner)]
     if isinstance(entry, Statement) and isinstance(entry.value, String) and entry.words[0].text == "from":
-        with suppress(Problem):  # which is told where the file's columns are read
+        with suppress(Problem):  # reported where the file's columns are read
             return [(column.name, column.place) for column in definitions.csv_files.get(entry.value).columns]
     return []
 
@@ -397,7 +397,7 @@ def paths_of(definitions: Definitions, definition: Definition) -> set[str]:
 
 
 def _refuse(entry: object, words: list[str], base: str) -> None:
-    """Tells that an entry has no business in a sweep."""
+    """Report that an entry has no business in a sweep."""
     place = entry.place  # type: ignore[attr-defined]  # every entry has one
     if isinstance(entry, Setting) and not words and len(entry.path) == 1 and entry.path[0].text in ("repeat", "sample"):
         usage = {"repeat": "repeat 5;", "sample": "sample lhs(200) { PATH = uniform(a, b) UNIT; }"}

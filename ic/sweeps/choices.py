@@ -241,11 +241,11 @@ def put_in(definitions: Definitions, run: Definition, choices: Choices) -> tuple
     """The deck's definitions and the run, changed to what is chosen (macros apart, which make another deck)."""
     tree: dict[str, Any] = {}
     servos: list[Definition] = []
-    told = []
+    chosen_values = []
     for column, option in choices:
         if column.macro:
             continue
-        told.append(f"{column.path} = {option.text}")
+        chosen_values.append(f"{column.path} = {option.text}")
         first, *rest = column.path.split(".")
         servo = definitions.of_kind("servo").get(first)
         if servo is not None and rest:
@@ -268,7 +268,7 @@ def put_in(definitions: Definitions, run: Definition, choices: Choices) -> tuple
         return made, run
     body = tuple(_entries(tree))
     base = Name((Word(run.name, run.place),), run.place)
-    name = f"{run.name} with {', '.join(told)}"
+    name = f"{run.name} with {', '.join(chosen_values)}"
     group = Group((*run.group.words[:-1], Word(name, run.place)), base, None, body, run.place)
     return made, Definition("run", name, group)
 

@@ -113,7 +113,7 @@ def _points(design: str, count: int, paths: list[str], seed: int, number: int) -
         stream = np.random.Generator(np.random.PCG64([seed, number]))
         sampler = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}[design](len(paths), rng=stream)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of counts that are no power of 2, which we tell
+            warnings.simplefilter("ignore")  # of counts that are no power of 2, for which MET has its own
             points = sampler.random(count)
     return np.asarray(np.clip(points, 2.0**-54, 1.0 - 2.0**-53))
 

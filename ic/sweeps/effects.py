@@ -1,8 +1,8 @@
-"""Whether what is set from outside of a deck does something in one of the runs and sweeps that are asked for.
+"""Checks that what `--set` sets does something in one of the runs and sweeps that are asked for.
 
-Each run is resolved once more with what was set in question: a number as an input of the program, of which `met.audit`
-then says whether anything is computed from it, and what is no number as a name that nothing has, which is told of where
-anyone looks at it. This is done for one structure after the other, until all is found to do something.
+Each run is resolved once more with what was set in question. A number becomes an input of the program, and `met.audit`
+says whether anything is computed from it. Anything else becomes a name that nothing has: reading it is an error. This
+is done for one structure after the other, until all is found to do something.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Effects:
             del self.waiting[path]
 
     def tell(self, complaints: Complaints, asked: Sequence[str]) -> None:
-        """Tells of all that is set to no effect. asked: names of runs and sweeps."""
+        """Report all that is set to no effect. asked: names of runs and sweeps."""
         shown = [f"`{name}`" for name in asked]
         where = ", ".join(shown[:MOST_NAMED]) + (f" and {len(shown) - MOST_NAMED} more" * (len(shown) > MOST_NAMED))
         for path, entry in self.waiting.items():
@@ -87,7 +87,7 @@ class Effects:
             (path in each.evaluated_settings and each.evaluated_settings[path] is None) or each.depends_on_failed(path)
             for each in self.scopes
         ):
-            return  # which was told
+            return  # already reported
         if kind in ("let", "servo") or path in self.met or any(path in each.targets for each in self.scopes):
             self._tell_idle(complaints, scope, path, entry, where)
         elif path in (*BLOCKS, "record"):
@@ -110,13 +110,13 @@ class Effects:
         first = entry.path[0].text
         lets, servos = scope.definitions.lets, scope.definitions.of_kind("servo")
         place = lets[first].name.place if path in lets else servos[first].place if first in servos else None
-        told = "no noise is in it" if path == SEED_PATH else "nothing that is computed depends on it"
+        message = "no noise is in it" if path == SEED_PATH else "nothing that is computed depends on it"
         complaints.error(
             "D236",
             f"`{path}` changes nothing in {where}",
             entry.place,
             also=[Label(place, "defined here")] if place is not None else [],
-            help=f"{told}: leave it out, or name a run that uses it",
+            help=f"{message}: leave it out, or name a run that uses it",
         )
 
     def _tell_unknown(self, complaints: Complaints, scope: Scope, path: str, entry: Setting, where: str) -> None:
@@ -199,7 +199,7 @@ def _idle(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> tup
 
 
 def _resolved(trial: Scope, run: Definition) -> Resolved | None:
-    """The run, where nothing is told of it."""
+    """The run resolved, without any report."""
     with trial.complaints.gather():
         found = resolve_run(trial, run)
         return found if not trial.complaints.errors else None

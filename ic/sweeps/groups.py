@@ -48,7 +48,7 @@ class DeckSource:
 
 
 def lower(source: DeckSource, definition: Definition) -> list[ScopedExperiment]:
-    """The experiments of a run or sweep; none where something of it is wrong, which was told."""
+    """The experiments of a run or sweep; none where something of it is wrong (already reported)."""
     if definition.kind == "run":
         definitions, run = source.settings.in_run(source.definitions, definition)
         scope = Scope(definitions, source.complaints, settings=source.settings.numbers(definitions))
@@ -133,7 +133,7 @@ class _Sweep:
     def _tell_the_rest(self, read: _Read) -> None:
         """Report mistakes in the run, and in entries of the sweep that do not depend on one that could not be read."""
         sweep = read.sweep
-        if self.source.settings != Settings():  # of which one may set what varies, as was told
+        if self.source.settings != Settings():  # of which one may set what varies, already reported
             resolve_run(Scope(read.definitions, self.complaints), read.base)
             return
         varied = {each.path: each for each in sweep.varied}
@@ -281,7 +281,7 @@ def _base(definitions: Definitions, definition: Definition, complaints: Complain
 
 
 def _seed_of(definitions: Definitions, run: Definition) -> int:
-    """The run's seed, for what the sweep draws; the run itself tells where it is wrong."""
+    """The run's seed, for what the sweep draws; mistakes in it are reported with the run."""
     block = definitions.block(run)
     item = block.get("seed") if block is not None else None
     try:
@@ -378,14 +378,14 @@ def _sum(source: DeckSource, definition: Definition, within: tuple[str, ...]) ->
             again = [n for n, each in enumerate(ids) if each in seen]
             if again and not source.complaints.errors:  # parts that are wrong may be the same until they are mended
                 there, position = seen[ids[again[0]]], int(group.cases.table[again[0]])
-                told = f"case #{position} of `{named.text}` is in `{there}` too"
+                message = f"case #{position} of `{named.text}` is in `{there}` too"
                 if len(again) > 1:
-                    told = f"{len(again)} cases of `{named.text}` are in `{there}` too, the first is #{position}"
+                    message = f"{len(again)} cases of `{named.text}` are in `{there}` too, the first is #{position}"
                 them = "it" if len(again) == 1 else "them"
                 raise Problem(
                     error(
                         "D227",
-                        told,
+                        message,
                         named.place,
                         also=[Label(definition.place, "in this sweep")],
                         help=[

@@ -16,7 +16,7 @@ from met.plan import REPEAT, Coordinate, Experiment
 def check_coordinates(scope: Scope, *, complete: bool) -> None:
     """Every coordinate sets something.
 
-    complete  all of the run was resolved; else nothing is said of what hangs on the rest, since that was told
+    complete  all of the run was resolved; else nothing is said of what hangs on the rest, reported already
     """
     for path, varied in scope.varied.items():
         if path in scope.targets or path in scope.names.followed or scope.depends_on_failed(path):

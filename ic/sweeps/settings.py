@@ -69,21 +69,21 @@ class Settings:
         return definitions, run
 
     def numbers(self, definitions: Definitions) -> dict[str, Setting]:
-        """By path, what is settled in the stead of what the run settles."""
+        """By path, what is settled in place of what the run settles."""
         return {path_of(entry): entry for entry in self.that_go(definitions, "number")}
 
     def check_lets(self, definitions: Definitions, complaints: Complaints) -> None:
-        """Tells of lets that would get another dimension. definitions: the deck's own."""
+        """Report lets that would get another dimension. definitions: the deck's own."""
         names, changed = Names(definitions, {}), Names(self.in_definitions(definitions), {})
         for entry in self.that_go(definitions, "let"):
             let = definitions.lets[path_of(entry)]
-            with suppress(Problem):  # of the deck's value, which is overridden, or of this one, which is told elsewhere
+            with suppress(Problem):  # of the deck's value, now overridden, or of this one, reported elsewhere
                 old, new = names.find(Name((let.name,), let.name.place)), changed.evaluate(entry.value)
                 if isinstance(old, Value) and isinstance(new, Value) and not units.same(old.dimension, new.dimension):
                     complaints.add(*_of_another_dimension(path_of(entry), old, new, let.name.place).diagnostics)
 
     def check_sweep(self, sweep: Sweep, complaints: Complaints, definitions: Definitions) -> None:
-        """Tells of what the sweep varies itself, so that it would be set in vain."""
+        """Report what the sweep varies itself, so that it would be set in vain."""
         for entry in self.entries:
             path = path_of(entry)
             found = [column for axis in sweep.axes for column in axis.columns if column.path == path]

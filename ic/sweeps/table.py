@@ -222,7 +222,7 @@ class _Truths:
         """Names in `exclude when`: coordinates, parameters of the run, then what any expression may name."""
         scope = self.scope
         if scope.checks.failed(name.text):
-            raise Problem(())  # which was told
+            raise Problem(())  # already reported
         if name.text in scope.varied:
             return scope.varied[name.text].value
         paths = scope.known.get(name.text) or [name.text]

@@ -1,4 +1,4 @@
-"""A collector of diagnostics: a deck's mistakes are told together, so that none hides the next."""
+"""A collector of diagnostics: a deck's mistakes are reported together, so that none hides the next."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from ic.text.source import UnreadableStretch
 from met.diagnostic import Diagnostic, Label, Place, Problem, error, meant
 
-MOST = 200  # a deck with more mistakes than this is told the first ones: the rest seldom say more
+MOST = 200  # diagnostics of one deck; any after these seldom say more
 
 ONCE = ("D060", "D061", "D076", "D077", "D087", "D104", "D109", "D125", "D141", "D305", "D307")
 """Codes that are reported once for each place: a bare number, a wrong unit, no such word, out of range, no body's
@@ -25,12 +25,14 @@ class Complaints:
     def __init__(self, found: Iterable[Diagnostic] = ()) -> None:
         self._found: dict[Diagnostic, None] = dict.fromkeys(found)
         self._remarks: dict[Diagnostic, None] = {}
-        self.error_count = 0  # errors so far, with those that are not told again: to see whether something brought one
+        self.error_count = (
+            0  # errors so far, those that are not reported again included: to see whether a step found one
+        )
         self._unreadable: list[UnreadableStretch] = []
         self._torn: set[Place] = set()  # definitions and blocks of which an entry could not be read
         self._lost: set[str] = set()  # names that what could not be read may have defined
-        self._spots: set[tuple[str, int, int]] = set()  # where errors of syntax are told
-        self.known_missing: set[tuple[Place, str]] = set()  # definitions, and entries that they lack, as was told
+        self._spots: set[tuple[str, int, int]] = set()  # where errors of syntax are reported
+        self.known_missing: set[tuple[Place, str]] = set()  # definitions, and entries that they lack, already reported
 
     @property
     def all(self) -> tuple[Diagnostic, ...]:
@@ -55,14 +57,14 @@ class Complaints:
                 self._found.setdefault(diagnostic)
 
     def note_unreadable(self, stretches: Sequence[UnreadableStretch]) -> None:
-        """Notes what could not be read, so that nothing is told that follows from it, nor from the errors so far."""
+        """Note what could not be read, so that nothing is reported that follows from it, nor from the errors so far."""
         self._spots.update(_spot(each.at.place) for each in self.errors if each.at is not None)
         self._unreadable += stretches
         self._torn.update(each.within for each in stretches if each.within is not None)
         self.note_lost_names(*(name for each in stretches for name in each.names))
 
     def note_lost_names(self, *names: str) -> None:
-        """Notes names that something may have defined which could not be taken in, as was told."""
+        """Notes names that something may have defined which could not be taken in, already reported."""
         self._lost.update(names)
 
     def note_base(self, of: Place, base: Place) -> None:
@@ -189,14 +191,14 @@ def _spot(place: Place) -> tuple[str, int, int]:
 
 def belongs(word: str) -> list[str]:
     """The remedy for a word of the language that stands in another block only."""
-    told = {
+    places = {
         "substitute": "`substitute JOINT { ... }`, in a run, puts a joint's motor on a bed",
         "payload": "`payload NAME { ... }`, in a run, is a body that a link carries or grapples",
         "guide": "`guide NAME = MODEL { ... }`, in a run, commands several joints together",
         "sensor": "`sensor NAME = MODEL { link = LINK; ... }`, in a run, is on a link; `sensor QUANTITY = MODEL "
         "{ ... }`, in a servo, is of its joint",
     }
-    return [told[word]] if word in told else []
+    return [places[word]] if word in places else []
 
 
 def an(word: str, *, quoted: bool = False) -> str:

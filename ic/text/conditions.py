@@ -102,7 +102,7 @@ def _each_defined(written: Sequence[Token], findings: Findings) -> list[tuple[in
 def evaluate(tokens: Sequence[Token], findings: Findings, unknown: Callable[[Token], None]) -> bool:
     """Return True if an expanded condition holds; raises Refused, with the error noted, where it has no meaning.
 
-    unknown: is told of each name that is no macro and counts as 0
+    unknown: called with each name that is no macro and counts as 0
     """
     return _Condition([token for token in tokens if token.kind != SPACE], findings, unknown).truth()
 
@@ -149,7 +149,7 @@ class _Condition:
 
     def no_stray(self, token: Token) -> None:
         if token.kind == BAD:
-            if token.text:  # else what it stands for has been told
+            if token.text:  # else the mistake it stands for is already reported
                 complain_of_stray(token, self.findings)
             raise Refused
 

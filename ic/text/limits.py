@@ -46,7 +46,7 @@ class GiveUp(Exception):
 
 
 class Findings(Complaints):
-    """Diagnostics of one reading. A mistake in a macro's body is told once, not at every use."""
+    """Diagnostics of one reading. A mistake in a macro's body is reported once, not at every use."""
 
     def __init__(self) -> None:
         super().__init__()

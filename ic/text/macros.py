@@ -43,12 +43,12 @@ class Macros(Pcpp):
         self.in_condition = False
         super().__init__(object())  # a lexer, which it never asks: it is handed tokens
         self.macros: dict[str, Macro] = {}
-        self.refused: dict[str, bool] = {}  # macros that were refused, which was told; whether with parameters
+        self.refused: dict[str, bool] = {}  # macros that were refused (already reported); whether with parameters
         self.auto_pragma_once_enabled = False
         self.expand_filemacro = False
 
     def _Preprocessor__lexprobe(self) -> None:
-        """Tells pcpp the kinds of our tokens, which it would otherwise find out by trying."""
+        """Tell pcpp the kinds of our tokens, which it would otherwise find out by trying."""
         self.t_ID, self.t_INTEGER, self.t_INTEGER_TYPE = NAME, WHOLE, str
         self.t_STRING, self.t_CHAR, self.t_DPOUND = STRING, CHARACTER, PASTE
         self.t_SPACE = self.t_NEWLINE = SPACE

@@ -139,15 +139,14 @@ class _Preprocessor(Macros):
         """Warns of names in conditions that are no macros, and of macros on the command line that nothing asks for."""
         lets = {name.text: name for word, name in pairwise(self.output) if word.text == "let" and name.kind == NAME}
         for name, place in self._zeros.items():
-            told = f"`{name}` is no macro, so it counts as 0 in this condition"
+            message = f"`{name}` is no macro, so it counts as 0 in this condition"
             help = f"ask `defined({name})`, or define it before: `#define {name} 1`, `-D {name}=1`"
             if name in lets:
                 label = Label(lets[name].place, "this `let` is a value; a condition sees macros alone")
-                self.findings.warn(
-                    "D036", told, place, also=(label,), help="define a macro for it, `#define NAME ...`, and ask that"
-                )
+                help = "define a macro for it, `#define NAME ...`, and ask that"
+                self.findings.warn("D036", message, place, also=(label,), help=help)
             else:
-                self.findings.warn("D036", told, place, help=[*did_you_mean(name, self.macros), help])
+                self.findings.warn("D036", message, place, help=[*did_you_mean(name, self.macros), help])
         for name, token in self.given.items():
             if name not in self.asked:
                 near = did_you_mean(name, [*self.asked, *self._zeros])
@@ -295,7 +294,7 @@ class _Preprocessor(Macros):
         return name, angled, at
 
     def _too_deep(self, at: Place) -> None:
-        """Tells the circle that includes go in, at the include that closes it, or just that they go too deep."""
+        """Report the circle that includes go in, at the include that closes it, or just that they go too deep."""
         chain = [file.identity for file, _ in self._including]
         for last, identity in enumerate(chain):
             first = chain.index(identity)
@@ -368,7 +367,7 @@ class _Preprocessor(Macros):
             if len(ifs) > CONDITION_DEPTH:
                 self._give_up("D018", f"`#if` goes deeper than {CONDITION_DEPTH}", directive.place)
             return
-        if not ifs and self._misspelt_ifs:  # which was told: this belongs to it
+        if not ifs and self._misspelt_ifs:  # already reported: this belongs to it
             self._misspelt_ifs -= name == "endif"
             raise OutputDirective(Action.IgnoreAndRemove)
         if not ifs:

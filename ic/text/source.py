@@ -8,7 +8,7 @@ from met.frozen import frozen
 
 @frozen
 class UnreadableStretch:
-    """A stretch of text that could not be read, which has been told: what else is wrong there follows from it.
+    """A stretch of text that could not be read, which is already reported: any other mistake there follows from it.
 
     place   its first token; the line and column of its end
     names   what it may have named or defined

@@ -75,7 +75,7 @@ def complain_of_stray(token: Token, findings: Findings) -> None:
         import unicodedata
 
         first = text[0]
-        if _UNSEEN.match(first) and first not in _JOINERS:  # which is told of the whole text
+        if _UNSEEN.match(first) and first not in _JOINERS:  # reported for the whole text
             return
         plain = _PLAIN.get(first)
         known = unicodedata.name(first, "no name").lower()

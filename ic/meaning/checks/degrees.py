@@ -17,7 +17,7 @@ from met.trace import Scalar
 
 
 def remark_degrees(deck: Deck, definitions: Definitions, complaints: Complaints) -> None:
-    """Tells of `sin(90)`: more than a turn of radians, which were not made with pi."""
+    """Report `sin(90)`: more than a turn of radians, which were not made with pi."""
     if not any("sin(" in text or "cos(" in text for text in (source.text.replace(" ", "") for source in deck.sources)):
         return
     names = Names(definitions, {})
@@ -28,7 +28,7 @@ def remark_degrees(deck: Deck, definitions: Definitions, complaints: Complaints)
         try:
             found = names.evaluate(argument)
         except Problem:
-            continue  # it is told where the value is used
+            continue  # reported where the value is used
         if not isinstance(found, Value) or not found.bare or found.hertz is None:
             continue
         if isinstance(found.number, Scalar) or abs(found.number) <= 2.0 * math.pi:

@@ -40,7 +40,7 @@ def check_failures(
     environment: Sequence[EnvironmentUse],
     schedule: Schedule,
 ) -> None:
-    """Tells of models about servos that are not there, have not what the model is about, or are on a bed."""
+    """Report models about servos that are not there, have not what the model is about, or are on a bed."""
     servos = {use.joint: use for use in uses}
     beds = {each.joint: each.place for each in found}
     sound = []
@@ -64,7 +64,7 @@ def check_failures(
 
 
 def check_friction(scope: Scope, uses: Iterable[Use], environment: Iterable[EnvironmentUse]) -> None:
-    """Tells of friction on a joint that is told its acceleration, for which it would do nothing."""
+    """Report friction on a joint that is told its acceleration, for which it would do nothing."""
     servos = {use.joint: use for use in uses}
     for failure in _about(scope, environment, "rubs"):
         servo = servos.get(failure.joint)
@@ -125,7 +125,7 @@ def _wrong(
 
 
 def _check_full(scope: Scope, failure: ServoFailure, servo: Use) -> None:
-    """Tells of a drive that would run away without a limit."""
+    """Report a drive that would run away without a limit."""
     if failure.model.gives is None or servo.servo.full is None or servo.parameters is None:
         return
     numbers = servo.parameters
@@ -158,7 +158,7 @@ def _window(scope: Scope, failure: ServoFailure) -> tuple[float, float] | None:
 
 
 def _remark_between_ticks(scope: Scope, failure: ServoFailure, period: float, duration: float) -> None:
-    """Tells of a window that lies between two ticks of the law, which never sees it."""
+    """Report a window that lies between two ticks of the law, which never sees it."""
     window, model = _window(scope, failure), failure.model
     if window is None or (model.gives is None and model.sees is None):
         return
@@ -180,7 +180,7 @@ def _remark_between_ticks(scope: Scope, failure: ServoFailure, period: float, du
 
 
 def _remark_overlaps(scope: Scope, failures: Iterable[ServoFailure]) -> None:
-    """Tells of two models of one sort that act on the same of a joint at a time: the later one has the last word."""
+    """Report two models of one sort that act on the same of a joint at a time: the later one has the last word."""
     known = models.find_own("environment").values()  # what another package's does to an earlier one is its own affair
     before: dict[tuple[str, str, Any], list[tuple[ServoFailure, tuple[float, float]]]] = {}
     for failure in failures:

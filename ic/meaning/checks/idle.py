@@ -41,7 +41,7 @@ def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str,
 
 
 def remark_kinds(scope: Scope, environment: Any, item: Item, arm: ResolvedArm) -> None:
-    """Tells of numbers for joints of a kind (`Parameter.joints`) that the arm has none of."""
+    """Report numbers for joints of a kind (`Parameter.joints`) that the arm has none of."""
     kinds = {joint.kind for joint in arm.moving}
     for parameter in environment.parameters:
         written = (item.body or MergedBlock()).get(parameter.name)
@@ -56,7 +56,7 @@ def remark_kinds(scope: Scope, environment: Any, item: Item, arm: ResolvedArm) -
 
 
 def remark_beginnings(scope: Scope, uses: tuple[EnvironmentUse, ...]) -> None:
-    """Tells of a joint that begins beyond the ends that a model keeps it between. After the initial state's."""
+    """Report a joint that begins beyond the ends that a model keeps it between. After the initial state's."""
     for use in uses:
         model = models.find("environment", use.model)
         found = {name: scope.parameters.get(f"environment.{use.name}.{name}") for name in model.between}
@@ -75,14 +75,14 @@ def remark_beginnings(scope: Scope, uses: tuple[EnvironmentUse, ...]) -> None:
         place = begins.origin.place or next((each.origin.place for each in ends if each.origin.place), use.place)
         also, shown = [Label(use.place, "this one")], unit_written([begins, *ends], begins.unit)
 
-        def told(
+        def warn(
             values: np.ndarray,
             use: EnvironmentUse = use,
             joint: str | None = joint,
             place: Any = place,
             also: list[Label] = also,
             shown: tuple[str, float] = shown,
-        ) -> tuple[np.ndarray, list[str]]:
+        ) -> None:
             q, lower, upper = values.T
             beyond = np.flatnonzero(((q < lower) & apart(q, lower)) | ((q > upper) & apart(q, upper)))
             if beyond.size:
@@ -95,13 +95,10 @@ def remark_beginnings(scope: Scope, uses: tuple[EnvironmentUse, ...]) -> None:
                     also=also,
                     help="the run begins with what drives it back: begin within, or move the end",
                 )
-            return np.zeros(len(values), bool), []
 
-        scope.checks.hold(
+        scope.checks.observe(
             (begins.value, *(each.value for each in ends)),  # type: ignore[arg-type]
-            told,
-            code="D294",
-            message="",
-            place=place,
+            warn,
+            place,
             needs=(f"initial.{joint}.q", f"environment.{use.name}"),
         )

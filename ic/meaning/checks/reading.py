@@ -14,7 +14,7 @@ from met.probe import reads
 
 
 def remark_unread(scope: Scope, uses: Iterable[Use], structure: Structure) -> None:
-    """Tells of sensors that no law sees through and nothing records, and of dead ones that no law would see."""
+    """Report sensors that no law sees through and nothing records, and dead ones that no law would see."""
     servos = {each.joint: each for each in structure.servos}
     for use in uses:
         servo = servos[use.joint]

@@ -17,7 +17,7 @@ from met.diagnostic import Label, Place
 from met.plan import BASE, Structure
 
 LOST_A_TURN = 0.01
-"""Share of the energy of a body that tumbles; where a turn may lose or gain more, that is told."""
+"""Share of the energy of a body that tumbles; a warning is given where a turn may lose or gain more."""
 
 FIRST, HIGHER = 1.6, 5.0
 """An integrator of order p is off by up to (h rate/HIGHER)^p of the energy of a body that tumbles for each radian, and
@@ -33,7 +33,7 @@ def check_spins(scope: Scope, block: MergedBlock, structure: Structure) -> None:
         paths = tuple(f"{path}.{axis}" for axis in XYZ)
         settled = [each.value for name in paths if (each := scope.parameters.get(name)) is not None]
 
-        def warn(rows: np.ndarray, label: str = label, place: Place = place) -> tuple[np.ndarray, list[str]]:
+        def warn(rows: np.ndarray, label: str = label, place: Place = place) -> None:
             fastest = float(np.max(np.sqrt((rows * rows).sum(axis=1))))
             if schedule.step * fastest > limit:
                 fits = slowest_that_fits(schedule, limit)(fastest)
@@ -47,17 +47,9 @@ def check_spins(scope: Scope, block: MergedBlock, structure: Structure) -> None:
                         "a steady spin about a principal axis through the frame's origin needs less",
                     ],
                 )
-            return np.zeros(len(rows), bool), []
 
         if len(settled) == len(paths):
-            scope.checks.hold(
-                tuple(settled),  # type: ignore[arg-type]
-                warn,
-                code="D300",
-                place=place,
-                message="",
-                needs=paths,
-            )
+            scope.checks.observe(tuple(settled), warn, place, needs=paths)  # type: ignore[arg-type]
 
 
 def _spinning(block: MergedBlock, structure: Structure) -> Iterator[tuple[str, str, Place]]:

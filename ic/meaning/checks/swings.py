@@ -25,7 +25,7 @@ from met.trace import Real
 
 T = TypeVar("T")
 
-GROWS = 1.0  # ln of the growth over a run, above which it is told: e times
+GROWS = 1.0  # ln of the growth over a run, above which a warning is given: e times
 FINEST = 1000  # times the base rate: beyond, no rate is proposed
 
 
@@ -35,7 +35,7 @@ def growth(integrator: Any, h: float, a: Any, b: Any) -> Any:
     def slope(_: float, y: Motion) -> Slope:
         return Slope((), (), (y.x[1], -a * y.x[0] - b * y.x[1]))
 
-    with np.errstate(all="ignore"):  # a step far too long is told of elsewhere
+    with np.errstate(all="ignore"):  # a step far too long is reported elsewhere
         columns = []
         for start in ((1.0, 0.0), (0.0, 1.0)):
             y = Motion((), (), start)
@@ -68,7 +68,7 @@ def check_swing(
         return
     steps, h = schedule.ticks // schedule.dynamics, schedule.step
 
-    def told(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    def warn(values: np.ndarray) -> None:
         grown = steps * growth(integrator, h, values[:, 0], values[:, 1])
         grown = np.where(np.isfinite(grown), grown, 0.0)
         if (grown > GROWS).any():
@@ -91,9 +91,8 @@ def check_swing(
                 Label(dynamics.place, f"h = {h:g} s"),
                 help=[*helps, *(["reckoned with the joint held: a gear swings faster against a light one"] * held)],
             )
-        return np.zeros(len(values), bool), []
 
-    scope.checks.hold(swing, told, code="D249", place=dynamics.place, message="", needs=(path,))
+    scope.checks.observe(swing, warn, dynamics.place, needs=(path,))
 
 
 def _enough(integrator: Any, h: float, steps: int, a: float, b: float) -> float | None:

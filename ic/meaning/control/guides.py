@@ -76,7 +76,7 @@ class Guiding:
 
 
 def name_guides(scope: Scope, block: MergedBlock) -> None:
-    """Enters the run's guides in the scope, so that commands may name them; tells names that are something else's."""
+    """Enters the run's guides in the scope, so that commands may name them; reports names that are something else's."""
     scope.guides = {item.name: item for item in block.of_kind(KIND)}
     for name, item in scope.guides.items():
         let = scope.definitions.lets.get(name)
@@ -100,7 +100,7 @@ def _meaning(scope: Scope, name: str) -> str:
 def resolve_guides(
     scope: Scope, block: MergedBlock, arm: ResolvedArm, uses: list[Use], duration: float | None
 ) -> list[Guiding]:
-    """Every guide of the run, in the deck's order; what is wrong is told. duration: of the run, s; None: unknown."""
+    """Every guide of the run, in the deck's order; mistakes are reported. duration: of the run, s; None: unknown."""
     found = []
     for item in block.of_kind(KIND):
         with scope.complaints.gather():
@@ -160,10 +160,10 @@ def check_period(scope: Scope, guide: Guiding, rate: Rate) -> None:
 def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration: float | None) -> Guiding | None:
     if item.detail or item.value is None:
         at = item.detail[0].place if item.detail else item.place
-        told = f"guide `{item.name}` has no model"
-        told = f"`{item.detail[0].text}` after the name of a guide" if item.detail else told
+        message = f"guide `{item.name}` has no model"
+        message = f"`{item.detail[0].text}` after the name of a guide" if item.detail else message
         scope.complaints.error(
-            "D270", told, at, help=[USAGE, known_words("guide models", sorted(models.available(KIND)))]
+            "D270", message, at, help=[USAGE, known_words("guide models", sorted(models.available(KIND)))]
         )
         return None
     guide = find_model(scope, KIND, word_of(item.value), place_of(item.value))
@@ -226,7 +226,7 @@ def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration
 
 
 def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any], duration: float) -> None:
-    """Tells of a guide that does nothing, or of a part of it, by its written constants."""
+    """Report a guide that does nothing, or a part of it that does, by its written constants."""
     numbers = [x for value in values.values() for x in (value if isinstance(value, tuple) else (value,))]
     if guide.idle is None or any(isinstance(x, Scalar) for x in numbers):
         return
@@ -279,7 +279,7 @@ def _of_joints(
                 joint=kinds[joint],
             )
             if scope.number(whose, wanted, item) is None and own is None:
-                break  # the same would be told of every joint
+                break  # the same would be reported for every joint
 
 
 def _courses(
@@ -332,8 +332,8 @@ def _course(scope: Scope, owner: Owner, item: Item) -> str | None:
             help=f"write `{item.name} = ramp(to = {unit}, over = 10 s);`",
         )
         return None
-    told, path = f"`{item.name}` of {owner.label}", f"{owner.path}.{item.name}"
-    spot = Owner(told, item.place, path, homes=item.homes, joint=kind, command="position", called=told)
+    label, path = f"`{item.name}` of {owner.label}", f"{owner.path}.{item.name}"
+    spot = Owner(label, item.place, path, homes=item.homes, joint=kind, command="position", called=label)
     inner = course_named(scope, item.value)
     model = use_course(scope, spot, inner, item, doc=f"{item.name} of the path", column=item.name, body=item.body)
     if model is not None:

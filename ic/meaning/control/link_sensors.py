@@ -56,7 +56,7 @@ class Sensing:
 def resolve_link_sensors(
     scope: Scope, block: MergedBlock, arm: ResolvedArm, payloads: tuple[Payload, ...]
 ) -> list[Sensing]:
-    """Every sensor of the run, in the deck's order; what is wrong is told."""
+    """Every sensor of the run, in the deck's order; mistakes are reported."""
     scope.sensors = frozenset(item.name for item in block.of_kind(KIND))
     found = []
     for item in block.of_kind(KIND):
@@ -70,12 +70,12 @@ def resolve_link_sensors(
 def _sensor(scope: Scope, item: Item, arm: ResolvedArm, payloads: tuple[Payload, ...]) -> Sensing | None:
     if item.detail or item.value is None:
         at = item.detail[0].place if item.detail else item.place
-        told = (
+        message = (
             f"`{item.detail[0].text}` after the name of a sensor"
             if item.detail
             else (f"sensor `{item.name}` has no model")
         )
-        scope.complaints.error("D280", told, at, help=[USAGE, known_words("sensors of links", _of_links())])
+        scope.complaints.error("D280", message, at, help=[USAGE, known_words("sensors of links", _of_links())])
         return None
     sensor = find_model(scope, KIND, word_of(item.value), place_of(item.value))
     if sensor is None or refuse_values(scope, item.value, [p.name for p in sensor.parameters]):

@@ -65,7 +65,7 @@ def base_rate(rates: list[Rate], written: Rate | None) -> Rate:
 
 
 def divisor(complaints: Complaints, rate: Rate, base: Rate, others: list[Rate], *, written: bool) -> int:
-    """Base ticks a tick of this rate; tells where that is not a whole number, and gives 1 then."""
+    """Base ticks a tick of this rate; reports where that is not a whole number, and gives 1 then."""
     if base.hz.is_integer() and rate.hz.is_integer() and base.hz % rate.hz == 0.0:
         return int(base.hz // rate.hz)
     ratio = exact(base.hz) / exact(rate.hz)
@@ -115,7 +115,7 @@ def make_schedule(
     *,
     base_written: bool,
 ) -> Schedule:
-    """The schedule. Tells what does not fit. duration: of the run, s; None: unknown, which was told."""
+    """The schedule. Reports what does not fit. duration: of the run, s; None: unknown (already reported)."""
     all_rates, before = [dynamics, record, *others], complaints.error_count
     step = divisor(complaints, dynamics, base, all_rates, written=base_written)
     row = step if record == dynamics else divisor(complaints, record, base, all_rates, written=base_written)
@@ -166,7 +166,7 @@ def fastest_rate(
 ) -> Real | None:
     """The fastest rate constant of a joint under its servo (`Servo.fastest`); None where the servo does not know it.
 
-    path        of the servo: where a parameter of it is out of its range, that is told, and nothing is computed of it
+    path        of the servo: nothing is computed where a parameter of it is out of its range (already reported)
     continuous  whether its law is, so that its gains count
     """
     bound = servo.fastest_law if continuous and servo.fastest_law is not None else servo.fastest
@@ -192,9 +192,9 @@ def check_stability(
     path: str,
     of: str = "the servo's fastest rate constant, on any arm",
 ) -> Real | None:
-    """h lambda of a joint under its servo, or of a sensor: given back, and warned of or told as an error.
+    """h lambda of a joint under its servo, or of a sensor: returned, with a warning or an error.
 
-    label  the servo in words; joints with the same servo and the same figure are told of once, and of several servos
+    label  the servo in words; joints with the same servo and the same figure are reported once, and of several servos
            for which one rate is too slow the first that is checked
     path   of the servo
     of     what lambda is
@@ -211,7 +211,7 @@ def check_stability(
                 f"h * lambda = {float(np.max(x)):.3g}; the slowest rate that fits is {slowest(worst)}"
             ] if bad.any() else []
 
-        def warn(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+        def warn(values: np.ndarray) -> None:
             x = h * values[:, 0]
             above = WARN_ABOVE * (1.0 + 1e-9)
             if above < float(np.max(x)) < limit:
@@ -223,7 +223,6 @@ def check_stability(
                     help=f"stable below {limit:g} with {integrator.name}, true to the motion below {WARN_ABOVE:g}: the "
                     f"slowest rate that fits is {better}",
                 )
-            return np.zeros(len(values), bool), []
 
         scope.checks.hold(
             (fastest,),
@@ -234,7 +233,7 @@ def check_stability(
             help=f"h * lambda must stay below {limit:g}; lambda is {of}",
             needs=(path,),
         )
-        scope.checks.hold((fastest,), warn, code="D105", place=dynamics.place, message="", needs=(path,))
+        scope.checks.observe((fastest,), warn, dynamics.place, needs=(path,))
         return fastest * h
     return None
 

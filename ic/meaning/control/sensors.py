@@ -24,7 +24,7 @@ def without_sensors(block: MergedBlock) -> MergedBlock:
 
 
 def use_sensor(scope: Scope, servo: Owner, use: ServoUse, item: Item) -> SensorUse | None:
-    """One sensor of a servo in use, its parameters entered in the scope; None where it failed, which was told.
+    """One sensor of a servo in use, its parameters entered in the scope; None where it failed (already reported).
 
     servo  owner of the servo's parameters;  use: what there is of it
     """

@@ -61,7 +61,7 @@ BESIDE = "write `model = {};`, and its parameters beside it"
 
 @frozen
 class Use:
-    """A servo on a joint. rate None: the run's `rates.servos`. parameters None: some failed, which was told.
+    """A servo on a joint. rate None: the run's `rates.servos`. parameters None: some failed (already reported).
 
     words    those on which parts of the model depend
     sensors  through which its law sees
@@ -89,7 +89,7 @@ class Use:
 
 def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[list[Use], frozenset[str]]:
     """Every servo of the run, in the order of the arm's joints; the joints whose servo failed or may be one of a name
-    that is no joint's, which was told.
+    that is no joint's (already reported).
     """
     uses = {}
     _note_kinds(scope, body, arm)
@@ -209,7 +209,8 @@ def _tell_no_model(scope: Scope, block: MergedBlock, owner: Owner, used: Place) 
 
 
 def moving_kind(scope: Scope, item: Item, arm: ResolvedArm, so: str) -> str | None:
-    """The kind of the joint that an entry names; None where it is none or fixed, which was told. so: if it is fixed."""
+    """The kind of the joint that an entry names; None where it is none or fixed (already reported). so: the
+    message where it is fixed."""
     kind = arm.kind(item.name) if item.kind in ("", "substitute") else None
     definition = scope.definitions.of_kind("arm").get(arm.name)
     if kind is None and definition is not None and scope.complaints.is_known_to_lack(definition.place):
@@ -418,11 +419,11 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
             return Command(kind, "", guide)
         _check_known(scope, call.positional[0])
     inner = _asked(scope, call)
-    told = f"the command of {owner.label}"
+    label = f"the command of {owner.label}"
     spot = replace(
         owner,
-        label=told,
-        called=told,
+        label=label,
+        called=label,
         place=place,
         path=f"{owner.path}.command",
         local="command",

@@ -105,7 +105,7 @@ def check_brakes(scope: Scope, found: tuple[Substitution, ...], environment: Ite
 def _substitution(
     scope: Scope, item: Item, arm: ResolvedArm, servos: Mapping[str, Use]
 ) -> tuple[Substitution, Place] | None:
-    """The joint's bed and law, and the place that names the law; None where something failed, which was told."""
+    """The joint's bed and law, and the place that names the law; None where something failed (already reported)."""
     if item.name in arm.failed:
         return None
     if item.value is not None or item.detail:
@@ -195,7 +195,7 @@ def _name_place(value: Expression) -> Place:
 
 
 def _model(scope: Scope, kind: models.Kind, item: Item | None, around: Item) -> Any:
-    """The model of a bed or a law, the default where none is named; None where that failed, which was told."""
+    """The model of a bed or a law, the default where none is named; None where that failed (already reported)."""
     if item is None or item.value is None:
         return models.find(kind, DEFAULTS[kind], around.place)
     model = find_model(scope, kind, word_of(item.value), _name_place(item.value))

@@ -41,10 +41,10 @@ def rate_of(scope: Scope, each: Ticking, shared: Rate | None) -> Rate | None:
     """Its own rate, else that of the servos; None where there is neither (already reported)."""
     found = each.rate or shared
     if found is None or found.hz == CONTINUOUS:
-        told = "the servos are continuous" if found is not None else "the run has no rate of the servos"
+        message = "the servos are continuous" if found is not None else "the run has no rate of the servos"
         scope.complaints.error(
             each.code,
-            f"{each.label} has no rate, and {told}",
+            f"{each.label} has no rate, and {message}",
             each.place,
             help=f"write `rate = 100 Hz;` in the {each.kind}",
         )

@@ -72,7 +72,7 @@ def _columns(
     if body.get(COLUMN.name) is not None:
         place = place_of(body.items[COLUMN.name].value or named)
     table = scope.definitions.csv_files.get(named)
-    here = Label(named.place, "read here")  # the same for all joints, so that the file's own faults are told once
+    here = Label(named.place, "read here")  # the same for all joints, so that the file's own faults are reported once
     columns = {}
     for name, column_name, at in zip(LISTS, (TIME, wanted), (named.place, place), strict=True):
         declared = parameter(profile, name)

@@ -304,7 +304,7 @@ def _of_name(items: Mapping[str, Item], name: str) -> Item | None:
 
 
 def as_meant(block: MergedBlock, keys: Iterable[str], kinds: Iterable[str]) -> MergedBlock:
-    """The block with entries that nobody knows, which is told, under the names that are meant: what is in them is
+    """The block with entries that nobody knows, which is reported, under the names that are meant: what is in them is
     looked at, too, and nothing is missing besides.
 
     keys, kinds  what the block may have; an entry that it has stays
@@ -328,7 +328,7 @@ def as_meant(block: MergedBlock, keys: Iterable[str], kinds: Iterable[str]) -> M
 
 
 def refuse_pending(block: MergedBlock, complaints: Complaints) -> None:
-    """Tells each `remove` of a block upon a name that turned out to have no entries of its own, such as a model's."""
+    """Report each `remove` of a block upon a name that turned out to have no entries of its own, such as a model's."""
     for entry in block.pending:
         complaints.add(_nothing(entry, block.items))
 

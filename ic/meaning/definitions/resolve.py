@@ -119,8 +119,8 @@ class Definitions:
         *,
         user: Definition | None = None,
     ) -> Definition:
-        """The definition of this name, else the one of the nearest name, which is told: then what it is used with is
-        looked at, too. Raises D041 where there is no near one.
+        """The definition of this name, else, with an error, the nearest one, so that its uses are checked too.
+        Raises D041 where no name is near.
 
         user  what is like it, which itself is not meant
         """
@@ -140,7 +140,7 @@ class Definitions:
             return self._by_kind[kind][near]
 
     def block(self, definition: Definition) -> MergedBlock | None:
-        """The definition merged with its bases; None where that failed (and was told)."""
+        """The definition merged with its bases; None where that failed (already reported)."""
         chain: list[Definition] = []
         at: Definition | None = definition
         while at is not None and (at.kind, at.name) not in self._merged:

@@ -1,4 +1,4 @@
-"""Numbers that are given from outside of a deck, in the stead of what it writes; and how an origin says so."""
+"""Numbers that are given from outside of a deck, in place of what it writes; and how an origin says so."""
 
 from __future__ import annotations
 

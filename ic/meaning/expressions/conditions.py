@@ -108,6 +108,17 @@ class Checks:
             self.fail(path)
             self.complaints.error(code, message, Label(place, causes[0] if causes else ""), help=check.help)
 
+    def observe(
+        self, values: tuple[Real, ...], act: Callable[[np.ndarray], None], place: Place, needs: tuple[str, ...] = ()
+    ) -> None:
+        """Call `act` with [n, k] values now, or once the cases are known where one of them varies: for warnings."""
+
+        def test(table: np.ndarray) -> tuple[np.ndarray, list[str]]:
+            act(table)
+            return np.zeros(len(table), bool), []
+
+        self.hold(values, test, code="", message="", place=place, needs=needs)
+
     def run(self, cases: dict[str, np.ndarray], count: int) -> None:
         """Every check that waited for the cases, over all of them; names the first case that fails one."""
         if not self._waiting or count == 0:

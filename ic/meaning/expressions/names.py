@@ -58,7 +58,7 @@ class Names:
             self.followed[text] = None
         worth = self._worth.get(text)
         if isinstance(worth, Problem):
-            raise worth  # which is told once, however often the name is used
+            raise worth  # reported once, however often the name is used
         if worth is not None:
             return worth
         if text in self._open:
@@ -161,7 +161,7 @@ class Names:
         """Every mistake in the deck's lets, used or not."""
         problems: list[Problem] = []
         for text, let in self.definitions.lets.items():
-            if len(problems) >= MOST:  # no more would be told, and each looks at all names for one that is near
+            if len(problems) >= MOST:  # no more would be reported, and each looks at all names for one that is near
                 break
             try:
                 if units.is_unit(text):

@@ -88,7 +88,7 @@ def resolve_arm(scope: Scope, definition: Definition) -> ResolvedArm | None:
 
 
 def check_arm(scope: Scope, definition: Definition) -> None:
-    """Tells what is wrong with an arm by itself, without payloads."""
+    """Report what is wrong with an arm by itself, without payloads."""
     arm = resolve_arm(scope, definition)
     if arm is not None and arm.free_of_errors:
         check_moved(scope, arm.links, arm.joints)

@@ -87,7 +87,7 @@ def _not_a_body(values: np.ndarray, kind: str) -> tuple[np.ndarray, list[str]]:
 
 def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint], payloads: Sequence[Payload] = ()) -> None:
     """Every joint that moves carries a link with mass, or a payload that is carried throughout, in every case; where
-    one does not, those behind it are not told.
+    one does not, those behind it are not reported.
 
     The joints make a tree.
     """
@@ -152,7 +152,7 @@ Loads = dict[str, list[tuple[str, Real]]]
 
 
 def carried_loads(scope: Scope, payloads: Sequence[Payload]) -> tuple[Loads, dict[str, list[str]]]:
-    """By link: path and mass of the payloads that it carries throughout, and what to tell of those that come or go."""
+    """By link: path and mass of the payloads that it carries throughout, and labels for those that come or go."""
     loads: Loads = {}
     passing: dict[str, list[str]] = {}
     for payload in payloads:

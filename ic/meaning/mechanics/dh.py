@@ -109,7 +109,7 @@ def use_dh(scope: Scope, owner: Owner, kind: str, item: Item, body: MergedBlock)
 
 
 def _refuse_others(scope: Scope, owner: Owner, item: Item, body: MergedBlock) -> None:
-    """Tells what says the joint's frame beside `dh`, and why what `dh` makes of it cannot vary by itself."""
+    """Report what says the joint's frame beside `dh`, and why what `dh` makes of it cannot vary by itself."""
     for name in INSTEAD:
         other = body.get(name)
         if other is not None:
@@ -130,7 +130,7 @@ def _numbers(owner: Owner) -> list[str]:
 
 
 def _convention(scope: Scope, item: Item) -> str | None:
-    """Name of the convention; None where it is none or its numbers have no names, which was told."""
+    """Name of the convention; None where it is none or its numbers have no names (already reported)."""
     name = word_of(item.value)
     if name in CONVENTIONS:
         if isinstance(item.value, Call) and item.value.positional:
@@ -141,8 +141,8 @@ def _convention(scope: Scope, item: Item) -> str | None:
         return name
     meant = OTHER_NAMES.get(name or "")
     helps = [f"write `{meant}`"] if meant else list(did_you_mean(name, CONVENTIONS)) if name else []
-    told = f"no Denavit-Hartenberg convention `{name}`" if name else "the name of a convention is needed here"
+    message = f"no Denavit-Hartenberg convention `{name}`" if name else "the name of a convention is needed here"
     scope.complaints.error(
-        "D180", told, place_of(item.value) if item.value is not None else item.place, help=[*helps, USAGE]
+        "D180", message, place_of(item.value) if item.value is not None else item.place, help=[*helps, USAGE]
     )
     return None

@@ -30,7 +30,7 @@ USAGE = "write `payload NAME { mass = 20 kg;  shape = sphere(radius = 0.2 m);  o
 
 
 def resolve_payloads(scope: Scope, block: MergedBlock, arm: ResolvedArm) -> tuple[Payload, ...]:
-    """The payloads of a run, in the deck's order, their numbers entered as parameters; what is wrong is told."""
+    """The payloads of a run, in the deck's order, their numbers entered as parameters; mistakes are reported."""
     found: list[Payload] = []
     for item in block.of_kind("payload"):
         with scope.complaints.gather():
@@ -102,7 +102,7 @@ def _payload(scope: Scope, item: Item, arm: ResolvedArm, taken: Collection[str])
 
 
 def _link(scope: Scope, owner: Owner, item: Item | None, arm: ResolvedArm) -> str | None:
-    """The link that carries it, as written; None where it is none of the arm's, which was told."""
+    """The link that carries it, as written; None where it is none of the arm's (already reported)."""
     known = [BASE, *(link.name for link in arm.links if link.name != BASE)]
     if item is None:
         scope.complaints.missing(
@@ -116,20 +116,25 @@ def _link(scope: Scope, owner: Owner, item: Item | None, arm: ResolvedArm) -> st
     name = item.value.text if isinstance(item.value, Name) else None
     if name in known or name in arm.failed:
         return name if name in known else None
-    told = f"no link `{name}` in arm `{arm.name}`" if name is not None else f"a link's name is needed for {owner.label}"
+    message = (
+        f"no link `{name}` in arm `{arm.name}`" if name is not None else f"a link's name is needed for {owner.label}"
+    )
     scope.complaints.error(
-        "D261", told, value_at(item), help=[*(did_you_mean(name, known) if name else ()), known_words("links", known)]
+        "D261",
+        message,
+        value_at(item),
+        help=[*(did_you_mean(name, known) if name else ()), known_words("links", known)],
     )
     return None
 
 
 def _check_unused(scope: Scope, item: Item, body: MergedBlock, grappled: bool) -> None:
-    """Tells of what has no meaning for a payload that is held from the start, or that is caught where it flies."""
+    """Report what has no meaning for a payload that is held from the start, or that is caught where it flies."""
     for name in ("rpy",) if grappled else tuple(each.name for each in FLIGHT):
         written = body.get(name)
         if written is None:
             continue
-        told, helps = (
+        message, helps = (
             f"payload `{item.name}` is held from the start",
             [
                 f"leave `{name}` out: `at` and `rpy` say where on its link it is",
@@ -138,7 +143,7 @@ def _check_unused(scope: Scope, item: Item, body: MergedBlock, grappled: bool) -
         )
         also = []
         if grappled:
-            told, helps = (
+            message, helps = (
                 f"payload `{item.name}` is held as it is when it is grappled",
                 [
                     f"leave `{name}` out: `attitude` and `rate` say how it flies before",
@@ -146,7 +151,7 @@ def _check_unused(scope: Scope, item: Item, body: MergedBlock, grappled: bool) -
                 ],
             )
             also = [Label(body.items["grapple"].place, "grappled here")]
-        scope.complaints.error("D263", f"{told}, so `{name}` has no effect", written.place, also=also, help=helps)
+        scope.complaints.error("D263", f"{message}, so `{name}` has no effect", written.place, also=also, help=helps)
 
 
 def _check_order(scope: Scope, item: Item, times: list[Real | None], place: Place) -> None:
@@ -207,7 +212,7 @@ def _not_solid(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 
 def _remark_time(scope: Scope, payload: Payload, event: str, time: float, structure: Structure, place: Place) -> None:
-    """Tells of what happens after the run's end, and of a time that is no instant of the dynamics."""
+    """Report events after the run's end, and times that are no instant of the dynamics."""
     schedule = structure.schedule
     does = f"payload `{payload.name}` is {event}d"
     if time > schedule.duration:

@@ -56,7 +56,7 @@ def word_written(wanted: Parameter, body: MergedBlock) -> str:
 def _check_unused(
     scope: Scope, owner: Owner, wanted: Parameter, only: Only, body: MergedBlock, words: Mapping[str, str]
 ) -> None:
-    """Tells a parameter that its word leaves out, unless that word was written over another, which may have had it."""
+    """Report a parameter that its word leaves out, unless that word was written over another, which may have had it."""
     item, word = body.get(wanted.name), body.get(only[0])
     if item is None or (word is not None and word.overrides):
         return
@@ -72,7 +72,7 @@ def _check_unused(
 
 
 def refuse_values(scope: Scope, expression: Expression | None, names: Iterable[str]) -> bool:
-    """Tells of values without a name, of which nobody can say what they are for; whether there are any."""
+    """Report values without a name, of which nobody can say what they are for; return True if there are any."""
     if not isinstance(expression, Call) or not expression.positional:
         return False
     name = word_of(expression)
@@ -90,7 +90,7 @@ def check_keys(
     owner: Owner,
     others: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
-    """Tells every entry of the body that is none of the known plain keys, and notes what it was meant for.
+    """Report every entry of the body that is none of the known plain keys, and note the key it was meant for.
 
     others  what to say of keys one expects
     """
@@ -127,9 +127,9 @@ def check_keys(
 
 
 def find_bare_model(scope: Scope, kind: models.Kind, item: Item, remedy: str) -> Any:
-    """The declaration that an entry names with nothing in parentheses or braces; None where that failed, and was told.
+    """The declaration that an entry names with nothing in parentheses or braces; None where that failed (reported).
 
-    remedy  what to write in the stead of parameters behind the name, with `{}` for the name
+    remedy  what to write in place of parameters behind the name, with `{}` for the name
     """
     name, place = word_of(item.value), place_of(item.value) if item.value is not None else item.place
     if name is not None and (isinstance(item.value, Call) or item.body is not None):
@@ -142,7 +142,7 @@ def find_bare_model(scope: Scope, kind: models.Kind, item: Item, remedy: str) ->
 
 
 def find_model(scope: Scope, kind: models.Kind, name: str | None, place: Place) -> Any:
-    """The declaration; None where there is none, which was told."""
+    """The declaration; None where there is none (already reported)."""
     if name is None:
         scope.complaints.error(
             "D143",
@@ -180,7 +180,7 @@ def use_model(
     for wanted in parameters:
         item = body.get(wanted.name)
         if wanted.only is not None and wanted.only[0] in wrong:
-            scope.checks.fail(owner.join(wanted.name))  # no word at all is told of where words are read
+            scope.checks.fail(owner.join(wanted.name))  # a missing word is reported where words are read
             continue
         if wanted.only is not None and not there(wanted, words):
             if wanted.name not in here:
@@ -203,7 +203,7 @@ def use_model(
 
 
 def body_of(scope: Scope, item: Item | None) -> MergedBlock:
-    """The block of an entry; an empty one where there is none, or a value in its place, which is told."""
+    """The block of an entry; an empty one where there is none, or a value in its place, which is reported."""
     if item is None:
         return MergedBlock()
     if item.body is None or item.value is not None:

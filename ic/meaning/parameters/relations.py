@@ -22,7 +22,7 @@ from met.plan import BASE
 def check_relations(
     scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: MergedBlock, values: Mapping[str, Any]
 ) -> None:
-    """Tells of parameters that do not go together; names of the arm apart, which `check_names` looks up."""
+    """Report parameters that do not go together; names of the arm apart, which `check_names` looks up."""
     for wanted in parameters:
         value, place, path = values[wanted.name], _place(owner, body, wanted.name), owner.join(wanted.name)
         if wanted.direction:
@@ -62,7 +62,7 @@ def check_names(
     known: Mapping[str, list[str]],
     failed: Iterable[str],
 ) -> dict[str, str]:
-    """Tells of words that should name a link or joint of the arm; the words, as written or by default.
+    """Report words that should name a link or joint of the arm; the words, as written or by default.
 
     known  what there is, by kind;  failed  names of which nothing can be said
     """
@@ -71,7 +71,7 @@ def check_names(
         item = body.get(wanted.name)
         named = isinstance(item.value, Name) if item is not None else isinstance(wanted.default, str)
         if not wanted.names or not named:
-            continue  # no word at all is told of where words are read
+            continue  # a missing word is reported where words are read
         word = item.value.text if item is not None and isinstance(item.value, Name) else str(wanted.default)
         names, place = [*known[wanted.names], *wanted.words], _place(owner, body, wanted.name)
         if word == WORLD and WORLD in known["link"] and WORLD not in words.values():

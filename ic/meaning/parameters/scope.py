@@ -109,9 +109,9 @@ class Scope:
         value: Value | None = None,
         record: bool = True,
     ) -> Real | None:
-        """The parameter's number; None where it could not be had, which was told.
+        """The parameter's number; None where it could not be had (already reported).
 
-        expression, value  what to take in the stead of the item's expression
+        expression, value  what to take in place of the item's expression
         """
         written = value
         if item is not None and value is None:
@@ -358,7 +358,7 @@ class Scope:
         self.auxiliary[path] = Settled(value, unit, origin, "", item.value if item is not None else None)
 
     def replace_values(self, values: Mapping[str, Real], item: Item) -> None:
-        """Puts values in the stead of settled ones, each made of all that the item writes: what varies one, varies
+        """Put values in place of settled ones, each made of all that the item writes: what varies one, varies
         all."""
         for path, value in values.items():
             settled = self.parameters[path]
@@ -441,7 +441,7 @@ class Scope:
         removed = self.removed.get(owner.join(wanted.name))
         lacks = removed or owner.place
         if any(self.complaints.is_known_to_lack(place, wanted.name) for place in (lacks, *bases)):
-            return  # which was told: of another use, or of a base, or another word was taken for it
+            return  # already reported: of another use, or of a base, or another word was taken for it
         self.complaints.known_missing.add((lacks, wanted.name))
         unit = owner.unit(wanted)[0]
         shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
@@ -546,7 +546,7 @@ class Scope:
         return value
 
     def _check_instead(self, owner: Owner, wanted: Parameter, value: Value, path: str) -> None:
-        """Tells of a value of the wrong dimension in place of the deck's; path: what has failed then."""
+        """Report a value of the wrong dimension in place of the deck's; path: what has failed then."""
         try:
             self.value_checks.dimension(owner, wanted, value)
         except Problem as problem:

@@ -57,7 +57,7 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Merged
 
 
 def tell_named_lists(scope: Scope, owner: Owner, lists: list[Parameter], body: MergedBlock) -> bool:
-    """Tells of a file's name that stands where a list does; whether one does."""
+    """Report a file's name that stands where a list should; return True if one does."""
     found = False
     for each in lists:
         item = body.get(each.name)

@@ -132,7 +132,7 @@ class ValueChecks:
         ]
 
     def _remark_cycles(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> None:
-        """Tells of a unit that may mean cycles where radians count, or the reverse."""
+        """Report a unit that may mean cycles where radians count, or the reverse."""
         if wanted.ticks:
             return
         found = doubt(value, text, measure_here(wanted.unit, owner.joint, owner.command, owner.of))
@@ -146,7 +146,7 @@ class ValueChecks:
             )
 
     def _remark_share(self, owner: Owner, wanted: Parameter, value: Value) -> None:
-        """Tells of a bare number above 1 where a share is meant, which may have been meant in per cent."""
+        """Report a bare number above 1 where a share is meant, which may have been meant in per cent."""
         if not wanted.share or not value.bare:
             return
         number = value.number

@@ -41,7 +41,7 @@ NOTHING = (0.0, 0.0, 0.0)
 
 
 def resolve_base(scope: Scope, item: Item | None, arm: ResolvedArm) -> tuple[Base | None, ResolvedArm]:
-    """The base, None where it is fixed or something failed, which was told; and the arm, which has it for a link where
+    """The base, None where it is fixed or failed (already reported); and the arm, which has it for a link where
     it moves."""
     scope.not_sweepable[BASE] = not_sweepable.chosen("write `vary base = [fixed, free];`")
     kind = word_of(item.value) if item is not None and item.value is not None else None
@@ -51,9 +51,9 @@ def resolve_base(scope: Scope, item: Item | None, arm: ResolvedArm) -> tuple[Bas
     if kind not in BASE_KINDS or item.appended:
         wrong = item.appended[0] if item.appended else item.value
         place = place_of(wrong) if wrong is not None else item.place
-        told = "a base is fixed, prescribed or free" if kind is None or item.appended else f"no base `{kind}`"
+        message = "a base is fixed, prescribed or free" if kind is None or item.appended else f"no base `{kind}`"
         meant = did_you_mean(kind, BASE_KINDS) if kind is not None and kind not in BASE_KINDS else ()
-        scope.complaints.error("D250", told, place, help=[*meant, USAGE])
+        scope.complaints.error("D250", message, place, help=[*meant, USAGE])
         return None, arm
     scope.keep_setting(BASE, kind, item=item)
     body = item.body or MergedBlock()
@@ -117,12 +117,12 @@ def initial_base(scope: Scope, body: MergedBlock, base: Base | None) -> None:
             assert place is not None  # a base that moves comes from a deck
             scope.vector(Owner("the base", place, f"initial.{BASE}"), wanted, item)
         elif item is not None:
-            told = "a fixed base stays at the world's origin"
+            message = "a fixed base stays at the world's origin"
             help = "write `base = free;`, or put the arm elsewhere: `at` and `rpy` of the joints on the base"
             if base is not None:
-                told = "a prescribed base begins where its courses do"
+                message = "a prescribed base begins where its courses do"
                 help = f"leave it out; `base = prescribed {{ ... }}` says where it is: {', '.join(COMPONENTS)}"
-            scope.complaints.error("D255", f"{told}, so `{item.name}` has no effect", item.place, help=help)
+            scope.complaints.error("D255", f"{message}, so `{item.name}` has no effect", item.place, help=help)
 
 
 def held_by(arm: ResolvedArm, payloads: Sequence[Payload]) -> dict[str, str]:
@@ -132,7 +132,7 @@ def held_by(arm: ResolvedArm, payloads: Sequence[Payload]) -> dict[str, str]:
     found = {}
     for name in held:
         last = name
-        for _ in held:  # as many steps as there can be: joints that go round were told of
+        for _ in held:  # as many steps as there can be: joints in a circle are reported already
             last = held.get(last, last)
         found[name] = last
     return found
@@ -147,7 +147,7 @@ def remark_ground(
     values: Mapping[str, Any],
     payloads: Sequence[Payload],
 ) -> None:
-    """Tells of an environment model that acts upon links none of which yields to it."""
+    """Report an environment model that acts upon links none of which yields to it."""
     if environment.pushes is None or (base is not None and base.kind == "free"):
         return
     keys = environment.pushes(SimpleNamespace(**values))
@@ -187,7 +187,7 @@ def _standing(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:
 
 
 def _courses(scope: Scope, item: Item, body: MergedBlock) -> tuple[Course, ...]:
-    """The courses of the components that are written, in order; what is wrong is told."""
+    """The courses of the components that are written, in order; mistakes are reported."""
     owner = Owner("a prescribed base", item.place, BASE)
     check_keys(scope, body, COMPONENTS, owner)
     if not any(name in body.items for name in COMPONENTS) and not body.items:
@@ -223,15 +223,15 @@ def _course(scope: Scope, item: Item) -> str | None:
         )
         return None
     inner: Expression = course_named(scope, item.value)
-    told = f"`{item.name}` of the base"
+    label = f"`{item.name}` of the base"
     spot = Owner(
-        told,
+        label,
         item.place,
         f"{BASE}.{item.name}",
         homes=item.homes,
         joint=component(item.name).kind,
         command="position",
-        called=told,
+        called=label,
     )
     model = use_course(
         scope, spot, inner, item, doc=f"{item.name} of the base", column=item.name, kind="component", body=item.body
@@ -245,7 +245,7 @@ def _course(scope: Scope, item: Item) -> str | None:
 
 
 def _check_jumps(scope: Scope, item: Item, model: str, place: Place) -> None:
-    """A base does not jump; where its rate does, the arm is not struck, which is told."""
+    """A base does not jump; where its rate does, the impulse on the arm is left out, with a warning."""
     profile, head = models.find("command", model, place), f"{BASE}.{item.name}."
     values = {path.removeprefix(head): each.value for path, each in scope.parameters.items() if path.startswith(head)}
     words: Mapping[str, object] = {name: value for name, value in values.items() if isinstance(value, str)}

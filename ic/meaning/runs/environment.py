@@ -94,7 +94,7 @@ def _environment_use(
     if environment is None or refuse_values(scope, item.value, [p.name for p in environment.written]):
         return None
     body = item.body or MergedBlock()
-    # a payload called `world` was told of, and is no reason to tell of those that mean the ground
+    # a payload called `world` is already reported, and is no reason to report uses that mean the ground
     bodies = [*(link.name for link in arm.links), *(each.name for each in payloads if each.name != WORLD)]
     failed = (*arm.failed, *(each.name for each in payloads if each.name == WORLD))
     known = {"joint": [joint.name for joint in arm.moving], "link": bodies}
@@ -102,7 +102,7 @@ def _environment_use(
     about = next((named[p.name] for p in environment.parameters if p.names == "joint" and p.name in named), None)
     if about is not None:  # what the unit words `joint` and `effort` mean
         kinds = {joint.name: joint.kind for joint in arm.moving}
-        if about not in kinds:  # which was told: without its joint, nothing can be said of the model's units
+        if about not in kinds:  # already reported: without its joint, nothing can be said of the model's units
             check_keys(scope, body, [each.name for each in environment.written], owner)
             scope.checks.fail(owner.path)
             return EnvironmentUse(item.name, environment.name, None, item.place)

@@ -49,10 +49,10 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
                 continue
             if listed is not None and len(listed.items) != len(arm.moving):
                 given, moving = len(listed.items), len(arm.moving)
-                told = f"{given} number{'s' * (given != 1)} for {moving} joint{'s' * (moving != 1)}"
+                message = f"{given} number{'s' * (given != 1)} for {moving} joint{'s' * (moving != 1)}"
                 names = ", ".join(joint.name for joint in arm.moving)
                 helps = f"one for each moving joint, in the arm's order, or one for all: {names}"
-                scope.complaints.error("D071", told, listed.place, help=helps)
+                scope.complaints.error("D071", message, listed.place, help=helps)
                 continue
         for n, joint in enumerate(arm.moving):
             own = body.get(f"{joint.name}.{name}")

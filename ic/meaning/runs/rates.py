@@ -79,7 +79,7 @@ def resolve_schedule(
                 "no rate of the servos",
                 help="write `servos = 1 kHz;`, or a `rate` in each servo's definition",
             )
-    if dynamics is None:  # which was told: nothing is said of rates, and what does not depend on them is looked at
+    if dynamics is None:  # already reported: nothing is said of rates, and what does not depend on them is looked at
         ticks = {use.joint: Ticks(1, continuous=False) for use in uses}
         return Schedule(ANY_RATE, 1, 1, ANY_RATE), ticks, dict.fromkeys((each.path for each in ticking), 1)
     shared = rates.get("servos")

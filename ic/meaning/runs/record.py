@@ -1,4 +1,4 @@
-"""What a run tells: recorded channels, metrics, and requirements on metrics."""
+"""The outputs of a run: recorded channels, metrics, and requirements on metrics."""
 
 from __future__ import annotations
 
@@ -259,7 +259,7 @@ class WrittenRequirement:
 
 
 def read_requirements(scope: Scope, block: MergedBlock) -> list[WrittenRequirement]:
-    """Every `require` that compares a metric of the run with a limit; tells of the others."""
+    """Every `require` that compares a metric of the run with a limit; reports the others."""
     written = {item.name for item in block.of_kind("metric")}
     found = []
     for position, statement in enumerate(block.statements):
@@ -318,7 +318,7 @@ def resolve_requirements(scope: Scope, read: list[WrittenRequirement], structure
     found = []
     for each in read:
         if each.metric not in metrics:
-            continue  # the metric failed, which was told
+            continue  # the metric failed (already reported)
         owner = Owner("", each.statement.place, "require", called=f"the limit on `{each.metric}`")
         wanted = Parameter(name="limit", unit=metrics[each.metric], doc="limit", share=each.metric in shares)
         number = _limit(scope, owner, wanted, each.limit)

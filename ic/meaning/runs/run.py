@@ -62,7 +62,7 @@ class Resolved:
 
 
 def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
-    """The run; None where something of it is wrong, which was told."""
+    """The run; None where something of it is wrong (already reported)."""
     block = scope.definitions.block(definition)
     if block is None:
         return None
@@ -76,8 +76,8 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     rates = resolve_rates(scope, run, block.get("rates"))
     duration = scope.constant(run, DURATION, block.items["duration"]) if "duration" in block.items else None
     if "duration" not in block.items:
-        told = f"{run.label} has no duration"
-        scope.complaints.missing(run.place, ("duration",), "D107", told, help="write `duration = 10 s;`")
+        message = f"{run.label} has no duration"
+        scope.complaints.missing(run.place, ("duration",), "D107", message, help="write `duration = 10 s;`")
     if arm is None:
         return None
     scope.failed_parts = arm.failed
@@ -102,7 +102,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         check_rest(scope, use)
         check_start(scope, use)
     schedule, ticks, others = resolve_schedule(scope, run, block, rates, uses, [*guides, *sensors], duration)
-    # else a mistake in one of them was told: what depends on it is not looked at, and all else is
+    # else a mistake in one of them is reported: checks that depend on it are left out, all others are made
     known = integrator is not None and "dynamics" in rates
     integrator = integrator or models.find_own("integrator")["modified_euler"]
     check_ticks(scope, substitutions, ticks, schedule)
@@ -120,7 +120,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
             if x is not None:
                 fastest[use.joint] = (use, x)
     stability: dict[str, Real] = {}
-    for use, x in sorted(fastest.values(), key=lambda each: -scope.checks.first(each[1])):  # the worst is told
+    for use, x in sorted(fastest.values(), key=lambda each: -scope.checks.first(each[1])):  # the worst is reported
         h_lambda = check_stability(
             scope, f"servo `{use.definition}`", x, schedule, integrator, rates["dynamics"], f"{use.joint}.servo"
         )
