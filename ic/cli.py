@@ -234,7 +234,7 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
         else:
             _print(text())
         return
-    found = print_models.chosen(words)
+    found = print_models.selected_models(words)
     if form == "json":
         _print_json([print_models.model_json(kind, model) for kind, model in found])
     elif not words or (words[0].removesuffix("s") in models.GROUPS and len(words) == 1):

@@ -26,11 +26,11 @@ def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet
     `arm panda from urdf("panda.urdf") { ... }`.
     """
     from ic.beginnings.files import put
-    from ic.driver.import_robot import imported
+    from ic.driver.import_robot import import_robot
 
     if force and output is None:
         raise click.UsageError("--force is for -o: nothing is written without it")
-    text = imported(file, mimic)  # type: ignore[arg-type]  # click has seen to it
+    text = import_robot(file, mimic)  # type: ignore[arg-type]  # click has seen to it
     if output is None:
         say(text, end="", exact=True)
         return

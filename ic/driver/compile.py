@@ -18,7 +18,7 @@ from ic.meaning.mechanics.arm import check_arm, resolve_arm
 from ic.meaning.parameters.scope import Scope
 from ic.read import in_order, read, read_again
 from ic.sweeps.effects import Effects
-from ic.sweeps.groups import DeckSource, ScopedExperiment, lower
+from ic.sweeps.groups import DeckSource, ScopedExperiment, experiments_of
 from ic.sweeps.settings import Settings
 from ic.text.complaints import Complaints, known_words
 from ic.text.lexer import COMMAND_LINE
@@ -86,11 +86,11 @@ def compile_deck(
         for kind in ("arm", "servo", "run"):
             for definition in definitions.of_kind(kind).values():
                 definitions.block(definition)
-        asked = chosen(definitions, complaints, select)
+        asked = asked_definitions(definitions, complaints, select)
         for definition in asked:
             groups: list[ScopedExperiment] = []
             with complaints.gather():
-                groups = lower(source, definition)
+                groups = experiments_of(source, definition)
             source.effects.complete &= bool(groups)
             experiments += (made for made, _ in groups)
             scopes += (scope for _, scope in groups)
@@ -134,7 +134,7 @@ def _with_settings(deck: Deck, settings: Sequence[str], complaints: Complaints) 
     return deck, ()
 
 
-def chosen(definitions: Definitions, complaints: Complaints, select: Select) -> list[Definition]:
+def asked_definitions(definitions: Definitions, complaints: Complaints, select: Select) -> list[Definition]:
     """The runs and sweeps that are asked for: by name, all, or the deck's only one, or the one marked `default`.
 
     A deck's own come before those of files that it includes, whatever these mark.

@@ -68,7 +68,7 @@ def explain(
     compiled = check(path, include_dirs=tuple(include_dirs), defines=tuple(defines), select=select)
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)
-    found = tuple(explained(compiled, target))
+    found = tuple(explanations_of(compiled, target))
     if not found:
         known = list(
             dict.fromkeys(
@@ -82,7 +82,7 @@ def explain(
     return found
 
 
-def in_full(compiled: Compiled, number: int = 0) -> Experiment:
+def with_all_settings(compiled: Compiled, number: int = 0) -> Experiment:
     """An experiment of a deck, with settings and what parameters are made of as if these were parameters."""
     assert compiled.plan is not None
     experiment, scope = compiled.plan.experiments[number], compiled.scopes[number]
@@ -100,7 +100,7 @@ def in_full(compiled: Compiled, number: int = 0) -> Experiment:
     return replace(experiment, parameters=parameters, formulas=Formulas.of(scope.graph, outputs))
 
 
-def explained(compiled: Compiled, target: str) -> Iterator[Explanation]:
+def explanations_of(compiled: Compiled, target: str) -> Iterator[Explanation]:
     """The explanations of a deck that is compiled."""
     assert compiled.plan is not None
     for experiment, scope in zip(compiled.plan.experiments, compiled.scopes, strict=True):

@@ -23,7 +23,7 @@ from met.diagnostic import Diagnostic, Problem
 Mimic = Literal["free", "fixed"]
 
 
-def imported(path: str, mimic: Mimic | None = None) -> str:
+def import_robot(path: str, mimic: Mimic | None = None) -> str:
     """The deck's text. mimic: what joints that follow others do instead. Raises Problem, with the file's text."""
     files = Files()
     try:

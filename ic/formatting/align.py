@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from ic.formatting.begins import goes_on, stands_below
-from ic.formatting.pieces import RowPiece, gap
+from ic.formatting.pieces import RowPiece, blanks_between
 from ic.formatting.rows import BLANK, CODE, REMARK, Row
 
 REACH = 3  # lines: two that are aligned may have as many less one between them
@@ -242,6 +242,6 @@ def neighbours(found: Sequence[Row]) -> Iterator[tuple[int, int]]:
 def _is_wide(pieces: Sequence[RowPiece], at: int) -> bool:
     """Return True if this piece is set apart. Behind a `[` one blank does that, as in `[ 90, 5]` below `[-90, 5]`."""
     before, piece = pieces[at - 1], pieces[at]
-    needed = gap(before, piece)
+    needed = blanks_between(before, piece)
     least = 1 if before.text == "[" or (before.kind == "open" and piece.kind == "number") else 2
     return at > 0 and piece.kind != "stop" and piece.gap > needed and piece.gap >= least

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 from ic.formatting.align import Groups, Node, aligned, offset
 from ic.formatting.begins import goes_on, stands_below
-from ic.formatting.pieces import gap
+from ic.formatting.pieces import blanks_between
 from ic.formatting.rows import BLANK, BLANKS, CODE, REMARK, TAB, Row
 
 BEFORE_COMMENT = 2
@@ -129,7 +129,7 @@ def _steps(at: int, row: Row, groups: Groups) -> list[tuple[int, Node | None, in
         before, piece = row.pieces[i - 1 : i + 1]
         group = groups.group((at, i))
         inside = offset(piece, groups.anchors[group]) if group is not None else 0
-        distance = len(before.text) + gap(before, piece) + ((at, i) in groups.unsigned)
+        distance = len(before.text) + blanks_between(before, piece) + ((at, i) in groups.unsigned)
         own = piece.column - row.pieces[0].column if (at, i) in groups.met else 0
         steps.append((distance, group, inside, own))
     return steps

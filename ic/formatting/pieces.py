@@ -151,7 +151,7 @@ def _unit(parser: Expressions, at: int, before: RowPiece) -> int:
     return 0 if product is None else product[1] - at
 
 
-def gap(before: RowPiece, piece: RowPiece) -> int:
+def blanks_between(before: RowPiece, piece: RowPiece) -> int:
     """The number of blanks between two pieces of a line that are not aligned with anything."""
     wanted = _wanted(before, piece)
     own = min(piece.gap, 1)

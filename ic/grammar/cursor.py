@@ -25,7 +25,7 @@ class EndedInsideBlock(Exception):
     """The tokens ended inside a block, and that has been said."""
 
 
-def found(token: Token) -> str:
+def token_in_words(token: Token) -> str:
     if token.kind == END:
         return "the end of the deck" if token.source.name != COMMAND_LINE else "the end of the line"
     text = token.text if len(token.text) <= SHOWN else token.text[: SHOWN - 3] + "..."
@@ -101,7 +101,7 @@ class Cursor:
         raise Unreadable
 
     def unexpected(self, wanted: str, help: str | Iterable[str] = ()) -> NoReturn:
-        self.fail("D020", f"expected {wanted}, found {found(self.token)}", self.token, help=help)
+        self.fail("D020", f"expected {wanted}, found {token_in_words(self.token)}", self.token, help=help)
 
     def behind(self, token: Token) -> Place:
         """The place just behind a token, where something is missing."""
@@ -125,7 +125,7 @@ class Cursor:
         if self.token.text != closing:
             expected = f"{wanted}`{closing}`"
             label = Label(opening.place, f"to close this `{opening.text}`")
-            self.fail("D022", f"expected {expected}, found {found(self.token)}", self.token, also=(label,))
+            self.fail("D022", f"expected {expected}, found {token_in_words(self.token)}", self.token, also=(label,))
         self.open.pop()
         return self.advance()
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from ic.grammar.cursor import found, span
+from ic.grammar.cursor import span, token_in_words
 from ic.grammar.quantities import Quantities
 from ic.grammar.syntax import (
     Binary,
@@ -286,7 +286,7 @@ class Expressions(Quantities):
             self.advance()
             return True
         if self.begins_value() and not self.begins_entry(self.at) and token.kind != BAD:
-            self.tell("D024", f"a `,` is missing before {found(token)}", self.behind(self.previous))
+            self.tell("D024", f"a `,` is missing before {token_in_words(token)}", self.behind(self.previous))
             return True
         if token.text == "=":
             self.unexpected(f"`,` or `{closing}`", help="to compare, write `==`")

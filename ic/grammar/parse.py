@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from itertools import takewhile
 
-from ic.grammar.cursor import OPENING, SHOWN, EndedInsideBlock, Unreadable, found, span
+from ic.grammar.cursor import OPENING, SHOWN, EndedInsideBlock, Unreadable, span, token_in_words
 from ic.grammar.expressions import Expressions
 from ic.grammar.syntax import Broken, Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, Token
@@ -251,10 +251,10 @@ class _Parser(Expressions):
     def replaced_name(self) -> None:
         """A macro has put its body where the name of a `let` stands: `-D height=2` and `let height = ...`."""
         step = self.token.expansions[-1]
-        message = f"the macro `{step.macro}` has put {found(self.token)} in the place of this name"
+        message = f"the macro `{step.macro}` has put {token_in_words(self.token)} in the place of this name"
         helps: tuple[str, ...] = ("give one of the two another name",)
         if self.token.source.name == COMMAND_LINE:
-            message = f"`-D {step.macro}` has put {found(self.token)} in the place of this name"
+            message = f"`-D {step.macro}` has put {token_in_words(self.token)} in the place of this name"
             helps = (
                 "-D defines a macro, as #define does; it does not set a `let`",
                 f"`--set '{step.macro}=VALUE'` does, with its unit",

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ic.driver.compile import Compiled
-from ic.driver.explain import explained, in_full
+from ic.driver.explain import explanations_of, with_all_settings
 from ic.printing.explain import NO_MORE, explain_json, find_paths, print_explain, with_settings
 from met.diagnostic import Label, Problem
 from met.frozen import frozen
@@ -37,7 +37,7 @@ class ExplainedExperiment:
     def names_of(self, path: str) -> tuple[Label, ...]:
         if self.compiled is None:
             return ()
-        return next((found.names for found in explained(self.compiled, path)), ())
+        return next((found.names for found in explanations_of(self.compiled, path)), ())
 
 
 def print_explained(sources: Sources, path: str) -> Iterator[str]:
@@ -77,7 +77,7 @@ def _found(sources: Sources, path: str) -> list[ExplainedExperiment]:
             raise
         made = []
         for number, experiment in enumerate(plan.experiments):
-            whole = with_settings(experiment if compiled is None else in_full(compiled, number))
+            whole = with_settings(experiment if compiled is None else with_all_settings(compiled, number))
             found = ExplainedExperiment(whole, plan, compiled, number, True)
             try:
                 find_paths(whole, path, found.known)

@@ -16,7 +16,7 @@ from met.parameter import Parameter
 from met.plan.channel import of_bed, of_law, watched_unit
 
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
-HOW = {
+WHERE_WRITTEN = {
     "servo": "servo NAME { model = MODEL; ... }",
     "sensor": "sensor QUANTITY = MODEL { ... }, in a servo: of q, qd or a state of the servo; of a link in a run",
     "command": "command = rate(MODEL(...)), position(...), torque(...) or acceleration(...), in a servo",
@@ -39,10 +39,10 @@ OTHERS = (*OF_LANGUAGE, "channels", "designs", "dh", "distributions", "functions
 FIELDS = tuple(field.name for field in fields(Parameter))
 """The fields of a parameter that `met doc --format json` gives."""
 
-OF = {"metric": "the unit of the channel that the metric watches", "sensor": "the unit of what is sensed"}
+MEANING_OF_OF = {"metric": "the unit of the channel that the metric watches", "sensor": "the unit of what is sensed"}
 """The meaning of the word `of` in units, by kind of model."""
 
-WORDS = {
+UNIT_WORDS = {
     "joint": "rad, or m on a prismatic joint",
     "effort": "N*m, or N on a prismatic joint",
     "of": "the unit of what is watched, or sensed",
@@ -50,7 +50,7 @@ WORDS = {
 }
 
 
-def chosen(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
+def selected_models(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
     """The models that `met doc` is asked for: all, those of a kind, one of a kind, or all of one name. Raises D171."""
     everything = [(kind, model) for kind in KINDS for model in models.available(kind).values()]
     if not words:
@@ -76,7 +76,7 @@ def print_list(found: list[tuple[models.Kind, Any]]) -> Iterator[str]:
     for kind in KINDS:
         listed = [(model.name, summary(model)) for k, model in found if k == kind]
         if listed:
-            yield f"{kind}: {HOW[kind]}"
+            yield f"{kind}: {WHERE_WRITTEN[kind]}"
             yield from columns(listed)
             yield ""
     yield "`met doc MODEL` says all that one declares; `met doc channels` what can be recorded."
@@ -90,15 +90,15 @@ def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
     yield f"{kind} {model.name}"
     yield from (f"  {line}".rstrip() for line in textwrap.dedent(model.doc).strip().splitlines())
     yield ""
-    yield f"In a deck: {how(kind, model)}"
-    yield from facts(kind, model)
+    yield f"In a deck: {where_written(kind, model)}"
+    yield from declared_facts(kind, model)
     parameters = models.written(model)
     if parameters:
         yield ""
         yield "Parameters"
         yield from columns(rows(parameters))
     yield from (f"  {word}: {text}" for word, text in words_in(kind, parameters))
-    for text, parts in shown_of(kind, model):
+    for text, parts in recorded_channels(kind, model):
         yield ""
         yield text
         yield from columns(parts)
@@ -122,13 +122,13 @@ def rows(parameters: Iterable[Parameter]) -> list[tuple[str, str, str, str, str]
     return [("name", "unit", "default", "range", "meaning"), *rows]
 
 
-def how(kind: models.Kind, model: Any) -> str:
+def where_written(kind: models.Kind, model: Any) -> str:
     """The place in a deck where this model is written, in words."""
-    usage = ON_LINK if kind == "sensor" and model.measures is not None else HOW[kind]
+    usage = ON_LINK if kind == "sensor" and model.measures is not None else WHERE_WRITTEN[kind]
     return usage.replace("MODEL", model.name)
 
 
-def shown_of(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
+def recorded_channels(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
     """Channels of a servo, guide, sensor of a link, bed or law: in words, then name, unit and meaning of each."""
     for words, text in (
         ("outputs", "Given by its law, at its ticks"),
@@ -151,7 +151,7 @@ def shown_of(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[st
         yield f"Held from tick to tick; recorded as JOINT.{kind}.NAME", rows
 
 
-def facts(kind: models.Kind, model: Any) -> Iterator[str]:
+def declared_facts(kind: models.Kind, model: Any) -> Iterator[str]:
     """Further facts that a model declares, in a line each."""
     for words, text in (
         ("commands", "Commands it takes"),
@@ -165,14 +165,15 @@ def facts(kind: models.Kind, model: Any) -> Iterator[str]:
     if kind == "sensor" and model.unit:
         yield f"Unit of what it reads: {model.unit}"
     if kind == "metric":
-        meant = WORDS | {"of": OF["metric"]}
+        meant = UNIT_WORDS | {"of": MEANING_OF_OF["metric"]}
         yield f"Unit of the result: {meant.get(model.unit, unit_in_words(model.unit))}"
 
 
 def words_in(kind: models.Kind, parameters: tuple[Parameter, ...]) -> Iterator[tuple[str, str]]:
     """The words in units that the use decides, and what they stand for."""
-    used = {word for p in parameters for word in WORDS if word in re.split(r"\W+", p.unit)}
-    return ((word, OF.get(kind, text) if word == "of" else text) for word, text in WORDS.items() if word in used)
+    used = {word for p in parameters for word in UNIT_WORDS if word in re.split(r"\W+", p.unit)}
+    meanings = {**UNIT_WORDS, "of": MEANING_OF_OF.get(kind, UNIT_WORDS["of"])}
+    return ((word, text) for word, text in meanings.items() if word in used)
 
 
 def summary(model: Any) -> str:

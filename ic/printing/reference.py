@@ -11,7 +11,17 @@ from ic.language import BLOCKS
 from ic.meaning.mechanics import dh, shapes
 from ic.printing import subjects, sweeps
 from ic.printing.language import type_of
-from ic.printing.models import HOW, KINDS, default, facts, how, rows, shown_of, unit_in_words, words_in
+from ic.printing.models import (
+    KINDS,
+    WHERE_WRITTEN,
+    declared_facts,
+    default,
+    recorded_channels,
+    rows,
+    unit_in_words,
+    where_written,
+    words_in,
+)
 from met import models
 
 HEAD = """\
@@ -40,7 +50,7 @@ def page() -> Iterator[str]:
         yield ""
         yield f"## {_title(kind)}"
         yield ""
-        yield f"In a deck: {_code(HOW[kind])}"
+        yield f"In a deck: {_code(WHERE_WRITTEN[kind])}"
         for model in models.find_own(kind).values():
             yield ""
             yield from _model(kind, model)
@@ -89,8 +99,8 @@ def _model(kind: models.Kind, model: Any) -> Iterator[str]:
     yield ""
     yield from _prose(model.doc)
     yield ""
-    yield f"In a deck: {_code(how(kind, model))}"
-    yield from (f"\n{_escaped(fact)}" for fact in facts(kind, model))
+    yield f"In a deck: {_code(where_written(kind, model))}"
+    yield from (f"\n{_escaped(fact)}" for fact in declared_facts(kind, model))
     parameters = models.written(model)
     if parameters:
         yield ""
@@ -99,7 +109,7 @@ def _model(kind: models.Kind, model: Any) -> Iterator[str]:
     if words:
         yield ""
         yield ". ".join(words) + "."
-    for text, parts in shown_of(kind, model):
+    for text, parts in recorded_channels(kind, model):
         yield ""
         yield f"{_escaped(text)}:"
         yield ""

@@ -14,7 +14,7 @@ from ic.meaning.control.substitution import DEFAULTS
 from ic.meaning.mechanics import dh, shapes
 from ic.printing.columns import columns, exactly
 from ic.printing.language import block_json, print_block
-from ic.printing.models import FIELDS, OF_LANGUAGE, WORDS, default, rows, summary, unit_in_words
+from ic.printing.models import FIELDS, OF_LANGUAGE, UNIT_WORDS, default, rows, summary, unit_in_words
 from ic.printing.sweeps import print_words, words_json
 from met import models, units
 from met.plan import channel
@@ -77,7 +77,7 @@ def print_channels() -> Iterator[str]:
 def words_of(found: list[dict[str, str]]) -> list[tuple[str, str]]:
     """The words in the units of channels that the joint decides, and what they stand for."""
     used = {word for each in found for word in each["unit"].replace("*", "/").split("/")}
-    return [(word, text) for word, text in {**WORDS, **MORE_WORDS}.items() if word in used]
+    return [(word, text) for word, text in {**UNIT_WORDS, **MORE_WORDS}.items() if word in used]
 
 
 def print_dh() -> Iterator[str]:

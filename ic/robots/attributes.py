@@ -20,7 +20,7 @@ def shown(text: str) -> str:
     return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
 
 
-def one(element: Element, tag: str) -> Element | None:
+def only_child(element: Element, tag: str) -> Element | None:
     """The element of this tag inside, None where there is none. Raises Problem D204 where there are two."""
     found = list(element.all(tag))
     if len(found) > 1:
@@ -36,9 +36,9 @@ def one(element: Element, tag: str) -> Element | None:
     return found[0] if found else None
 
 
-def needed(element: Element, tag: str, usage: str) -> Element:
+def required_child(element: Element, tag: str, usage: str) -> Element:
     """The same, which must be there. Raises Problem D205."""
-    found = one(element, tag)
+    found = only_child(element, tag)
     if found is None:
         raise Problem(error("D205", f"this `<{element.tag}>` has no `<{tag}>`", element.place, help=f"write `{usage}`"))
     return found
@@ -105,14 +105,14 @@ def number(element: Element, attribute: str) -> Numbers:
     return found
 
 
-def lenient(element: Element, attribute: str) -> float | None:
+def number_or_none(element: Element, attribute: str) -> float | None:
     """A number that nothing is computed from; None where there is none."""
     text = element.attributes.get(attribute, "").strip()
     value = float(text) if _NUMBER.fullmatch(text) else math.inf
     return value + 0.0 if math.isfinite(value) else None
 
 
-def known(element: Element, attributes: Iterable[str]) -> None:
+def refuse_unknown(element: Element, attributes: Iterable[str]) -> None:
     """Raises Problem D208 for an attribute that is none of these, unless all of it is 0: it might say where something
     is, or how heavy."""
     names = list(attributes)

@@ -8,7 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from ic.robots.attributes import XACRO, known, lenient, needed, number, numbers, one, shown, word
+from ic.robots.attributes import (
+    XACRO,
+    number,
+    number_or_none,
+    numbers,
+    only_child,
+    refuse_unknown,
+    required_child,
+    shown,
+    word,
+)
 from ic.robots.robot import TYPES, Inertial, Joint, Link, Numbers, Robot
 from ic.robots.xml import Element, parse
 from ic.text.complaints import Complaints, known_words
@@ -101,17 +111,17 @@ def _drop(element: Element, dropped: dict[str, list[Place]]) -> None:
 def _link(element: Element, dropped: dict[str, list[Place]]) -> Link:
     name = word(element, "name", '<link name="...">')
     _drop(element, dropped)
-    inertial = one(element, "inertial")
+    inertial = only_child(element, "inertial")
     return Link(name, None if inertial is None else _inertial(inertial, dropped))
 
 
 def _inertial(element: Element, dropped: dict[str, list[Place]]) -> Inertial:
     _drop(element, dropped)
     com, rpy = _origin(element)
-    mass = needed(element, "mass", '<mass value="..."/>')
-    known(mass, ("value",))
-    inertia = needed(element, "inertia", '<inertia ixx="..." iyy="..." izz="..." ixy="0" ixz="0" iyz="0"/>')
-    known(inertia, MOMENTS)
+    mass = required_child(element, "mass", '<mass value="..."/>')
+    refuse_unknown(mass, ("value",))
+    inertia = required_child(element, "inertia", '<inertia ixx="..." iyy="..." izz="..." ixy="0" ixz="0" iyz="0"/>')
+    refuse_unknown(inertia, MOMENTS)
     moments = [number(inertia, each) if each in MOMENTS[:3] else numbers(inertia, each, 1) for each in MOMENTS]
     values = tuple(0.0 if moment is None else moment.values[0] for moment in moments)
     each = tuple(inertia.place if moment is None else moment.place for moment in moments)
@@ -120,10 +130,10 @@ def _inertial(element: Element, dropped: dict[str, list[Place]]) -> Inertial:
 
 def _origin(element: Element) -> tuple[Numbers | None, Numbers | None]:
     """xyz and rpy of the `<origin>` inside."""
-    origin = one(element, "origin")
+    origin = only_child(element, "origin")
     if origin is None:
         return None, None
-    known(origin, ("xyz", "rpy"))
+    refuse_unknown(origin, ("xyz", "rpy"))
     return numbers(origin, "xyz", 3), numbers(origin, "rpy", 3)
 
 
@@ -132,13 +142,13 @@ def _joint(element: Element, dropped: dict[str, list[Place]]) -> Joint:
     kind = word(element, "type", '<joint name="..." type="revolute">')
     _drop(element, dropped)
     at, rpy = _origin(element)
-    parent = word(needed(element, "parent", '<parent link="..."/>'), "link", '<parent link="..."/>')
-    child = word(needed(element, "child", '<child link="..."/>'), "link", '<child link="..."/>')
-    axis = one(element, "axis")
+    parent = word(required_child(element, "parent", '<parent link="..."/>'), "link", '<parent link="..."/>')
+    child = word(required_child(element, "child", '<child link="..."/>'), "link", '<child link="..."/>')
+    axis = only_child(element, "axis")
     if axis is not None:
-        known(axis, ("xyz",))
-    limit, dynamics, mimic = one(element, "limit"), one(element, "dynamics"), one(element, "mimic")
-    limits = {} if limit is None else {name: lenient(limit, name) for name in LIMITS}
+        refuse_unknown(axis, ("xyz",))
+    limit, dynamics, mimic = only_child(element, "limit"), only_child(element, "dynamics"), only_child(element, "mimic")
+    limits = {} if limit is None else {name: number_or_none(limit, name) for name in LIMITS}
     friction = _friction(dynamics)
     law = ""
     if mimic is not None:

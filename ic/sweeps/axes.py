@@ -22,9 +22,17 @@ from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, measure_of
-from ic.sweeps.choices import MACRO, Chosen, check_still, chosen, decides, path_place, refuse_words
+from ic.sweeps.choices import (
+    MACRO,
+    ChoiceColumn,
+    check_constant,
+    choice_column,
+    decides_structure,
+    path_place,
+    refuse_words,
+)
 from ic.sweeps.designs import DESIGNS, read_sample
-from ic.text.complaints import Complaints, belongs, known_words
+from ic.text.complaints import Complaints, known_words, where_it_belongs
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
@@ -34,7 +42,7 @@ MOST_CASES = 10_000_000
 MOST_COUNTED = 16  # axes that are read of a sweep that has too many cases
 KNOWN = tuple(entry.name for entry in SWEEP.entries)
 
-Column = VariedPath | Chosen
+Column = VariedPath | ChoiceColumn
 
 
 @frozen
@@ -71,8 +79,8 @@ class Sweep:
         return tuple(column for axis in self.axes for column in axis.columns if isinstance(column, VariedPath))
 
     @property
-    def chosen(self) -> tuple[Chosen, ...]:
-        return tuple(column for axis in self.axes for column in axis.columns if isinstance(column, Chosen))
+    def chosen(self) -> tuple[ChoiceColumn, ...]:
+        return tuple(column for axis in self.axes for column in axis.columns if isinstance(column, ChoiceColumn))
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -145,14 +153,14 @@ class _SweepReader:
         for entry in definition.group.body:  # first of all: what is drawn needs it, wherever it stands
             if isinstance(entry, Setting) and _is(entry, "seed"):
                 with complaints.gather():
-                    self.seed = whole(definitions, entry.value, "a seed", least=0)
+                    self.seed = whole_number(definitions, entry.value, "a seed", least=0)
 
     def enter(self, entry: object) -> None:
         words = [word.text for word in getattr(entry, "words", ())]
         match entry:
             case Setting() if words in (["vary"], ["vary", "macro"]):
                 column = self.column(entry, entry.words[1:])
-                check_equal([column], self.places.get(column.path, ()))
+                check_no_equal_cases([column], self.places.get(column.path, ()))
                 self.axes.append(SweepAxis((column,)))
             case Group() if words == ["zip"]:
                 self.zip(entry)
@@ -217,7 +225,7 @@ class _SweepReader:
                     )
                 )
         if columns and self.complaints.error_count == before:
-            check_equal(columns, self.places.get(columns[0].path, ()))
+            check_no_equal_cases(columns, self.places.get(columns[0].path, ()))
             self.axes.append(SweepAxis(tuple(columns)))
 
     def file(self, statement: Statement) -> None:
@@ -236,7 +244,7 @@ class _SweepReader:
         columns, rows = columns_of(self.definitions, statement.value, self.graph)
         for column in columns:
             self.note(column.path, column.place)
-        check_equal(columns, rows)
+        check_no_equal_cases(columns, rows)
         self.axes.append(SweepAxis(tuple(columns)))
 
     def sample(self, statement: Statement) -> None:
@@ -266,7 +274,7 @@ class _SweepReader:
                     help="leave one out",
                 )
             )
-        self.repeat = whole(self.definitions, statement.value, "a number of repeats", least=2)
+        self.repeat = whole_number(self.definitions, statement.value, "a number of repeats", least=2)
         self.repeated = statement.place
 
     # One column
@@ -294,14 +302,14 @@ class _SweepReader:
         if entry.operator == "+=":
             raise Problem(error("D056", "nothing to append to in a sweep", place, help="write `=`"))
         names = Names(self.definitions, {}, watched=set(self.paths))
-        if detail or decides(self.definitions, path, entry.value, names):
-            return chosen(path, entry, names)
+        if detail or decides_structure(self.definitions, path, entry.value, names):
+            return choice_column(path, entry, names)
         refuse_words(path, place, entry.value, names)
         return self.numbers(path, entry, names)
 
     def numbers(self, path: str, entry: Setting, names: Names) -> VariedPath:
         found = names.evaluate(entry.value)
-        check_still(path, entry, names, self.paths)
+        check_constant(path, entry, names, self.paths)
         if isinstance(found, Value):
             raise Problem(
                 error(
@@ -362,7 +370,7 @@ def _is(entry: Setting, name: str) -> bool:
     return not entry.words and len(entry.path) == 1 and entry.path[0].text == name
 
 
-def whole(definitions: Definitions, expression: Expression, what: str, *, least: int) -> int:
+def whole_number(definitions: Definitions, expression: Expression, what: str, *, least: int) -> int:
     """A whole number that no sweep varies. Raises Problem D113."""
     found = evaluate_number(expression, Names(definitions, {}).find)
     number = found.number
@@ -391,7 +399,7 @@ def _paths(definitions: Definitions, entry: object) -> list[tuple[str, Place]]:
     return []
 
 
-def paths_of(definitions: Definitions, definition: Definition) -> set[str]:
+def varied_paths(definitions: Definitions, definition: Definition) -> set[str]:
     """Everything that a sweep's block varies."""
     return {path for entry in definition.group.body for path, _ in _paths(definitions, entry)}
 
@@ -458,7 +466,7 @@ def _refuse(entry: object, words: list[str], base: str) -> None:
             place,
             help=[
                 *did_you_mean(" ".join(words), KNOWN),
-                *belongs(words[0] if words else ""),
+                *where_it_belongs(words[0] if words else ""),
                 known_words("a sweep has", KNOWN),
             ],
         )
@@ -469,7 +477,7 @@ def named(value: Value) -> str:
     return "a pure number" if value.dimension == PURE else units.text(value.dimension)
 
 
-def check_equal(columns: Sequence[Column], places: Sequence[Place]) -> None:
+def check_no_equal_cases(columns: Sequence[Column], places: Sequence[Place]) -> None:
     """The same values twice are the same case twice. places: of the rows, or of the first column's numbers."""
     seen: dict[tuple[float | str, ...], int] = {}
     keys = [
@@ -478,7 +486,7 @@ def check_equal(columns: Sequence[Column], places: Sequence[Place]) -> None:
     ]
     for n, row in enumerate(zip(*keys, strict=True)):
         if row in seen:
-            if isinstance(columns[0], Chosen) and not places:
+            if isinstance(columns[0], ChoiceColumn) and not places:
                 places = [option.place for option in columns[0].options]
             first, again = places[seen[row]], places[n]
             raise Problem(

@@ -47,7 +47,7 @@ class Option:
 
 
 @frozen
-class Chosen:
+class ChoiceColumn:
     """A column of a sweep that decides the structure, with an option for each of its values."""
 
     path: str
@@ -64,10 +64,10 @@ class Chosen:
         return name if head == MACRO else ""
 
 
-Choices = tuple[tuple[Chosen, Option], ...]
+Choices = tuple[tuple[ChoiceColumn, Option], ...]
 
 
-def decides(definitions: Definitions, path: str, values: Expression, names: Names) -> bool:
+def decides_structure(definitions: Definitions, path: str, values: Expression, names: Names) -> bool:
     """Return True if this path names something that decides the structure; a model's words do."""
     first, *rest = path.split(".")
     if path in definitions.lets:
@@ -148,7 +148,7 @@ def path_place(entry: Setting) -> Place:
     return spanned(entry.path[0].place, entry.path[-1].place)
 
 
-def check_still(path: str, entry: Setting, names: Names, varied: Mapping[str, Place]) -> None:
+def check_constant(path: str, entry: Setting, names: Names, varied: Mapping[str, Place]) -> None:
     """Raises Problem D121 where the values were computed from what varies. varied: all paths of the sweep."""
     for other in names.followed:
         if other == path:
@@ -174,7 +174,7 @@ def check_still(path: str, entry: Setting, names: Names, varied: Mapping[str, Pl
         )
 
 
-def chosen(path: str, entry: Setting, names: Names) -> Chosen:
+def choice_column(path: str, entry: Setting, names: Names) -> ChoiceColumn:
     """The options of a `vary` or of a line of a `zip`."""
     values = entry.value
     if isinstance(values, List):
@@ -197,7 +197,7 @@ def chosen(path: str, entry: Setting, names: Names) -> Chosen:
         options = [_number(item, found.unit) for item in found.items if isinstance(item, Value)]
     if not options:
         raise Problem(error("D126", f"`{path}` has no values", place_of(values), help="one at least"))
-    return Chosen(path, path_place(entry), tuple(options))
+    return ChoiceColumn(path, path_place(entry), tuple(options))
 
 
 def _option(item: Expression, names: Names, unit: Unit | None) -> Option:
@@ -237,7 +237,7 @@ def _number(value: Value, unit: Unit | None) -> Option:
 # A run with its choices put in
 
 
-def put_in(definitions: Definitions, run: Definition, choices: Choices) -> tuple[Definitions, Definition]:
+def with_choices(definitions: Definitions, run: Definition, choices: Choices) -> tuple[Definitions, Definition]:
     """The deck's definitions and the run, changed to what is chosen (macros apart, which make another deck)."""
     tree: dict[str, Any] = {}
     servos: list[Definition] = []
@@ -259,7 +259,7 @@ def put_in(definitions: Definitions, run: Definition, choices: Choices) -> tuple
                     )
                 )
             earlier = next((each for each in servos if each.name == first), servo)
-            entry = inside(in_servo(rest, definitions.block(earlier)), option.expression, column.place)
+            entry = nested_entry(in_servo(rest, definitions.block(earlier)), option.expression, column.place)
             servos = [*(each for each in servos if each is not earlier), replace(earlier, upon=(*earlier.upon, entry))]
             continue
         _place(tree, keys_of(first, rest, definitions.block(run)), column, option)
@@ -293,7 +293,7 @@ def in_servo(keys: Sequence[str], block: MergedBlock | None) -> tuple[str, ...]:
     return (keys[1] if there else f"{SENSOR} {keys[1]}", *keys[2:])
 
 
-def inside(keys: Sequence[str], value: Expression, place: Place) -> Entry:
+def nested_entry(keys: Sequence[str], value: Expression, place: Place) -> Entry:
     """A value as a block writes it: `servos { elbow { rate = ...; } }`."""
     *words, name = (Word(word, place) for word in keys[-1].split())
     made: Entry = Setting(tuple(words), (name,), "=", value, place)
@@ -306,7 +306,7 @@ def _group(key: str, body: tuple[Entry, ...], place: Place) -> Group:
     return Group(tuple(Word(word, place) for word in key.split()), None, None, body, place)
 
 
-def _place(tree: dict[str, Any], keys: Sequence[str], column: Chosen, option: Option) -> None:
+def _place(tree: dict[str, Any], keys: Sequence[str], column: ChoiceColumn, option: Option) -> None:
     at = tree
     for key in keys[:-1]:
         at = at.setdefault(key, {})
@@ -318,7 +318,7 @@ def _place(tree: dict[str, Any], keys: Sequence[str], column: Chosen, option: Op
     at[keys[-1]] = (column, option)
 
 
-def _both(earlier: Chosen, later: Chosen) -> Problem:
+def _both(earlier: ChoiceColumn, later: ChoiceColumn) -> Problem:
     return Problem(
         error(
             "D123",
@@ -339,5 +339,5 @@ def _entries(tree: dict[str, Any]) -> list[Entry]:
             made.append(_group(key, entries, place))
         else:
             column, option = inner
-            made.append(inside((key,), option.expression, column.place))
+            made.append(nested_entry((key,), option.expression, column.place))
     return made

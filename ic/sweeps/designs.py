@@ -24,7 +24,7 @@ from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, measure_of
-from ic.sweeps.choices import check_still
+from ic.sweeps.choices import check_constant
 from ic.text.complaints import Complaints, known_words
 from met import units
 from met.diagnostic import Place, Problem, did_you_mean, error
@@ -244,7 +244,7 @@ def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> DrawnPara
     if len(call.positional) != len(wanted) or call.named or call.body is not None:
         raise Problem(error("D225", f"`{name}` takes {len(wanted)} numbers, in order", call.name.place, help=usage))
     found = [evaluate_number(_in_unit(each, unit), names.find) for each in call.positional]
-    check_still(path, entry, names, paths)
+    check_constant(path, entry, names, paths)
     for other in found[1:]:
         if not units.same(other.dimension, found[0].dimension):
             raise Problem(

@@ -21,9 +21,9 @@ from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.experiment import experiment
 from ic.meaning.runs.run import BLOCKS, Resolved, resolve_run
 from ic.sweeps.choices import OF_RUN, OF_SERVO
-from ic.sweeps.reach import beginnings, continued, ends, without_effect
+from ic.sweeps.reach import first_words, parameters_nearby, paths_ending_in, without_effect
 from ic.sweeps.settings import SEED as SEED_PATH
-from ic.sweeps.settings import Goes, Settings, concerns, goes
+from ic.sweeps.settings import Destination, Settings, applies_to, destination
 from ic.text.complaints import Complaints, known_words
 from met.diagnostic import Label, Problem, did_you_mean
 from met.plan import SEED, Cases, Coordinate, Experiment
@@ -46,7 +46,7 @@ class Effects:
         """Notes what a run has."""
         self.scopes.append(scope)
         for path, entry in self.waiting.items():
-            if goes(scope.definitions, entry) == "run" and concerns(scope.definitions, run, entry):
+            if destination(scope.definitions, entry) == "run" and applies_to(scope.definitions, run, entry):
                 self.met.add(path)
 
     def look(self, scope: Scope, run: Definition, made: Experiment, sweep: Sequence[Entry] = ()) -> None:
@@ -56,7 +56,7 @@ class Effects:
         named = _named(scope.definitions, sweep)
         numbers: dict[str, Setting] = {}
         for path, entry in tuple(self.waiting.items()):
-            kind = goes(scope.definitions, entry)
+            kind = destination(scope.definitions, entry)
             if path == SEED_PATH:
                 used = _has_noise(scope, made)
             elif kind == "number" and path not in scope.targets:
@@ -81,7 +81,7 @@ class Effects:
 
     def _tell(self, complaints: Complaints, path: str, entry: Setting, where: str) -> None:
         scope = next((each for each in self.scopes if path in each.known or path in each.not_sweepable), self.scopes[0])
-        kind = goes(scope.definitions, entry)
+        kind = destination(scope.definitions, entry)
         inside = sorted(known for known in scope.known if known.startswith(f"{path}."))
         if any(
             (path in each.evaluated_settings and each.evaluated_settings[path] is None) or each.depends_on_failed(path)
@@ -135,16 +135,16 @@ class Effects:
         else:
             known = [each for one in self.scopes for each in (*one.known, *one.not_sweepable)]
             known += [*scope.definitions.lets, *OF_RUN, *(f"{joint}.servo" for joint in joints)]
-            helps = did_you_mean(path, known) or continued(scope, path) or ends(scope, path)
+            helps = did_you_mean(path, known) or parameters_nearby(scope, path) or paths_ending_in(scope, path)
             macro = [] if rest else [f"a macro is defined by `-D {path}=VALUE`"]
-            helps = helps or [*macro, *beginnings(scope)]
+            helps = helps or [*macro, *first_words(scope)]
         complaints.error("D234", f"nothing in {where} is called `{path}`", entry.place, also=also, help=helps)
 
 
 # Numbers
 
 
-def _decides(kind: Goes, entry: Setting) -> bool:
+def _decides(kind: Destination, entry: Setting) -> bool:
     """Return True if this setting is a compile-time number: the rate of a servo's definition."""
     return kind == "servo" and entry.path[-1].text in OF_SERVO
 
@@ -163,7 +163,7 @@ def _used(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> lis
     there = {
         path: entry
         for path, entry in settings.items()
-        if path in scope.targets or goes(scope.definitions, entry) != "number"
+        if path in scope.targets or destination(scope.definitions, entry) != "number"
     }
     if not there:
         return []

@@ -10,17 +10,19 @@ from ic.grammar.syntax import Name, String, Unit, Word
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.quantity import Value
-from ic.sweeps.choices import Chosen, Option
+from ic.sweeps.choices import ChoiceColumn, Option
 from met.diagnostic import Place, Problem, error
 from met.trace import Graph
 
 _PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 
 
-def columns_of(definitions: Definitions, named: String, graph: Graph) -> tuple[list[VariedPath | Chosen], list[Place]]:
+def columns_of(
+    definitions: Definitions, named: String, graph: Graph
+) -> tuple[list[VariedPath | ChoiceColumn], list[Place]]:
     """The columns of the file, in its order, and the places of its rows. Raises Problem, placed in the file."""
     table = definitions.csv_files.get(named)
-    made: list[VariedPath | Chosen] = []
+    made: list[VariedPath | ChoiceColumn] = []
     for column in table.columns:
         if not _PATH.fullmatch(column.name):
             raise Problem(
@@ -34,7 +36,7 @@ def columns_of(definitions: Definitions, named: String, graph: Graph) -> tuple[l
         words = table.words(column)
         if words is not None:
             options = [Option(text, Name((Word(text, place),), place), place) for text, place in words]
-            made.append(Chosen(column.name, column.place, tuple(options)))
+            made.append(ChoiceColumn(column.name, column.place, tuple(options)))
             continue
         numbers, measure = table.quantities(column)
         unit = Unit((), column.place, column.unit) if column.unit is not None else None

@@ -14,10 +14,10 @@ from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.experiment import experiment
 from ic.meaning.runs.run import resolve_run
-from ic.sweeps.axes import Sweep, paths_of, read_sweep, whole
-from ic.sweeps.choices import Choices, put_in
+from ic.sweeps.axes import Sweep, read_sweep, varied_paths, whole_number
+from ic.sweeps.choices import Choices, with_choices
 from ic.sweeps.effects import Effects
-from ic.sweeps.reach import check_coordinates, coordinates, idle
+from ic.sweeps.reach import check_coordinates, check_effects, plan_coordinates
 from ic.sweeps.settings import Settings
 from ic.sweeps.table import columns, kept, repeats, structures
 from ic.text.complaints import Complaints, known_words
@@ -47,7 +47,7 @@ class DeckSource:
     effects: Effects = field(default_factory=lambda: Effects(Settings()))
 
 
-def lower(source: DeckSource, definition: Definition) -> list[ScopedExperiment]:
+def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExperiment]:
     """The experiments of a run or sweep; none where something of it is wrong (already reported)."""
     if definition.kind == "run":
         definitions, run = source.settings.in_run(source.definitions, definition)
@@ -140,7 +140,7 @@ class _Sweep:
         scope = Scope(read.definitions, self.complaints, varied, read.graph)
         resolved = resolve_run(scope, read.base)
         check_coordinates(scope, complete=resolved is not None)
-        lost = paths_of(read.definitions, self.definition) - set(varied)
+        lost = varied_paths(read.definitions, self.definition) - set(varied)
         excludes = [each for each in sweep.excludes if not names_in(each.value) & lost]
         if resolved is not None and excludes and not self.complaints.is_known_to_lack(read.base.place):
             first = np.zeros(1, dtype=np.int64)
@@ -160,7 +160,7 @@ class _Sweep:
         """The cases of one structure, with their rows of the product; and how many each `exclude when` drops."""
         read = self._with_macros(sweep, choices)
         there = read.sweep
-        definitions, run = put_in(read.definitions, read.base, choices)
+        definitions, run = with_choices(read.definitions, read.base, choices)
         scope = Scope(
             definitions,
             self.complaints,
@@ -183,7 +183,7 @@ class _Sweep:
         scope.checks.run(values, count)
         cases = Cases(
             count,
-            coordinates(scope, there, values, _dependents(scope)),
+            plan_coordinates(scope, there, values, _dependents(scope)),
             resolved.seed if there.seed is None else there.seed,
             "independent" if there.independent is not None else "common",
             tuple(Choice(column.path, option.text, option.place) for column, option in choices),
@@ -192,7 +192,7 @@ class _Sweep:
         made = experiment(scope, sweep.name, sweep.place, resolved, cases)
         made = replace(made, notes=(*(axis.note for axis in there.axes if axis.note), *made.notes))
         if not self.complaints.errors:
-            idle(self.complaints, there, made)
+            check_effects(self.complaints, there, made)
             check_stops(self.complaints, made)
         self.source.effects.look(scope, run, made, self.definition.group.body)
         return ((made, scope), rows[keep]), dropped
@@ -285,7 +285,7 @@ def _seed_of(definitions: Definitions, run: Definition) -> int:
     block = definitions.block(run)
     item = block.get("seed") if block is not None else None
     try:
-        return whole(definitions, item.value, "a seed", least=0) if item is not None and item.value else 0
+        return whole_number(definitions, item.value, "a seed", least=0) if item is not None and item.value else 0
     except Problem:
         return 0
 
@@ -359,7 +359,7 @@ def _sum(source: DeckSource, definition: Definition, within: tuple[str, ...]) ->
             raise Problem(
                 error("D043", f"sweep `{definition.name}` is made of itself", named.place, help="leave it out")
             )
-        found = _sum(source, part, (*within, definition.name)) if part.parts else lower(source, part)
+        found = _sum(source, part, (*within, definition.name)) if part.parts else experiments_of(source, part)
         if not found:
             return []
         parts.append((named, found))

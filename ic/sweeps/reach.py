@@ -59,9 +59,9 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
                 f"no parameter `{path}` in this run",
                 place,
                 help=did_you_mean(path, (*scope.known, *scope.not_sweepable, *scope.definitions.lets))
-                or continued(scope, path)
-                or ends(scope, path)
-                or beginnings(scope),
+                or parameters_nearby(scope, path)
+                or paths_ending_in(scope, path)
+                or first_words(scope),
             )
 
 
@@ -76,18 +76,18 @@ def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
     return [Label(item.place, "written here")] if item is not None else None
 
 
-def beginnings(scope: Scope) -> list[str]:
-    """The first words of the paths of this run."""
+def first_words(scope: Scope) -> list[str]:
+    """The remedy that lists the first words of paths of this run."""
     return [known_words("paths begin with", dict.fromkeys(known.partition(".")[0] for known in scope.known))]
 
 
-def ends(scope: Scope, path: str) -> list[str]:
-    """Parameters whose last word the path is: `kp` where `motor.kp` was meant."""
+def paths_ending_in(scope: Scope, path: str) -> list[str]:
+    """The remedy that lists parameters whose last word the path is: `kp` where `motor.kp` was meant."""
     found = [known for known in scope.known if known.endswith(f".{path}")]
     return [known_words(f"there is `{path}` of", (known.removesuffix(f".{path}") for known in found))] if found else []
 
 
-def continued(scope: Scope, path: str) -> list[str]:
+def parameters_nearby(scope: Scope, path: str) -> list[str]:
     """Parameters of the thing that the path's first words name, where they name one."""
     parts = path.split(".")
     for length in range(len(parts) - 1, 0, -1):
@@ -98,7 +98,7 @@ def continued(scope: Scope, path: str) -> list[str]:
     return []
 
 
-def coordinates(
+def plan_coordinates(
     scope: Scope,
     sweep: Sweep,
     columns: dict[str, np.ndarray],
@@ -129,7 +129,7 @@ def without_effect(experiment: Experiment) -> tuple[str, ...]:
     return idle(experiment)
 
 
-def idle(complaints: Complaints, sweep: Sweep, experiment: Experiment) -> None:
+def check_effects(complaints: Complaints, sweep: Sweep, experiment: Experiment) -> None:
     """Every coordinate changes something in the program, and so do repeats: else cases would be equal in silence."""
     if not experiment.cases.coordinates and not experiment.cases.noise:
         return

@@ -21,11 +21,11 @@ from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.evaluate import PURE
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value
-from ic.meaning.expressions.remedies import mended
+from ic.meaning.expressions.remedies import unit_remedy
 from ic.meaning.parameters.models import word_of
 from ic.meaning.parameters.scope import VARIES
 from ic.sweeps.axes import Sweep
-from ic.sweeps.choices import OF_RUN, ONE_OF_TWO, SENSOR, decides, in_servo, inside, keys_of
+from ic.sweeps.choices import OF_RUN, ONE_OF_TWO, SENSOR, decides_structure, in_servo, keys_of, nested_entry
 from ic.text.complaints import Complaints
 from met import units
 from met.diagnostic import Label, Problem, error
@@ -33,7 +33,7 @@ from met.frozen import frozen
 from met.trace import Scalar
 
 SEED = "seed"
-Goes = Literal["let", "servo", "run", "number"]
+Destination = Literal["let", "servo", "run", "number"]
 
 
 @frozen
@@ -42,8 +42,8 @@ class Settings:
 
     entries: tuple[Setting, ...] = ()
 
-    def that_go(self, definitions: Definitions, where: Goes) -> tuple[Setting, ...]:
-        return tuple(entry for entry in self.entries if goes(definitions, entry) == where)
+    def that_go(self, definitions: Definitions, where: Destination) -> tuple[Setting, ...]:
+        return tuple(entry for entry in self.entries if destination(definitions, entry) == where)
 
     def in_definitions(self, definitions: Definitions) -> Definitions:
         """The deck's definitions with what is set of lets and of servos."""
@@ -54,17 +54,17 @@ class Settings:
         for entry in self.that_go(definitions, "servo"):
             name, *keys = (word.text for word in entry.path)
             servo = servos.get(name) or definitions.of_kind("servo")[name]
-            made = inside(in_servo(keys, definitions.block(servo)), entry.value, entry.place)
+            made = nested_entry(in_servo(keys, definitions.block(servo)), entry.value, entry.place)
             servos[name] = replace(servo, upon=(*servo.upon, made))
         return definitions.instead(*servos.values(), lets=lets)
 
     def in_run(self, definitions: Definitions, run: Definition) -> tuple[Definitions, Definition]:
         """The definitions and the run with what is set of its structure; a whole before a part of it."""
         for entry in sorted(self.that_go(definitions, "run"), key=lambda entry: len(entry.path)):
-            if concerns(definitions, run, entry):
+            if applies_to(definitions, run, entry):
                 first, *rest = (word.text for word in entry.path)
                 keys = keys_of(first, rest, definitions.block(run))
-                run = replace(run, upon=(*run.upon, inside(keys, entry.value, entry.place)))
+                run = replace(run, upon=(*run.upon, nested_entry(keys, entry.value, entry.place)))
                 definitions = definitions.instead(run)
         return definitions, run
 
@@ -87,7 +87,7 @@ class Settings:
         for entry in self.entries:
             path = path_of(entry)
             found = [column for axis in sweep.axes for column in axis.columns if column.path == path]
-            if goes(definitions, entry) == "run":  # else it is a number of what the sweep chooses
+            if destination(definitions, entry) == "run":  # else it is a number of what the sweep chooses
                 found += [column for column in sweep.chosen if path.startswith(f"{column.path}.")]
             for column in found[:1]:
                 complaints.error(
@@ -107,7 +107,7 @@ class Settings:
                 )
 
 
-def goes(definitions: Definitions, entry: Setting) -> Goes:
+def destination(definitions: Definitions, entry: Setting) -> Destination:
     """The part of a deck that would hold this entry."""
     path = path_of(entry)
     if path in definitions.lets:
@@ -115,14 +115,14 @@ def goes(definitions: Definitions, entry: Setting) -> Goes:
     values = List((entry.value,), place_of(entry.value))
     if entry.path[0].text in definitions.of_kind("servo"):
         of_sensor = len(entry.path) > 2 and entry.path[1].text == SENSOR
-        words = of_sensor and decides(definitions, path, values, Names(definitions, {}))
+        words = of_sensor and decides_structure(definitions, path, values, Names(definitions, {}))
         return "servo" if len(entry.path) == 2 or words else "number"
     if len(entry.path) == 1:
         return "run" if path in (*OF_RUN, SEED) else "number"
-    return "run" if decides(definitions, path, values, Names(definitions, {})) else "number"
+    return "run" if decides_structure(definitions, path, values, Names(definitions, {})) else "number"
 
 
-def concerns(definitions: Definitions, run: Definition, entry: Setting) -> bool:
+def applies_to(definitions: Definitions, run: Definition, entry: Setting) -> bool:
     """Return True if the run has what the path of its structure names, or if that cannot be said."""
     path, first = path_of(entry), entry.path[0].text
     block = definitions.block(run)
@@ -162,6 +162,6 @@ def _of_another_dimension(path: str, old: Value, new: Value, defined) -> Problem
             f"`{path}` is {is_in}, and this is {found}",
             new.place,
             also=also,
-            help=mended(new, wanted, old.dimension),
+            help=unit_remedy(new, wanted, old.dimension),
         )
     )

@@ -8,9 +8,9 @@ from contextlib import contextmanager
 from ic.text.source import UnreadableStretch
 from met.diagnostic import Diagnostic, Label, Place, Problem, error, meant
 
-MOST = 200  # diagnostics of one deck; any after these seldom say more
+MOST_DIAGNOSTICS = 200  # diagnostics of one deck; any after these seldom say more
 
-ONCE = ("D060", "D061", "D076", "D077", "D087", "D104", "D109", "D125", "D141", "D305", "D307")
+REPORTED_ONCE = ("D060", "D061", "D076", "D077", "D087", "D104", "D109", "D125", "D141", "D305", "D307")
 """Codes that are reported once for each place: a bare number, a wrong unit, no such word, out of range, no body's
 inertia, a rate too slow, no entry of a run, no channel, no such key, a unit that may mean cycles, a share above 1."""
 
@@ -50,7 +50,7 @@ class Complaints:
         for diagnostic in diagnostics:
             self.error_count += diagnostic.severity == "error"
             if (
-                len(self._found) < MOST
+                len(self._found) < MOST_DIAGNOSTICS
                 and not self._is_known_at_this_place(diagnostic)
                 and not self._follows_from_unreadable(diagnostic)
             ):
@@ -88,7 +88,7 @@ class Complaints:
 
     def _is_known_at_this_place(self, diagnostic: Diagnostic) -> bool:
         """Return True if this mistake is reported here already: one in a base or a `let` is found at every use."""
-        if diagnostic.at is None or diagnostic.code not in ONCE:
+        if diagnostic.at is None or diagnostic.code not in REPORTED_ONCE:
             return False
         return any(
             each.code == diagnostic.code and each.at is not None and each.at.place == diagnostic.at.place
@@ -189,7 +189,7 @@ def _spot(place: Place) -> tuple[str, int, int]:
     return at.file, at.line, at.column
 
 
-def belongs(word: str) -> list[str]:
+def where_it_belongs(word: str) -> list[str]:
     """The remedy for a word of the language that stands in another block only."""
     places = {
         "substitute": "`substitute JOINT { ... }`, in a run, puts a joint's motor on a bed",
@@ -201,7 +201,7 @@ def belongs(word: str) -> list[str]:
     return [places[word]] if word in places else []
 
 
-def an(word: str, *, quoted: bool = False) -> str:
+def with_article(word: str, *, quoted: bool = False) -> str:
     """`an arm`, `a servo`; quoted: in the quotes of what a deck writes."""
     return f"{'an' if word[:1] in tuple('aeiou') else 'a'} {f'`{word}`' if quoted else word}"
 

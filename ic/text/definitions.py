@@ -17,7 +17,7 @@ COUNTER = "__COUNTER__"  # 0, 1, 2, ...: another number at each use
 PREDEFINED = ("__FILE__", "__LINE__", COUNTER, "defined", REST, OPTIONAL, *CLOCK)
 
 
-def checked(tokens: list[Token], is_macro: Callable[[str], bool], findings: Findings) -> list[Token] | None:
+def checked_definition(tokens: list[Token], is_macro: Callable[[str], bool], findings: Findings) -> list[Token] | None:
     """The body of a sound definition; None, and a message, for another. is_macro: whether there is one of a name."""
     name, tell = tokens[0], findings.error
     if name.kind != NAME:

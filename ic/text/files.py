@@ -41,7 +41,7 @@ class Directory:
             return FoundFile(
                 os.path.join(self.path, file), f"<{posixpath.normpath(posixpath.join(self.name[1:-1], file))}>"
             )
-        return found_at(os.path.join(self.path, file))
+        return file_at(os.path.join(self.path, file))
 
     @property
     def said(self) -> str:
@@ -68,7 +68,7 @@ class FoundFile:
         return os.path.realpath(self.path)
 
 
-def found_at(path: str) -> FoundFile:
+def file_at(path: str) -> FoundFile:
     """A file that is not the library's, by a name that no other file has.
 
     `a/../b.ic` is `b.ic`, unless `a` is a link to elsewhere.
@@ -92,7 +92,7 @@ class Files:
     def deck(self, path: str | Path) -> FoundFile:
         """The deck of that name: a file, or else one of the library's."""
         name = os.fspath(path)
-        given = found_at(name)
+        given = file_at(name)
         if os.path.exists(name) or os.path.isabs(name):
             return given
         return next((found for d in self.path if os.path.isfile((found := d.join(name)).path)), given)
@@ -103,7 +103,7 @@ class Files:
 
     def find(self, header: str, directories: Sequence[Directory]) -> FoundFile | None:
         """The first that there is; a folder of that name only where there is no file."""
-        asked = [found_at(header)] if os.path.isabs(header) else [d.join(header) for d in directories]
+        asked = [file_at(header)] if os.path.isabs(header) else [d.join(header) for d in directories]
         there = [file for file in asked if os.path.exists(file.path)]
         return next((file for file in there if not os.path.isdir(file.path)), there[0] if there else None)
 

@@ -60,7 +60,7 @@ class Macros(Pcpp):
     def define(self, tokens: Any) -> None:
         if isinstance(tokens, str):  # pcpp's own macros, and the clock: a deck must mean the same tomorrow
             return
-        body = definitions.checked(tokens, self.macros.__contains__, self.findings)
+        body = definitions.checked_definition(tokens, self.macros.__contains__, self.findings)
         name = tokens[0]
         if body is None:
             takes = len(tokens) > 1 and tokens[1].text == "("

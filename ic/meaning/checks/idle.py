@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ic.meaning.control.servos import apart, unit_written
+from ic.meaning.control.servos import differ_beyond_rounding, unit_written
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters.models import value_at
+from ic.meaning.parameters.models import value_place
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.diagnostic import Label
@@ -34,7 +34,7 @@ def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str,
         scope.complaints.remark(
             "D168",
             f"environment `{item.name}` never acts: {found[1]}",
-            value_at(written[0]) if written else item.place,
+            value_place(written[0]) if written else item.place,
             help="change that, or leave it out",
         )
     return found is not None
@@ -50,7 +50,7 @@ def remark_kinds(scope: Scope, environment: Any, item: Item, arm: ResolvedArm) -
                 "D168",
                 f"`{parameter.name}` of environment `{item.name}` changes nothing: no "
                 f"joint of arm `{arm.name}` is {parameter.joints}",
-                value_at(written),
+                value_place(written),
                 help="leave it out",
             )
 
@@ -84,7 +84,11 @@ def remark_beginnings(scope: Scope, uses: tuple[EnvironmentUse, ...]) -> None:
             shown: tuple[str, float] = shown,
         ) -> None:
             q, lower, upper = values.T
-            beyond = np.flatnonzero(((q < lower) & apart(q, lower)) | ((q > upper) & apart(q, upper)))
+            below, above = (
+                (q < lower) & differ_beyond_rounding(q, lower),
+                (q > upper) & differ_beyond_rounding(q, upper),
+            )
+            beyond = np.flatnonzero(below | above)
             if beyond.size:
                 (q, lower, upper), unit = values[beyond[0]] / shown[1], shown[0]
                 which = f"below {lower:g} {unit}" if q < lower else f"above {upper:g} {unit}"

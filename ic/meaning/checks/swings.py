@@ -133,7 +133,7 @@ def check_circuits(
     path, servo = f"{use.joint}.servo", use.servo
     if servo.swings is not None and not on_bed and use.parameters is not None:
         kind = use.command.kind if use.command is not None else "none"
-        found = asked(scope, servo.swings, use.parameters, path, kind)
+        found = evaluate_declared(scope, servo.swings, use.parameters, path, kind)
         for what, swing in (found or {}).items():
             label = f"the {what} of servo `{use.definition}`"
             check_swing(scope, label, swing, schedule, integrator, dynamics, path, held=True)
@@ -158,7 +158,7 @@ def check_sensor(
     path: str,
 ) -> None:
     """The filter of a sensor at the dynamics' step. label: the sensor in words; path: of its parameters."""
-    rate = asked(scope, sensor.fastest, values, path)
+    rate = evaluate_declared(scope, sensor.fastest, values, path)
     if rate is not None:
         check_stability(
             scope,
@@ -170,12 +170,12 @@ def check_sensor(
             path,
             of="the rate constant of the sensor's filter, 2 pi cutoff",
         )
-    swing = asked(scope, sensor.swing, values, path)
+    swing = evaluate_declared(scope, sensor.swing, values, path)
     if swing is not None:
         check_swing(scope, f"the filter of {label}", swing, schedule, integrator, dynamics, path, held=False)
 
 
-def asked(
+def evaluate_declared(
     scope: Scope, function: Callable[..., T] | None, values: Mapping[str, Any], path: str, *more: Any
 ) -> T | None:
     """The result of a declaration's function for these parameters; None without a function, or if one is out of range.

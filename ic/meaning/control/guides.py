@@ -18,7 +18,7 @@ from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.remedies import components
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters import not_sweepable
-from ic.meaning.parameters.models import find_model, refuse_values, use_model, value_at, word_of
+from ic.meaning.parameters.models import find_model, refuse_values, use_model, value_place, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
@@ -237,7 +237,7 @@ def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any]
         scope.complaints.remark(
             "D301",
             f"guide `{item.name}` {found[1]}",
-            value_at(written[0] if written else item),
+            value_place(written[0] if written else item),
             help="change that, or leave it out"
             if not needed
             else f"change {' or '.join(f'`{name}`' for name in found[0])}",
@@ -260,7 +260,7 @@ def _of_joints(
             scope.complaints.error(
                 "D071",
                 f"`{wanted.name}` of {owner.label} is one number for each joint, and this is a list",
-                value_at(general),
+                value_place(general),
                 help=f"write `{each}`",
             )
             scope.checks.fail(owner.join(wanted.name))
@@ -305,7 +305,7 @@ def _courses(
             scope.complaints.error(
                 "D274",
                 f"`{name}` is not guided by {owner.label}",
-                value_at(chosen) if chosen is not None and later else part.place,
+                value_place(chosen) if chosen is not None and later else part.place,
                 also=[Label(part.place, "written here")] if later else [],
                 help=[
                     f"it guides {', '.join(guided)}",

@@ -48,7 +48,7 @@ RATE = Parameter(
     name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, ticks=True, doc="how often the servo's computer ticks"
 )
 NOT_PARAMETERS = ("model", "command", "rate")
-ASKED: Mapping[str, Mapping[str, str]] = MappingProxyType(
+EXAMPLE_SETPOINTS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "revolute": {"rate": "0.03 rad/s", "position": "30 deg", "torque": "2 N*m", "acceleration": "0.1 rad/s^2"},
         "prismatic": {"rate": "0.03 m/s", "position": "0.1 m", "torque": "2 N", "acceleration": "0.1 m/s^2"},
@@ -56,7 +56,7 @@ ASKED: Mapping[str, Mapping[str, str]] = MappingProxyType(
 )
 """Examples of setpoints, by kind of joint and of command, for messages that show how a command is written."""
 
-BESIDE = "write `model = {};`, and its parameters beside it"
+MODEL_NOT_COMMAND = "write `model = {};`, and its parameters beside it"
 
 
 @frozen
@@ -164,7 +164,7 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
     if model is None:
         _tell_no_model(scope, block, owner, place)
         return None
-    servo = find_bare_model(scope, "servo", model, BESIDE)
+    servo = find_bare_model(scope, "servo", model, MODEL_NOT_COMMAND)
     if servo is None:
         return None
     sensed, block = list(block.of_kind("sensor")), without_sensors(block)
@@ -318,7 +318,7 @@ def check_start(scope: Scope, use: Use) -> None:
         return  # a sweep varies one of them
     unit, scale = unit_written([*asked.values(), begins], begins.unit)
     value, _ = profile.course(SimpleNamespace(**{name: each.value for name, each in asked.items()}), 0.0)
-    if apart(value, begins.value):
+    if differ_beyond_rounding(value, begins.value):
         places = [each.origin.place for each in asked.values() if each.origin.place is not None]
         also = [] if begins.origin.place is None else [Label(begins.origin.place, "the joint begins here")]
         scope.complaints.remark(
@@ -331,7 +331,7 @@ def check_start(scope: Scope, use: Use) -> None:
         )
 
 
-def apart(a: Any, b: Any) -> Any:
+def differ_beyond_rounding(a: Any, b: Any) -> Any:
     """Return True, for each pair, if two positions or arrays of them differ by more than rounding."""
     return np.abs(a - b) > APART + DIGITS * np.maximum(np.abs(a), np.abs(b))
 
@@ -401,7 +401,8 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
             "D151",
             "a command is its kind and one value or course in time",
             place,
-            help=f"{servo.name} takes {known}: `{first}({ASKED[owner.joint][first]})` or `{first}(step(to = ...))`",
+            help=f"{servo.name} takes {known}: `{first}({EXAMPLE_SETPOINTS[owner.joint][first]})` or "
+            f"`{first}(step(to = ...))`",
         )
         return None
     kind = call.name.text
@@ -541,7 +542,7 @@ def check_servo_definition(scope: Scope, name: str) -> None:
         owner = Owner(f"servo `{name}`", definition.place, "")
         if model is None:
             return
-        servo = find_bare_model(scope, "servo", model, BESIDE)
+        servo = find_bare_model(scope, "servo", model, MODEL_NOT_COMMAND)
         for sensor in block.of_kind("sensor"):
             if sensor.value is not None:
                 find_model(scope, "sensor", word_of(sensor.value), place_of(sensor.value))

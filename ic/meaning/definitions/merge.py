@@ -146,7 +146,7 @@ class _Merger:
         earlier = self._earlier(kind, name, entry.place)
         key = earlier.key if earlier else (f"{kind} {name}" if kind else name)
         if key in self.written:
-            raise Problem(twice(kind, name, entry.place, self.written[key]))
+            raise Problem(defined_twice(kind, name, entry.place, self.written[key]))
         if kind and earlier:
             raise Problem(
                 error(
@@ -303,7 +303,7 @@ def _of_name(items: Mapping[str, Item], name: str) -> Item | None:
     return items.get(name) or next((item for item in items.values() if item.name == name), None)
 
 
-def as_meant(block: MergedBlock, keys: Iterable[str], kinds: Iterable[str]) -> MergedBlock:
+def with_meant_names(block: MergedBlock, keys: Iterable[str], kinds: Iterable[str]) -> MergedBlock:
     """The block with entries that nobody knows, which is reported, under the names that are meant: what is in them is
     looked at, too, and nothing is missing besides.
 
@@ -352,7 +352,7 @@ def _taken_over(item: Item, homes: tuple[str, ...]) -> Item:
     return replace(item, body=body, homes=(*(h for h in item.homes if h not in homes), *homes))
 
 
-def twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnostic:
+def defined_twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnostic:
     what = f"{kind} `{name}`" if kind else f"`{name}`"
     helps = ["remove one of the two"]
     if (place.file, place.line, place.column) == (earlier.file, earlier.line, earlier.column):

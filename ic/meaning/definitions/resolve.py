@@ -12,9 +12,9 @@ from dataclasses import replace
 from ic.grammar.syntax import Binary, Call, Deck, Entry, Group, Let, Name, Setting, Word
 from ic.language import DEFINITIONS, HEADS
 from ic.meaning.definitions.csv_files import csv_files
-from ic.meaning.definitions.merge import MergedBlock, merge, twice
+from ic.meaning.definitions.merge import MergedBlock, defined_twice, merge
 from ic.robots.files import RobotFiles
-from ic.text.complaints import Complaints, an, belongs, known_words
+from ic.text.complaints import Complaints, known_words, where_it_belongs, with_article
 from ic.text.files import library_defines
 from met.diagnostic import Label, Place, Problem, did_you_mean, error, meant
 from met.frozen import frozen
@@ -94,7 +94,7 @@ class Definitions:
                 raise Problem(
                     error(
                         "D042",
-                        f"`{name.text}` is {an(other)}, and {an(kind)} is needed here",
+                        f"`{name.text}` is {with_article(other)}, and {with_article(kind)} is needed here",
                         name.place,
                         also=[Label(definitions[name.text].place, "defined here")],
                         help=known_words(f"{kind}s of this deck", known),
@@ -213,7 +213,7 @@ class Definitions:
         if isinstance(entry, Let):
             earlier = self.lets.get(entry.name.text)
             if earlier is not None:
-                raise Problem(twice("let", entry.name.text, entry.name.place, earlier.name.place))
+                raise Problem(defined_twice("let", entry.name.text, entry.name.place, earlier.name.place))
             self.lets[entry.name.text] = entry
         elif isinstance(entry, Group):
             self._define(entry)
@@ -266,7 +266,11 @@ class Definitions:
                 "D045",
                 f"no kind of definition `{kind.text}`",
                 kind.place,
-                help=[*did_you_mean(kind.text, DEFINITIONS), *belongs(kind.text), "kinds: arm, servo, run, sweep"],
+                help=[
+                    *did_you_mean(kind.text, DEFINITIONS),
+                    *where_it_belongs(kind.text),
+                    "kinds: arm, servo, run, sweep",
+                ],
             )
             near = meant(kind.text, DEFINITIONS)
             if near is None or len(words) != 2:
@@ -290,7 +294,7 @@ class Definitions:
             raise Problem(
                 error(
                     "D047",
-                    f"`{words[2].text}` after the name of {an(kind.text)}",
+                    f"`{words[2].text}` after the name of {with_article(kind.text)}",
                     words[2].place,
                     help=f"write `{kind.text} {words[1].text} {{ ... }}`, `like BASE` before the brace",
                 )
@@ -299,7 +303,7 @@ class Definitions:
             raise Problem(
                 error(
                     "D048",
-                    f"{an(kind.text)} cannot be the default",
+                    f"{with_article(kind.text)} cannot be the default",
                     group.words[0].place,
                     help="`default` marks the run or sweep that `met run` takes unless told another",
                 )
@@ -318,7 +322,7 @@ class Definitions:
             raise Problem(
                 error(
                     "D214",
-                    f"{an(kind.text)} is not made from a file",
+                    f"{with_article(kind.text)} is not made from a file",
                     group.made_from.name.place,
                     help="`from urdf(...)` makes an arm",
                 )
@@ -369,7 +373,7 @@ class Definitions:
         kind, name = definition.kind, definition.group.words[-1]
         for space in ("run", "sweep") if kind in ("run", "sweep") else (kind,):
             if name.text in self._by_kind[space]:
-                raise Problem(twice(space, name.text, name.place, self._by_kind[space][name.text].place))
+                raise Problem(defined_twice(space, name.text, name.place, self._by_kind[space][name.text].place))
         self._by_kind[kind][name.text] = definition
 
     def _check_defaults(self) -> None:

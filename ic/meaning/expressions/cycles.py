@@ -18,14 +18,14 @@ _FLUX = units.parse_unit("V*s").dimension  # of a motor's constant: V*s/rad and 
 
 
 @frozen
-class Doubt:
+class AmbiguousUnit:
     """A unit that may be a mistake: what the value is taken for, and what to write for each possible meaning."""
 
     taken: str
     helps: tuple[str, ...]
 
 
-def doubt(value: Value, text: str, wanted: Measure) -> Doubt | None:
+def ambiguous_unit(value: Value, text: str, wanted: Measure) -> AmbiguousUnit | None:
     """The other possible meaning of a value whose dimension is right; None where there is none.
 
     text, wanted  the unit that is declared, in SI, as text and as what it means
@@ -51,40 +51,40 @@ def doubt(value: Value, text: str, wanted: Measure) -> Doubt | None:
     return None
 
 
-def _hertz_for_rate(value: Value) -> Doubt:
+def _hertz_for_rate(value: Value) -> AmbiguousUnit:
     """Hz for 1/s."""
     number = _number(value)
     if isinstance(value.number, Scalar):
-        return Doubt(
+        return AmbiguousUnit(
             "in 1/s, and Hz is taken as 1/s",
             ("if that is meant, write `1/s`", "if cycles a second are meant, write `1/s`, and 2 pi times each number"),
         )
-    return Doubt(
+    return AmbiguousUnit(
         f"in 1/s, and {_written(value)} is taken as {number} 1/s",
         (f"if that is meant, write `{number} 1/s`", f"if cycles a second are meant, write `(2*pi*{number}) 1/s`"),
     )
 
 
-def _no_hertz(value: Value) -> Doubt | None:
+def _no_hertz(value: Value) -> AmbiguousUnit | None:
     """1/s for Hz; None where it was computed, as from a period."""
     if _unit(value) is None:
         return None
     number = _number(value)
     if isinstance(value.number, Scalar):
-        return Doubt(
+        return AmbiguousUnit(
             "in Hz, and 1/s is taken as Hz, cycles a second",
             (
                 "if that is meant, write `Hz`",
                 "if radians a second are meant, write `Hz`, and each number divided by 2 pi",
             ),
         )
-    return Doubt(
+    return AmbiguousUnit(
         f"in Hz, and {_written(value)} is taken as {number} Hz, cycles a second",
         (f"if that is meant, write `{number} Hz`", f"if radians a second are meant, write `({number}/(2*pi)) Hz`"),
     )
 
 
-def _hertz_for_rad(value: Value, text: str) -> Doubt:
+def _hertz_for_rad(value: Value, text: str) -> AmbiguousUnit:
     """V/Hz for V*s/rad."""
     unit = _unit(value)
     if unit is not None and "kHz" not in unit.text:
@@ -98,10 +98,10 @@ def _hertz_for_rad(value: Value, text: str) -> Doubt:
             f"if that is meant, write `{_number(value)} {text}`",
             "if cycles a second are meant, write `cycle/s` in the place of the hertz",
         )
-    return Doubt(f"in {text}, and {_written(value)} is taken as {_number(value)} {text}", helps)
+    return AmbiguousUnit(f"in {text}, and {_written(value)} is taken as {_number(value)} {text}", helps)
 
 
-def _no_angle(value: Value, text: str, power: int) -> Doubt:
+def _no_angle(value: Value, text: str, power: int) -> AmbiguousUnit:
     """1/mm for rad/m, and mm for m/rad."""
     unit = _unit(value)
     number = _number(value) if unit is None else _in(value, unit)
@@ -113,19 +113,19 @@ def _no_angle(value: Value, text: str, power: int) -> Doubt:
             return f"`{number} {plain}/{angle}`"
         return f"`{number} {angle}{plain[1:]}`" if plain.startswith("1/") else f"`{number} {angle}*{plain}`"
 
-    return Doubt(
+    return AmbiguousUnit(
         f"in {text}, and {_written(value)} is taken as {_number(value)} {text}",
         (f"if that is meant, write {angled('rad')}", f"if turns are meant, write {angled('cycle')}"),
     )
 
 
-def _angle_for_none(value: Value, text: str) -> Doubt | None:
+def _angle_for_none(value: Value, text: str) -> AmbiguousUnit | None:
     """1/cycle, 1/deg where no angle is declared: it counts in radians."""
     unit = _unit(value)
     if unit is None or not measure_of(unit).turns:
         return None
     number = _number(value)
-    return Doubt(
+    return AmbiguousUnit(
         f"in {text}, and {_written(value)} is taken as {number} {text}: angles count in radians",
         (f"write `{number} {text}`",),
     )

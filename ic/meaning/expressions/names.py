@@ -8,7 +8,7 @@ from ic.grammar.syntax import Expression, Name
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, evaluate
 from ic.meaning.expressions.quantity import Value, ValueList
-from ic.text.complaints import MOST, known_words
+from ic.text.complaints import MOST_DIAGNOSTICS, known_words
 from ic.text.lexer import COMMAND_LINE
 from met import other_units, units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
@@ -161,7 +161,7 @@ class Names:
         """Every mistake in the deck's lets, used or not."""
         problems: list[Problem] = []
         for text, let in self.definitions.lets.items():
-            if len(problems) >= MOST:  # no more would be reported, and each looks at all names for one that is near
+            if len(problems) >= MOST_DIAGNOSTICS:  # no more would be reported, and each searches all names
                 break
             try:
                 if units.is_unit(text):

@@ -28,7 +28,7 @@ def components(item: Item | None, count: int) -> tuple[Expression | None, ...]:
     return (*parts, *[None] * (count - len(parts)))
 
 
-def mended(value: Value, text: str, dimension: Dimension) -> str:
+def unit_remedy(value: Value, text: str, dimension: Dimension) -> str:
     """The remedy where a value has the wrong dimension."""
     number = None if isinstance(value.number, Scalar) else float(value.number)
     if dimension == PURE:

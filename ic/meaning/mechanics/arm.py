@@ -9,18 +9,18 @@ from dataclasses import replace
 from ic.grammar.syntax import Call, Expression, Name, Unary
 from ic.language import HEADS
 from ic.language.bodies import ARM, AT, AXIS, JOINT, JOINT_KINDS, LINK, RPY
-from ic.meaning.definitions.merge import Item, MergedBlock, as_meant
+from ic.meaning.definitions.merge import Item, MergedBlock, with_meant_names
 from ic.meaning.definitions.resolve import Definition
 from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.dh import use_dh
-from ic.meaning.mechanics.foreign import refused
+from ic.meaning.mechanics.foreign import refuse_foreign_joint
 from ic.meaning.mechanics.matter import use_matter
 from ic.meaning.parameters.addresses import in_arm
-from ic.meaning.parameters.models import check_keys, value_at, word_of
+from ic.meaning.parameters.models import check_keys, value_place, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import no_direction
 from ic.meaning.parameters.scope import Scope
-from ic.text.complaints import belongs, known_words
+from ic.text.complaints import known_words, where_it_belongs
 from met.diagnostic import Label, Place, did_you_mean, meant
 from met.frozen import frozen
 from met.plan import BASE, Joint, Link
@@ -62,7 +62,7 @@ def resolve_arm(scope: Scope, definition: Definition) -> ResolvedArm | None:
     for item in block.items.values():
         if item.kind not in ARM.named:
             _stray(scope, item, block)
-    block = as_meant(block, (), ARM.named)
+    block = with_meant_names(block, (), ARM.named)
     for statement in block.statements:
         scope.complaints.error(
             "D080", "an arm holds links and joints; this is neither", statement.place, help="move it to the run"
@@ -101,7 +101,7 @@ def _stray(scope: Scope, item: Item, block: MergedBlock) -> None:
             "D082",
             f"no `{item.kind}` in an arm",
             item.place,
-            help=[*did_you_mean(item.kind, ARM.named), *belongs(item.kind), "an arm holds links and joints"],
+            help=[*did_you_mean(item.kind, ARM.named), *where_it_belongs(item.kind), "an arm holds links and joints"],
         )
     else:
         adds = f"`link {item.name} {{ ... }}` or `joint {item.name} revolute {{ ... }}` would add one"
@@ -140,7 +140,7 @@ def _link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
 
 def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str, None]) -> Joint | None:
     owner = Owner(f"joint `{item.name}`", item.place, item.name, homes=homes)
-    if refused(scope, item):
+    if refuse_foreign_joint(scope, item):
         return None
     kind = item.detail[0].text if item.detail else None
     if item.body is None or item.value is not None:
@@ -205,17 +205,17 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping
         return name
     if name == BASE:
         scope.complaints.error(
-            "D093", "the base cannot be a child", value_at(item), help="turn the joint round: `parent = base;`"
+            "D093", "the base cannot be a child", value_place(item), help="turn the joint round: `parent = base;`"
         )
     elif name is None:
         scope.complaints.error(
-            "D094", f"a link's name is needed for {key}", value_at(item), help=known_words("links", known)
+            "D094", f"a link's name is needed for {key}", value_place(item), help=known_words("links", known)
         )
     else:
         ground = name in scope.definitions.robot_files.roots
         near = (f"`{name}` is the root of its robot: write `base`",) if ground else did_you_mean(name, known)
         scope.complaints.error(
-            "D094", f"no link `{name}` in this arm", value_at(item), help=[*near, known_words("links", known)]
+            "D094", f"no link `{name}` in this arm", value_place(item), help=[*near, known_words("links", known)]
         )
     return None
 
@@ -253,7 +253,7 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
         no_direction,
         code="D097",
         message=f"the axis of {owner.label} has no direction",
-        place=value_at(item),
+        place=value_place(item),
         needs=(owner.join("axis"),),
         help="write numbers of ordinary size, not all of them zero",
     )

@@ -15,7 +15,7 @@ OTHER_KINDS = {
 }
 
 
-def refused(scope: Scope, item: Item) -> bool:
+def refuse_foreign_joint(scope: Scope, item: Item) -> bool:
     """Return True, with an error, if a joint is of a kind that MET does not have, or follows another joint."""
     kind = item.detail[0].text if item.detail else ""
     there = "in the arm's block, " if written_elsewhere(scope, item.place) else ""

@@ -9,7 +9,7 @@ from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.bodies import check_body
 from ic.meaning.mechanics.shapes import SHAPES, Solid
 from ic.meaning.parameters import not_sweepable
-from ic.meaning.parameters.models import check_keys, refuse_values, value_at, word_of
+from ic.meaning.parameters.models import check_keys, refuse_values, value_place, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from met.diagnostic import did_you_mean
@@ -51,7 +51,7 @@ def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
         scope.complaints.error(
             "D088",
             f"no shape `{name}`" if name else "a shape is needed here",
-            value_at(item),
+            value_place(item),
             help=[
                 *helps,
                 "shapes: rod(length, along), box(size, along), cylinder(radius, length, along), sphere(radius)",

@@ -13,7 +13,7 @@ from ic.meaning.definitions.merge import Item, MergedBlock, refuse_pending
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_relations
 from ic.meaning.parameters.scope import Scope
-from ic.text.complaints import an, belongs, known_words
+from ic.text.complaints import known_words, where_it_belongs, with_article
 from met import models
 from met.diagnostic import Label, Place, Problem, did_you_mean
 from met.environments.environment import FILE
@@ -29,12 +29,12 @@ def word_of(expression: Expression | None) -> str | None:
     return None
 
 
-def value_at(item: Item) -> Place:
+def value_place(item: Item) -> Place:
     """The place of an entry's value; that of the entry itself where it has none."""
     return place_of(item.value) if item.value is not None else item.place
 
 
-def upon(item: Item) -> Place | None:
+def overriding_place(item: Item) -> Place | None:
     """The place of the first entry of a block put upon an entry's value; None where there is none."""
     return next((each.place for each in item.body.items.values()), None) if item.body is not None else None
 
@@ -101,7 +101,7 @@ def check_keys(
                 "D141",
                 f"no `{item.kind}` in {owner.label}",
                 item.place,
-                help=[*belongs(item.kind), known_words("it has", known)],
+                help=[*where_it_belongs(item.kind), known_words("it has", known)],
             )
         elif item.name not in known:
             if item.name not in others:
@@ -133,7 +133,7 @@ def find_bare_model(scope: Scope, kind: models.Kind, item: Item, remedy: str) ->
     """
     name, place = word_of(item.value), place_of(item.value) if item.value is not None else item.place
     if name is not None and (isinstance(item.value, Call) or item.body is not None):
-        place = place if isinstance(item.value, Call) else upon(item) or place
+        place = place if isinstance(item.value, Call) else overriding_place(item) or place
         scope.complaints.error(
             "D143", f"`{item.name} = {name}` takes neither parentheses nor braces", place, help=remedy.format(name)
         )
@@ -146,7 +146,7 @@ def find_model(scope: Scope, kind: models.Kind, name: str | None, place: Place) 
     if name is None:
         scope.complaints.error(
             "D143",
-            f"the name of {an(kind)} model is needed here",
+            f"the name of {with_article(kind)} model is needed here",
             place,
             help=known_words(f"{kind} models", sorted(models.available(kind))),
         )

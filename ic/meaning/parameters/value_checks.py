@@ -10,10 +10,10 @@ import numpy as np
 from ic.language.unit_words import either, in_degrees, measure_here, unit_here
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.conditions import Checks
-from ic.meaning.expressions.cycles import doubt
+from ic.meaning.expressions.cycles import ambiguous_unit
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value
-from ic.meaning.expressions.remedies import mended
+from ic.meaning.expressions.remedies import unit_remedy
 from ic.meaning.parameters.owner import Owner
 from ic.text.complaints import Complaints
 from met import units
@@ -67,7 +67,7 @@ class ValueChecks:
         message = f"{what} is " + ("a pure number" if dimension == PURE else f"in {text}") + f", and this is in {found}"
         other = self._other(owner, wanted, value) if dimension == PURE else []
         raise Problem(
-            error("D061", message, value.place, also=also, help=apart or [*other, mended(value, text, dimension)])
+            error("D061", message, value.place, also=also, help=apart or [*other, unit_remedy(value, text, dimension)])
         )
 
     def range(
@@ -135,7 +135,7 @@ class ValueChecks:
         """Report a unit that may mean cycles where radians count, or the reverse."""
         if wanted.ticks:
             return
-        found = doubt(value, text, measure_here(wanted.unit, owner.joint, owner.command, owner.of))
+        found = ambiguous_unit(value, text, measure_here(wanted.unit, owner.joint, owner.command, owner.of))
         if found is not None:
             self.complaints.warn(
                 "D305",

@@ -125,7 +125,7 @@ def initial_base(scope: Scope, body: MergedBlock, base: Base | None) -> None:
             scope.complaints.error("D255", f"{message}, so `{item.name}` has no effect", item.place, help=help)
 
 
-def held_by(arm: ResolvedArm, payloads: Sequence[Payload]) -> dict[str, str]:
+def fixed_to(arm: ResolvedArm, payloads: Sequence[Payload]) -> dict[str, str]:
     """For each link and payload, the body that it is fixed to for good: a link that moves, or the base."""
     held = {joint.child: joint.parent for joint in arm.joints if joint.kind == "fixed"}
     held |= {payload.name: payload.link for payload in payloads if not payload.flies}

@@ -15,7 +15,7 @@ from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.parameters.tables import tell_named_lists, use_table
-from ic.meaning.runs.base import held_by, remark_ground
+from ic.meaning.runs.base import fixed_to, remark_ground
 from ic.text.complaints import known_words
 from met import models
 from met.parameter import WORLD
@@ -122,7 +122,7 @@ def _environment_use(
             extra=[each.name for each in environment.written[len(environment.parameters) :]],
         )
     if values is not None:
-        held = held_by(arm, payloads)
+        held = fixed_to(arm, payloads)
         words = {p.name: held.get(values[p.name], values[p.name]) for p in environment.parameters if p.names == "link"}
         if not (duration is not None and remark_idle(scope, environment, item, {**values, **words}, duration)):
             remark_ground(scope, item, arm, base, environment, values, payloads)

@@ -15,7 +15,7 @@ from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import body_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
-from ic.text.complaints import an, known_words
+from ic.text.complaints import known_words, with_article
 from met import models
 from met.diagnostic import Label, did_you_mean
 from met.plan import Schedule
@@ -114,7 +114,7 @@ def resolve_schedule(
             )
         for sensor in use.sensors if continuous else ():
             if models.find("sensor", sensor.model).clocked and sensor.place is not None:
-                reads = f"{an(sensor.model, quoted=True)} reads at ticks"
+                reads = f"{with_article(sensor.model, quoted=True)} reads at ticks"
                 scope.complaints.error(
                     "D106",
                     f"{reads}, and the law of joint `{use.joint}` is continuous",

@@ -19,13 +19,13 @@ from ic.meaning.control.link_sensors import resolve_link_sensors
 from ic.meaning.control.schedule import Rate, check_stability, fastest_rate
 from ic.meaning.control.servos import check_rest, check_start, resolve_servos
 from ic.meaning.control.substitution import check_brakes, check_ticks, resolve_substitutions
-from ic.meaning.definitions.merge import Item, MergedBlock, as_meant
+from ic.meaning.definitions.merge import Item, MergedBlock, with_meant_names
 from ic.meaning.definitions.resolve import Definition
 from ic.meaning.mechanics.arm import ResolvedArm, resolve_arm
 from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.payloads import check_payloads, resolve_payloads
 from ic.meaning.parameters.addresses import in_run
-from ic.meaning.parameters.models import body_of, find_bare_model, upon, word_of
+from ic.meaning.parameters.models import body_of, find_bare_model, overriding_place, word_of
 from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
@@ -35,7 +35,7 @@ from ic.meaning.runs.initial import resolve_initial
 from ic.meaning.runs.rates import resolve_rates, resolve_schedule
 from ic.meaning.runs.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
 from ic.meaning.runs.tolerances import resolve_tolerances
-from ic.text.complaints import belongs, known_words
+from ic.text.complaints import known_words, where_it_belongs
 from met import models
 from met.diagnostic import Place, did_you_mean
 from met.frozen import frozen
@@ -68,7 +68,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         return None
     run = Owner(f"run `{definition.name}`", definition.place, "")
     _check_entries(scope, block, definition)
-    block = as_meant(block, RUN.keys, RUN.named)
+    block = with_meant_names(block, RUN.keys, RUN.named)
     comparisons = read_requirements(scope, block)
     arm = _arm(scope, run, block.get("arm"))
     integrator = _integrator(scope, block.get("integrator"))
@@ -240,7 +240,7 @@ def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> 
                 "D109",
                 f"nothing named `{item.name}` in run `{definition.name}` to change",
                 item.place,
-                help=belongs(item.name) or [*did_you_mean(item.name, (*metrics, *RUN.keys)), adds],
+                help=where_it_belongs(item.name) or [*did_you_mean(item.name, (*metrics, *RUN.keys)), adds],
             )
         else:
             near = did_you_mean(item.name, (*RUN.keys, *metrics)) if "." not in item.name else ()
@@ -258,7 +258,7 @@ def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> 
                 if words == "exclude when"
                 else ["write `metric NAME = MODEL { of = CHANNEL; }`"]
                 if words == "metric"
-                else belongs(words)
+                else where_it_belongs(words)
                 or [*did_you_mean(words, ("require", "remove")), "statements of a run: require, remove"],
             )
 
@@ -288,7 +288,7 @@ def _arm(scope: Scope, run: Owner, item: Item | None) -> ResolvedArm | None:
         scope.complaints.error(
             "D112",
             f"a run does not change its arm `{name}`",
-            upon(item) or item.place,
+            overriding_place(item) or item.place,
             help=f"define `arm NAME like {name} {{ ... }}`, and write `arm = NAME;`",
         )
         return None

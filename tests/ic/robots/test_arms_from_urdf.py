@@ -10,7 +10,7 @@ import pytest
 
 import ic
 from ic.driver.explain import explain
-from ic.driver.import_robot import imported
+from ic.driver.import_robot import import_robot
 from ic.robots.entries import moments, rotation
 from ic.robots.names import deck_names
 from ic.robots.urdf import read
@@ -68,7 +68,7 @@ def test_the_imported_deck_has_the_plan_of_the_file_bit_for_bit(tmp_path: Path) 
     for seed in SEEDS:
         path.write_text(random_urdf(seed), encoding="utf-8")
         deck.write_text(
-            imported(str(path)) + "run fall_of_file { arm = random; environment { gravity = [0, 0, -9.81] m/s^2; }"
+            import_robot(str(path)) + "run fall_of_file { arm = random; environment { gravity = [0, 0, -9.81] m/s^2; }"
             " rates { dynamics = 1 kHz; } duration = 1 ms; record = []; }\n",
             encoding="utf-8",
         )

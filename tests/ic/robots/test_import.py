@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ic
-from ic.driver.import_robot import imported
+from ic.driver.import_robot import import_robot
 from met import cli, run
 from met.diagnostic import Problem
 from tests.ic.robots.two import TWO, changed, refused
@@ -152,7 +152,7 @@ error[D213]: joint `finger` follows `roll`, which is not in this version
 
 def test_a_joint_that_is_let_go_and_moves_nothing_is_refused() -> None:
     with pytest.raises(Problem) as problem:
-        imported("arm.urdf", "free")
+        import_robot("arm.urdf", "free")
     assert refused(problem.value).startswith(
         "error[D217]: joint `finger` moves nothing that has mass\n  --> arm.urdf:22:16\n"
     )
@@ -161,7 +161,7 @@ def test_a_joint_that_is_let_go_and_moves_nothing_is_refused() -> None:
 def test_a_robot_that_is_no_arm_is_told_with_what_a_deck_could_do() -> None:
     Path("two.urdf").write_text(changed(TWO, ('izz="0.2"', 'izz="0.9"')), encoding="utf-8")
     with pytest.raises(Problem) as problem:
-        imported("two.urdf")
+        import_robot("two.urdf")
     assert (
         refused(problem.value)
         == """\
@@ -234,7 +234,7 @@ def test_comments_hold_whatever_a_file_says() -> None:
         ('"bar"', '"bar\\"'),
     )
     Path("two.urdf").write_text(nasty, encoding="utf-8")
-    Path("two.ic").write_text(imported("two.urdf"), encoding="utf-8")
+    Path("two.ic").write_text(import_robot("two.urdf"), encoding="utf-8")
     compiled = ic.check("two.ic")
     assert compiled.plan is not None and compiled.diagnostics == ()
 
@@ -246,7 +246,7 @@ def test_comments_hold_whatever_a_file_says() -> None:
 def test_a_joint_whose_range_is_without_0_is_held_within_it(lower: str, upper: str, held: str) -> None:
     limit = f'<limit lower="{lower}" upper="{upper}"/><axis'
     Path("two.urdf").write_text(changed(TWO, ("<axis", limit)), encoding="utf-8")
-    text = imported("two.urdf")
+    text = import_robot("two.urdf")
     assert f"command = position({held} rad);" in text and float(lower) <= float(held) <= float(upper)
     Path("two.ic").write_text(text, encoding="utf-8")
     assert ic.check("two.ic").plan is not None
@@ -254,10 +254,10 @@ def test_a_joint_whose_range_is_without_0_is_held_within_it(lower: str, upper: s
 
 def test_servos_of_the_deck_never_bear_a_joints_name() -> None:
     Path("two.urdf").write_text(TWO.replace("hinge", "held").replace('"bar"', '"held_"'), encoding="utf-8")
-    text = imported("two.urdf")
+    text = import_robot("two.urdf")
     assert "servo held__ {" in text and "held = held__;" in text
 
 
 def test_a_robot_without_a_joint_that_moves_makes_an_arm_and_no_run() -> None:
     Path("two.urdf").write_text(TWO.replace("revolute", "fixed"), encoding="utf-8")
-    assert imported("two.urdf").endswith("joint hinge fixed { parent = base;  child = bar; }\n}\n")
+    assert import_robot("two.urdf").endswith("joint hinge fixed { parent = base;  child = bar; }\n}\n")

@@ -13,7 +13,7 @@ import pytest
 import robots
 
 import ic
-from ic.driver.import_robot import imported
+from ic.driver.import_robot import import_robot
 from ic.robots.robot import MOVING
 from met import run
 from met.diagnostic import Problem
@@ -48,7 +48,7 @@ def shown(path: Path) -> str:
 def refusal(path: Path) -> str:
     """Why the file is refused, joints that follow others let go; "" where it is not."""
     try:
-        imported(str(path), "free")
+        import_robot(str(path), "free")
     except Problem as problem:
         first = problem.diagnostics[0]
         message = first.message.replace(str(path), path.name)
@@ -102,7 +102,7 @@ def test_the_pages_table_is_what_becomes_of_the_files() -> None:
 @pytest.mark.parametrize("name", ["panda", "ur5_robot", "kinova", "xarm7", "so100", "z1", "baxter", "cartpole"])
 def test_the_deck_of_a_published_robot_holds_its_arm_and_lets_it_fall(name: str, tmp_path: Path) -> None:
     path = next(path for path in files() if path.stem == name)
-    (tmp_path / "arm.ic").write_text(imported(str(path), "free"), encoding="utf-8")
+    (tmp_path / "arm.ic").write_text(import_robot(str(path), "free"), encoding="utf-8")
     compiled = ic.check(tmp_path / "arm.ic")
     assert compiled.plan is not None and compiled.diagnostics == ()
     for experiment in compiled.plan.experiments:

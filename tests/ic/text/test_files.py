@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import ic
-from ic.text.files import Files, found_at
+from ic.text.files import Files, file_at
 from met import cli
 from met.diagnostic import Problem
 from tests.ic.decktext import Desk
@@ -308,7 +308,7 @@ def test_a_file_that_does_not_say_its_size_is_not_cut() -> None:
     status = "/proc/self/status"
     assert Path(status).stat().st_size == 0
     with pytest.raises(Problem, match=f"D018: `{status}` has no end"):
-        Files().text(found_at(status), most=100)
+        Files().text(file_at(status), most=100)
 
 
 def test_a_circle_through_a_link_is_a_circle(desk: Desk) -> None:

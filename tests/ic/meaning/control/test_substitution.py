@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import met.substitution
-from ic.driver.explain import explained
+from ic.driver.explain import explanations_of
 from met.plan import Experiment, Formula, Substitution
 from met.plan.channel import channels
 from met.substitution import BEDS
@@ -225,7 +225,9 @@ sweep s of hybrid {
 
 def test_explain_tells_what_was_written_and_what_is_the_servos(tmp_path: Path) -> None:
     made = check(tmp_path, DECK, HYBRID, select=["hybrid"])
-    (kt,), (resistance,), (once,) = (list(explained(made, f"one.bed.{name}")) for name in ("kt", "resistance", "once"))
+    (kt,), (resistance,), (once,) = (
+        list(explanations_of(made, f"one.bed.{name}")) for name in ("kt", "resistance", "once")
+    )
     assert (kt.value, kt.written, kt.origin, kt.note) == (0.065, "0.065 N*m/A", "deck", "")
     assert (resistance.written, resistance.note) == ("1 ohm", "that of `one.servo.resistance`")
     assert (once.written, once.note, once.doc) == ("typical", "by `faults`", "misalignment, once a turn")
