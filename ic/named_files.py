@@ -65,6 +65,6 @@ class NamedFiles(Generic[T]):
         found = self._files.find(named.value, folders) if named.value.strip() else None
         if found is None:
             near = did_you_mean(named.value, self._files.listed(folders, self._ending))
-            looked = f"looked in {', '.join(dict.fromkeys(folder.said for folder in folders))}"
+            looked = f"looked in {', '.join(dict.fromkeys(folder.in_words for folder in folders))}"
             raise Problem(error(self._missing, f'cannot find "{named.value}"', named.place, help=(*near, looked)))
         return found

@@ -43,11 +43,11 @@ def read(
     sound = False
     with suppress(GiveUp):
         findings.add(*seen.diagnostics)
-        if seen.whole:
+        if seen.complete:
             entries, unreadable, sound = parse_on(seen.tokens, findings)
     found = in_order(findings.all, seen.sources)
     sound = sound and despite_errors and not any(each.code in UNKNOWN_TEXT for each in findings.errors)
-    if not seen.whole or (findings.errors and not sound):
+    if not seen.complete or (findings.errors and not sound):
         raise Problem(found, {source.name: source.text for source in seen.sources})
     return Deck(
         seen.sources[0].name,

@@ -94,7 +94,7 @@ def compile_deck(
             source.effects.complete &= bool(groups)
             experiments += (made for made, _ in groups)
             scopes += (scope for _, scope in groups)
-        source.effects.tell(complaints, [definition.name for definition in asked])
+        source.effects.report(complaints, [definition.name for definition in asked])
         blocks = [definitions.block(definition) for definition in definitions.of_kind("run").values()]
         loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
         for arm in definitions.of_kind("arm").values():  # with a payload its joints may move what has mass

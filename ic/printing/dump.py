@@ -72,7 +72,7 @@ def tokens(asked: DumpRequest) -> Iterator[str]:
     from ic.text.preprocess import preprocess
 
     read = preprocess(asked.deck, asked.include_dirs, asked.defines)
-    if not read.whole or any(diagnostic.severity == "error" for diagnostic in read.diagnostics):
+    if not read.complete or any(diagnostic.severity == "error" for diagnostic in read.diagnostics):
         raise Problem(read.diagnostics, {source.name: source.text for source in read.sources})
     for token in read.tokens:
         place = token.place

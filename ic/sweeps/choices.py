@@ -260,10 +260,13 @@ def with_choices(definitions: Definitions, run: Definition, choices: Choices) ->
                 )
             earlier = next((each for each in servos if each.name == first), servo)
             entry = nested_entry(in_servo(rest, definitions.block(earlier)), option.expression, column.place)
-            servos = [*(each for each in servos if each is not earlier), replace(earlier, upon=(*earlier.upon, entry))]
+            servos = [
+                *(each for each in servos if each is not earlier),
+                replace(earlier, extra_entries=(*earlier.extra_entries, entry)),
+            ]
             continue
         _place(tree, keys_of(first, rest, definitions.block(run)), column, option)
-    made = definitions.instead(*servos)
+    made = definitions.replacing(*servos)
     if not tree:
         return made, run
     body = tuple(_entries(tree))

@@ -42,14 +42,14 @@ class Effects:
         self.scopes: list[Scope] = []  # of the runs that were resolved, as far as they could be
         self.complete = True  # all of them could
 
-    def resolved(self, scope: Scope, run: Definition) -> None:
+    def note_run(self, scope: Scope, run: Definition) -> None:
         """Notes what a run has."""
         self.scopes.append(scope)
         for path, entry in self.waiting.items():
             if destination(scope.definitions, entry) == "run" and applies_to(scope.definitions, run, entry):
                 self.met.add(path)
 
-    def look(self, scope: Scope, run: Definition, made: Experiment, sweep: Sequence[Entry] = ()) -> None:
+    def examine(self, scope: Scope, run: Definition, made: Experiment, sweep: Sequence[Entry] = ()) -> None:
         """Looks for effects in a run that was resolved without a mistake. sweep: the block of the sweep of it."""
         if not self.waiting or scope.complaints.errors:
             return
@@ -71,15 +71,15 @@ class Effects:
         for path in _used(scope, run, numbers):
             del self.waiting[path]
 
-    def tell(self, complaints: Complaints, asked: Sequence[str]) -> None:
+    def report(self, complaints: Complaints, asked: Sequence[str]) -> None:
         """Report all that is set to no effect. asked: names of runs and sweeps."""
         shown = [f"`{name}`" for name in asked]
         where = ", ".join(shown[:MOST_NAMED]) + (f" and {len(shown) - MOST_NAMED} more" * (len(shown) > MOST_NAMED))
         for path, entry in self.waiting.items():
             if self.scopes:
-                self._tell(complaints, path, entry, where)
+                self._report_one(complaints, path, entry, where)
 
-    def _tell(self, complaints: Complaints, path: str, entry: Setting, where: str) -> None:
+    def _report_one(self, complaints: Complaints, path: str, entry: Setting, where: str) -> None:
         scope = next((each for each in self.scopes if path in each.known or path in each.not_sweepable), self.scopes[0])
         kind = destination(scope.definitions, entry)
         inside = sorted(known for known in scope.known if known.startswith(f"{path}."))
@@ -89,7 +89,7 @@ class Effects:
         ):
             return  # already reported
         if kind in ("let", "servo") or path in self.met or any(path in each.targets for each in self.scopes):
-            self._tell_idle(complaints, scope, path, entry, where)
+            self._report_idle(complaints, scope, path, entry, where)
         elif path in (*BLOCKS, "record"):
             complaints.error(
                 "D235",
@@ -102,9 +102,9 @@ class Effects:
         elif inside:
             complaints.error("D235", f"`{path}` cannot be set", entry.place, help=known_words("set one of", inside))
         elif self.complete:
-            self._tell_unknown(complaints, scope, path, entry, where)
+            self._report_unknown(complaints, scope, path, entry, where)
 
-    def _tell_idle(self, complaints: Complaints, scope: Scope, path: str, entry: Setting, where: str) -> None:
+    def _report_idle(self, complaints: Complaints, scope: Scope, path: str, entry: Setting, where: str) -> None:
         if complaints.errors:  # of which each may be why
             return
         first = entry.path[0].text
@@ -119,7 +119,7 @@ class Effects:
             help=f"{message}: leave it out, or name a run that uses it",
         )
 
-    def _tell_unknown(self, complaints: Complaints, scope: Scope, path: str, entry: Setting, where: str) -> None:
+    def _report_unknown(self, complaints: Complaints, scope: Scope, path: str, entry: Setting, where: str) -> None:
         first, _, rest = path.partition(".")
         joints = list(
             dict.fromkeys(

@@ -53,11 +53,11 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
         definitions, run = source.settings.in_run(source.definitions, definition)
         scope = Scope(definitions, source.complaints, settings=source.settings.numbers(definitions))
         resolved = resolve_run(scope, run)
-        source.effects.resolved(scope, run)
+        source.effects.note_run(scope, run)
         if resolved is None:
             return []
         made = experiment(scope, run.name, run.place, resolved, Cases(1, (), resolved.seed))
-        source.effects.look(scope, run, made)
+        source.effects.examine(scope, run, made)
         if not source.complaints.errors:
             check_stops(source.complaints, made)
         return [(made, scope)]
@@ -90,7 +90,7 @@ class _Sweep:
         read = self._read(self.definitions, self.definition)
         sweep = read.sweep
         if self.complaints.error_count > before:
-            self._tell_the_rest(read)
+            self._report_the_rest(read)
             return []
         self.read_so_far[()] = read
         found = structures(sweep)
@@ -124,13 +124,13 @@ class _Sweep:
                     *(Label(option.place, f"where `{column.path}` is `{option.text}`") for column, option in choices),
                 )
                 return []
-        self._tell_of_exclusions(dropped, bool(made))
+        self._report_exclusions(dropped, bool(made))
         if not made:
             return []
-        self._tell_of_idle_choices(sweep, [group for group, _ in made])
+        self._report_idle_choices(sweep, [group for group, _ in made])
         return _numbered(sweep.name, made)
 
-    def _tell_the_rest(self, read: _Read) -> None:
+    def _report_the_rest(self, read: _Read) -> None:
         """Report mistakes in the run, and in entries of the sweep that do not depend on one that could not be read."""
         sweep = read.sweep
         if self.source.settings != Settings():  # of which one may set what varies, already reported
@@ -169,7 +169,7 @@ class _Sweep:
             settings=self.source.settings.numbers(definitions),
         )
         resolved = resolve_run(scope, run)
-        self.source.effects.resolved(scope, run)
+        self.source.effects.note_run(scope, run)
         check_coordinates(scope, complete=resolved is not None)
         if resolved is None:
             return None
@@ -194,7 +194,7 @@ class _Sweep:
         if not self.complaints.errors:
             check_effects(self.complaints, there, made)
             check_stops(self.complaints, made)
-        self.source.effects.look(scope, run, made, self.definition.group.body)
+        self.source.effects.examine(scope, run, made, self.definition.group.body)
         return ((made, scope), rows[keep]), dropped
 
     def _with_macros(self, sweep: Sweep, choices: Choices) -> _Read:
@@ -226,7 +226,7 @@ class _Sweep:
             self.read_so_far[macros] = read
         return self.read_so_far[macros]
 
-    def _tell_of_exclusions(self, dropped: Mapping[Place, int], some: bool) -> None:
+    def _report_exclusions(self, dropped: Mapping[Place, int], some: bool) -> None:
         if not some and dropped:
             *others, last = dropped
             self.complaints.error(
@@ -240,7 +240,7 @@ class _Sweep:
             if some and not count:
                 self.complaints.remark("D138", "this excludes no case", place, help="the sweep is the same without it")
 
-    def _tell_of_idle_choices(self, sweep: Sweep, groups: Sequence[ScopedExperiment]) -> None:
+    def _report_idle_choices(self, sweep: Sweep, groups: Sequence[ScopedExperiment]) -> None:
         """A choice of which every option makes the same program of the same numbers is none."""
         for column in sweep.chosen:
             same: dict[tuple[str, ...], list[str]] = {}

@@ -42,40 +42,41 @@ class Settings:
 
     entries: tuple[Setting, ...] = ()
 
-    def that_go(self, definitions: Definitions, where: Destination) -> tuple[Setting, ...]:
+    def for_destination(self, definitions: Definitions, where: Destination) -> tuple[Setting, ...]:
         return tuple(entry for entry in self.entries if destination(definitions, entry) == where)
 
     def in_definitions(self, definitions: Definitions) -> Definitions:
         """The deck's definitions with what is set of lets and of servos."""
         lets = [
-            replace(definitions.lets[path_of(entry)], value=entry.value) for entry in self.that_go(definitions, "let")
+            replace(definitions.lets[path_of(entry)], value=entry.value)
+            for entry in self.for_destination(definitions, "let")
         ]
         servos: dict[str, Definition] = {}
-        for entry in self.that_go(definitions, "servo"):
+        for entry in self.for_destination(definitions, "servo"):
             name, *keys = (word.text for word in entry.path)
             servo = servos.get(name) or definitions.of_kind("servo")[name]
             made = nested_entry(in_servo(keys, definitions.block(servo)), entry.value, entry.place)
-            servos[name] = replace(servo, upon=(*servo.upon, made))
-        return definitions.instead(*servos.values(), lets=lets)
+            servos[name] = replace(servo, extra_entries=(*servo.extra_entries, made))
+        return definitions.replacing(*servos.values(), lets=lets)
 
     def in_run(self, definitions: Definitions, run: Definition) -> tuple[Definitions, Definition]:
         """The definitions and the run with what is set of its structure; a whole before a part of it."""
-        for entry in sorted(self.that_go(definitions, "run"), key=lambda entry: len(entry.path)):
+        for entry in sorted(self.for_destination(definitions, "run"), key=lambda entry: len(entry.path)):
             if applies_to(definitions, run, entry):
                 first, *rest = (word.text for word in entry.path)
                 keys = keys_of(first, rest, definitions.block(run))
-                run = replace(run, upon=(*run.upon, nested_entry(keys, entry.value, entry.place)))
-                definitions = definitions.instead(run)
+                run = replace(run, extra_entries=(*run.extra_entries, nested_entry(keys, entry.value, entry.place)))
+                definitions = definitions.replacing(run)
         return definitions, run
 
     def numbers(self, definitions: Definitions) -> dict[str, Setting]:
         """By path, what is settled in place of what the run settles."""
-        return {path_of(entry): entry for entry in self.that_go(definitions, "number")}
+        return {path_of(entry): entry for entry in self.for_destination(definitions, "number")}
 
     def check_lets(self, definitions: Definitions, complaints: Complaints) -> None:
         """Report lets that would get another dimension. definitions: the deck's own."""
         names, changed = Names(definitions, {}), Names(self.in_definitions(definitions), {})
-        for entry in self.that_go(definitions, "let"):
+        for entry in self.for_destination(definitions, "let"):
             let = definitions.lets[path_of(entry)]
             with suppress(Problem):  # of the deck's value, now overridden, or of this one, reported elsewhere
                 old, new = names.find(Name((let.name,), let.name.place)), changed.evaluate(entry.value)

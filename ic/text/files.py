@@ -44,7 +44,7 @@ class Directory:
         return file_at(os.path.join(self.path, file))
 
     @property
-    def said(self) -> str:
+    def in_words(self) -> str:
         if self.name == "<>":
             return "the standard library"
         return f"`{self.name or '.'}`" + ("" if os.path.isdir(self.path or ".") else " (there is no such folder)")

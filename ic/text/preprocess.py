@@ -51,13 +51,13 @@ class Tokens:
     tokens       those of the deck, without white space; the last is of kind END
     sources      every file that was read, in order
     diagnostics  errors and warnings so far
-    whole        whether all was read; where not, the tokens are not worth parsing
+    complete     whether all was read; where not, the tokens are not worth parsing
     """
 
     tokens: tuple[Token, ...]
     sources: tuple[SourceText, ...]
     diagnostics: tuple[Diagnostic, ...]
-    whole: bool
+    complete: bool
 
 
 def preprocess(
@@ -244,7 +244,7 @@ class _Preprocessor(Macros):
                 if link is None
                 else (f"`{link}` is a link to a file that is not there",)
             )
-            looked = f"looked in {', '.join(dict.fromkeys(d.said for d in directories))}"
+            looked = f"looked in {', '.join(dict.fromkeys(d.in_words for d in directories))}"
             self.findings.error("D005", f"cannot find {quoted}", at, help=(*near, looked))
             return ()
         if file.identity in self._once:

@@ -40,7 +40,7 @@ class Guiding:
     """A guide of the run. rate None: that of the servos, or none where it has no computer (`ticks`).
 
     link, components  what is guided, of one with a path
-    whole             whether the command of every joint is known, so that none is missing among `joints`
+    all_commands_known  whether the command of every joint is known, so that none is missing among `joints`
     fastest           of its error, 1/s (`Guide.fastest`); None where that is unknown
     """
 
@@ -51,12 +51,12 @@ class Guiding:
     rate: Rate | None
     link: str
     components: tuple[str, ...]
-    whole: bool
+    all_commands_known: bool
     fastest: Real | None
     place: Place
 
     kind = KIND
-    does = "ticks"
+    verb = "ticks"
     code = "D277"
 
     @property
@@ -121,7 +121,7 @@ def check_guides(scope: Scope, guides: Iterable[Guiding], structure: Structure) 
                 guide.place,
                 help="give it a command of its own, or guide a link that it carries",
             )
-        elif guide.whole and 0 < len(guide.joints) < len(guide.components):
+        elif guide.all_commands_known and 0 < len(guide.joints) < len(guide.components):
             words = next((p for p in guide.model.parameters if p.name == "guides"), None)
             others = words.words if words is not None else ()
             scope.complaints.error(
@@ -145,7 +145,7 @@ def check_period(scope: Scope, guide: Guiding, rate: Rate) -> None:
         bad = ~(values[:, 0] < 2.0 * rate.hz)
         return bad, [f"{x / rate.hz:.3g} times the error is taken off at each tick" for x in values[bad, 0][:1]]
 
-    scope.checks.hold(
+    scope.checks.require(
         (guide.fastest,),
         test,
         code="D279",

@@ -37,7 +37,7 @@ class Sensing:
     place: Place
 
     kind = KIND
-    does = "reads"
+    verb = "reads"
     code = "D282"
     ticks = True
 

@@ -224,7 +224,7 @@ def check_stability(
                     f"slowest rate that fits is {better}",
                 )
 
-        scope.checks.hold(
+        scope.checks.require(
             (fastest,),
             test,
             code="D104",

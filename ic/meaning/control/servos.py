@@ -162,7 +162,7 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
     )
     model = block.get("model")
     if model is None:
-        _tell_no_model(scope, block, owner, place)
+        _report_no_model(scope, block, owner, place)
         return None
     servo = find_bare_model(scope, "servo", model, MODEL_NOT_COMMAND)
     if servo is None:
@@ -192,7 +192,7 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
     return Use(item.name, name, servo, command, rate, parameters, item.place, words, sensors)
 
 
-def _tell_no_model(scope: Scope, block: MergedBlock, owner: Owner, used: Place) -> None:
+def _report_no_model(scope: Scope, block: MergedBlock, owner: Owner, used: Place) -> None:
     """A servo without a model, or the entry that may have been meant for it; of the others nothing can be said."""
     known = known_words("servo models", sorted(models.find_own("servo")))
     for item in block.items.values():
@@ -269,7 +269,7 @@ def _check_above(scope: Scope, owner: Owner, parameter: Parameter, command: Comm
         bad = values[:, 0] <= bound
         return bad, [f"this is {x:g}{unit}" for x in values[bad, 0][:1]]
 
-    scope.checks.hold(
+    scope.checks.require(
         (settled.value,),
         test,
         code="D077",
@@ -289,7 +289,7 @@ def check_rest(scope: Scope, use: Use) -> None:
         return
     with scope.complaints.gather():
         rate = where(use.servo.at_rest(SimpleNamespace(**use.parameters)), begins.value, 0.0)
-        scope.checks.hold(
+        scope.checks.require(
             (rate,),
             lambda values: (values[:, 0] != 0.0, [f"this is {x:g} {begins.unit}" for x in values[:, 0] if x][:1]),
             code="D119",

@@ -13,7 +13,7 @@ class Ticking(Protocol):
     """A guide or a sensor of the run.
 
     label     in words: "guide `tip`";  kind: "guide";  path: of its parameters
-    does      what it does at its ticks: "ticks", "reads"
+    verb      of what it does at its ticks: "ticks", "reads"
     code      of what is wrong with its rate
     rate      as it says; None: that of the servos
     ticks     whether it has a computer
@@ -26,7 +26,7 @@ class Ticking(Protocol):
     @property
     def path(self) -> str: ...
     @property
-    def does(self) -> str: ...
+    def verb(self) -> str: ...
     @property
     def code(self) -> str: ...
     @property
@@ -57,7 +57,7 @@ def check_instants(scope: Scope, each: Ticking, divisor: int, dynamics: int, rat
     if divisor % dynamics:
         scope.complaints.error(
             each.code,
-            f"{each.label} {each.does} at {rate.hz:g} Hz, between the steps of the dynamics",
+            f"{each.label} {each.verb} at {rate.hz:g} Hz, between the steps of the dynamics",
             rate.place,
             also=[Label(step.place, f"{step.hz:g} Hz")],
             help=f"give the {each.kind} a `rate` that divides {step.hz:g} Hz, or quicken the dynamics",

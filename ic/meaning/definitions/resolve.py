@@ -28,7 +28,7 @@ class Definition:
     """A definition as written: `default run nominal like base { ... }`.
 
     parts: of a sweep made of others, `sweep both = gains + spread;`, which are runs and sweeps
-    upon: further entries, each put upon all that the definition writes
+    extra_entries: further entries, each merged over all that the definition writes
     """
 
     kind: str
@@ -36,7 +36,7 @@ class Definition:
     group: Group
     default: bool = False
     parts: tuple[Name, ...] = ()
-    upon: tuple[Entry, ...] = ()
+    extra_entries: tuple[Entry, ...] = ()
 
     @property
     def place(self) -> Place:
@@ -69,7 +69,7 @@ class Definitions:
                 complaints.note_lost_names(*(word.text for word in getattr(entry, "words", ())[1:]))
         self._check_defaults()
 
-    def instead(self, *changed: Definition, lets: Sequence[Let] = ()) -> Definitions:
+    def replacing(self, *changed: Definition, lets: Sequence[Let] = ()) -> Definitions:
         """The same definitions and lets but for these, which take the places of those of their names."""
         if not changed and not lets:
             return self
@@ -181,7 +181,7 @@ class Definitions:
             if above is not None:
                 self._complaints.note_base(each.place, above.place)
             block = merge(block, each.group.body, home=each.home, base_name=base_name, complaints=self._complaints)
-            for entry in each.upon:
+            for entry in each.extra_entries:
                 block = merge(block, (entry,), home=each.home, base_name=base_name, complaints=self._complaints)
             self._merged[(each.kind, each.name)] = block
             above = each

@@ -77,11 +77,11 @@ class Checks:
     def failed(self, path: str) -> bool:
         return bool(path) and any(each == path or each.startswith(path + ".") for each in self._failed)
 
-    def touches(self, path: str) -> bool:
+    def touches_failed(self, path: str) -> bool:
         """Return True if a failed path is this one, inside it, or around it."""
         return self.failed(path) or any(path.startswith(each + ".") for each in self._failed if each)
 
-    def hold(
+    def require(
         self,
         values: tuple[Real, ...],
         test: Test,
@@ -117,7 +117,7 @@ class Checks:
             act(table)
             return np.zeros(len(table), bool), []
 
-        self.hold(values, test, code="", message="", place=place, needs=needs)
+        self.require(values, test, code="", message="", place=place, needs=needs)
 
     def run(self, cases: dict[str, np.ndarray], count: int) -> None:
         """Every check that waited for the cases, over all of them; names the first case that fails one."""

@@ -248,7 +248,7 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
     written = scope.vector(owner, AXIS, item if named is None else replace(item, value=None), given=named)
     if written is None:
         return
-    scope.checks.hold(
+    scope.checks.require(
         written,
         no_direction,
         code="D097",

@@ -39,7 +39,7 @@ def check_body(
         if written_elsewhere(scope, place):
             entry = "remove inertia;" if weightless else "inertia = [...] kg*m^2;"
             helps.append(f"in the arm's block: `{name} {{ {entry} }}`")
-    scope.checks.hold(
+    scope.checks.require(
         (*inertia, 1.0 if mass is None else mass),
         lambda values: in_pieces(lambda rows: _not_a_body(rows, kind), values),
         code="D087",
@@ -128,7 +128,7 @@ def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint], pa
         values = [value for name in names if (value := masses.get(name)) is not None]
         values += [value for name in names for _, value in loads.get(name, ())]
         also = [word for name in names for word in passing.get(name, ())]
-        scope.checks.hold(
+        scope.checks.require(
             tuple(values),  # type: ignore[arg-type]  # masses are numbers
             lambda rows: (~(rows.sum(axis=1) > 0.0), []),
             code="D217",

@@ -159,7 +159,7 @@ def _check_order(scope: Scope, item: Item, times: list[Real | None], place: Plac
     if grapple is None or release is None:
         return
     head = f"payloads.{item.name}"
-    scope.checks.hold(
+    scope.checks.require(
         (grapple, release),
         _not_in_order,
         code="D264",
@@ -183,7 +183,7 @@ def _check_solid(scope: Scope, owner: Owner, payload: Payload, item: Item) -> No
         "what flies has mass, and resists a turn about every axis: a box, a cylinder or a sphere does",
         "or leave `grapple` and `release` out: then it is a part of its link",
     )
-    scope.checks.hold(
+    scope.checks.require(
         tuple(each.value for each in settled if each is not None),  # type: ignore[misc]  # numbers, by the test above
         _not_solid,
         code="D265",

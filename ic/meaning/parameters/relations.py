@@ -26,7 +26,7 @@ def check_relations(
     for wanted in parameters:
         value, place, path = values[wanted.name], _place(owner, body, wanted.name), owner.join(wanted.name)
         if wanted.direction:
-            scope.checks.hold(
+            scope.checks.require(
                 value,
                 no_direction,
                 code="D240",
@@ -38,7 +38,7 @@ def check_relations(
             )
         if wanted.less_than:
             other = wanted.less_than
-            scope.checks.hold(
+            scope.checks.require(
                 (value, values[other]),
                 _not_less,
                 code="D241",

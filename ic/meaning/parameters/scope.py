@@ -93,7 +93,7 @@ class Scope:
         """Return True if nothing can be said of this path, because what it leads to has failed (already reported)."""
         first, _, rest = path.partition(".")
         thing = rest.partition(".")[0] if first in ("links", "payloads") else first
-        if self.checks.touches(path) or thing in self.failed_parts:
+        if self.checks.touches_failed(path) or thing in self.failed_parts:
             return True
         return bool(self.failed_servos) and (first in self.failed_servos or first in self.definitions.of_kind("servo"))
 

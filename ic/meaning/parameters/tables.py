@@ -56,7 +56,7 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Merged
     return None if values is None or columns is None else {**values, **columns}
 
 
-def tell_named_lists(scope: Scope, owner: Owner, lists: list[Parameter], body: MergedBlock) -> bool:
+def report_named_lists(scope: Scope, owner: Owner, lists: list[Parameter], body: MergedBlock) -> bool:
     """Report a file's name that stands where a list should; return True if one does."""
     found = False
     for each in lists:

@@ -100,7 +100,7 @@ class ValueChecks:
         if wanted.whole:
             limits, remedy = f"whole and {limits}", remedy.replace("a number", "a whole number")
         limits += unit if bounds else ""
-        self.checks.hold(
+        self.checks.require(
             (value,),
             test,
             code="D077",

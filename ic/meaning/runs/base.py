@@ -90,7 +90,7 @@ def check_base(
     masses = [settled.value for path in paths if (settled := scope.parameters.get(path)) is not None]
     own = scope.parameters.get(f"links.{BASE}.mass")
     written = own is not None and own.origin.kind != "default"
-    scope.checks.hold(
+    scope.checks.require(
         tuple(masses),  # type: ignore[arg-type]  # masses are numbers
         lambda rows: (~(rows.sum(axis=1) > 0.0), []),
         code="D254",

@@ -14,7 +14,7 @@ from ic.meaning.parameters.models import check_keys, find_model, refuse_values, 
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
-from ic.meaning.parameters.tables import tell_named_lists, use_table
+from ic.meaning.parameters.tables import report_named_lists, use_table
 from ic.meaning.runs.base import fixed_to, remark_ground
 from ic.text.complaints import known_words
 from met import models
@@ -108,7 +108,7 @@ def _environment_use(
             return EnvironmentUse(item.name, environment.name, None, item.place)
         owner = replace(owner, joint=kinds[about])
     lists = [each for each in environment.parameters if each.shape == "list" and environment.from_file]
-    if tell_named_lists(scope, owner, lists, body):
+    if report_named_lists(scope, owner, lists, body):
         scope.checks.fail(owner.path)
         return EnvironmentUse(item.name, environment.name, None, item.place)
     if environment.from_file and body.get("file") is not None:
