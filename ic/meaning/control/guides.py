@@ -37,11 +37,12 @@ USAGE = "write `guide NAME = MODEL { ... }`"
 
 @frozen
 class Guiding:
-    """A guide of the run. rate None: that of the servos, or none where it has no computer (`ticks`).
+    """A guide of the run.
 
-    link, components  what is guided, of one with a path
+    rate                its own; None: that of the servos, or none where it has no computer (`ticks`)
+    link, components    the link that it guides, and in which components, where it has a path
     all_commands_known  whether the command of every joint is known, so that none is missing among `joints`
-    fastest           of its error, 1/s (`Guide.fastest`); None where that is unknown
+    fastest             rate constant of its error, 1/s (`Guide.fastest`); None where that is unknown
     """
 
     name: str
