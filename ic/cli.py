@@ -64,7 +64,7 @@ def check(
 
 
 def _check_plan(path: str, form: str, quiet: bool) -> int:
-    """The same for a plan file. Raises Problem where it cannot be read."""
+    """Find all that is wrong with a plan file. Raises Problem where it cannot be read."""
     from ic.printing.check import verdict
     from met.plan import file as plan_file
 
@@ -348,7 +348,7 @@ def _print_json(value: object) -> None:
 
 
 def _spelled(value: object) -> object:
-    """The same with the words of plan files for numbers that JSON has none for: "inf", "nan"."""
+    """The value with words for numbers that JSON does not have, as in plan files: "inf", "nan"."""
     if isinstance(value, Mapping):
         return {key: _spelled(part) for key, part in value.items()}
     if isinstance(value, list | tuple):

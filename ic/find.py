@@ -1,5 +1,5 @@
-"""Which decks there are: `met run two_link.ic` works anywhere, since a deck is looked for as a file first, then in the
-directories of MET_DECK_PATH and in the standard library."""
+"""Finds a deck by its name: as a file, then in the directories of MET_DECK_PATH and in the standard library. So
+`met run two_link.ic` works anywhere."""
 
 from __future__ import annotations
 

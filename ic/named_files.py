@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 from ic.grammar.syntax import Deck, String
 from ic.text.files import LIBRARY, Files, FoundFile
 from ic.text.lexer import COMMAND_LINE
-from ic.text.source import SourceText
+from ic.text.source import SourceFile
 from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
 
 T = TypeVar("T")
@@ -31,7 +31,7 @@ class NamedFiles(Generic[T]):
         self._read: dict[str, T | Problem] = {}
 
     @property
-    def sources(self) -> tuple[SourceText, ...]:
+    def sources(self) -> tuple[SourceFile, ...]:
         """The files that were read, whole, in order."""
         return tuple(self._files.read_so_far.values())
 

@@ -12,7 +12,7 @@ from ic.grammar.syntax import Deck, Entry
 from ic.text.files import LIBRARY
 from ic.text.limits import Findings, GiveUp
 from ic.text.preprocess import preprocess
-from ic.text.source import SourceText, UnreadableStretch
+from ic.text.source import SourceFile, UnreadableStretch
 from met.diagnostic import Diagnostic, Problem
 from met.render import shown_place
 
@@ -68,7 +68,7 @@ def read_again(deck: Deck, defines: Sequence[str], *, library: Path = LIBRARY) -
     return read(deck.path, deck.include_dirs, (*kept, *defines), library=library)
 
 
-def in_order(diagnostics: Iterable[Diagnostic], sources: Sequence[SourceText]) -> tuple[Diagnostic, ...]:
+def in_order(diagnostics: Iterable[Diagnostic], sources: Sequence[SourceFile]) -> tuple[Diagnostic, ...]:
     """Diagnostics as one meets them reading the files, one after the other; those without a place come last."""
     number = {source.name: i for i, source in enumerate(sources)}
 

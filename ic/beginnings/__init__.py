@@ -1,1 +1,1 @@
-"""What `met new` writes: decks and models that run as they are, to begin from."""
+"""Decks and models that run as they are, to begin from: the files that `met new` writes."""

@@ -1,1 +1,1 @@
-"""What commands ask of the compiler: a deck compiled, a value explained, the deck of a URDF file."""
+"""The compiler's commands: a deck compiled, a value explained, the deck of a URDF file."""

@@ -1,4 +1,4 @@
-"""From a deck to a plan: the runs and sweeps that were asked for, each as an experiment."""
+"""Compiles a deck to a plan: the runs and sweeps that were asked for, each as an experiment."""
 
 from __future__ import annotations
 

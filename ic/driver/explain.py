@@ -1,4 +1,4 @@
-"""Where a value comes from: what it is, who wrote it, what it overrode, through which macros and names it came."""
+"""The origin of a value: who wrote it, what it overrode, through which macros and names it came."""
 
 from __future__ import annotations
 

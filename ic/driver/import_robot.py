@@ -68,7 +68,7 @@ def _check(made: ArmEntries) -> None:
 
 
 def _mended(found: tuple[Diagnostic, ...]) -> list[Diagnostic]:
-    """With what `met import` can do about it, in the place of what a deck can."""
+    """The errors with the remedies of `met import` in place of those for a deck."""
     follow = "`--mimic free` lets such joints move by themselves, `--mimic fixed` holds them at 0"
     made = [replace(each, help=(follow,)) if each.code == "D213" else each for each in found]
     if made[-1].code != "D213":

@@ -1,4 +1,4 @@
-"""Which pieces of neighbouring lines the author has aligned.
+"""Alignments: the pieces of neighbouring lines that the author has aligned.
 
 Neighbours are lines of one block with no blank line between; lines within a nested block do not count. Two pieces are
 aligned where they are of one family, one of them is set apart, and both begin at the same column, or end there, or

@@ -1,4 +1,4 @@
-"""How a row begins: anew, going on with an entry, or below what follows a bracket."""
+"""The beginning of a row: a new entry, the continuation of one, or a place below what follows a bracket."""
 
 from __future__ import annotations
 

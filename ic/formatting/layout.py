@@ -1,4 +1,4 @@
-"""Where everything on a row goes: indentation, blanks between pieces, and what stands below what.
+"""The column of everything on a row: indentation, blanks between pieces, alignment with rows above and below.
 
 A line begins four blanks to the right of the line that opened the bracket it stands in, and four more where it goes on
 with an entry. Behind a bracket that is not the last of its line it may stand below what follows the bracket, if it did.
@@ -173,7 +173,7 @@ def _tails(found: Sequence[Row], columns: Sequence[Sequence[int]]) -> list[int]:
 
 
 def _settle(found: Sequence[Row], columns: Sequence[Sequence[int]], paragraph: Sequence[int], tails: list[int]) -> None:
-    """The same for the rows of a paragraph: comments that were below each other are."""
+    """Give the comments of a paragraph's rows one column where they were below each other."""
     places: dict[int, list[int]] = {}
     for at in paragraph:
         tail = found[at].tail

@@ -1,4 +1,4 @@
-"""What stands apart on a line of a deck: tokens that belong together as one piece, and the blanks between pieces.
+"""The pieces of a line, tokens that belong together, and the blanks between them.
 
 A path, a unit and a number with its sign are one piece each. Where a unit ends is asked of the parser, so that the
 `*` of `2 kg*m^2` is told from that of `2 * width`.
@@ -163,7 +163,7 @@ def blanks_between(before: RowPiece, piece: RowPiece) -> int:
 
 
 def _wanted(before: RowPiece, piece: RowPiece) -> int | None:
-    """The same by what the two are; None to leave it to the author, whether one or none."""
+    """The blanks between two pieces by their kinds; None to leave it to the author, whether one or none."""
     first, second = before.kind, piece.kind
     if second == "stop" and first != "comment":
         return 1 if before.text == "{" else 0

@@ -1,4 +1,4 @@
-"""Where the author's tab stops were. A deck does not say; its columns do: they meet where the author saw them meet."""
+"""The author's tab stops. A deck does not state them; its columns do: they meet where the author saw them meet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the parser stands in the tokens, how it complains, and how it finds its feet again.
+"""The parser's position in the tokens, its messages, and how it goes on after an error.
 
 A mistake is noted and raises Unreadable; the list of entries that holds the one in trouble catches it, skips to its
 end and goes on, so that one run reports several mistakes, and none twice.
@@ -18,7 +18,7 @@ SHOWN = 40  # characters of a token in a message
 
 
 class Unreadable(Exception):
-    """This entry cannot be read, and that has been said."""
+    """Raised where an entry cannot be read (already reported)."""
 
 
 class EndedInsideBlock(Exception):

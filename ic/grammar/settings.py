@@ -1,4 +1,4 @@
-"""What is set from outside of a deck, `PATH=VALUE`, as entries of the syntax tree; their text is the command line's."""
+"""Settings of the command line, `PATH=VALUE`, as entries of the syntax tree."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from ic.grammar.parse import parse
 from ic.grammar.syntax import Setting
 from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, SPACE, Text, Token, logical_lines
 from ic.text.limits import Findings, GiveUp
-from ic.text.source import SourceText
+from ic.text.source import SourceFile
 from ic.text.strays import complain_of_stray
 from met.diagnostic import Place, Problem, error
 
 EXAMPLE = "write `PATH=VALUE`, such as `gearbox.kp=0.02 V*s/rad`"
 
 
-def command_line(texts: Sequence[str], before: str = "") -> SourceText:
+def command_line(texts: Sequence[str], before: str = "") -> SourceFile:
     """The text that messages show: a line for each `PATH=VALUE`, behind the macros of -D."""
-    return SourceText(COMMAND_LINE, before + "".join(f"{_one_line(text)}\n" for text in texts), "")
+    return SourceFile(COMMAND_LINE, before + "".join(f"{_one_line(text)}\n" for text in texts), "")
 
 
 def read_settings(texts: Sequence[str], before: str = "") -> tuple[Setting, ...]:

@@ -22,7 +22,7 @@ what may stand where is decided when the tree is resolved. So a joint may be cal
 
 from __future__ import annotations
 
-from ic.text.source import SourceText, UnreadableStretch
+from ic.text.source import SourceFile, UnreadableStretch
 from met.diagnostic import Diagnostic, Place
 from met.frozen import frozen
 
@@ -202,7 +202,7 @@ class Deck:
 
     file: str
     entries: tuple[Entry, ...]
-    sources: tuple[SourceText, ...]
+    sources: tuple[SourceFile, ...]
     warnings: tuple[Diagnostic, ...] = ()
     include_dirs: tuple[str, ...] = ()
     path: str = ""

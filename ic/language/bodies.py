@@ -1,4 +1,4 @@
-"""What a deck says of bodies: links, joints between them, and payloads."""
+"""The blocks of a deck about bodies: links, joints between them, and payloads."""
 
 from __future__ import annotations
 

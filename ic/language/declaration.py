@@ -1,4 +1,4 @@
-"""How a block of the deck language is declared: what may stand in it, as models declare their parameters."""
+"""The declaration of a block of the deck language: its entries, declared as models declare their parameters."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Entry:
 
     @property
     def unit(self) -> str:
-        """Its unit; "" where it is no number."""
+        """The unit of its number; "" where it has none."""
         if self.parameter is None or self.parameter.shape in ("word", "words"):
             return ""
         return self.parameter.unit

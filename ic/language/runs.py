@@ -1,4 +1,4 @@
-"""What a deck says of a run and of a sweep."""
+"""The blocks of a deck about a run and a sweep."""
 
 from __future__ import annotations
 

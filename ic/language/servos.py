@@ -1,4 +1,4 @@
-"""What a deck says of a servo."""
+"""The block of a deck about a servo."""
 
 from __future__ import annotations
 

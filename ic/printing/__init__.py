@@ -1,1 +1,1 @@
-"""What the terminal shows of a deck, a plan and the models."""
+"""Decks, plans and models as the terminal shows them."""

@@ -97,7 +97,7 @@ class _Rows:
 
 
 def cases_json(groups: Sequence[Experiment]) -> dict[str, Any]:
-    """The same for programs, in SI, whole; a value is null where a case of this group has no such coordinate."""
+    """The cases for programs, in SI, in full; a value is null where a case of this group has no such coordinate."""
     rows = _Rows(groups)
     first = {c.path: c for group in reversed(groups) for c in group.cases.coordinates}
     paths = list(first)

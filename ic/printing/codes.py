@@ -1,4 +1,4 @@
-"""What the code of a message means: its entry on the page docs/diagnostics.md, for the terminal."""
+"""The meaning of a message's code: its entry on the page docs/diagnostics.md, for the terminal."""
 
 from __future__ import annotations
 

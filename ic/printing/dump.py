@@ -1,4 +1,4 @@
-"""What each stage of the way hands to the next, as text: `met dump STAGE deck.ic`.
+"""The result of each stage, as text: `met dump STAGE deck.ic`.
 
 A stage is a function from `DumpRequest` to lines, offered as an entry point in the group `met.stages` by the lowest
 package that may import all it needs: tokens, syntax, model and plan from here, program, kernel and assembly from

@@ -1,4 +1,4 @@
-"""Where a value comes from: `elbow.servo.kt`, its unit, who wrote it, what that overrode, through which macros."""
+"""The origin of a value as text: `elbow.servo.kt`, its unit, who wrote it, what that overrode, through which macros."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ def print_explain(
 def explain_json(
     experiment: Experiment, path: str, also: Mapping[str, Sequence[str]] = NO_MORE
 ) -> list[dict[str, Any]]:
-    """The same for programs, values in SI."""
+    """The explanations for programs, values in SI."""
     records = []
     for name in find_paths(experiment, path, also):
         found = experiment.parameters[name]

@@ -1,4 +1,4 @@
-"""Where a value comes from, in each of the structures that a run or sweep is of, and where need be in other runs."""
+"""The origin of a value in each structure of a run or sweep, and in other runs where these do not know it."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def print_explained(sources: Sources, path: str) -> Iterator[str]:
 
 
 def explained_json(sources: Sources, path: str) -> list[dict[str, Any]]:
-    """The same for programs; of several experiments each says its name."""
+    """The explanations for programs; of several experiments each names its own."""
     found = _found(sources, path)
     several = len(found) > 1 or not found[0].alone
     return [

@@ -1,4 +1,4 @@
-"""What `met doc run` and the like say, and the tables of docs/deck.md: the blocks of the deck language, as declared.
+"""Blocks of the deck language, as declared: pages of `met doc`, and the tables of docs/deck.md.
 
 `python -m ic.printing.language` writes the tables of docs/deck.md anew.
 """

@@ -1,4 +1,4 @@
-"""What models declare of themselves: their kinds, one kind's models, one model with all of its numbers."""
+"""Models, as declared: their kinds, one kind's models, one model with all of its numbers."""
 
 from __future__ import annotations
 

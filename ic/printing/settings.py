@@ -1,4 +1,4 @@
-"""What a run is besides its parameters, under the names of a deck: `rates.dynamics`, `elbow.servo.model`."""
+"""Settings of a run besides its parameters, under the names of a deck: `rates.dynamics`, `elbow.servo.model`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `met doc` says besides models: channels, Denavit-Hartenberg numbers, shapes, motors on beds, units, and the
+"""Subjects of `met doc` besides models: channels, Denavit-Hartenberg numbers, shapes, motors on beds, units, and the
 words of values and sweeps (ic/printing/sweeps.py)."""
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What `met doc` says of the words in values and sweeps: functions, designs, distributions.
+"""Words in values and sweeps, for `met doc`: functions, designs, distributions.
 
 The names, and what each takes, are those that the compiler reads by; here stands what they mean.
 """

@@ -1,4 +1,4 @@
-"""What an element of a URDF file must hold and may hold; every fault placed at it."""
+"""Attributes and elements of a URDF file, read and checked; every fault placed at its element."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def only_child(element: Element, tag: str) -> Element | None:
 
 
 def required_child(element: Element, tag: str, usage: str) -> Element:
-    """The same, which must be there. Raises Problem D205."""
+    """The element of this tag inside. Raises Problem D204 where there are two, D205 where there is none."""
     found = only_child(element, tag)
     if found is None:
         raise Problem(error("D205", f"this `<{element.tag}>` has no `<{tag}>`", element.place, help=f"write `{usage}`"))

@@ -1,4 +1,4 @@
-"""What of a URDF file an arm does not have: one warning, a line for each kind; and which names it changes: another."""
+"""Warnings of a URDF file's arm: what it leaves out, a line for each kind; and the names that it changes."""
 
 from __future__ import annotations
 

@@ -478,7 +478,7 @@ def named(value: Value) -> str:
 
 
 def check_no_equal_cases(columns: Sequence[Column], places: Sequence[Place]) -> None:
-    """The same values twice are the same case twice. places: of the rows, or of the first column's numbers."""
+    """Report equal rows: equal values are equal cases. places: of the rows, or of the first column's numbers."""
     seen: dict[tuple[float | str, ...], int] = {}
     keys = [
         column.values.tolist() if isinstance(column, VariedPath) else [o.text for o in column.options]

@@ -1,4 +1,4 @@
-"""What decides the structure of a case: words, models, rates, macros. A run with one choice of each put in.
+"""Choices of a sweep that decide the structure of a case: words, models, rates, macros; and a run with its choices.
 
 A number that a model takes is an input of the program, and cases that differ in it alone run together. What decides
 the program itself makes another structure: a servo, a law, an integrator, a rate, a word such as `world`. For each

@@ -1,4 +1,4 @@
-"""What a sweep's coordinates reach: the parameters that each sets, and that each sets something."""
+"""The reach of a sweep's coordinates: the parameters that each sets, and a check that each sets something."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is set from outside of a deck, `--set PATH=VALUE`: the deck's definitions as if they said so.
+"""Settings of the command line, `--set PATH=VALUE`: the deck's definitions as if they said so.
 
 A path is one that `vary` takes, or the seed. Where its value goes is where the deck would say it:
 

@@ -183,7 +183,7 @@ class _Condition:
             self.refuse(f"a condition goes deeper than {CONDITION_NESTING}", token, code="D018")
 
     def whole(self, live: bool) -> _Value:
-        """With commas, of which the last value counts."""
+        """The value of a condition with commas, of which the last value counts."""
         value = self.choice(live)
         while self.text() == ",":
             self.at += 1

@@ -1,4 +1,4 @@
-"""What a `#define` may define: the checks of a macro's name, parameters and body, and the forms that its body takes."""
+"""Checks of a `#define`: the macro's name, parameters and body, and the forms that its body takes."""
 
 from __future__ import annotations
 

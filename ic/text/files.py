@@ -1,4 +1,4 @@
-"""Where a deck's files are found, and how they are read: a regular file of UTF-8 text, not too large.
+"""Finds a deck's files, and reads them: a regular file of UTF-8 text, not too large.
 
 An `#include "name"` looks beside the including file first; both forms then look in the `-I` directories, in those of
 MET_DECK_PATH, and in the standard library (ic/decks), whose files are called `<servos/rigid_gearbox.ic>` in messages
@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ic.text.limits import MOST_BYTES
-from ic.text.source import SourceText
+from ic.text.source import SourceFile
 from met.diagnostic import Diagnostic, Place, Problem, error
 from met.files import open_regular
 from met.frozen import frozen
@@ -86,7 +86,7 @@ class Files:
         named = [os.fspath(d) for d in include_dirs]
         named += [d for d in os.environ.get("MET_DECK_PATH", "").split(os.pathsep) if d]
         self.path = [Directory(d, d) for d in named] + [Directory(os.fspath(library), "<>")]
-        self.read_so_far: dict[str, SourceText] = {}
+        self.read_so_far: dict[str, SourceFile] = {}
         self._refused: dict[str, Problem] = {}
 
     def deck(self, path: str | Path) -> FoundFile:
@@ -142,7 +142,7 @@ class Files:
         if file.name not in self.read_so_far:
             data = _read_bytes(file, kind, most)
             text, complaint = decode(data, file.name, kind)
-            self.read_so_far[file.name] = SourceText(file.name, text, hashlib.sha256(data).hexdigest())
+            self.read_so_far[file.name] = SourceFile(file.name, text, hashlib.sha256(data).hexdigest())
             if complaint is not None:
                 self._refused[file.name] = Problem(complaint)
                 raise self._refused[file.name]

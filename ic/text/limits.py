@@ -1,4 +1,4 @@
-"""How much a deck may ask for: a hostile or broken one ends in a diagnostic, soon and in little memory.
+"""Limits of a deck: a hostile or broken one ends in a diagnostic, soon and in little memory.
 
 Each limit is far above what a deck written by hand needs (the standard library's largest file has some thousand
 tokens) and far below what would hurt.
@@ -69,7 +69,7 @@ class Findings(Complaints):
 
 @contextmanager
 def without_collection() -> Iterator[None]:
-    """Without the cyclic garbage collector: a large deck makes many objects, no cycles, and half the time was its."""
+    """Turn the cyclic garbage collector off: a large deck makes many objects and no cycles; it took half the time."""
     collecting = gc.isenabled()
     gc.disable()
     try:

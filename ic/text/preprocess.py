@@ -32,7 +32,7 @@ from ic.text.limits import (
     without_collection,
 )
 from ic.text.macros import Macros
-from ic.text.source import SourceText
+from ic.text.source import SourceFile
 from ic.text.strays import complain_of_stray, complain_of_unseen
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, nearest
 from met.frozen import frozen
@@ -55,7 +55,7 @@ class Tokens:
     """
 
     tokens: tuple[Token, ...]
-    sources: tuple[SourceText, ...]
+    sources: tuple[SourceFile, ...]
     diagnostics: tuple[Diagnostic, ...]
     complete: bool
 
@@ -103,7 +103,7 @@ class _Preprocessor(Macros):
     def __init__(self, files: Files, findings: Findings) -> None:
         self.files = files
         self.output: list[Token] = []
-        self.command_line: tuple[SourceText, ...] = ()
+        self.command_line: tuple[SourceFile, ...] = ()
         self.given: dict[str, Token] = {}
         self._including: list[tuple[FoundFile, Text]] = []
         self._entered: list[Place] = []
@@ -125,7 +125,7 @@ class _Preprocessor(Macros):
         written = "".join(
             f"{name} {value if equals else 1}\n" for name, equals, value in (d.partition("=") for d in defines)
         )
-        self.command_line = (SourceText(COMMAND_LINE, written, ""),)
+        self.command_line = (SourceFile(COMMAND_LINE, written, ""),)
         for line in logical_lines(Text(COMMAND_LINE, written)):
             self.define(self.tokenstrip(line))
         self.given = {name: macro.name_token for name, macro in self.macros.items()}

@@ -22,7 +22,7 @@ class UnreadableStretch:
 
 
 @frozen
-class SourceText:
+class SourceFile:
     """A file that was read: the name messages print, its text, SHA-256 of its bytes."""
 
     name: str

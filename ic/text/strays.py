@@ -1,4 +1,4 @@
-"""What to say of text that is no token: unclosed comments and strings, and characters that a deck does not have."""
+"""Messages for text that is no token: unclosed comments and strings, and characters that a deck does not have."""
 
 from __future__ import annotations
 

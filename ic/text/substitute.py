@@ -1,4 +1,4 @@
-"""What a use of a macro becomes: its body with the arguments in it; `#`, `##` and `__VA_OPT__` are done as in gcc."""
+"""Substitution of a macro's use: its body with the arguments in it; `#`, `##` and `__VA_OPT__` are done as in gcc."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ class _Substitution:
         return pieces, end
 
     def end(self, body: list[Token], at: int) -> int:
-        """Behind the parameter, or behind the `__VA_OPT__(...)`, that stands at `at`."""
+        """The position behind the parameter, or behind the `__VA_OPT__(...)`, that stands at `at`."""
         return at + 1 if body[at].text != OPTIONAL else closing(body, _solid(body, at + 1)) + 1
 
     def optional(self, body: list[Token], at: int, end: int) -> list[Token]:

@@ -1,4 +1,4 @@
-"""What environment models do to the servo of a joint: that there is one to which they can, and that it is anything.
+"""Checks of environment models that act on a joint's servo: that there is such a servo, and that they have an effect.
 
 `Environment.servo_of` has what a model does to a servo, `Environment.rubs` friction beside it.
 """

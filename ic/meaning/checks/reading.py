@@ -1,4 +1,4 @@
-"""What laws of servos read: sensors of anything else change nothing, nor do failures of such."""
+"""Warnings of sensors, and of failures of sensors, that no servo's law reads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the step is short enough for what flies and spins from the start: a base that is free, payloads."""
+"""Warnings of steps that are too long for what spins from the start: a free base, payloads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the step is short enough for the stops that joints may run into."""
+"""Warnings of steps that are too long for the stops that joints may run into."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What swings in a servo or a sensor, and whether the integrator's steps make it grow: x'' = -a x - b x'.
+"""Warnings of oscillations in a servo or a sensor that the integrator's steps make grow: x'' = -a x - b x'.
 
 The figure h lambda is about decay, and a swing has roots beside the real axis, where integrators bear other steps: the
 methods of order 2 and 1 let an undamped swing grow at any step, slowly or fast. So the integrator itself is asked. Its

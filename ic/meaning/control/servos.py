@@ -83,7 +83,7 @@ class Use:
 
     @property
     def bare(self) -> ServoUse:
-        """As a plan has it, but for its rate and its sensors."""
+        """The servo as a plan has it, without its rate and its sensors."""
         return ServoUse(self.joint, self.definition, self.servo.name, self.command, 1, self.place, self.words)
 
 

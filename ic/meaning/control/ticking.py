@@ -1,4 +1,4 @@
-"""What of a run ticks besides servos: guides and sensors of links. How often, and that it is at instants."""
+"""Guides and sensors of links as things that tick: how often, and that each tick is at an instant of the dynamics."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""From entries as written to definitions as meant: each under its kind and name, found when it is needed.
+"""Definitions of a deck by kind and name, merged with their bases when they are asked for.
 
-A definition refers to its base, or to the file that it is made from, and is merged with it when asked for (`merge`).
+A definition refers to its base, or to the file that it is made from (`merge`).
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Definitions:
         self._check_defaults()
 
     def replacing(self, *changed: Definition, lets: Sequence[Let] = ()) -> Definitions:
-        """The same definitions and lets but for these, which take the places of those of their names."""
+        """A copy of the definitions and lets in which these take the places of those of their names."""
         if not changed and not lets:
             return self
         other = copy(self)

@@ -1,4 +1,4 @@
-"""What names in expressions are worth: `let`s in any order, parameters of servo definitions, what a sweep varies."""
+"""The values of names in expressions: `let`s in any order, parameters of servo definitions, a sweep's coordinates."""
 
 from __future__ import annotations
 

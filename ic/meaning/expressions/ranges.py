@@ -63,7 +63,7 @@ def _steps(a: float, b: float, step: float, expression: Range, first: Value, sca
     """The points of a range. scale: SI units in one of what the numbers are in."""
 
     def shown(number: float) -> str:
-        """In the unit of the first value, where it has one of its own."""
+        """The number in the unit of the first value, where that has one of its own."""
         number *= scale
         if first.unit is None or measure_of(first.unit).dimension != first.dimension:
             return f"{number:g}"

@@ -1,4 +1,4 @@
-"""What to write instead of a value of the wrong dimension; and how each number of a list was written."""
+"""Remedies for a value of the wrong dimension; and the expressions of a list's numbers."""
 
 from __future__ import annotations
 

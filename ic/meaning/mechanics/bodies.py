@@ -1,4 +1,4 @@
-"""Whether links could be bodies: their inertia, and whether what a joint moves has mass.
+"""Checks that links can be bodies: their inertia, and that whatever a joint moves has mass.
 
 A link of `mass = 0 kg` is a frame: it has no inertia. Fixed to a body it is a place on it, between two joints it is
 where they meet. An inertia of zeros is a point's, one of 0 and two that are alike is a thin rod's, as the shape `rod`

@@ -1,4 +1,4 @@
-"""What a body is made of: mass, centre and inertia of a link or payload, as numbers or by a uniform solid."""
+"""Mass, centre and inertia of a link or payload, as numbers or by a uniform solid."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a run or an arm writes what a path names: `elbow.servo.kp` is `servos { elbow { kp = ...; } }` there."""
+"""Remedies for a path written as an entry: `elbow.servo.kp` is `servos { elbow { kp = ...; } }` in a run."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def in_run(definitions: Definitions, block: MergedBlock, item: Item, rates: tupl
 
 
 def in_arm(item: Item, known: list[str]) -> list[str]:
-    """The same for an arm, whose links and joints are these."""
+    """The remedy for a path that stands in an arm's block as an entry. known: names of its links and joints."""
     value = spell(item.value) if item.value is not None else "..."
     words = item.name.removeprefix("links.").split(".")
     if len(words) == 2 and words[0] in known and item.body is None:

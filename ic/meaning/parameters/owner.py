@@ -1,4 +1,4 @@
-"""What parameters belong to, and a parameter that is settled."""
+"""The owner of parameters, such as a joint's servo, and a parameter that is settled."""
 
 from __future__ import annotations
 

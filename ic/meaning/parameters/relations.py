@@ -1,4 +1,4 @@
-"""What a declaration says of parameters together: names of the arm, directions, order, lists that match."""
+"""Checks of parameters together, as declared: names of the arm, directions, order, lists of one length."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run allows another version to differ by: `tolerances { qd = 1e-6 rad/s;  rel = 1e-9; }`."""
+"""Tolerances of a run for comparison with another version: `tolerances { qd = 1e-6 rad/s;  rel = 1e-9; }`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ WRITE = "write `NAME = SIZE;`: `qd = 1e-6 rad/s;`, `elbow.q = 0.01 deg;`, `rel =
 
 
 def resolve_tolerances(scope: Scope, body: MergedBlock, structure: Structure) -> tuple[Tolerance, ...]:
-    """In SI, in the order in which they are written. structure: with its metrics and record."""
+    """The tolerances in SI, in the order in which they are written. structure: with its metrics and record."""
     for statement in body.statements:
         scope.complaints.error(
             "D239",
