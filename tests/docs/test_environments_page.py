@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 from ic.formatting.formatter import formatted
 from met import models
-from tests.ic.small_decks import check, told
+from tests.ic.small_decks import check, messages
 from tests.met.environments.test_joint_stop import given_back
 from tests.met.environments.test_plume import THRUST, felt
 from tests.met.environments.worlds import Link
@@ -33,7 +33,7 @@ def test_its_decks_compile_and_are_laid_out(deck: str, tmp_path: Path) -> None:
     assert formatted("deck.ic", deck) == deck
     whole = re.sub(r"^(run \w+ \{)", rf"\1 {RUN}", deck, flags=re.MULTILINE)
     compiled = check(tmp_path, ARM, whole)
-    assert compiled.plan is not None and not compiled.diagnostics, told(compiled)
+    assert compiled.plan is not None and not compiled.diagnostics, messages(compiled)
 
 
 def test_its_table_of_a_plates_cells_is_what_the_model_gives() -> None:

@@ -44,12 +44,12 @@ def check(folder: Path, *parts: str, select: Select = None, **options: object) -
 def experiment(folder: Path, *parts: str, select: Select = None) -> Experiment:
     """The one experiment of a deck that must compile."""
     compiled = check(folder, *parts, select=select)
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     (only,) = compiled.plan.experiments
     return only
 
 
-def told(compiled: Compiled) -> str:
+def messages(compiled: Compiled) -> str:
     """What was said, as a terminal without colours shows it; places by the file's name alone."""
     text = render(compiled.diagnostics, compiled.sources)
     for name in compiled.sources:

@@ -11,7 +11,7 @@ import pytest
 
 from met.diagnostic import Problem
 from met.plan import file as plan_file
-from tests.ic.small_decks import check, told
+from tests.ic.small_decks import check, messages
 
 DECK = """\
 arm pair {
@@ -44,7 +44,7 @@ Change = Callable[[dict[str, Any]], Any]
 
 def text(folder: Path) -> str:
     compiled = check(folder, DECK)
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     return plan_file.dumps(compiled.plan)
 
 

@@ -18,7 +18,7 @@ from met import run as engine
 from met.diagnostic import Problem
 from met.servos.servo import Asked, JointMotion, Seen
 from met.trace import Formulas, Graph
-from tests.ic.small_decks import check, experiment, told
+from tests.ic.small_decks import check, experiment, messages
 
 HERE = Path(__file__).parent
 PAGE = (HERE.parents[1] / "docs" / "models.md").read_text(encoding="utf-8")
@@ -197,7 +197,7 @@ def test_a_servo_of_ones_own_without_full_is_told_what_to_declare(
 ) -> None:
     bare = replace(models.find("servo", "belt_drive"), full=None)
     monkeypatch.setitem(models.available("servo"), "belt_drive", bare)
-    said = told(check(tmp_path, BELT, select=["away"]))
+    said = messages(check(tmp_path, BELT, select=["away"]))
     assert "D247" in said
     assert "= help: declare `full` in the model `belt_drive`: the law's outputs at full drive" in said
 

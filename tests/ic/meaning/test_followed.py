@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ic.small_decks import ARM, RUN, SERVO, check, told
+from tests.ic.small_decks import ARM, RUN, SERVO, check, messages
 
 FREE = "servo free { model = ideal; bandwidth = 5 s^-1; command = position(both); }\n"
 GUIDED = """\
@@ -58,7 +58,7 @@ def test_what_the_help_says_to_write(tmp_path: Path, name: str) -> None:
     assert instead is not None, found.help
     written = instead[1] + ("" if instead[1][-1] in ";}" else wrong[-1])
     compiled = check(tmp_path, base, text.replace(wrong, written), select="all")
-    assert [each.code for each in compiled.diagnostics] == [], told(compiled)
+    assert [each.code for each in compiled.diagnostics] == [], messages(compiled)
 
 
 def test_a_links_number_in_a_run_goes_to_an_arm_like_the_runs(tmp_path: Path) -> None:

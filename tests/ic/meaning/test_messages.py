@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from ic.meaning.expressions import conditions
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, messages
 
 
 def shown(folder: Path, *parts: str) -> str:
     """What is said of a deck, without the counting line."""
-    return told(check(folder, *parts)).rpartition("\n\n")[0] + "\n"
+    return messages(check(folder, *parts)).rpartition("\n\n")[0] + "\n"
 
 
 def test_an_unknown_key(tmp_path: Path) -> None:
@@ -628,7 +628,7 @@ error[D109]: a run has no `rates.base`
 def test_a_block_of_a_run_with_a_name_of_its_own(tmp_path: Path) -> None:
     named = "run other like hold { rates fast { record = 50 Hz; } }\n"
     assert (
-        told(check(tmp_path, ARM, SERVO, RUN, named, select="all"))
+        messages(check(tmp_path, ARM, SERVO, RUN, named, select="all"))
         == """\
 error[D108]: `fast` after `rates`, which takes no name
   --> deck.ic:18:23

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, messages
 
 OF_RUN = "a run has: arm, base, servos, initial, environment, rates, integrator, duration, record, tolerances, seed"
 OF_JOINT = "it has: parent, child, at, rpy, axis, dh"
@@ -94,7 +94,7 @@ def test_a_misspelt_key_is_told_once(
     margin = " " * len(str(number))
     helps = "".join(f"{margin} = help: {each}\n" for each in (f"did you mean `{meant}`?", *remedies))
     assert (
-        told(check(tmp_path, text))
+        messages(check(tmp_path, text))
         == f"""\
 error[{code}]: {message}
 {margin}--> deck.ic:{number}:{line.index(word) + 1}
@@ -110,7 +110,7 @@ error[{code}]: {message}
 def test_what_is_missing_besides_is_told(tmp_path: Path) -> None:
     joint = changed(ARM, ("parent = base; child = bar", "parnt = base"))
     assert (
-        told(check(tmp_path, joint, SERVO, RUN))
+        messages(check(tmp_path, joint, SERVO, RUN))
         == """\
 error[D092]: joint `hinge` has no child
  --> deck.ic:3:5
@@ -136,7 +136,7 @@ def test_it_is_told_beside_a_joint_that_is_not_there(tmp_path: Path) -> None:
     stop = "environment { wall = joint_stop { joint = hing; upper = 1 rad; stifness = 10 N*m/rad; } }"
     run = changed(RUN, ("duration", f"{stop}\n    duration"))
     assert (
-        told(check(tmp_path, ARM, SERVO, run))
+        messages(check(tmp_path, ARM, SERVO, run))
         == """\
 error[D159]: no joint `hing` in arm `swing`
   --> deck.ic:15:47
@@ -162,7 +162,7 @@ error[D141]: environment `wall` has no `stifness`
 def test_a_word_like_nothing_is_taken_for_nothing(tmp_path: Path) -> None:
     servo = changed(SERVO, ("tau_max =", "strength ="))
     assert (
-        told(check(tmp_path, ARM, servo, RUN))
+        messages(check(tmp_path, ARM, servo, RUN))
         == f"""\
 error[D075]: servo `drive` has no `tau_max`
  --> deck.ic:5:1

@@ -10,15 +10,15 @@ import pytest
 
 from ic.driver.compile import Compiled
 from met import models
-from tests.ic.meaning.test_told_once import ARM, RUN, SLIDE
+from tests.ic.meaning.test_reported_once import ARM, RUN, SLIDE
 from tests.ic.small_decks import ARM as SWING
 from tests.ic.small_decks import RUN as HOLD
-from tests.ic.small_decks import SERVO, changed, check, told
+from tests.ic.small_decks import SERVO, changed, check, messages
 
 
 def said(compiled: Compiled) -> str:
     """What is said of a deck, without the counting line."""
-    return told(compiled).rpartition("\n\n")[0] + "\n"
+    return messages(compiled).rpartition("\n\n")[0] + "\n"
 
 
 def helps(compiled: Compiled) -> list[tuple[str, ...]]:

@@ -9,13 +9,13 @@ import pytest
 
 from ic.printing.plan import print_plan
 from met import cli
-from tests.ic.small_decks import check, told
+from tests.ic.small_decks import check, messages
 from tests.met.test_plan_guides import DECK
 
 
 def test_a_plan_shows_guides_with_their_joints_and_paths(tmp_path: Path) -> None:
     compiled = check(tmp_path, DECK)
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     text = "\n".join(print_plan(compiled.plan))
     assert (
         """\

@@ -18,7 +18,7 @@ from met import cli, run
 from met.plan import Experiment
 from met.plan import file as plan_file
 from tests.ic.robots.two import DECK, TWO, changed, check, said
-from tests.ic.small_decks import told
+from tests.ic.small_decks import messages
 from tests.oracles.random_urdf import random_urdf
 from tests.oracles.urdf_plan import made_from, see
 from tests.oracles.worst import Worst
@@ -31,7 +31,7 @@ CLOSE = 1e-11  # rounding, times the condition number of the mass matrix (up to 
 
 def made(folder: Path, robot: str = TWO, deck: str = DECK) -> Experiment:
     compiled = check(folder, robot, deck)
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     return compiled.plan.experiments[0]
 
 

@@ -8,7 +8,7 @@ import ic
 from ic.driver.compile import Compiled
 from met.diagnostic import Problem
 from met.render import render
-from tests.ic.small_decks import changed, told
+from tests.ic.small_decks import changed, messages
 
 TWO = """\
 <robot name="two">
@@ -42,7 +42,7 @@ def check(folder: Path, robot: str | bytes = TWO, deck: str = DECK) -> Compiled:
 
 def said(folder: Path, robot: str | bytes = TWO, deck: str = DECK) -> str:
     """What is told of the deck, without the line that counts."""
-    return without_count(told(check(folder, robot, deck)).replace(str(folder), "DIR"))
+    return without_count(messages(check(folder, robot, deck)).replace(str(folder), "DIR"))
 
 
 def refused(problem: Problem) -> str:

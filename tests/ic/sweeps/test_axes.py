@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from met.plan import Experiment, Formula
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
 
 TWO = """\
 arm swing {
@@ -266,7 +266,7 @@ def test_an_inertia_that_becomes_impossible_in_one_case_is_told(tmp_path: Path) 
     compiled = check(tmp_path, arm, SERVO, RUN, f"sweep it of hold {{ {body} }}", select=["it"])
     (diagnostic,) = compiled.diagnostics
     assert diagnostic.code == "D087"
-    assert "case #2" in diagnostic.message, told(compiled)
+    assert "case #2" in diagnostic.message, messages(compiled)
 
 
 def test_a_comparison_that_rounding_decides_is_warned_of(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from met.plan import Experiment, keys
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, messages
 
 OTHERS = """\
 servo brisk like drive { kp = 0.3 V*s/rad; }
@@ -19,12 +19,12 @@ servo plain { model = ideal; bandwidth = 5 1/s; command = rate(0.1 rad/s); }
 def groups(folder: Path, body: str, *more: str, run: str = RUN) -> tuple[Experiment, ...]:
     parts = (ARM, SERVO, OTHERS, run, *more, f"sweep it of hold {{ {body} }}\n")
     compiled = check(folder, *parts, select=["it"])
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     return compiled.plan.experiments
 
 
 def told_of(folder: Path, body: str, *more: str, run: str = RUN) -> str:
-    return told(check(folder, ARM, SERVO, OTHERS, run, *more, f"sweep it of hold {{ {body} }}\n", select=["it"]))
+    return messages(check(folder, ARM, SERVO, OTHERS, run, *more, f"sweep it of hold {{ {body} }}\n", select=["it"]))
 
 
 def choices(found: tuple[Experiment, ...]) -> list[dict[str, str]]:
@@ -218,7 +218,7 @@ def loaded(folder: Path, body: str, defines: tuple[str, ...] = ()) -> tuple[Expe
     compiled = check(
         folder, LOADED, SERVO, OTHERS, RUN, f"sweep it of hold {{ {body} }}\n", select=["it"], defines=defines
     )
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     return compiled.plan.experiments
 
 
@@ -249,13 +249,15 @@ def test_a_macro_that_turns_blocks_on_may_vary(tmp_path: Path) -> None:
         "sweep it of hold { zip { macro HEAVY = [0, 1]; drive.kp = [1, 2] V*s/rad; } }",
         select=["it"],
     )
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     assert [len(each.structure.links) for each in compiled.plan.experiments] == [1, 2]
     assert [each.cases.coordinates[0].values.tolist() for each in compiled.plan.experiments] == [[1.0], [2.0]]
 
 
 def test_a_macro_that_changes_nothing_is_told(tmp_path: Path) -> None:
-    text = told(check(tmp_path, LOADED, SERVO, RUN, "sweep it of hold { vary macro PAYLAOD = [0, 1]; }", select=["it"]))
+    text = messages(
+        check(tmp_path, LOADED, SERVO, RUN, "sweep it of hold { vary macro PAYLAOD = [0, 1]; }", select=["it"])
+    )
     assert (
         text
         == """\
@@ -272,7 +274,7 @@ error[D137]: `macro PAYLAOD` changes nothing in this run
 
 
 def test_a_mistake_with_a_macros_value_is_told_with_it(tmp_path: Path) -> None:
-    text = told(
+    text = messages(
         check(tmp_path, LOADED, SERVO, RUN, "sweep it of hold { vary macro PAYLOAD = [0, -3]; }", select=["it"])
     )
     assert "where `macro PAYLOAD` is `-3`" in text

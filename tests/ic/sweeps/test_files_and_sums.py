@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from met.plan import Experiment
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
 
 
 def from_file(
@@ -16,13 +16,13 @@ def from_file(
 ) -> tuple[Experiment, ...]:
     (folder / "cases.csv").write_text(table, encoding="utf-8")
     compiled = check(folder, arm, SERVO, *more, RUN, f"sweep it of hold {{ {body} }}\n", select=["it"])
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     return compiled.plan.experiments
 
 
 def said_of_file(folder: Path, table: str) -> str:
     (folder / "cases.csv").write_text(table, encoding="utf-8")
-    return told(check(folder, ARM, SERVO, RUN, 'sweep it of hold { from "cases.csv"; }\n', select=["it"]))
+    return messages(check(folder, ARM, SERVO, RUN, 'sweep it of hold { from "cases.csv"; }\n', select=["it"]))
 
 
 def rows(run: Experiment) -> list[tuple[float, ...]]:
@@ -103,7 +103,7 @@ def test_ranges(tmp_path: Path, written: str, numbers: list[float]) -> None:
 
 
 def test_a_range_that_misses_its_end_says_where_it_would_end(tmp_path: Path) -> None:
-    text = told(
+    text = messages(
         check(tmp_path, ARM, SERVO, RUN, "sweep it of hold { vary drive.kp = (1 .. 2 by 0.3) V*s/rad; }", select=["it"])
     )
     assert (
@@ -122,7 +122,7 @@ error[D220]: the steps do not meet the end: they reach 1.9, and 2 is not a whole
 
 
 def test_a_unit_behind_a_range_alone_is_told_how_to_be_for_all(tmp_path: Path) -> None:
-    text = told(
+    text = messages(
         check(tmp_path, ARM, SERVO, RUN, "sweep it of hold { vary drive.kp = 1 .. 2 by 0.5 V*s/rad; }", select=["it"])
     )
     assert "error[D063]: a range from a pure number to a pure number by V*s/rad" in text
@@ -137,7 +137,7 @@ MASSES = "sweep masses of hold { vary links.bar.mass = [1, 3, 4] kg; }\n"
 
 def summed(folder: Path, *more: str) -> tuple[Experiment, ...]:
     compiled = check(folder, ARM, SERVO, RUN, GAINS, MASSES, *more, select=["all_of_it"])
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     return compiled.plan.experiments
 
 
@@ -177,7 +177,7 @@ def test_a_sum_may_be_of_sums_and_the_default(tmp_path: Path) -> None:
      "error[D227]: 2 cases of `more` are in `masses` too, the first is #1"),
 ])  # fmt: skip
 def test_sums_that_cannot_be(tmp_path: Path, more: str, message: str) -> None:
-    assert message in told(check(tmp_path, ARM, SERVO, RUN, GAINS, MASSES, more, select="all"))
+    assert message in messages(check(tmp_path, ARM, SERVO, RUN, GAINS, MASSES, more, select="all"))
 
 
 # Repeats
@@ -207,7 +207,7 @@ def test_a_run_alone_may_be_repeated(tmp_path: Path) -> None:
 def test_repeats_without_noise_are_an_error(tmp_path: Path) -> None:
     quiet = changed(NOISY, ("typical", "none"))
     assert codes(tmp_path, ARM, SERVO, quiet, "sweep it of hold { repeat 3; }", select=["it"]) == ["D230"]
-    text = told(check(tmp_path, ARM, SERVO, RUN, "sweep it of hold { repeat 3; }", select=["it"]))
+    text = messages(check(tmp_path, ARM, SERVO, RUN, "sweep it of hold { repeat 3; }", select=["it"]))
     assert (
         text
         == """\

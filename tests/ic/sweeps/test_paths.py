@@ -10,7 +10,7 @@ import pytest
 from ic.driver.explain import explain
 from met.plan import Experiment, Formula
 from met.run import run as simulate
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
 
 TWO = """\
 arm swing {
@@ -106,7 +106,7 @@ def test_gravity_under_two_names_is_one_parameter_varied_twice(tmp_path: Path) -
     body = "vary environment.gravity = [1, 2] m/s^2;"
     compiled = check(tmp_path, TWO, SERVO, BOTH, f"sweep it of hold {{ {body} }}", select=["it"])
     assert [diagnostic.code for diagnostic in compiled.diagnostics] == ["D122"]
-    assert "`environment.gravity.x`" in told(compiled)
+    assert "`environment.gravity.x`" in messages(compiled)
 
 
 def test_an_exclusion_by_a_definition_whose_joints_differ_is_an_error(tmp_path: Path) -> None:

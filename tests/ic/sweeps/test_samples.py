@@ -11,7 +11,7 @@ from scipy import stats
 from ic.sweeps import designs
 from met.plan import Experiment
 from met.plan import file as plan_file
-from tests.ic.small_decks import ARM, RUN, SERVO, check, codes, experiment, told
+from tests.ic.small_decks import ARM, RUN, SERVO, check, codes, experiment, messages
 
 KP = "drive.kp = uniform(1, 2) V*s/rad;"
 MASS = "links.bar.mass = normal(20, 1) kg;"
@@ -144,7 +144,7 @@ def test_the_plan_holds_what_was_drawn(tmp_path: Path) -> None:
 
 
 def test_an_uneven_sobol_sequence_is_warned_of(tmp_path: Path) -> None:
-    text = told(
+    text = messages(
         check(tmp_path, ARM, SERVO, RUN, f"sweep it of hold {{ sample sobol(100) {{ {KP} }} }}\n", select=["it"])
     )
     assert (
@@ -163,7 +163,7 @@ warning[D228]: 100 points of a Sobol sequence are less even than 64 or 128
 
 
 def test_what_is_wrong_with_a_distribution_is_placed(tmp_path: Path) -> None:
-    text = told(
+    text = messages(
         check(
             tmp_path,
             ARM,

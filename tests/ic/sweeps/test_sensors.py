@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from met.plan import Experiment
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, messages
 
 NOISY = changed(SERVO, ("command", "sensor qd = tachometer { noise = 0.1 rad/s; }\n    command"))
 FILTERED = changed(NOISY, ("noise = 0.1 rad/s;", "filter = butterworth;  cutoff = 20 Hz;  noise = 0.1 rad/s;"))
@@ -16,7 +16,7 @@ OWN = changed(RUN, ("hinge = drive;", "hinge = drive { sensor qd = encoder { ste
 
 def groups(folder: Path, body: str, servo: str = NOISY, run: str = RUN) -> tuple[Experiment, ...]:
     compiled = check(folder, ARM, servo, run, f"sweep it of hold {{ {body} }}\n", select=["it"])
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     return compiled.plan.experiments
 
 
@@ -63,7 +63,7 @@ def test_a_word_of_a_sensor_may_vary(path: str, tmp_path: Path) -> None:
 ])  # fmt: skip
 def test_both_may_be_set(setting: str, model: str, words: tuple[tuple[str, str], ...], tmp_path: Path) -> None:
     compiled = check(tmp_path, ARM, FILTERED, RUN, set=[setting])
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     (sensor,) = compiled.plan.experiments[0].structure.servos[0].sensors
     assert (sensor.model, sensor.words) == (model, words)
 

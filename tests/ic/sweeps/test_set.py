@@ -13,7 +13,7 @@ from ic.driver.compile import Compiled, Select
 from met import cli
 from met.plan import Experiment, Formula, keys
 from met.plan import file as plan_file
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, messages
 
 OTHERS = """\
 let slow = 0.1 rad/s;
@@ -34,7 +34,7 @@ GAINS = "sweep it of hold { vary drive.ki = [1, 2] V/rad; }\n"
 
 def made(folder: Path, text: str, select: Select = None, settings: Sequence[str] = ()) -> tuple[Experiment, ...]:
     compiled = check(folder, text, select=select, set=settings)
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     return compiled.plan.experiments
 
 
@@ -48,7 +48,7 @@ def same(some: Sequence[Experiment], others: Sequence[Experiment]) -> bool:
 def refused(folder: Path, *settings: str, text: str = ARM + SERVO + OTHERS + RUN, select: Select = None) -> str:
     compiled = check(folder, text, select=select, set=settings)
     assert compiled.plan is None
-    return told(compiled)
+    return messages(compiled)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, messages
 
 
 def said(folder: Path, *parts: str) -> list[str]:
@@ -110,7 +110,7 @@ def test_a_root_that_is_asked_for_where_there_is_one_is_one(tmp_path: Path, cond
     turned = changed(RUN, ("record = [q]", "record = [q, links.bar.position]"))
     body = f"vary hinge.at.x = [-1, 2, 0.5] m; exclude when {condition};"
     compiled = check(tmp_path, ARM, SERVO, turned, f"sweep it of hold {{ {body} }}", select=["it"])
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     assert compiled.plan.experiments[0].cases.coordinates[0].values.tolist() == [-1.0, 0.5]
 
 
@@ -194,7 +194,7 @@ def test_a_macro_may_bring_exclusions_of_its_own(tmp_path: Path) -> None:
         "#if COUNT > 1\nexclude when links.bar.mass == 2 kg;\nexclude when links.bar.mass > 3.5 kg;\n#endif\n"
     )
     compiled = check(tmp_path, ARM, SERVO, RUN, COUNT, f"sweep it of counted {{ {body} }}\n", select=["it"])
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     masses = [group.cases.coordinates[0].values.tolist() for group in compiled.plan.experiments]
     assert masses == [[2.0, 3.0, 4.0], [3.0]]
     assert compiled.diagnostics == ()

@@ -12,7 +12,7 @@ from met import models
 from met import run as engine
 from met.parameter import Parameter
 from met.plan import Experiment, keys
-from tests.ic.small_decks import check, experiment, told
+from tests.ic.small_decks import check, experiment, messages
 from tests.met.declarations.values import errors, inner, paths, varied
 from tests.met.small_models import EVERY, Use, finite, first_uses, uses
 
@@ -89,14 +89,14 @@ def test_what_must_be_written_is_missed_by_its_name(kind: models.Kind, name: str
         for parameter in new:
             found = check(tmp_path, use.put(tmp_path).deck(without=[parameter.name]), select=["it"])
             if not use.needed(parameter):
-                assert not errors(found), (parameter.name, told(found))
+                assert not errors(found), (parameter.name, messages(found))
                 continue
             message = f"{use.owner(parameter)} has no `{parameter.name}`"
             if use.command in parameter.needed_for:
                 message = f"{use.owner(parameter)} needs `{parameter.name}` under a {use.command} command"
-            assert [each.message for each in errors(found)] == [message], (parameter.name, told(found))
+            assert [each.message for each in errors(found)] == [message], (parameter.name, messages(found))
             (missed,) = errors(found)
-            assert missed.at is not None and missed.help[0].startswith(f"write `{parameter.name} = "), told(found)
+            assert missed.at is not None and missed.help[0].startswith(f"write `{parameter.name} = "), messages(found)
             assert parameter.doc in missed.help[0] or parameter.shape == "text", "and what it is is said"
 
 
@@ -130,7 +130,7 @@ def test_what_must_be_written_may_come_from_a_sweep_or_the_command_line(
             swept = check(tmp_path, deck, select=["cases"])
             given = check(tmp_path, deck, select=["it"], set=[f"{path}={text}"])
             # what this command makes no use of, an error of its own; under another command it is used
-            assert {each.code for each in errors(swept)} <= {"D137"}, told(swept)
-            assert {each.code for each in errors(given)} <= {"D236"}, told(given)
+            assert {each.code for each in errors(swept)} <= {"D137"}, messages(swept)
+            assert {each.code for each in errors(given)} <= {"D236"}, messages(given)
             taken[parameter.name] = taken.get(parameter.name, False) or not (errors(swept) or errors(given))
     assert all(taken.values()), taken

@@ -22,7 +22,7 @@ from met.parameter import Parameter
 from met.plan import Experiment
 from met.plan import check as plan_check
 from met.plan.codec import Damaged
-from tests.ic.small_decks import check, experiment, told
+from tests.ic.small_decks import check, experiment, messages
 from tests.met.declarations.values import NUMBERS, bounds, constant, errors, inner, paths, several, shaped, varied
 from tests.met.small_models import EVERY, SMALLEST, Small, Use, smallest, uses
 
@@ -47,7 +47,7 @@ def refused(folder: Path, use: Use, parameter: Parameter, deck: str, written: st
     """The deck is refused for one number alone: by code, parameter and bound, and at the place where it is written."""
     found = check(folder, deck, select=[select], set=settings)
     refusals = [each for each in errors(found) if each.code not in UNSTABLE]
-    assert [each.code for each in refusals] == ["D077"], (parameter.name, written, told(found))
+    assert [each.code for each in refusals] == ["D077"], (parameter.name, written, messages(found))
     message, at = refusals[0].message, refusals[0].at
     assert message.startswith(f"`{parameter.name}` of {use.owner(parameter)} must be "), message
     assert words in message and message.endswith(ends), (words, message)
@@ -62,7 +62,7 @@ def test_a_number_at_its_bound_is_taken_as_it_is(kind: models.Kind, name: str, t
         for inside, _, _ in bounds(parameter):
             text = use.text(parameter, shaped(parameter, use, inside))
             found = check(tmp_path, use.put(tmp_path).deck({parameter.name: text}), select=["it"])
-            assert {each.code for each in errors(found)} <= UNSTABLE, told(found)
+            assert {each.code for each in errors(found)} <= UNSTABLE, messages(found)
             if found.plan is not None:
                 value = found.plan.experiments[0].parameters[paths(use, parameter)[-1]].value
                 assert (value[-1] if isinstance(value, tuple) else value) == inside, parameter.name
@@ -120,7 +120,7 @@ def test_what_comes_out_as_no_number_or_infinite_is_refused(
         shown = "nan" if "*" in expression else "inf"
         found = check(tmp_path, deck, select=["cases"])
         refusals = [each for each in errors(found) if each.code not in UNSTABLE]
-        assert [each.code for each in refusals] == ["D077"], (parameter.name, told(found))
+        assert [each.code for each in refusals] == ["D077"], (parameter.name, messages(found))
         assert refusals[0].at is not None and refusals[0].at.text.startswith(f"this is {shown}"), refusals[0]
         assert refusals[0].message.startswith(f"`{parameter.name}` of {use.owner(parameter)} must be "), refusals[0]
 
@@ -193,7 +193,7 @@ def test_what_is_said_of_each_kind_of_bound(
     line = deck.splitlines()[number - 1]
     before = line.index(bad, line.index(f" {name} = ") + len(name) + 3)
     assert (
-        told(check(tmp_path, deck, select=["it"]))
+        messages(check(tmp_path, deck, select=["it"]))
         == f"""\
 error[D077]: `{name}` of environment `used` must be {must}
   --> deck.ic:{number}:{before + 1}

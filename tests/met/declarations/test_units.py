@@ -18,7 +18,7 @@ from met import models
 from met.diagnostic import Diagnostic
 from met.parameter import Parameter
 from met.units import PURE, UNITS, parse_unit, same
-from tests.ic.small_decks import check, experiment, told
+from tests.ic.small_decks import check, experiment, messages
 from tests.met.declarations.values import NUMBERS, holds, inner, paths, several, shaped
 from tests.met.small_models import EVERY, JOINTS, Use, Value, first_uses, smallest
 
@@ -79,9 +79,9 @@ def refused(folder: Path, use: Use, texts: Mapping[str, str], code: str) -> dict
     """
     found = check(folder, use.put(folder).deck(texts), select=["it"])
     codes = sorted(code if re.search("[A-Za-z]", text) else "D060" for text in texts.values())
-    assert sorted(each.code for each in found.diagnostics) == codes, told(found)
+    assert sorted(each.code for each in found.diagnostics) == codes, messages(found)
     by_name = {each.message.split("`")[1]: each for each in found.diagnostics}
-    assert by_name.keys() == texts.keys(), told(found)
+    assert by_name.keys() == texts.keys(), messages(found)
     for name, each in by_name.items():
         assert each.message.startswith(f"`{name}` of {use.owner(use.parameter(name))} is "), each.message
         assert each.help and each.at is not None

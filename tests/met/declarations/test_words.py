@@ -9,7 +9,7 @@ import pytest
 
 from met import models
 from met.parameter import Parameter
-from tests.ic.small_decks import check, told
+from tests.ic.small_decks import check, messages
 from tests.met.declarations.values import errors, inner
 from tests.met.small_models import EVERY, LINKS, Use, smallest, uses
 
@@ -29,7 +29,7 @@ def test_every_word_that_is_declared_is_taken(kind: models.Kind, name: str, tmp_
     found = set()
     for use in uses(kind, name):
         compiled = check(tmp_path, use.put(tmp_path).deck(), select=["it"])
-        assert compiled.plan is not None, told(compiled)
+        assert compiled.plan is not None, messages(compiled)
         held = compiled.plan.experiments[0].parameters
         for parameter in use.in_plan():
             if parameter.shape == "word":
@@ -49,12 +49,12 @@ def test_any_other_word_is_refused_with_those_there_are(kind: models.Kind, name:
         compiled = check(tmp_path, use.put(tmp_path).deck({parameter.name: "wrongly"}), select=["it"])
         (refused,) = errors(compiled)
         if parameter.names:
-            assert refused.code == "D159", told(compiled)
+            assert refused.code == "D159", messages(compiled)
             assert refused.message == f"no {parameter.names} `wrongly` in arm `small`"
         elif not parameter.words:  # it names something of a servo
-            assert refused.code == "D247" and refused.message.endswith("does not see `wrongly`"), told(compiled)
+            assert refused.code == "D247" and refused.message.endswith("does not see `wrongly`"), messages(compiled)
         else:
-            assert refused.code == "D076", told(compiled)
+            assert refused.code == "D076", messages(compiled)
             assert refused.message == f"`{parameter.name}` of {use.label} cannot be `wrongly`"
             assert f"one of: {', '.join(parameter.words)}" in refused.help
 
@@ -68,7 +68,7 @@ def test_what_is_no_word_is_refused(kind: models.Kind, name: str, text: str, tmp
         compiled = check(tmp_path, use.put(tmp_path).deck({parameter.name: text}), select=["it"])
         (refused,) = errors(compiled)
         quoted = ", without quotes" if text.startswith('"') else ""
-        assert refused.code == "D076", told(compiled)
+        assert refused.code == "D076", messages(compiled)
         assert refused.message == f"`{parameter.name}` of {use.label} is a word{quoted}"
 
 
@@ -79,7 +79,7 @@ def test_a_word_does_not_vary_as_a_number_does(kind: models.Kind, name: str, tmp
         path = f"{use.head}.{parameter.name}"
         compiled = check(tmp_path, use.put(tmp_path).deck(cases=f"vary {path} = [1, 2];"), select=["cases"])
         (refused,) = errors(compiled)
-        assert f"`{path}`" in refused.message and "word" in refused.message + " ".join(refused.help), told(compiled)
+        assert f"`{path}`" in refused.message and "word" in refused.message + " ".join(refused.help), messages(compiled)
 
 
 @pytest.mark.slow
@@ -94,6 +94,6 @@ def test_what_is_not_there_under_a_word_is_refused_with_the_words_under_which_it
             (refused,) = errors(compiled)
             assert parameter.only is not None
             word, where = parameter.only
-            assert refused.code == "D141", told(compiled)
+            assert refused.code == "D141", messages(compiled)
             assert refused.message == f"{use.label} has no `{parameter.name}` with `{word} = {use.chosen[word]}`"
             assert refused.help == (f"it is there with {' or '.join(f'`{word} = {each};`' for each in where)}",)

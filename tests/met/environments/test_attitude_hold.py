@@ -12,7 +12,7 @@ import pytest
 from met import run as engine
 from met.dynamics.spatial import rotation_about, rotation_rpy
 from met.environments.attitude_hold import ENVIRONMENT, loads
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, experiment, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, experiment, messages
 
 DECK = """\
 arm top { link base { mass = 3 kg; inertia = [2, 3, 4] kg*m^2; } }
@@ -119,7 +119,7 @@ def test_a_rate_that_is_no_number_is_not_hidden_by_the_limit() -> None:
 def test_one_that_holds_nothing_is_told(tmp_path: Path) -> None:
     text = changed(DECK, ("stiffness = [8,9,10] N*m/rad; damping = [2, 12, 1] N*m*s/rad; ", ""))
     assert (
-        told(check(tmp_path, text))
+        messages(check(tmp_path, text))
         == """\
 warning[D168]: environment `h` never acts: it has neither stiffness nor damping
  --> deck.ic:8:19
@@ -141,7 +141,7 @@ def test_one_on_a_base_that_does_not_yield_is_told(tmp_path: Path) -> None:
         (told_of, "    }\n"),
     )
     assert (
-        told(check(tmp_path, text))
+        messages(check(tmp_path, text))
         == """\
 warning[D256]: environment `h` changes nothing: link `base` moves as it is told
  --> deck.ic:6:19
@@ -158,7 +158,7 @@ warning[D256]: environment `h` changes nothing: link `base` moves as it is told
 def test_one_on_a_base_that_is_no_link_is_told_where_it_stands(tmp_path: Path) -> None:
     held = changed(RUN, ("duration", "environment { h = attitude_hold { stiffness = [1, 1, 1] N*m/rad; } }  duration"))
     assert (
-        told(check(tmp_path, ARM, SERVO, held))
+        messages(check(tmp_path, ARM, SERVO, held))
         == """\
 error[D159]: no link `base` in arm `swing`
   --> deck.ic:15:19

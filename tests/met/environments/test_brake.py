@@ -8,7 +8,7 @@ import numpy as np
 
 from met import run as engine
 from met.run import Run
-from tests.ic.small_decks import ARM, SERVO, changed, check, experiment, told
+from tests.ic.small_decks import ARM, SERVO, changed, check, experiment, messages
 
 INERTIA = 2.0 / 3.0
 RUN = """\
@@ -91,7 +91,7 @@ def test_what_is_told_its_acceleration_has_no_brake(tmp_path: Path) -> None:
 def test_a_joint_whose_motor_is_on_a_bed_has_no_brake(tmp_path: Path) -> None:
     run = changed(RUN, ("servos { }", "servos { hinge = drive; }"), ("duration", "substitute hinge { }  duration"))
     assert (
-        told(check(tmp_path, ARM, SERVO, run))
+        messages(check(tmp_path, ARM, SERVO, run))
         == """\
 error[D244]: `hold` puts friction on joint `hinge`, whose motor is on a bed
   --> deck.ic:15:9

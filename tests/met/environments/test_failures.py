@@ -9,7 +9,7 @@ import pytest
 
 from met import run as engine
 from met.run import Run
-from tests.ic.small_decks import ARM, SERVO, changed, check, codes, experiment, told
+from tests.ic.small_decks import ARM, SERVO, changed, check, codes, experiment, messages
 
 INERTIA, ROTOR = 2.0 / 3.0, 100.0**2 * 1e-4
 RUN = """\
@@ -138,7 +138,7 @@ IDEAL = "servo drive { model = ideal;  bandwidth = 30 s^-1;  command = rate(0.1 
 def test_a_failure_of_what_is_not_there_is_told(failure: str, servo: str, said: str, tmp_path: Path) -> None:
     run = changed(RUN, ("FAILURE", failure), ("record = [q, qd, qdd, tau, servo.voltage]", "record = [q]"))
     run = run if servo else changed(run, ("servos { hinge = drive; }", ""))
-    text = told(check(tmp_path, ARM, servo, run))
+    text = messages(check(tmp_path, ARM, servo, run))
     assert text.startswith("error[D247]: ") and said in text
 
 

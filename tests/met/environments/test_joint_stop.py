@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from met import run as engine
 from met.environments.joint_stop import ENVIRONMENT, loads
-from tests.ic.small_decks import changed, check, codes, experiment, told
+from tests.ic.small_decks import changed, check, codes, experiment, messages
 from tests.met.environments.worlds import Given, given
 
 SLIDER = """\
@@ -138,7 +138,7 @@ def test_the_units_are_those_of_its_joint(tmp_path: Path) -> None:
 
 def test_ends_that_are_the_wrong_way_round_are_told(tmp_path: Path) -> None:
     assert (
-        told(check(tmp_path, changed(SLIDER, ("lower = -0.1 m", "lower = 0.2 m"))))
+        messages(check(tmp_path, changed(SLIDER, ("lower = -0.1 m", "lower = 0.2 m"))))
         == """\
 error[D241]: `lower` of environment `end` must be less than `upper`
  --> deck.ic:8:51
@@ -158,7 +158,7 @@ error[D241]: `lower` of environment `end` must be less than `upper`
 
 
 def test_a_joint_that_is_not_there_and_a_stop_without_ends_are_told(tmp_path: Path) -> None:
-    assert told(check(tmp_path, changed(SLIDER, ("joint = slide;", "joint = slid;")))).startswith(
+    assert messages(check(tmp_path, changed(SLIDER, ("joint = slide;", "joint = slid;")))).startswith(
         "error[D159]: no joint `slid` in arm `rail`\n"
     )
     assert codes(tmp_path, changed(SLIDER, ("lower = -0.1 m; upper = 0.1 m;", ""))) == ["D168"]

@@ -14,7 +14,7 @@ from met import run as engine
 from met.environments.gauss import gauss
 from met.environments.plume import ENVIRONMENT, loads, on_plate
 from met.trace import Formulas, Graph
-from tests.ic.small_decks import check, experiment, told
+from tests.ic.small_decks import check, experiment, messages
 from tests.met.environments.worlds import Given, Link, given, turned
 
 THRUST, EXPONENT = 110.0, 6.5
@@ -344,7 +344,7 @@ def test_a_direction_that_is_none_and_cells_that_vary_are_told(tmp_path: Path) -
     assert [d.code for d in check(tmp_path, text).diagnostics] == ["D240"]
     sweep = "sweep some of it { vary environment.jet.cells = [2, 4]; }"
     assert (
-        told(check(tmp_path, DECK, sweep, select=["some"]))
+        messages(check(tmp_path, DECK, sweep, select=["some"]))
         == """\
 error[D122]: `environment.jet.cells` cannot vary
   --> deck.ic:15:25
@@ -395,7 +395,7 @@ def test_the_times_of_a_file_are_the_switches_of_a_deck(tmp_path: Path) -> None:
 
 def test_a_files_name_in_the_place_of_the_switches_is_sent_to_where_it_stands(tmp_path: Path) -> None:
     assert (
-        told(check(tmp_path, FILED.replace("[0.2, 0.4] s", '"fire.csv"')))
+        messages(check(tmp_path, FILED.replace("[0.2, 0.4] s", '"fire.csv"')))
         == """\
 error[D064]: `switches` of environment `jet` is a list of numbers, not text
  --> deck.ic:9:62
@@ -408,4 +408,4 @@ error[D064]: `switches` of environment `jet` is a list of numbers, not text
 """
     )
     (tmp_path / "fire.csv").write_text("times [s]\n1\n", encoding="utf-8")
-    assert "column `times`" in told(check(tmp_path, FILED.replace("switches = [0.2, 0.4] s", 'file = "fire.csv"')))
+    assert "column `times`" in messages(check(tmp_path, FILED.replace("switches = [0.2, 0.4] s", 'file = "fire.csv"')))

@@ -12,7 +12,7 @@ from met import run as engine
 from met.environments.spring import ENVIRONMENT, loads
 from met.integrators import INTEGRATORS
 from met.integrators.integrator import Integrator
-from tests.ic.small_decks import changed, check, experiment, told
+from tests.ic.small_decks import changed, check, experiment, messages
 from tests.met.environments.energies import Placed, order_of_loss
 from tests.met.environments.worlds import Given, Link, given, turned
 
@@ -121,7 +121,7 @@ def test_a_rope_lets_the_slider_go_at_the_rate_that_it_reached(tmp_path: Path) -
 
 def test_a_link_that_is_not_there_and_one_that_is_both_ends_are_told(tmp_path: Path) -> None:
     assert (
-        told(check(tmp_path, changed(RAIL, ("to_point = [-1, 0, 0] m", "to = blok"))))
+        messages(check(tmp_path, changed(RAIL, ("to_point = [-1, 0, 0] m", "to = blok"))))
         == """\
 error[D159]: no link `blok` in arm `rail`
  --> deck.ic:8:44
@@ -142,7 +142,7 @@ error[D159]: no link `blok` in arm `rail`
 def test_a_link_called_world_is_not_the_ground(tmp_path: Path) -> None:
     text = RAIL.replace("block", "world").replace("length = 1 m; damping = 4 N*s/m;", "")
     assert (
-        told(check(tmp_path, text))
+        messages(check(tmp_path, text))
         == """\
 error[D159]: `world` is the ground here, and a link of arm `rail`
  --> deck.ic:8:32

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from met import run as engine
-from tests.ic.small_decks import ARM, changed, check, experiment, told
+from tests.ic.small_decks import ARM, changed, check, experiment, messages
 from tests.met.tree_deck import GRAVITY, TREE
 from tests.oracles.plan_tree import pinocchio
 
@@ -147,7 +147,7 @@ sweep some of it {
 
 def test_a_link_that_is_not_there_is_told(tmp_path: Path) -> None:
     assert (
-        told(check(tmp_path, changed(SLIDER, ("link = block", "link = bloc"))))
+        messages(check(tmp_path, changed(SLIDER, ("link = block", "link = bloc"))))
         == """\
 error[D159]: no link `bloc` in arm `rail`
  --> deck.ic:7:42
@@ -164,7 +164,7 @@ error[D159]: no link `bloc` in arm `rail`
 
 def test_axes_are_the_worlds_or_the_links(tmp_path: Path) -> None:
     assert (
-        told(check(tmp_path, changed(SLIDER, ("from = 0.2 s", "axes = wold"))))
+        messages(check(tmp_path, changed(SLIDER, ("from = 0.2 s", "axes = wold"))))
         == """\
 error[D076]: `axes` of environment `push` cannot be `wold`
  --> deck.ic:7:77

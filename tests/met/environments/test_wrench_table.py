@@ -9,7 +9,7 @@ import pytest
 
 from met import run as engine
 from met.environments.wrench_table import ENVIRONMENT, loads
-from tests.ic.small_decks import changed, check, codes, experiment, told
+from tests.ic.small_decks import changed, check, codes, experiment, messages
 from tests.met.environments.worlds import Given, Link, given, turned
 
 SLIDER = """\
@@ -83,7 +83,7 @@ def test_a_column_of_another_dimension_is_not_proposed(tmp_path: Path) -> None:
 def test_what_is_wrong_with_a_file_is_told_in_it(tmp_path: Path) -> None:
     (tmp_path / "loads.csv").write_text("time [s], force_X [N]\n0, 1\n", encoding="utf-8")
     assert (
-        told(check(tmp_path, FROM_FILE))
+        messages(check(tmp_path, FROM_FILE))
         == """\
 error[D243]: environment `push` has no use for column `force_X`
  --> loads.csv:1:11
@@ -110,7 +110,7 @@ def test_lists_and_a_file_are_too_much(tmp_path: Path) -> None:
     (tmp_path / "loads.csv").write_text("time [s], force_x [N]\n0, 1\n", encoding="utf-8")
     text = changed(SLIDER, ("times = [0.2, 0.4, 0.7] s; force_x = [0, 6, -3] N;", 'file = "loads.csv"; times = [1] s;'))
     assert (
-        told(check(tmp_path, text))
+        messages(check(tmp_path, text))
         == """\
 error[D242]: `times` of environment `push` stands in the file
  --> deck.ic:7:75
@@ -127,7 +127,7 @@ error[D242]: `times` of environment `push` stands in the file
 
 def test_lists_that_do_not_match_are_told(tmp_path: Path) -> None:
     assert (
-        told(check(tmp_path, changed(SLIDER, ("[0, 6, -3] N", "[0, 6] N"))))
+        messages(check(tmp_path, changed(SLIDER, ("[0, 6, -3] N", "[0, 6] N"))))
         == """\
 error[D154]: `force_x` of environment `push` has 2 numbers, and `times` 3
  --> deck.ic:7:92

@@ -12,7 +12,7 @@ from met import run as engine
 from met.integrators import INTEGRATORS, Integrator
 from met.integrators.integrator import Motion, Slope, ahead
 from met.program import friction
-from tests.ic.small_decks import ARM, changed, check, experiment, told
+from tests.ic.small_decks import ARM, changed, check, experiment, messages
 
 BY_NAME = {model.name: model for model in INTEGRATORS}
 EACH = pytest.mark.parametrize("model", INTEGRATORS, ids=lambda model: model.name)
@@ -148,7 +148,7 @@ def test_a_servo_beyond_the_limit_is_an_error_that_names_integrator_and_rate(tmp
     text = ARM + FAST.format(w=1000 * model.real_limit * 1.001, integrator=model.name)
     lambda_ = 1.001 * model.real_limit
     assert (
-        told(check(tmp_path, text))
+        messages(check(tmp_path, text))
         == f"""\
 error[D104]: servo `quick` is unstable with {model.name} at this rate of the dynamics
  --> deck.ic:8:24
@@ -167,7 +167,7 @@ def test_a_servo_just_below_the_limit_is_warned_of_and_runs(tmp_path: Path, mode
     text = ARM + FAST.format(w=1000 * model.real_limit * 0.99, integrator=model.name)
     compiled = check(tmp_path, text)
     assert [diagnostic.code for diagnostic in compiled.diagnostics] == ["D105"]
-    assert f"stable below {model.real_limit:g} with {model.name}" in told(compiled)
+    assert f"stable below {model.real_limit:g} with {model.name}" in messages(compiled)
     rates = engine.run(compiled.plan.experiments[0]).signals["q"][0]  # type: ignore[union-attr]
     assert rates[-1] == pytest.approx(0.1, rel=0.01)  # 0.1 rad/s for 1 s, after a start of some steps
 

@@ -9,7 +9,7 @@ import pytest
 
 from met import run as engine
 from met.run import Run
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
 
 MOVED = """\
 servo moved {
@@ -150,7 +150,7 @@ error[D061]: `noise` of sensor `qd` of servo `drive` is in rad/s, and this is in
 """),
 ])  # fmt: skip
 def test_what_is_wrong_with_a_sensor_is_told(sensor: str, said: str, tmp_path: Path) -> None:
-    text = told(check(tmp_path, ARM, changed(SERVO, ("command", f"{sensor} command")), RUN))
+    text = messages(check(tmp_path, ARM, changed(SERVO, ("command", f"{sensor} command")), RUN))
     assert text.startswith(said) if said.count("\n") == 1 else text == said
 
 

@@ -12,7 +12,7 @@ from met import models
 from met import run as engine
 from met.plan import Experiment
 from met.servos.servo import Asked, JointMotion, Seen
-from tests.ic.small_decks import check, experiment, told
+from tests.ic.small_decks import check, experiment, messages
 from tests.met.small_models import Use, uses
 
 BALANCED = [name for name, servo in models.find_own("servo").items() if servo.balance]
@@ -248,4 +248,4 @@ run it {{
     duration = 1 s;  record = [q];
 }}
 """
-    assert told(check(tmp_path, deck)) == said
+    assert messages(check(tmp_path, deck)) == said

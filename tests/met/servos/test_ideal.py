@@ -11,7 +11,7 @@ import pytest
 from met import run as engine
 from met.plan.channel import channels
 from tests.ic import small_decks
-from tests.ic.small_decks import ARM, SERVO, changed, check, experiment, told
+from tests.ic.small_decks import ARM, SERVO, changed, check, experiment, messages
 from tests.met.tree_deck import GRAVITY, TREE
 from tests.oracles.plan_tree import pinocchio
 
@@ -127,7 +127,7 @@ def test_a_rate_or_position_needs_a_bandwidth(tmp_path: Path) -> None:
     for command, place in (("rate(0.5 rad/s)", "rate(0.5 rad/s)"), ("position(1 rad)", "position(1 rad)")):
         text = changed(RUN, (" bandwidth = 20 s^-1;", ""), ("rate(0.5 rad/s)", command))
         assert (
-            told(check(tmp_path, ARM, text))
+            messages(check(tmp_path, ARM, text))
             == f"""\
 error[D160]: servo `follow` needs `bandwidth` under a {place.partition("(")[0]} command
  --> deck.ic:5:41
@@ -144,7 +144,7 @@ error[D160]: servo `follow` needs `bandwidth` under a {place.partition("(")[0]} 
 def test_a_servo_that_takes_no_acceleration_says_so(tmp_path: Path) -> None:
     gearbox = changed(SERVO, ("rate(0.1 rad/s)", "acceleration(1 rad/s^2)"))
     assert (
-        told(check(tmp_path, ARM, gearbox, small_decks.RUN))
+        messages(check(tmp_path, ARM, gearbox, small_decks.RUN))
         == """\
 error[D152]: the model `rigid_gearbox` takes no command `acceleration`
  --> deck.ic:9:15
@@ -161,7 +161,7 @@ error[D152]: the model `rigid_gearbox` takes no command `acceleration`
 def test_an_acceleration_in_another_unit_is_told(tmp_path: Path) -> None:
     text = changed(RUN, ("rate(0.5 rad/s)", "acceleration(0.5 rad/s)"))
     assert (
-        told(check(tmp_path, ARM, text))
+        messages(check(tmp_path, ARM, text))
         == """\
 error[D061]: the command of servo `follow` is in rad/s^2, and this is in rad/s
  --> deck.ic:5:75

@@ -12,7 +12,7 @@ from ic.printing.settings import settings
 from met import run as engine
 from met.plan import check as plan_check
 from met.plan.codec import Damaged
-from tests.ic.small_decks import changed, check, experiment, told
+from tests.ic.small_decks import changed, check, experiment, messages
 from tests.met.tree_deck import GRAVITY, TREE
 from tests.oracles.plan_tree import pinocchio
 
@@ -81,7 +81,7 @@ MOVING = changed(RUN, ("turn.qd = 1 rad/s", "raise.qd = 0.1 rad/s"))
 
 def test_a_locked_joint_that_begins_with_a_rate_is_an_error(tmp_path: Path) -> None:
     assert (
-        told(check(tmp_path, TREE, MOVING))
+        messages(check(tmp_path, TREE, MOVING))
         == """\
 error[D119]: joint `raise` begins with a rate, and servo `lock` (locked) needs it at rest
   --> deck.ic:16:45
@@ -99,7 +99,7 @@ error[D119]: joint `raise` begins with a rate, and servo `lock` (locked) needs i
 def test_so_it_is_in_a_case_of_a_sweep(tmp_path: Path) -> None:
     sweep = "sweep some of it { vary initial.push.qd = [0, 20, 30] cm/s; }\n"
     assert (
-        told(check(tmp_path, TREE, RUN, sweep, select=["some"]))
+        messages(check(tmp_path, TREE, RUN, sweep, select=["some"]))
         == """\
 error[D119]: joint `push` begins with a rate, and servo `lock` (locked) needs it at rest; case #1 breaks it, and 1 more
   --> deck.ic:21:25
@@ -143,7 +143,7 @@ def test_a_plan_by_hand_is_held_to_it_too(tmp_path: Path, sweep: str, said: str)
 def test_a_rate_has_no_meaning_for_a_servo_without_a_computer(tmp_path: Path) -> None:
     text = changed(RUN, ("model = locked;", "model = locked; rate = 1 kHz;"))
     assert (
-        told(check(tmp_path, TREE, text))
+        messages(check(tmp_path, TREE, text))
         == """\
 error[D150]: the model `locked` has no computer that ticks, so no rate
   --> deck.ic:13:30

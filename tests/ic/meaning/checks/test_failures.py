@@ -8,7 +8,7 @@ import pytest
 
 from met import run as engine
 from met.diagnostic import Problem
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
 
 
 def run_with(environment: str) -> str:
@@ -17,7 +17,7 @@ def run_with(environment: str) -> str:
 
 def shown(folder: Path, *parts: str) -> str:
     """What is said of a deck, without the counting line."""
-    return told(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
+    return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
 
 
 SLOW = changed(SERVO, ("ratio = 100;", "ratio = 100; rate = 500 Hz;"))

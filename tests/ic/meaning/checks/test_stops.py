@@ -9,7 +9,7 @@ import pytest
 
 from met import run as engine
 from met.contact import contacts
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, experiment, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, experiment, messages
 
 STOP = "environment { end = joint_stop { joint = hinge;  upper = 1 deg;  stiffness = STIFF N*m/rad; } }"
 RIGID = 2.0 / 3.0 + 100.0**2 * 1e-4
@@ -31,10 +31,10 @@ def test_below_ten_steps_it_is_warned_and_of_rk4_below_four(tmp_path: Path) -> N
         return float(RIGID * (np.pi / (steps * 1e-3)) ** 2)
 
     rk4 = ("duration", "integrator = rk4;  duration")
-    assert told(check(tmp_path, ARM, SERVO, deck(stiffness(10.1)))) == ""
-    assert told(check(tmp_path, ARM, SERVO, deck(stiffness(4.1), rk4))) == ""
-    assert told(check(tmp_path, ARM, SERVO, deck(stiffness(3.9), rk4))).startswith("warning[D295]")
-    text = told(check(tmp_path, ARM, SERVO, deck(stiffness(5.0))))
+    assert messages(check(tmp_path, ARM, SERVO, deck(stiffness(10.1)))) == ""
+    assert messages(check(tmp_path, ARM, SERVO, deck(stiffness(4.1), rk4))) == ""
+    assert messages(check(tmp_path, ARM, SERVO, deck(stiffness(3.9), rk4))).startswith("warning[D295]")
+    text = messages(check(tmp_path, ARM, SERVO, deck(stiffness(5.0))))
     assert text.startswith("""\
 warning[D295]: `end` is stiff for the dynamics' step: joint `hinge` touches it for 5 steps
 """), text
@@ -48,10 +48,10 @@ warning[D295]: `end` is stiff for the dynamics' step: joint `hinge` touches it f
 
 def test_of_a_sweep_the_stiffest_case_counts_and_a_stop_without_ends_does_not(tmp_path: Path) -> None:
     sweep = "sweep stiff of hold { vary environment.end.stiffness = [100, 1e9, 200] N*m/rad; }"
-    text = told(check(tmp_path, ARM, SERVO, deck(100.0), sweep, select=["stiff"]))
+    text = messages(check(tmp_path, ARM, SERVO, deck(100.0), sweep, select=["stiff"]))
     assert text.startswith("warning[D295]: ") and "joint `hinge` touches it for 0.13 steps" in text
     endless = deck(1e9).replace("upper = 1 deg;  ", "")
-    assert "D295" not in told(check(tmp_path, ARM, SERVO, endless))
+    assert "D295" not in messages(check(tmp_path, ARM, SERVO, endless))
 
 
 def test_a_joint_that_is_told_its_acceleration_is_not_pushed(tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_with_numbers_at_their_ends_it_is_no_fault(tmp_path: Path) -> None:
     nothing = changed(ARM, ("mass = 2 kg", "mass = 1e-308 kg"))
     assert contacts(experiment(tmp_path, nothing, deck(500.0, ("servos { hinge = drive; }", "servos { }")))) == ()
     rotor = changed(SERVO, ("ratio = 100", "ratio = 1"), ("j_m = 1e-4", "j_m = 1e-308"), ("kt = 0.05", "kt = 1e-308"))
-    text = told(check(tmp_path, nothing, rotor, deck(1e308)))
+    text = messages(check(tmp_path, nothing, rotor, deck(1e308)))
     assert "touches it for 0 steps" in text and "no rate is so high: make the stop softer" in text
 
 

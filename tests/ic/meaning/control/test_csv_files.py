@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.ic.meaning.control.trajectories import MOVES, servo, shown
-from tests.ic.small_decks import ARM, RUN, changed, check, told
+from tests.ic.small_decks import ARM, RUN, changed, check, messages
 
 
 def test_no_such_file(tmp_path: Path) -> None:
@@ -604,7 +604,7 @@ error[D018]: a CSV file has at most 100000 rows
 def test_what_is_no_file_of_text_is_not_read(tmp_path: Path, named: str, message: str) -> None:
     with open(tmp_path / "large.csv", "wb") as stream:
         stream.truncate(17 << 20)
-    said = told(check(tmp_path, ARM, servo(f'trajectory(file = "{named}")'), RUN)).replace(str(tmp_path), "DIR")
+    said = messages(check(tmp_path, ARM, servo(f'trajectory(file = "{named}")'), RUN)).replace(str(tmp_path), "DIR")
     assert said.splitlines()[:2] == [message, " --> deck.ic:9:42"]
 
 

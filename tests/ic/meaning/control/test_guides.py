@@ -12,7 +12,7 @@ from met import run as engine
 from met.plan import Command, Course, GuideUse
 from met.plan.file import dumps, loads
 from met.plan.keys import structure_key
-from tests.ic.small_decks import changed, check, experiment, told
+from tests.ic.small_decks import changed, check, experiment, messages
 
 ARM = """\
 arm pair {
@@ -121,7 +121,7 @@ def test_a_plan_without_guides_says_nothing_of_them(tmp_path: Path) -> None:
     bare = (RUN[:begin] + RUN[end:]).replace(", guides.tip.error", "")
     text = ARM.replace("rate(tip)", "rate(1 rad/s)")
     compiled = check(tmp_path, text, bare)
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     assert '"guides"' not in dumps(compiled.plan)
     structure = compiled.plan.experiments[0].structure
     assert structure.guides == ()
@@ -453,14 +453,14 @@ error[D271]: `tip` is a value, so no guide can be called so
 
 @pytest.mark.parametrize(("text", "instead", "expected"), MISTAKES)
 def test_a_mistake_is_told_with_its_place_and_a_remedy(tmp_path: Path, text: str, instead: str, expected: str) -> None:
-    assert told(check(tmp_path, ARM, changed(RUN, (text, instead)))) == expected
+    assert messages(check(tmp_path, ARM, changed(RUN, (text, instead)))) == expected
 
 
 def test_a_run_that_guides_less_is_told_what_to_remove(tmp_path: Path) -> None:
     run = "run other like it { tip { guides = xz; } }\n"
     y = changed(RUN, ("x = ramp", "y = ramp"))
     assert (
-        told(check(tmp_path, ARM, y, run, select=["other"]))
+        messages(check(tmp_path, ARM, y, run, select=["other"]))
         == """\
 error[D274]: `y` is not guided by guide `tip`
   --> deck.ic:21:36
@@ -478,7 +478,7 @@ error[D274]: `y` is not guided by guide `tip`
 
 def test_a_unit_and_a_course_are_no_names_of_guides(tmp_path: Path) -> None:
     for name, what in (("m", "a unit"), ("step", "a course in time")):
-        text = told(check(tmp_path, ARM, changed(RUN, ("guide tip", f"guide {name}"))))
+        text = messages(check(tmp_path, ARM, changed(RUN, ("guide tip", f"guide {name}"))))
         assert (
             f"""\
 error[D271]: `{name}` is {what}, so no guide can be called so
@@ -505,7 +505,7 @@ def test_at_a_singularity_a_damped_guide_stays_and_another_fails(tmp_path: Path)
 
 def test_a_joint_is_not_called_as_a_component_of_the_path(tmp_path: Path) -> None:
     assert (
-        told(check(tmp_path, ARM.replace("high", "x"), RUN.replace("high", "x")))
+        messages(check(tmp_path, ARM.replace("high", "x"), RUN.replace("high", "x")))
         == """\
 error[D274]: `x` of guide `tip` is a component of its path, and a joint that follows it
   --> deck.ic:13:9
@@ -553,14 +553,14 @@ VARY = [
 @pytest.mark.parametrize(("vary", "message", "remedy"), VARY)
 def test_what_of_a_guide_does_not_vary(vary: str, message: str, remedy: str, tmp_path: Path) -> None:
     path = vary.partition(" ")[0]
-    text = told(check(tmp_path, ARM, RUN, f"sweep s of it {{ vary {vary}; }}", select=["s"]))
+    text = messages(check(tmp_path, ARM, RUN, f"sweep s of it {{ vary {vary}; }}", select=["s"]))
     assert text.startswith(f"error[D122]: `{path}` {message}\n")
     assert f"= help: {remedy}\n" in text
 
 
 def test_a_guide_that_does_nothing_or_in_part_is_told(tmp_path: Path) -> None:
     assert (
-        told(check(tmp_path, ARM, changed(RUN, ("threshold = 0.2 m", "threshold = 0 m"))))
+        messages(check(tmp_path, ARM, changed(RUN, ("threshold = 0.2 m", "threshold = 0 m"))))
         == """\
 warning[D301]: guide `tip` is never damped: no singular value is below a `threshold` of 0 m
   --> deck.ic:12:69
@@ -573,7 +573,7 @@ warning[D301]: guide `tip` is never damped: no singular value is below a `thresh
 """
     )
     bare = changed(RUN, ("threshold = 0.2 m", "threshold = 0 m"), ("max_damping = 0.1 m", "max_damping = 0 m"))
-    assert told(check(tmp_path, ARM, bare)) == ""
+    assert messages(check(tmp_path, ARM, bare)) == ""
     together = changed(
         RUN,
         (
@@ -596,5 +596,5 @@ warning[D301]: guide `tip` is never damped: no singular value is below a `thresh
 def test_words_of_a_guide_vary(tmp_path: Path) -> None:
     sweep = "sweep some of it { vary guides.tip.loop = [closed, open]; }"
     compiled = check(tmp_path, ARM, RUN, sweep, select=["some"])
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     assert [each.parameters["guides.tip.loop"].value for each in compiled.plan.experiments] == ["closed", "open"]

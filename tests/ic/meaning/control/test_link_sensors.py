@@ -9,7 +9,7 @@ import pytest
 from met import run as engine
 from met.plan.channel import channels
 from met.plan.keys import structure_key
-from tests.ic.small_decks import changed, check, experiment, told
+from tests.ic.small_decks import changed, check, experiment, messages
 
 DECK = """\
 arm swing {
@@ -82,7 +82,7 @@ def test_sensors_stands_for_what_all_of_them_read(tmp_path: Path) -> None:
 def test_its_parameters_can_be_varied(path: str, values: str, tmp_path: Path) -> None:
     deck = changed(DECK, ("along = [0, 0, 1]", "at = [1, 0, 0] m; along = [1, 1, 1]"))
     compiled = check(tmp_path, deck, f"sweep cases of hold {{ vary {path} = {values}; }}\n", select=["cases"])
-    assert compiled.plan is not None and not compiled.diagnostics, told(compiled)
+    assert compiled.plan is not None and not compiled.diagnostics, messages(compiled)
     assert sum(each.cases.count for each in compiled.plan.experiments) == 2
 
 
@@ -94,7 +94,7 @@ def test_what_decides_its_program_makes_a_group_for_each(path: str, values: str,
     spin = "sensor spin = gyroscope { link = bar; along = [0, 0, 1]; filter = butterworth; cutoff = 9 Hz; }"
     deck = changed(DECK, ("    rates", f"    {spin}\n    rates"))
     compiled = check(tmp_path, deck, f"sweep cases of hold {{ vary {path} = {values}; }}\n", select=["cases"])
-    assert compiled.plan is not None and not compiled.diagnostics, told(compiled)
+    assert compiled.plan is not None and not compiled.diagnostics, messages(compiled)
     one, other = compiled.plan.experiments
     if path.endswith("rate"):
         assert [each.structure.sensors[0].divisor for each in (one, other)] == [10, 5]
@@ -298,4 +298,4 @@ error[D157]: no `sensor` in an environment
 """),
 ])  # fmt: skip
 def test_a_mistake_is_told_with_its_place_and_a_remedy(text: str, instead: str, expected: str, tmp_path: Path) -> None:
-    assert told(check(tmp_path, changed(DECK, (text, instead)))) == expected
+    assert messages(check(tmp_path, changed(DECK, (text, instead)))) == expected

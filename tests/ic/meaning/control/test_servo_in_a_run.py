@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
 
 SENSED = changed(
     SERVO,
@@ -59,14 +59,14 @@ def test_a_parameter_that_a_run_removes_has_its_default(tmp_path: Path) -> None:
 def test_a_sweep_may_choose_a_servo_without_its_sensor(tmp_path: Path) -> None:
     sweep = "sweep kinds of hold { vary hinge.servo = [drive, drive { remove qd; }]; }\n"
     compiled = check(tmp_path, ARM, SENSED, RUN, sweep, select=["kinds"])
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     assert [len(each.structure.servos[0].sensors) for each in compiled.plan.experiments] == [2, 1]
 
 
 def test_removing_what_is_not_there_is_told_once_the_definition_is_known(tmp_path: Path) -> None:
     run = "run other like hold { servos { hinge { remove qdd;  remove q;  remove q; } } }\n"
     assert (
-        told(check(tmp_path, ARM, SENSED, RUN, run, select=["other"]))
+        messages(check(tmp_path, ARM, SENSED, RUN, run, select=["other"]))
         == """\
 error[D058]: nothing named `qdd` to remove
   --> deck.ic:20:47
@@ -92,7 +92,7 @@ error[D058]: nothing named `q` to remove
 def test_a_model_has_no_definition_under_it_to_remove_from(tmp_path: Path) -> None:
     loads = "environment { d = joint_damping { damping = 1 N*m*s/rad; remove jont; } } record"
     assert (
-        told(check(tmp_path, ARM, SERVO, changed(RUN, ("record = [q]", f"{loads} = [q]"))))
+        messages(check(tmp_path, ARM, SERVO, changed(RUN, ("record = [q]", f"{loads} = [q]"))))
         == """\
 error[D058]: nothing named `jont` to remove
   --> deck.ic:16:69
@@ -109,7 +109,7 @@ error[D058]: nothing named `jont` to remove
 def test_what_a_run_removed_and_the_model_needs_is_told_where_it_was_removed(tmp_path: Path) -> None:
     run = "run other like hold { servos { hinge { remove kp; } } }\n"
     assert (
-        told(check(tmp_path, ARM, SERVO, RUN, run, select=["other"]))
+        messages(check(tmp_path, ARM, SERVO, RUN, run, select=["other"]))
         == """\
 error[D075]: servo `drive` on joint `hinge` has no `kp`
   --> deck.ic:18:40
@@ -128,7 +128,7 @@ def test_a_block_in_the_wrong_place_is_sent_to_where_its_name_stands(tmp_path: P
     damped = changed(RUN, ("duration", "environment { damp = joint_damping { damping = 1 N*m*s/rad; } } duration"))
     run = "run other like hold { damp { damping = 2 N*m*s/rad; }  hinge { kp = 0.2 V*s/rad; } }\n"
     assert (
-        told(check(tmp_path, ARM, SERVO, damped, run, select=["other"]))
+        messages(check(tmp_path, ARM, SERVO, damped, run, select=["other"]))
         == """\
 error[D109]: nothing named `damp` in run `other` to change
   --> deck.ic:18:23
@@ -159,7 +159,7 @@ def test_a_block_upon_a_name_that_takes_none_is_not_ignored(change: str, code: s
 
 def test_a_channel_under_another_word_of_the_model_is_told_with_that_word(tmp_path: Path) -> None:
     assert (
-        told(check(tmp_path, ARM, SERVO, changed(RUN, ("[q]", "[servo.bristle]"))))
+        messages(check(tmp_path, ARM, SERVO, changed(RUN, ("[q]", "[servo.bristle]"))))
         == """\
 error[D125]: no channel `servo.bristle`
   --> deck.ic:16:15
@@ -176,7 +176,7 @@ error[D125]: no channel `servo.bristle`
 def test_a_share_with_a_unit_is_sent_to_the_parameter_that_has_it(tmp_path: Path) -> None:
     metric = "metric settle = settling_time { of = hinge.q; target = 1 rad; band = 0.2 deg; }\n    record = [q]"
     assert (
-        told(check(tmp_path, ARM, SERVO, changed(RUN, ("record = [q]", metric))))
+        messages(check(tmp_path, ARM, SERVO, changed(RUN, ("record = [q]", metric))))
         == """\
 error[D061]: `band` of metric `settle` is a pure number, and this is in rad
   --> deck.ic:16:74
@@ -193,5 +193,5 @@ error[D061]: `band` of metric `settle` is a pure number, and this is in rad
 
 def test_an_encoder_under_a_continuous_law(tmp_path: Path) -> None:
     run = changed(RUN, ("servos = 1 kHz", "servos = continuous"))
-    told_ = told(check(tmp_path, ARM, SENSED, run))
+    told_ = messages(check(tmp_path, ARM, SENSED, run))
     assert "error[D106]: an `encoder` reads at ticks, and the law of joint `hinge` is continuous" in told_

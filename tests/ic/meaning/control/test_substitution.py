@@ -13,7 +13,7 @@ from ic.driver.explain import explanations_of
 from met.plan import Experiment, Formula, Substitution
 from met.plan.channel import channels
 from met.substitution import BEDS
-from tests.ic.small_decks import changed, check, experiment, told
+from tests.ic.small_decks import changed, check, experiment, messages
 
 ARM = """\
 arm chain {
@@ -66,12 +66,12 @@ def compiled(folder: Path, more: str, select: str = "hybrid") -> Experiment:
 def shown(folder: Path, more: str) -> str:
     """What is said of a run with these lines besides, without the counting line; line 1 is theirs."""
     run = f"run it like base_run {{ {more} }}\n"
-    return told(check(folder, run, DECK, select=["it"])).rpartition("\n\n")[0] + "\n"
+    return messages(check(folder, run, DECK, select=["it"])).rpartition("\n\n")[0] + "\n"
 
 
 def said(folder: Path, more: str) -> str:
     """What is said of definitions besides, without the counting line; line 1 is theirs."""
-    return told(check(folder, more + "\n", DECK, select="all")).rpartition("\n\n")[0] + "\n"
+    return messages(check(folder, more + "\n", DECK, select="all")).rpartition("\n\n")[0] + "\n"
 
 
 # What it makes

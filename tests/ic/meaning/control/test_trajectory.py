@@ -16,7 +16,7 @@ from met.plan import Experiment
 from met.plan import file as plan_file
 from met.units import parse_unit
 from tests.ic.meaning.control.trajectories import MOVES, servo
-from tests.ic.small_decks import ARM, RUN, changed, check, experiment, told
+from tests.ic.small_decks import ARM, RUN, changed, check, experiment, messages
 
 DEGREES = parse_unit("deg")  # rounded once, which numpy's radians are not
 
@@ -90,7 +90,7 @@ def test_a_file_is_looked_for_beside_the_deck_that_names_it_then_where_i_says(tm
 def test_a_file_that_a_macro_of_the_command_line_names_is_beside_the_deck(tmp_path: Path) -> None:
     (tmp_path / "moves.csv").write_text(MOVES)
     compiled = check(tmp_path, ARM, servo("trajectory(file = FILE)"), RUN, defines=['FILE="moves.csv"'])
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
 
 
 def test_the_file_is_kept_whole_and_the_plan_runs_without_it(tmp_path: Path) -> None:
@@ -147,7 +147,7 @@ def test_a_sweep_may_move_the_beginning_and_nothing_of_the_file(tmp_path: Path) 
         "sweep several of hold { vary hinge.servo.command.values = [1, 2] rad; vary drive.command.begin = [0, 1] s; }\n"
     )
     assert (
-        told(check(tmp_path, ARM, servo(), RUN, sweep, select=["several"]))
+        messages(check(tmp_path, ARM, servo(), RUN, sweep, select=["several"]))
         == """\
 error[D122]: `hinge.servo.command.values` cannot vary
   --> deck.ic:18:30

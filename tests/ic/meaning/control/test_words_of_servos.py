@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
 
 CURVED = changed(SERVO, ("j_m", "friction = stribeck;  f_c = 0.01 N*m;  f_s = 0.02 N*m;  rate_s = 3 rad/s;  j_m"))
 
@@ -14,7 +14,7 @@ CURVED = changed(SERVO, ("j_m", "friction = stribeck;  f_c = 0.01 N*m;  f_s = 0.
 def test_a_parameter_of_another_word_is_told_with_the_words_that_have_it(tmp_path: Path) -> None:
     coulomb = changed(CURVED, ("friction = stribeck", "friction = coulomb"))
     assert (
-        told(check(tmp_path, ARM, coulomb, RUN)).split("\n\n")[0]
+        messages(check(tmp_path, ARM, coulomb, RUN)).split("\n\n")[0]
         == """\
 error[D141]: servo `drive` has no `f_s` with `friction = coulomb`
  --> deck.ic:8:60
@@ -42,7 +42,7 @@ def test_what_a_word_needs_is_asked_for(tmp_path: Path) -> None:
 def test_a_word_may_be_chosen_by_a_sweep(tmp_path: Path) -> None:
     sweep = "sweep laws of hold { vary drive.friction = [coulomb, stribeck]; }\n"
     compiled = check(tmp_path, ARM, CURVED, RUN, sweep, select=["laws"])
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     words = [e.structure.servos[0].words for e in compiled.plan.experiments]
     assert words == [(), (("friction", "stribeck"),)], "a default is no choice: keys of older archives stay"
 
@@ -51,7 +51,7 @@ def test_states_of_a_word_can_be_recorded_under_it_alone(tmp_path: Path) -> None
     record = changed(RUN, ("[q]", "[q, servo.bristle]"))
     lugre = changed(CURVED, ("stribeck;", "lugre;  sigma_0 = 1 N*m/rad;"))
     assert codes(tmp_path, ARM, lugre, record) == []
-    assert "no" in told(check(tmp_path, ARM, CURVED, record))
+    assert "no" in messages(check(tmp_path, ARM, CURVED, record))
 
 
 @pytest.mark.parametrize(("place", "continuous"), [("servos", True), ("own", True), ("neither", False)])
@@ -83,7 +83,7 @@ def test_a_wrong_word_is_told_once_and_nothing_of_what_depends_on_it(used: bool,
     wrong = changed(CURVED, ("friction = stribeck", "friction = stribek"))
     servos = wrong if used else wrong.replace("servo drive", "servo other") + SERVO
     assert (
-        told(check(tmp_path, ARM, servos, RUN))
+        messages(check(tmp_path, ARM, servos, RUN))
         == f"""\
 error[D076]: `friction` of servo `{"drive" if used else "other"}` cannot be `stribek`
  --> deck.ic:8:33
@@ -100,7 +100,7 @@ error[D076]: `friction` of servo `{"drive" if used else "other"}` cannot be `str
 
 def test_a_word_in_quotes_is_told_once(tmp_path: Path) -> None:
     assert (
-        told(check(tmp_path, ARM, changed(CURVED, ("= stribeck", '= "stribeck"')), RUN))
+        messages(check(tmp_path, ARM, changed(CURVED, ("= stribeck", '= "stribeck"')), RUN))
         == """\
 error[D076]: `friction` of servo `drive` is a word, without quotes
  --> deck.ic:8:33
@@ -118,7 +118,7 @@ def test_a_ratio_whose_square_is_nothing_is_infinitely_fast(tmp_path: Path) -> N
     elastic = "compliant_gearbox; stiffness = 9 N*m/rad; damping = 1 N*m*s/rad"
     geared = changed(SERVO, ("rigid_gearbox", elastic), ("100", "1e-200"))
     assert (
-        told(check(tmp_path, ARM, geared, RUN))
+        messages(check(tmp_path, ARM, geared, RUN))
         == """\
 error[D104]: servo `drive` is unstable with modified_euler at this rate of the dynamics
   --> deck.ic:14:24

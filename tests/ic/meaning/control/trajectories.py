@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, messages
 
 MOVES = """\
 time [s], hinge [deg], other [rad]
@@ -22,4 +22,4 @@ def shown(folder: Path, text: str | bytes | None, course: str = 'trajectory(file
     """What is said of a deck with this CSV file beside it, without the counting line."""
     if text is not None:
         (folder / "moves.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
-    return told(check(folder, ARM, servo(course), RUN)).rpartition("\n\n")[0] + "\n"
+    return messages(check(folder, ARM, servo(course), RUN)).rpartition("\n\n")[0] + "\n"

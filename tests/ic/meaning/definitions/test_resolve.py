@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.ic.small_decks import ARM, RUN, SERVO, check, codes, experiment, told
+from tests.ic.small_decks import ARM, RUN, SERVO, check, codes, experiment, messages
 
 METRIC = (
     "run base like hold { metric top = max { of = hinge.qd; } metric end = final { of = hinge.q; }"
@@ -53,7 +53,7 @@ def test_a_block_with_its_kind_adds_and_must_be_new(tmp_path: Path) -> None:
 def test_a_block_without_its_kind_must_be_in_the_base(tmp_path: Path) -> None:
     compiled = check(tmp_path, *derived("tip { of = hinge.q; }"), select=["it"])
     assert [diagnostic.code for diagnostic in compiled.diagnostics] == ["D109"]
-    assert "did you mean `top`?" in told(compiled)
+    assert "did you mean `top`?" in messages(compiled)
 
 
 def test_remove_takes_a_metric_away_and_its_requirements_with_it(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from met import models
-from tests.ic.small_decks import check, codes, told
+from tests.ic.small_decks import check, codes, messages
 
 DECK = """\
 arm swing {
@@ -48,7 +48,7 @@ def deck(*changes: tuple[str, str]) -> str:
 def found(folder: Path, *changes: tuple[str, str], **options: object) -> tuple[list[str], list[tuple[str, ...]]]:
     """Codes of what is told of the deck, and the help of each."""
     compiled = check(folder, deck(*changes), select="all", **options)  # type: ignore[arg-type]
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     return [each.code for each in compiled.diagnostics], [each.help for each in compiled.diagnostics]
 
 
@@ -61,7 +61,7 @@ HZ = ("bandwidth = 5 s^-1", "bandwidth = 5 Hz")
 
 def test_hertz_for_a_rate_constant(tmp_path: Path) -> None:
     assert (
-        told(check(tmp_path, deck(HZ)))
+        messages(check(tmp_path, deck(HZ)))
         == """\
 warning[D305]: `bandwidth` of servo `still` is in 1/s, and 5 Hz is taken as 5 1/s
  --> deck.ic:7:42
@@ -151,7 +151,7 @@ def test_damping_of_stiffness_and_inertia_is_plain(tmp_path: Path) -> None:
         ),
     )
     compiled = check(tmp_path, text)
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     assert not [each.code for each in compiled.diagnostics if each.code == "D305"]
     assert compiled.plan.experiments[0].parameters["hinge.servo.damping"].value == pytest.approx(16.0, rel=1e-15)
 

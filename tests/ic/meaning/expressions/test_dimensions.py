@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ic.small_decks import check, told
+from tests.ic.small_decks import check, messages
 from tests.met.test_units import PINT_NAMES
 from tests.oracles.package import Package
 
@@ -147,7 +147,7 @@ def test_a_quantity_of_the_wanted_dimension_is_taken_at_pints_size(
 ) -> None:
     _, path, _, _ = PLACES[place]
     compiled = check(tmp_path, deck(**{place: written}))
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     (experiment,) = compiled.plan.experiments
     if path:
         # a unit's few factors, multiplied in another order
@@ -160,7 +160,7 @@ def test_a_quantity_of_another_dimension_is_refused_where_it_stands(place: str, 
     compiled = check(tmp_path, deck(**{place: written}))
     assert compiled.plan is None
     wrong = [each for each in compiled.diagnostics if each.severity == "error"]
-    assert [each.code for each in wrong] in (["D060"], ["D061"]), told(compiled)
+    assert [each.code for each in wrong] in (["D060"], ["D061"]), messages(compiled)
     (at,) = (each.at for each in wrong)
     assert at is not None
     line = compiled.sources[at.place.file].splitlines()[at.place.line - 1]

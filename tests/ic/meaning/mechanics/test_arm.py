@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from met.plan import Experiment
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, told
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
 
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
@@ -222,6 +222,6 @@ def test_an_arm_that_no_run_uses_is_checked_too(tmp_path: Path) -> None:
 def test_several_mistakes_are_told_in_one_run(tmp_path: Path) -> None:
     arm = changed(ARM, ("2 kg", "-2 kg"), ("axis = z;", ""))
     compiled = check(tmp_path, arm, changed(SERVO, ("kp", "strength")), changed(RUN, ("[q]", "[qq]")))
-    assert {diagnostic.code for diagnostic in compiled.diagnostics} == {"D077", "D141", "D096", "D075", "D125"}, told(
-        compiled
+    assert {diagnostic.code for diagnostic in compiled.diagnostics} == {"D077", "D141", "D096", "D075", "D125"}, (
+        messages(compiled)
     )

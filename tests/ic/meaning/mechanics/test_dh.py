@@ -15,7 +15,7 @@ from met.dynamics.spatial import rotation_rpy
 from met.plan import Experiment
 from met.program.machine import Machine
 from met.trace import Formulas, Graph
-from tests.ic.small_decks import check, experiment, told
+from tests.ic.small_decks import check, experiment, messages
 from tests.oracles import denavit_hartenberg as dh
 from tests.oracles.package import Package
 
@@ -285,12 +285,12 @@ error[D180]: the name of a convention is needed here
 """),
 ])  # fmt: skip
 def test_a_mistake_in_a_row_is_told(tmp_path: Path, written: str, message: str) -> None:
-    said = told(check(tmp_path, ONE.replace("XXX", written), RUN)).rpartition("\n\n")[0] + "\n"
+    said = messages(check(tmp_path, ONE.replace("XXX", written), RUN)).rpartition("\n\n")[0] + "\n"
     assert said == message
 
 
 def test_what_follows_from_a_row_cannot_vary_by_itself(tmp_path: Path) -> None:
-    said = told(check(tmp_path, ONE.replace("XXX", "dh = craig(a = 1 m);"), RUN, SWEEP, select=["many"]))
+    said = messages(check(tmp_path, ONE.replace("XXX", "dh = craig(a = 1 m);"), RUN, SWEEP, select=["many"]))
     assert (
         said.rpartition("\n\n")[0] + "\n"
         == """\

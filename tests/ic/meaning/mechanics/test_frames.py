@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from met import run
-from tests.ic.small_decks import changed, check, codes, experiment, told
+from tests.ic.small_decks import changed, check, codes, experiment, messages
 from tests.oracles.plan_tree import pinocchio
 
 YOKE = """\
@@ -63,7 +63,7 @@ def test_a_joint_that_moves_nothing_with_mass_is_told_and_not_those_behind_it(tm
         ("mass = 0.1 kg; inertia = [0, 0, 0] kg*m^2;", "mass = 0 kg;"),
     )
     assert (
-        told(check(tmp_path, arm, FALL))
+        messages(check(tmp_path, arm, FALL))
         == """\
 error[D217]: joint `roll` moves nothing that has mass
  --> deck.ic:6:5
@@ -91,7 +91,7 @@ def test_a_sweep_that_leaves_a_joint_nothing_is_told_with_its_case(tmp_path: Pat
     )
     sweep = "sweep many of fall { vary links.bar.mass = [2, 0] kg; }\n"
     assert (
-        told(check(tmp_path, arm, FALL, sweep, select=["many"]))
+        messages(check(tmp_path, arm, FALL, sweep, select=["many"]))
         == """\
 error[D217]: joint `roll` moves nothing that has mass; case #1 breaks it
  --> deck.ic:6:5

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from met import run as engine
-from tests.ic.small_decks import changed, check, experiment, told
+from tests.ic.small_decks import changed, check, experiment, messages
 
 ARM = """\
 arm crane {
@@ -364,7 +364,7 @@ error[D159]: no link `bix` in arm `crane`
 @pytest.mark.parametrize("mistake", WRONG)
 def test_a_mistake_is_told_whole(tmp_path: Path, mistake: str) -> None:
     changes, message = WRONG[mistake]
-    assert told(check(tmp_path, ARM, changed(RUN, *changes))) == message
+    assert messages(check(tmp_path, ARM, changed(RUN, *changes))) == message
 
 
 def found(
@@ -499,13 +499,13 @@ error[D128]: no parameter `payloads.box.size` in this run
 )
 def test_what_a_sweep_cannot_vary_is_told(tmp_path: Path, sweep: str, message: str) -> None:
     more = f"sweep many of it {{ {sweep} }}\n"
-    assert told(check(tmp_path, ARM, changed(RUN, FLIES), more, select=["many"])) == message
+    assert messages(check(tmp_path, ARM, changed(RUN, FLIES), more, select=["many"])) == message
 
 
 def test_a_block_that_looks_like_a_payload_is_told_how_to_be_one(tmp_path: Path) -> None:
     more = "run other like it { crate { mass = 3 kg; } }\n"
     assert (
-        told(check(tmp_path, ARM, RUN, more, select=["other"]))
+        messages(check(tmp_path, ARM, RUN, more, select=["other"]))
         == """\
 error[D109]: nothing named `crate` in run `other` to change
   --> deck.ic:19:21
@@ -526,7 +526,7 @@ def test_a_load_on_what_the_ground_holds_is_told(tmp_path: Path) -> None:
         ("environment {}", "environment { w = wrench { link = box; force = [1, 0, 0] N; } }"),
     )
     assert (
-        told(check(tmp_path, ARM, changed(RUN, *changes)))
+        messages(check(tmp_path, ARM, changed(RUN, *changes)))
         == """\
 warning[D256]: environment `w` changes nothing: link `base` is part of the ground
   --> deck.ic:14:39
@@ -543,7 +543,7 @@ warning[D256]: environment `w` changes nothing: link `base` is part of the groun
 def test_a_run_that_removes_where_a_payload_begins_is_told_so(tmp_path: Path) -> None:
     run = "run other like it { box { remove position; } }\n"
     assert (
-        told(check(tmp_path, ARM, changed(RUN, FLIES), run, select=["other"]))
+        messages(check(tmp_path, ARM, changed(RUN, FLIES), run, select=["other"]))
         == """\
 error[D075]: payload `box` has no `position`
   --> deck.ic:23:27
@@ -580,7 +580,7 @@ def test_a_payload_that_is_carried_throughout_is_mass_to_its_joint_and_one_that_
     np.testing.assert_allclose(found.signals["q"], wanted.signals["q"], rtol=0, atol=1e-12)
     goes = changed(RUN, ("    }\n    env", "        release = 3 s;\n    }\n    env"))
     assert (
-        told(check(tmp_path, BARE, goes))
+        messages(check(tmp_path, BARE, goes))
         == """\
 error[D217]: joint `wrist` moves nothing that has mass
  --> deck.ic:5:5
@@ -603,10 +603,10 @@ def test_a_payload_that_a_free_base_carries_throughout_is_its_mass(tmp_path: Pat
     run = changed(
         RUN, ("    arm = crane;\n", "    arm = crane;\n    base = free;\n"), ("on    = hand;", "on    = base;")
     )
-    assert told(check(tmp_path, ARM, run)) == ""
+    assert messages(check(tmp_path, ARM, run)) == ""
     goes = changed(run, ("on    = base;\n", "on    = base;\n        release = 3 s;\n"))
     assert (
-        told(check(tmp_path, ARM, goes))
+        messages(check(tmp_path, ARM, goes))
         == """\
 error[D254]: the base moves freely and has no mass
  --> deck.ic:9:5
@@ -624,7 +624,7 @@ error[D254]: the base moves freely and has no mass
 
 def test_a_payload_that_spins_too_fast_for_the_step_is_warned_of(tmp_path: Path) -> None:
     spun = changed(RUN, FLIES, ("velocity = [0, -1, 0] m/s;", "rate = [0, 9, 250] rad/s;"))
-    assert told(check(tmp_path, ARM, spun)).startswith("""\
+    assert messages(check(tmp_path, ARM, spun)).startswith("""\
 warning[D300]: payload `box` turns by 0.25 rad in a step of the dynamics
   --> deck.ic:16:16
    |
@@ -636,7 +636,7 @@ warning[D300]: payload `box` turns by 0.25 rad in a step of the dynamics
 def test_a_time_that_is_not_written_does_not_vary_and_the_remedy_says_why(tmp_path: Path) -> None:
     sweep = "sweep late of it { vary payloads.box.release = [1, 2] s; }"
     assert (
-        told(check(tmp_path, ARM, RUN, sweep, select=["late"]))
+        messages(check(tmp_path, ARM, RUN, sweep, select=["late"]))
         == """\
 error[D122]: `payloads.box.release` cannot vary
   --> deck.ic:19:25

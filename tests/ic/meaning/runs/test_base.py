@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ic.small_decks import changed, check, experiment, told
+from tests.ic.small_decks import changed, check, experiment, messages
 
 ARM = """\
 arm swing {
@@ -91,7 +91,7 @@ def test_a_run_like_another_changes_one_number_of_a_course(tmp_path: Path) -> No
 
 def test_a_sweep_varies_the_kind_of_base(tmp_path: Path) -> None:
     compiled = check(tmp_path, ARM, RUN, "sweep kinds of it { vary base = [fixed, free]; }", select=["kinds"])
-    assert compiled.plan is not None, told(compiled)
+    assert compiled.plan is not None, messages(compiled)
     assert [each.structure.free for each in compiled.plan.experiments] == [False, True]
 
 
@@ -271,13 +271,13 @@ def test_a_mistake_is_told_with_its_place_and_a_remedy(tmp_path: Path, base: str
     changes = [("base = free;", base)]
     if other:
         changes.append((f"{other.partition(' ')[0]} {{}}", other))
-    assert told(check(tmp_path, ARM, changed(RUN, *changes))) == expected
+    assert messages(check(tmp_path, ARM, changed(RUN, *changes))) == expected
 
 
 def test_a_free_base_without_mass_is_told(tmp_path: Path) -> None:
     arm = changed(ARM, ("    link base { mass = 50 kg; shape = sphere(radius = 1 m); }\n", ""))
     assert (
-        told(check(tmp_path, arm, RUN))
+        messages(check(tmp_path, arm, RUN))
         == """\
 error[D254]: the base moves freely and has no mass
  --> deck.ic:7:5
@@ -310,13 +310,13 @@ def test_a_link_fixed_to_the_base_is_its_mass_as_well(tmp_path: Path) -> None:
         ("    link base", "    link hull"),
         ("    joint hinge", "    joint mount fixed { parent = base; child = hull; }\n    joint hinge"),
     )
-    assert told(check(tmp_path, arm, RUN)) == ""
+    assert messages(check(tmp_path, arm, RUN)) == ""
 
 
 def test_no_joint_is_called_base_and_none_has_it_for_a_child(tmp_path: Path) -> None:
     text = changed(ARM, ("joint hinge", "joint base"))
     assert (
-        told(check(tmp_path, text, RUN)).partition("\n\n")[0]
+        messages(check(tmp_path, text, RUN)).partition("\n\n")[0]
         == """\
 error[D166]: `base` begins paths of its own, so no joint may be called so
  --> deck.ic:4:5
@@ -326,13 +326,13 @@ error[D166]: `base` begins paths of its own, so no joint may be called so
   = help: give the joint another name"""
     )
     text = changed(ARM, ("child = bar", "child = base"))
-    assert "error[D093]: the base cannot be a child\n" in told(check(tmp_path, text, RUN))
+    assert "error[D093]: the base cannot be a child\n" in messages(check(tmp_path, text, RUN))
 
 
 def test_a_component_varies_by_its_parameters(tmp_path: Path) -> None:
     sweep = "sweep some of it { vary base.x = [1, 2] cm; }"
     assert (
-        told(check(tmp_path, ARM, changed(RUN, ("base = free;", SHAKEN)), sweep, select=["some"]))
+        messages(check(tmp_path, ARM, changed(RUN, ("base = free;", SHAKEN)), sweep, select=["some"]))
         == """\
 error[D122]: `base.x` cannot vary
   --> deck.ic:15:25
@@ -349,7 +349,7 @@ error[D122]: `base.x` cannot vary
 def test_a_spin_that_the_step_does_not_follow_is_warned_of(tmp_path: Path) -> None:
     spun = changed(RUN, ("initial {}", "initial { base.rate = [150, 0, 200] rad/s; }"))
     assert (
-        told(check(tmp_path, ARM, spun))
+        messages(check(tmp_path, ARM, spun))
         == """\
 warning[D300]: the base turns by 0.25 rad in a step of the dynamics
  --> deck.ic:9:27
@@ -362,7 +362,7 @@ warning[D300]: the base turns by 0.25 rad in a step of the dynamics
 1 warning
 """
     )
-    assert told(check(tmp_path, ARM, changed(spun, ("duration", "integrator = rk4; duration")))) == ""
+    assert messages(check(tmp_path, ARM, changed(spun, ("duration", "integrator = rk4; duration")))) == ""
     sweep = "sweep some of it { vary initial.base.rate.x = [100, 300] rad/s; }"
     found = check(
         tmp_path, ARM, changed(RUN, ("initial {}", "initial { base.rate = [0, 0, 10] rad/s; }")), sweep, select=["some"]
@@ -373,7 +373,7 @@ warning[D300]: the base turns by 0.25 rad in a step of the dynamics
 def test_a_kind_of_command_is_no_course_of_a_base(tmp_path: Path) -> None:
     text = changed(RUN, ("base = free;", "base = prescribed { yaw = rate(1 rad/s); }"))
     assert (
-        told(check(tmp_path, ARM, text))
+        messages(check(tmp_path, ARM, text))
         == """\
 error[D250]: `yaw` of the base is told its positions, and `rate` is a kind of command of servos
  --> deck.ic:8:31

@@ -12,7 +12,7 @@ from met import models
 from met.plan import Plan, Recorded
 from met.plan import file as plan_file
 from met.plan.channel import recordable
-from tests.ic.small_decks import RUN, SERVO, changed, check, experiment, told
+from tests.ic.small_decks import RUN, SERVO, changed, check, experiment, messages
 
 ARM = """\
 arm swing {
@@ -34,7 +34,7 @@ def recorded(folder: Path, names: str) -> tuple[Recorded, ...]:
 
 
 def shown(folder: Path, names: str) -> str:
-    text = told(check(folder, ARM, SERVO, changed(RUN, ("[q]", f"[{names}]"))))
+    text = messages(check(folder, ARM, SERVO, changed(RUN, ("[q]", f"[{names}]"))))
     assert text.endswith("\n\n1 error\n")
     return text.removesuffix("\n1 error\n")
 
@@ -141,7 +141,9 @@ error[D040]: `energy.kinetic` is recorded twice
 
 def test_a_metric_watches_one_number(tmp_path: Path) -> None:
     def of(channel: str) -> str:
-        return told(check(tmp_path, ARM, SERVO, changed(RUN, ("[q];", f"[]; metric top = max {{ of = {channel}; }}"))))
+        return messages(
+            check(tmp_path, ARM, SERVO, changed(RUN, ("[q];", f"[]; metric top = max {{ of = {channel}; }}")))
+        )
 
     assert of("links.hook.position.z") == ""
     assert (

@@ -42,7 +42,7 @@ def compiled(tmp_path: Path) -> Callable[..., Plan]:
 
     def compile_it(text: str, name: str = "other", **options: object) -> Plan:
         made = small_decks.check(tmp_path, text, select=[name], **options)
-        assert made.plan is not None, small_decks.told(made)
+        assert made.plan is not None, small_decks.messages(made)
         return made.plan
 
     return compile_it
@@ -51,7 +51,7 @@ def compiled(tmp_path: Path) -> Callable[..., Plan]:
 @pytest.fixture
 def told(tmp_path: Path) -> Callable[..., str]:
     def tell(text: str, **options: object) -> str:
-        return small_decks.told(small_decks.check(tmp_path, text, select="all", **options))
+        return small_decks.messages(small_decks.check(tmp_path, text, select="all", **options))
 
     return tell
 

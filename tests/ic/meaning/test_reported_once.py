@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.ic.small_decks import SERVO, changed, check, codes, told
+from tests.ic.small_decks import SERVO, changed, check, codes, messages
 
 ARM = """\
 arm swing {
@@ -31,7 +31,7 @@ SWEEP = "sweep gains of hold { vary drive.kp = [0.1, 0.2] V*s/rad; }\n"
 
 def shown(folder: Path, *parts: str) -> str:
     """What is said of a deck, without the counting line."""
-    return told(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
+    return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
 
 
 def test_the_decks_that_the_next_tests_break_are_sound(tmp_path: Path) -> None:
