@@ -14,7 +14,6 @@ from typing import Any
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression, Name, Setting, String
-from ic.language.unit_words import either, in_degrees
 from ic.meaning.definitions.merge import Item
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.command_line import (
@@ -116,17 +115,7 @@ class Scope:
         written = value
         if item is not None and value is None:
             with self.complaints.gather():
-                found = self.evaluate(item, expression)
-                if isinstance(found, ValueList):
-                    raise Problem(
-                        error(
-                            "D071",
-                            f"`{wanted.name}` of {owner.label} is one number, and this is a list",
-                            found.place,
-                            help="leave the brackets out",
-                        )
-                    )
-                written = found
+                written = self._one_number(owner, wanted, item, expression)
         default = wanted.default if isinstance(wanted.default, (int, float)) else None
         return self._settle(owner, wanted, wanted.name, item, written, default, record, expression)
 
@@ -151,7 +140,8 @@ class Scope:
         values: list[Value | None] = [None] * len(names)
         if item is not None and given is None:
             with self.complaints.gather():
-                values = list(self._components(owner, wanted, item, names, short))
+                found = self.evaluate(item)
+                values = list(self.value_checks.components(owner, wanted, item.name, found, names, short))
             if all(value is None for value in values):
                 self.checks.fail(owner.join(wanted.name))
                 return None
@@ -169,54 +159,6 @@ class Scope:
         ]
         return None if any(number is None for number in numbers) else tuple(numbers)  # type: ignore[arg-type]
 
-    def _components(
-        self, owner: Owner, wanted: Parameter, item: Item, names: Sequence[str], short: int
-    ) -> Iterable[Value]:
-        count = len(names)
-        found = self.evaluate(item)
-        text, dimension = owner.unit(wanted)
-        expected = f"{short} or {count}" if short else f"{count}"
-        if isinstance(found, Value):
-            unit = "" if text == "1" else f" {text}"
-            raise Problem(
-                error(
-                    "D071",
-                    f"{owner.what(wanted)} is a list of {expected} numbers",
-                    found.place,
-                    help=f"write `{item.name} = [...]{unit};`",
-                )
-            )
-        if len(found.items) not in (short, count):
-            shown = ", ".join(names)
-            raise Problem(
-                error(
-                    "D071",
-                    f"{owner.what(wanted)} has {expected} numbers, not {len(found.items)}",
-                    found.place,
-                    help=f"they are [{shown}]",
-                )
-            )
-        numbers = []
-        for value in found.items:
-            if isinstance(value, ValueList):
-                raise Problem(error("D071", "a list inside a list", value.place))
-            numbers.append(value)
-        if dimension != PURE and len(numbers) > 1 and all(value.bare for value in numbers):
-            raise Problem(
-                error(
-                    "D060",
-                    f"{owner.what(wanted)} is in {text}, and these are bare numbers",
-                    found.place,
-                    help=f"write {either(f'[...] {each}' for each in in_degrees(text))}: "
-                    "a unit after the bracket is for all of them",
-                )
-            )
-        dimensions = {value.dimension for value in numbers}
-        if found.unit is not None and len(dimensions) == 1:  # one unit for all: where it is wrong, it is so once
-            self.value_checks.dimension(owner, wanted, replace(numbers[0], place=found.place))
-        numbers += [Value(0.0, dimension, found.place)] * (count - len(numbers))
-        return numbers
-
     def constant(self, owner: Owner, wanted: Parameter, item: Item) -> float | None:
         """A compile-time constant: another value is another program."""
         path = owner.join(wanted.name)
@@ -224,16 +166,7 @@ class Scope:
             self.not_sweepable[known] = not_sweepable.COMPILED
         number = None
         with self.complaints.gather():
-            found = self.evaluate(item)
-            if isinstance(found, ValueList):
-                raise Problem(
-                    error(
-                        "D071",
-                        f"`{wanted.name}` of {owner.label} is one number, and this is a list",
-                        found.place,
-                        help="leave the brackets out",
-                    )
-                )
+            found = self._one_number(owner, wanted, item)
             self.value_checks.dimension(owner, wanted, found)
             if isinstance(found.number, Scalar):
                 raise Problem(
@@ -433,6 +366,14 @@ class Scope:
             value = self.names.evaluate(more)
             items.extend(value.items if isinstance(value, ValueList) else (value,))
         return ValueList(tuple(items), found.place, found.unit)
+
+    def _one_number(self, owner: Owner, wanted: Parameter, item: Item, expression: Expression | None = None) -> Value:
+        """The value of the item's expression. Raises Problem, D071 where it is a list."""
+        found = self.evaluate(item, expression)
+        if isinstance(found, ValueList):
+            message = f"`{wanted.name}` of {owner.label} is one number, and this is a list"
+            raise Problem(error("D071", message, found.place, help="leave the brackets out"))
+        return found
 
     def _missing(self, owner: Owner, wanted: Parameter) -> None:
         self.checks.fail(owner.join(wanted.name))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.conditions import Checks
 from ic.meaning.expressions.cycles import ambiguous_unit
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Value
+from ic.meaning.expressions.quantity import Value, ValueList
 from ic.meaning.expressions.remedies import unit_remedy
 from ic.meaning.parameters.owner import Owner
 from ic.text.complaints import Complaints
@@ -70,9 +70,70 @@ class ValueChecks:
             error("D061", message, value.place, also=also, help=apart or [*other, unit_remedy(value, text, dimension)])
         )
 
+    def components(
+        self,
+        owner: Owner,
+        wanted: Parameter,
+        key: str,
+        found: Value | ValueList,
+        names: Sequence[str],
+        short: int,
+    ) -> Iterable[Value]:
+        """The numbers of a list, one for each name; zeros behind the first `short` where there are only these.
+
+        key  what the deck calls the list.  Raises Problem where it is no list of so many numbers.
+        """
+        count = len(names)
+        text, dimension = owner.unit(wanted)
+        expected = f"{short} or {count}" if short else f"{count}"
+        if isinstance(found, Value):
+            unit = "" if text == "1" else f" {text}"
+            raise Problem(
+                error(
+                    "D071",
+                    f"{owner.what(wanted)} is a list of {expected} numbers",
+                    found.place,
+                    help=f"write `{key} = [...]{unit};`",
+                )
+            )
+        if len(found.items) not in (short, count):
+            shown = ", ".join(names)
+            raise Problem(
+                error(
+                    "D071",
+                    f"{owner.what(wanted)} has {expected} numbers, not {len(found.items)}",
+                    found.place,
+                    help=f"they are [{shown}]",
+                )
+            )
+        numbers = []
+        for value in found.items:
+            if isinstance(value, ValueList):
+                raise Problem(error("D071", "a list inside a list", value.place))
+            numbers.append(value)
+        if dimension != PURE and len(numbers) > 1 and all(value.bare for value in numbers):
+            raise Problem(
+                error(
+                    "D060",
+                    f"{owner.what(wanted)} is in {text}, and these are bare numbers",
+                    found.place,
+                    help=f"write {either(f'[...] {each}' for each in in_degrees(text))}: "
+                    "a unit after the bracket is for all of them",
+                )
+            )
+        dimensions = {value.dimension for value in numbers}
+        if found.unit is not None and len(dimensions) == 1:  # one unit for all: where it is wrong, it is so once
+            self.dimension(owner, wanted, replace(numbers[0], place=found.place))
+        numbers += [Value(0.0, dimension, found.place)] * (count - len(numbers))
+        return numbers
+
     def range(
         self, owner: Owner, wanted: Parameter, value: Real, place: Place, path: str = "", needs: tuple[str, ...] = ()
     ) -> None:
+        """Report a number out of the parameter's range, now or once the cases of a sweep are known.
+
+        path  of the parameter;  needs  paths whose own checks must hold for this one to say anything
+        """
         bounds = [
             (bound, word, sign)
             for bound, word, sign in (

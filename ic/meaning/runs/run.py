@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,9 +15,9 @@ from ic.meaning.checks.reading import remark_unread
 from ic.meaning.checks.spin import check_spins
 from ic.meaning.checks.swings import check_circuits, check_sensor
 from ic.meaning.control.guides import check_guides, name_guides, resolve_guides
-from ic.meaning.control.link_sensors import resolve_link_sensors
-from ic.meaning.control.schedule import Rate, check_stability, fastest_rate
-from ic.meaning.control.servos import check_rest, check_start, resolve_servos
+from ic.meaning.control.link_sensors import Sensing, resolve_link_sensors
+from ic.meaning.control.schedule import Rate, Ticks, check_stability, fastest_rate
+from ic.meaning.control.servos import Use, check_rest, check_start, resolve_servos
 from ic.meaning.control.substitution import check_brakes, check_ticks, resolve_substitutions
 from ic.meaning.definitions.merge import Item, MergedBlock, with_meant_names
 from ic.meaning.definitions.resolve import Definition
@@ -110,36 +110,10 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     check_failures(scope, uses, ticks, substitutions, environment, schedule)
     check_friction(scope, uses, environment)
     _keep_settings(scope, block, arm, integrator, rates, schedule)
-    fastest = {}
     on_beds = [each.joint for each in substitutions]
-    for use in uses:
-        if known and use.parameters is not None and use.joint not in on_beds:  # there the motor is no part of the step
-            x = fastest_rate(
-                scope, use.servo, use.parameters, f"{use.joint}.servo", continuous=ticks[use.joint].continuous
-            )
-            if x is not None:
-                fastest[use.joint] = (use, x)
-    stability: dict[str, Real] = {}
-    for use, x in sorted(fastest.values(), key=lambda each: -scope.checks.first(each[1])):  # the worst is reported
-        h_lambda = check_stability(
-            scope, f"servo `{use.definition}`", x, schedule, integrator, rates["dynamics"], f"{use.joint}.servo"
-        )
-        if h_lambda is not None:
-            stability[use.joint] = h_lambda
-    for sensor in sensors:
-        if known and sensor.values:
-            check_sensor(
-                scope,
-                sensor.label,
-                models.find("sensor", sensor.model),
-                sensor.values,
-                schedule,
-                integrator,
-                rates["dynamics"],
-                sensor.path,
-            )
-    for use in uses if known else ():
-        check_circuits(scope, use, schedule, integrator, rates["dynamics"], on_bed=use.joint in on_beds)
+    stability: tuple[tuple[str, Real], ...] = ()
+    if known:
+        stability = _check_steps(scope, uses, sensors, on_beds, schedule, ticks, integrator, rates["dynamics"])
     servos = tuple(
         ServoUse(
             joint=use.joint,
@@ -184,8 +158,45 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     scope.keep_setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure)
     tolerances = resolve_tolerances(scope, body_of(scope, block.get("tolerances")), structure)
-    in_order = tuple((joint, stability[joint]) for joint in fastest if joint in stability)
-    return Resolved(structure, requirements, tolerances, seed, in_order, definition.place)
+    return Resolved(structure, requirements, tolerances, seed, stability, definition.place)
+
+
+def _check_steps(
+    scope: Scope,
+    uses: Sequence[Use],
+    sensors: Sequence[Sensing],
+    on_beds: Sequence[str],
+    schedule: Schedule,
+    ticks: Mapping[str, Ticks],
+    integrator: Any,
+    dynamics: Rate,
+) -> tuple[tuple[str, Real], ...]:
+    """Check that the integrator's steps can follow servos and sensors; h * lambda by joint, in the order of `uses`.
+
+    on_beds  joints whose motor is on a bed, and so no part of the step
+    """
+    fastest = {}
+    for use in uses:
+        if use.parameters is not None and use.joint not in on_beds:
+            x = fastest_rate(
+                scope, use.servo, use.parameters, f"{use.joint}.servo", continuous=ticks[use.joint].continuous
+            )
+            if x is not None:
+                fastest[use.joint] = (use, x)
+    stability: dict[str, Real] = {}
+    for use, x in sorted(fastest.values(), key=lambda each: -scope.checks.first(each[1])):  # the worst is reported
+        h_lambda = check_stability(
+            scope, f"servo `{use.definition}`", x, schedule, integrator, dynamics, f"{use.joint}.servo"
+        )
+        if h_lambda is not None:
+            stability[use.joint] = h_lambda
+    for sensor in sensors:
+        if sensor.values:
+            model = models.find("sensor", sensor.model)
+            check_sensor(scope, sensor.label, model, sensor.values, schedule, integrator, dynamics, sensor.path)
+    for use in uses:
+        check_circuits(scope, use, schedule, integrator, dynamics, on_bed=use.joint in on_beds)
+    return tuple((joint, stability[joint]) for joint in fastest if joint in stability)
 
 
 def _keep_settings(
