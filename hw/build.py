@@ -22,9 +22,9 @@ from pathlib import Path
 from typing import Literal
 
 from hw.bed import Capability, Limits, Scales
-from met import cache
 from met.diagnostic import Problem, error
 from met.frozen import frozen
+from met.host import cache
 
 Kind = Literal["host", "library", "arm"]
 

@@ -24,10 +24,10 @@ from hw.protocol.frames import unframed
 from hw.protocol.messages import Step
 from hw.transcript import MAGIC, SENT, File, read
 from met.diagnostic import Problem, error
-from met.files import open_regular
 from met.frozen import frozen
+from met.host.files import open_regular
 from met.plan import Experiment
-from met.program.plant import Plant, bed_values, plant_c
+from met.program.control.plant import Plant, bed_values, plant_c
 
 SIMULATED = EMULATED, FIRMWARE, QEMU = "emulated", "firmware", "qemu"
 """Ports that simulate a deck's bed."""

@@ -23,9 +23,9 @@ from typing import Any, TypeVar
 
 from hw import realtime
 from hw.bed import About, Bed
-from met import interpreter
 from met.diagnostic import Problem, error
-from met.render import to_json
+from met.host import interpreter
+from met.messages.render import to_json
 
 PAUSE = 0.1
 """s between two looks at how far it is, while nothing is said."""

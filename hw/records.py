@@ -20,8 +20,8 @@ from typing import IO, Any
 import numpy as np
 
 from hw.bed import Sample
-from met.files import parse_json, read_regular
 from met.frozen import frozen
+from met.host.files import parse_json, read_regular
 
 MAGIC = b"MET bed records 1\n"
 

@@ -22,8 +22,8 @@ from typing import Any
 
 from hw.line import Line
 from met.diagnostic import Problem, error
-from met.files import parse_json, read_regular
 from met.frozen import frozen
+from met.host.files import parse_json, read_regular
 
 MAGIC = b"MET bed transcript 1\n"
 

@@ -21,8 +21,8 @@ from typing import Any
 
 from hw import records, ring
 from hw.ring import Full, Ring
-from met import interpreter
 from met.diagnostic import Problem, error
+from met.host import interpreter
 
 RING_BYTES = 64 << 20
 """Of records that may wait for the disk: minutes of them."""

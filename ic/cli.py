@@ -12,7 +12,7 @@ import click
 
 from met.cli import BAD_INPUT, YES, check_options, complain, deck_options, format_option, loudness_options
 from met.diagnostic import Problem, did_you_mean, error
-from met.visible import say
+from met.messages.visible import say
 
 if TYPE_CHECKING:
     from ic.driver.compile import Compiled

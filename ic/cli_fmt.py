@@ -6,7 +6,7 @@ import click
 
 from met.cli import BAD_INPUT, NO, YES, complain, loudness_options
 from met.diagnostic import Problem
-from met.visible import say
+from met.messages.visible import say
 
 
 @click.command()

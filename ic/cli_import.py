@@ -8,7 +8,7 @@ import click
 
 from met.cli import loudness_options
 from met.diagnostic import Problem, error
-from met.visible import say
+from met.messages.visible import say
 
 
 @click.command("import", short_help="Make a deck of a robot's URDF file.")

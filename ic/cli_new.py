@@ -9,7 +9,7 @@ import sys
 import click
 
 from met.cli import loudness_options
-from met.visible import say
+from met.messages.visible import say
 
 KINDS = ["deck", "servo", "sensor", "environment", "command", "guide", "metric", "integrator"]
 

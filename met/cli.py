@@ -18,10 +18,10 @@ from typing import Any, TypeVar
 import click
 
 from met.diagnostic import Diagnostic, Problem, error, nearest
-from met.entry_points import EntryPoint, offered
-from met.sources import names_archive, names_plan
+from met.host.entry_points import EntryPoint, offered
+from met.host.sources import names_archive, names_plan
+from met.messages.visible import say
 from met.version import VERSION
-from met.visible import say
 
 YES, NO, BAD_INPUT = 0, 1, 2
 INTERRUPTED, PIPE_CLOSED = 130, 141  # 128 + the signal, as a shell counts
@@ -218,7 +218,7 @@ def _run(arguments: list[str]) -> int:
 
 def complain(diagnostics: Sequence[Diagnostic], sources: Mapping[str, str], *, json: bool = False) -> None:
     """Print diagnostics: for people on stderr, for programs as JSON on stdout."""
-    from met import render
+    from met.messages import render
 
     if json:
         print(render.to_json(diagnostics))

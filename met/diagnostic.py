@@ -87,7 +87,7 @@ class Problem(Exception):
         if not self.sources:
             helps = (f"\n  {text}" for each in self.diagnostics for text in each.help)
             return super().__str__() + "".join(helps)
-        from met.render import render
+        from met.messages.render import render
 
         return "\n" + render(self.diagnostics, self.sources).rstrip("\n")
 

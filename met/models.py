@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from met import units
 from met.diagnostic import Place, Problem, did_you_mean, error
-from met.entry_points import offered
 from met.frozen import frozen
+from met.host.entry_points import offered
 from met.parameter import Parameter, there
 from met.plan import LinkSensor, SensorUse, ServoUse, Structure
 

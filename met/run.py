@@ -15,8 +15,8 @@ from met.backends.backend import Kernel
 from met.frozen import frozen
 from met.plan import REPEAT, Experiment, keys
 from met.program.build import COORDINATE, METRIC, OUTPUTS, build
+from met.program.control.substituted import LIMITED
 from met.program.step import ASTRAY, EVENTS, NOT_FINITE, SINGULAR
-from met.program.substituted import LIMITED
 from met.trace.identity import result_keys, state_key
 from met.trace.program import Program
 from met.trace.recorder import record

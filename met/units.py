@@ -334,7 +334,7 @@ class _Reader:
         elif piece in UNITS:
             result = UNITS[piece].measure
         else:
-            from met.other_units import suggest  # for a message alone
+            from met.messages.other_units import suggest  # for a message alone
 
             near = suggest(piece)
             raise ValueError(f"unit `{self.written}`: `{piece}` is not a unit" + (f"; `{near}`?" if near else ""))

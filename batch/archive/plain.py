@@ -17,7 +17,7 @@ from typing import Any
 from batch.archive import room
 from batch.archive.hdf5 import h5py
 from met.diagnostic import Problem, error
-from met.files import open_regular
+from met.host.files import open_regular
 
 DEEPEST = 64
 """Groups that one may be in: whoever opens a file of thousands takes minutes."""

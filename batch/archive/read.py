@@ -22,8 +22,8 @@ from batch.archive.sound import Unlike, of_joints
 from batch.queries.rows import row_of
 from met.diagnostic import Problem, error
 from met.distinct import distinct
-from met.files import open_regular
 from met.frozen import frozen
+from met.host.files import open_regular
 from met.plan import Plan
 
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from met.messages.visible import line
 from met.run import DONE, LOST
-from met.visible import line
 
 if TYPE_CHECKING:
     from batch.archive.read import Group, Stored

@@ -11,7 +11,7 @@ from hw.bed import About, Fault
 from hw.beds import latch
 from hw.ports import SIMULATED, Port, opened
 from met.diagnostic import Problem, error
-from met.visible import say
+from met.messages.visible import say
 
 
 def clear_and_tell(word: str, *, baud: int, form: str, quiet: bool = False, verbose: bool = False) -> None:

@@ -27,8 +27,8 @@ from hw.case import Asked, pace_of
 from hw.ports import kind
 from hw.process import talk
 from met.diagnostic import Problem, error
-from met.files import new_file, read_json
 from met.frozen import frozen
+from met.host.files import new_file, read_json
 from met.plan import Plan
 from met.plan import file as plan_file
 from met.run import FAILED

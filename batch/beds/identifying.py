@@ -15,13 +15,14 @@ from hw.bed import About, Capability, Limits, Scales
 from hw.identify.driving import Asked
 from hw.process import talk
 from ic.printing.columns import columns, quantity
-from met import models, visible
+from met import models
 from met.diagnostic import Problem, error
-from met.files import new_file
 from met.frozen import frozen
+from met.host.files import new_file
+from met.messages import visible
 from met.plan import Experiment, Formula, Plan, Substitution
 from met.plan import file as plan_file
-from met.program.plant import bed_values
+from met.program.control.plant import bed_values
 
 if TYPE_CHECKING:
     from hw.identify.fit import Estimate, Found

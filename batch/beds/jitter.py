@@ -15,9 +15,9 @@ from hw.process import talk
 from hw.timing import EDGES
 from ic.printing.columns import columns
 from met.diagnostic import Problem, error
+from met.messages.visible import say
 from met.plan import Plan
 from met.plan import file as plan_file
-from met.visible import say
 
 HZ, SECONDS = 1000.0, 10.0
 """What is measured where nothing else is asked for, nor a deck has a rate."""

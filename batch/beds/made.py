@@ -14,8 +14,8 @@ import numpy as np
 from hw import records
 from hw.driven import Driven
 from hw.records import ANSWERED
-from met.files import is_count
 from met.frozen import frozen
+from met.host.files import is_count
 from met.program.build import OUTPUTS
 from met.run import STOPPED, Prepared
 

@@ -20,7 +20,7 @@ from hw.ports import Port, opened
 from ic.printing.columns import columns, number, quantity
 from met.diagnostic import Diagnostic
 from met.frozen import frozen
-from met.visible import say
+from met.messages.visible import say
 
 ASKED = 32
 """Times that the sensors are read, for the time that an answer takes."""

@@ -19,10 +19,10 @@ from batch.terminal.running import first_picture, read_plan
 from batch.terminal.verdict import announcement, told, worst_cases, writing
 from hw.case import pace_of
 from hw.ports import SIMULATED, in_lock_step
-from met import visible
+from met.analysis.margin import margins
 from met.diagnostic import Problem, error
-from met.files import read_json
-from met.margin import margins
+from met.host.files import read_json
+from met.messages import visible
 from met.plan import Experiment, Plan
 
 

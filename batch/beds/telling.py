@@ -14,7 +14,7 @@ from batch.beds.jitter import duration, off
 from batch.terminal.progress import Bar
 from hw.records import ANSWERED
 from hw.timing import Spread, Timing, timing
-from met.visible import say
+from met.messages.visible import say
 
 
 class Telling:

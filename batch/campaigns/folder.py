@@ -35,7 +35,7 @@ from batch.campaigns import shard
 from batch.campaigns.tasks import Done, Section, Task
 from met import run as engine
 from met.diagnostic import Problem, error
-from met.files import is_count, new_file, read_json, read_regular, whole_file
+from met.host.files import is_count, new_file, read_json, read_regular, whole_file
 from met.plan import Plan
 from met.plan import file as plan_file
 from met.program.step import ASTRAY

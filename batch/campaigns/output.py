@@ -19,7 +19,7 @@ from batch.campaigns.folder import Folder, beside
 from batch.export import FORMATS
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem, error
-from met.files import new_file
+from met.host.files import new_file
 from met.plan import Experiment, Plan
 
 

@@ -26,9 +26,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from met import interpreter, models
+from met import models
 from met.diagnostic import Label, Place, Problem, error
-from met.entry_points import PACKAGE, offered
+from met.host import interpreter
+from met.host.entry_points import PACKAGE, offered
 
 LEAST_SECONDS = 60.0
 """That reading and recording may take whatever the time limit of a case is."""
@@ -122,8 +123,8 @@ def main(lines: Sequence[str]) -> None:
     from batch.archive.read import ArchiveFile
     from batch.terminal.running import read_plan
     from hw import realtime
+    from met.host.sources import names_archive
     from met.run import prepare
-    from met.sources import names_archive
 
     realtime.end_with_parent(signal.SIGKILL)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

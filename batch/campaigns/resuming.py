@@ -18,7 +18,7 @@ from batch.campaigns.output import sidecar_path
 from batch.campaigns.tasks import Section
 from batch.terminal.progress import duration
 from met.diagnostic import Problem, error
-from met.files import open_regular, read_json
+from met.host.files import open_regular, read_json
 from met.plan import file as plan_file
 
 WHOLE, DAMAGED = "whole", "damaged"

@@ -24,8 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from met.files import is_count, memory, open_regular, parse_json, whole_file
 from met.frozen import frozen
+from met.host.files import is_count, memory, open_regular, parse_json, whole_file
 from met.run import FAILED, LOST, TIMED_OUT
 
 MAGIC = b"MET shard 1\n"

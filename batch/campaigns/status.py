@@ -14,7 +14,7 @@ from batch.campaigns.drive import Progress
 from batch.campaigns.folder import ENDING, Folder, beside, gaps, put
 from batch.campaigns.output import sidecar_path
 from batch.terminal.progress import duration
-from met.files import is_count, read_json
+from met.host.files import is_count, read_json
 
 WRITE_SECONDS = 1.0
 

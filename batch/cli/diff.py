@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from met.cli import NO, YES, format_option
-from met.visible import line, say
+from met.messages.visible import line, say
 
 
 @click.command(short_help="Say what changed between two archives, case by case.")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from met.cli import YES, format_option, loudness_options
-from met.visible import say
+from met.messages.visible import say
 
 if TYPE_CHECKING:
     from batch.export import Rows

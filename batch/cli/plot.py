@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from met.cli import YES, loudness_options
-from met.visible import say
+from met.messages.visible import say
 
 
 @click.command(short_help="Draw signals, metrics and maps of an archive: PNG, SVG, PDF.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from met.cli import YES, loudness_options
-from met.visible import say
+from met.messages.visible import say
 
 
 @click.command(short_help="Make one HTML page of an archive, to open anywhere and to send.")

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
-from met.visible import line, say
+from met.messages.visible import line, say
 
 MOST_NAMED = 5
 """Archives that are named where none was meant."""

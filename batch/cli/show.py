@@ -1,4 +1,4 @@
-"""`met show`, `profile`, `margin`: faces of batch.terminal.show, met.profile and met.margin."""
+"""`met show`, `profile`, `margin`: faces of batch.terminal.show, met.analysis.profile and met.analysis.margin."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from met.cli import NO, YES, check_options, deck_options, format_option
-from met.visible import say
+from met.messages.visible import say
 
 if TYPE_CHECKING:
     from met.plan import Experiment
@@ -39,7 +39,7 @@ def show(
     from batch.archive.read import ArchiveFile
     from batch.queries.ordering import by_names
     from batch.terminal.show import as_json, show
-    from met.render import wants_colour
+    from met.messages.render import wants_colour
 
     if reverse and not sort:
         raise click.UsageError("--reverse is of --sort, and nothing is sorted: `--sort NAME`")
@@ -75,8 +75,8 @@ def profile(
     and what is an input, and how the kernel was made. Nothing is written but the cache.
     """
     from batch.terminal.profile import told
-    from met.profile import as_data
-    from met.profile import profile as measured
+    from met.analysis.profile import as_data
+    from met.analysis.profile import profile as measured
 
     found = [(measured(each), each) for each in _asked_for(source, names, defines, include_dirs, settings, form)]
     _say(form, [as_data(each) for each, _ in found], [told(*each) for each in found])
@@ -98,8 +98,8 @@ def margin(
     Exit status: 0 all joints are stable in all cases; 1 one is not; 2 the input is wrong, or no joint is on a bed.
     """
     from batch.terminal.margin import as_data, told
+    from met.analysis.margin import margins
     from met.diagnostic import Problem, error
-    from met.margin import margins
 
     named = _asked_for(source, names, defines, include_dirs, settings, form)
     asked = [each for each in named if each.structure.substitutions]

@@ -11,7 +11,7 @@ from batch.differences.samples import LEVEL, Sample
 from batch.queries.failures import STATUS, ranges
 from batch.queries.signals import number_text
 from met.frozen import frozen
-from met.visible import visible
+from met.messages.visible import visible
 
 SAME = "made from the same: deck, parameters, models and versions"
 

@@ -22,7 +22,7 @@ from typing import Any
 from batch.campaigns.output import more_files
 from batch.campaigns.tasks import Done, Task
 from batch.executors import Outcome
-from met import interpreter
+from met.host import interpreter
 
 COMMAND = tuple(interpreter.command("batch.executors.worker"))
 WATCH_SECONDS = 0.2

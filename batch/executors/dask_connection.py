@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from met.diagnostic import Problem, error
-from met.files import read_json
+from met.host.files import read_json
 
 CONNECT_SECONDS = 5.0
 """How long we try to reach a scheduler."""

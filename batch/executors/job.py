@@ -28,8 +28,8 @@ from batch.executors.termination import TERMINATED, Terminated, terminable
 from batch.executors.threads import Threads
 from batch.terminal.progress import Bar
 from met.diagnostic import Problem
-from met.files import is_count, read_json
-from met.visible import say
+from met.host.files import is_count, read_json
+from met.messages.visible import say
 
 
 def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = COMMAND) -> int:
@@ -129,7 +129,7 @@ def main(arguments: Sequence[str]) -> int:
         say("met: terminated; what is done is kept", err=True)
         return TERMINATED
     except Problem as problem:
-        from met.render import render
+        from met.messages.render import render
 
         say(render(problem.diagnostics, problem.sources), err=True)
         return 1

@@ -14,9 +14,9 @@ from batch.campaigns.campaign import Campaign, values_sections
 from batch.campaigns.folder import Busy, Folder, beside, gaps, put
 from batch.campaigns.output import busy, cannot_write, check_room
 from batch.campaigns.tasks import GRANULE, Task
-from met import interpreter
 from met.diagnostic import Problem, error
 from met.frozen import frozen
+from met.host import interpreter
 
 STRIPES = 8
 """Stretches of a job's share, spread over all cases: neighbours in a sweep often take alike, and all jobs as long."""

@@ -23,8 +23,8 @@ from batch.archive.read import ArchiveFile
 from batch.export.cases import Field, Table, of_varied, value_of, varied
 from batch.export.output import whole
 from batch.export.picking import Case, Column
+from met.messages.visible import line
 from met.version import VERSION
-from met.visible import line
 
 BEGINS = "=+-@\t\r\uff1d\uff0b\uff0d\uff20"
 """With what a spreadsheet takes a cell for a formula; no name that a deck gives begins so."""

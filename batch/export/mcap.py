@@ -31,8 +31,8 @@ from batch.export.poses import Arm, arm_of
 from batch.export.said import Line, lines, result, varied
 from batch.export.wire import plain
 from met.diagnostic import Diagnostic, Problem, error
-from met.files import open_regular
 from met.frozen import frozen
+from met.host.files import open_regular
 from met.version import VERSION
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from batch.export.csv import united
 from batch.export.output import whole
 from batch.export.picking import Case, Column
 from met.diagnostic import Problem, error
-from met.files import open_regular
+from met.host.files import open_regular
 from met.version import VERSION
 
 MAGIC = b"PAR1"

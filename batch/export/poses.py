@@ -17,8 +17,8 @@ from met.diagnostic import Problem, error
 from met.dynamics.spatial import HERE, IDENTITY, Pose, compose, inverse, rotation_quaternion, sub
 from met.frozen import frozen
 from met.plan import BASE, Experiment, Formula, Plan
-from met.program.base import Base, motions, prescribed
 from met.program.machine import PARAMETER, Machine
+from met.program.motion.base import Base, motions, prescribed
 from met.vectors import quaternion
 
 POSITION = "q"

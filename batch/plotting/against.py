@@ -13,8 +13,8 @@ from batch.campaigns.output import quoted
 from batch.differences import matching
 from batch.queries.signals import Panel, pretty_unit
 from met.diagnostic import Problem, error
+from met.messages.visible import line
 from met.plan.channel import channel_paths
-from met.visible import line
 
 LONGEST = 40
 """Letters of a file's name in a picture: of more, those in the middle are left out."""

@@ -12,7 +12,7 @@ import numpy as np
 from batch.archive.read import ArchiveFile
 from batch.plotting.sheet import FAINT, INK, Sheet
 from met.diagnostic import Problem, error
-from met.visible import visible
+from met.messages.visible import visible
 
 T = TypeVar("T")
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from batch.campaigns.output import quoted
 from met.diagnostic import Problem, error
-from met.files import open_regular, whole_file
-from met.visible import visible
+from met.host.files import open_regular, whole_file
+from met.messages.visible import visible
 
 SOFTWARE = "MET"
 MOST_DOTS = 200_000_000

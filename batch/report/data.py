@@ -23,7 +23,7 @@ from batch.report.verdicts import metric_rows, verdict
 from batch.terminal.show import chosen
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem
-from met.files import open_regular
+from met.host.files import open_regular
 from met.plan import Experiment
 
 MOST_LINES, MOST_LETTERS = 2000, 200_000

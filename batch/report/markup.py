@@ -6,7 +6,7 @@ import html
 import re
 from collections.abc import Iterable
 
-from met.visible import visible
+from met.messages.visible import visible
 
 
 class Html(str):

@@ -15,8 +15,8 @@ from ic.printing.columns import number
 from ic.printing.settings import settings
 from met.diagnostic import Place
 from met.distinct import distinct
+from met.messages.render import shown_place
 from met.plan import Experiment, Formula, Origin, Quantity
-from met.render import shown_place
 
 SAID = {"deck": "deck", "case": "varied", "default": "default", "derived": "computed"}
 MOST_LISTED = 6

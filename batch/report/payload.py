@@ -14,7 +14,7 @@ from batch.queries.signals import pretty_unit
 from batch.report.changes import Comparison
 from batch.report.content import History, Map, Overview, Ruler, Section, Signals, Stability
 from batch.report.markup import Html
-from met.visible import visible
+from met.messages.visible import visible
 
 PRECISE = 1e-6
 """Numbers are kept in four bytes where the error of that is smaller than this share of their range."""

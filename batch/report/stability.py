@@ -11,8 +11,8 @@ from batch.queries.failures import ranges
 from batch.queries.pool import Column, Pool
 from batch.report.content import Bed, Stability
 from batch.terminal.margin import stable_at, verdict
+from met.analysis.margin import Margin, margins
 from met.distinct import distinct
-from met.margin import Margin, margins
 from met.plan import Experiment
 
 MOST_CASES = 60

@@ -8,7 +8,7 @@ from pathlib import Path
 from batch.campaigns.output import quoted
 from batch.report.page import GENERATOR
 from met.diagnostic import Problem, error
-from met.files import open_regular, whole_file
+from met.host.files import open_regular, whole_file
 
 ENDINGS = (".html", ".htm")
 HEAD_BYTES = 400

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from met.visible import line
+from met.messages.visible import line
 
 DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 """Bit of each dot of a character, by row and column (Unicode, "Braille Patterns")."""

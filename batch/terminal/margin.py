@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from ic.printing.columns import columns, count
-from met.margin import HEAVIEST, Margin
+from met.analysis.margin import HEAVIEST, Margin
 from met.plan import Experiment
 
 

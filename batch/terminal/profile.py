@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from ic.printing.columns import columns, count, size
+from met.analysis.profile import Part, Profile
 from met.plan import Experiment
-from met.profile import Part, Profile
 
 EVENTS = "friction events"
 

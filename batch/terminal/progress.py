@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TextIO
 
-from met.visible import line
+from met.messages.visible import line
 
 FIRST_SECONDS = 0.3
 """What is over sooner needs no bar."""

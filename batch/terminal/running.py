@@ -22,10 +22,10 @@ from batch.queries.structures import structures
 from batch.queries.summary import summarise
 from batch.terminal.progress import Bar
 from batch.terminal.verdict import announcement, told, verdict_json, worst_cases, writing
-from met import visible
 from met.diagnostic import Problem, error
+from met.host.sources import names_archive, names_plan
+from met.messages import visible
 from met.plan import Plan
-from met.sources import names_archive, names_plan
 
 
 def run_and_tell(
@@ -198,7 +198,7 @@ def _of_deck(
 
 def _complain(problem: Problem, json: bool) -> None:
     """For people on stderr, for programs as JSON."""
-    from met import render
+    from met.messages import render
 
     if json:
         print(render.to_json(problem.diagnostics))
@@ -240,7 +240,7 @@ def read_plan(
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)
     if compiled.diagnostics and not quiet:
-        from met import render
+        from met.messages import render
 
         colour = render.wants_colour(sys.stderr)
         print(render.render(compiled.diagnostics, compiled.sources, colour=colour), file=sys.stderr)

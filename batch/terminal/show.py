@@ -22,7 +22,7 @@ from batch.terminal import braille
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem, error
 from met.distinct import distinct
-from met.visible import line
+from met.messages.visible import line
 
 MOST_GROUPS = 4
 """So many structures of a sweep are shown in full unless they are named; of more, their table alone."""

@@ -14,7 +14,7 @@ from ic.beginnings.models import MODELS, PROJECT, TRIAL, Beginning
 from ic.language import HEADS
 from met import models, units
 from met.diagnostic import Problem, error
-from met.files import new_file
+from met.host.files import new_file
 
 PARTS = [each.name for each in dataclasses.fields(Beginning)]
 

@@ -15,8 +15,8 @@ from ic.formatting.strings import making_strings
 from ic.text.files import Files, FoundFile, decode
 from ic.text.limits import MOST_BYTES
 from met.diagnostic import Problem, error
-from met.files import open_regular, whole_file
 from met.frozen import frozen
+from met.host.files import open_regular, whole_file
 
 STDIN = "-"
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from ic.text.files import Files, FoundFile
 from ic.text.lexer import Text, Token, logical_lines
 from ic.text.limits import MOST_BYTES, MOST_INCLUDES
-from met.files import open_regular
+from met.host.files import open_regular
 
 _INCLUDE = re.compile(r'\s*#\s*include\s*(?:"([^"\n]*)"|<([^>\n]*)>)')
 

@@ -12,7 +12,8 @@ from ic.grammar.cursor import Cursor, span
 from ic.grammar.syntax import Expression, Number, Unit, Word
 from ic.text.lexer import NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import LONGEST_NUMBER
-from met import other_units, units
+from met import units
+from met.messages import other_units
 
 _POWERED = re.compile(r"([A-Za-z]+)([2-9])")
 _UNIT_DEPTH = 8

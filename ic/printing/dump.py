@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from met.diagnostic import Place, Problem, did_you_mean, error
-from met.entry_points import offered
 from met.frozen import frozen
+from met.host.entry_points import offered
 
 if TYPE_CHECKING:
     from ic.grammar.syntax import Entry

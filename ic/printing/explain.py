@@ -15,8 +15,9 @@ from ic.printing.codes import is_code
 from ic.printing.columns import columns, number, quantity, vector
 from ic.printing.settings import settings
 from ic.text.complaints import known_words
-from met import models, render
+from met import models
 from met.diagnostic import Diagnostic, Label, Place, Problem, error, nearest
+from met.messages import render
 from met.models import parameter as declared
 from met.parameter import Parameter
 from met.plan import Coordinate, Experiment, Formula, Origin, Quantity

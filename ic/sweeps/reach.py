@@ -124,7 +124,7 @@ def plan_coordinates(
 
 def without_effect(experiment: Experiment) -> tuple[str, ...]:
     """Inputs of the experiment's program that change nothing. Raises Problem where a model cannot be recorded."""
-    from met.audit import idle
+    from met.analysis.audit import idle
 
     return idle(experiment)
 

@@ -18,8 +18,8 @@ from pathlib import Path
 from ic.text.limits import MOST_BYTES
 from ic.text.source import SourceFile
 from met.diagnostic import Diagnostic, Place, Problem, error
-from met.files import open_regular
 from met.frozen import frozen
+from met.host.files import open_regular
 
 LIBRARY = Path(__file__).parents[1] / "decks"
 MOST_LISTED = 2_000  # names that a "did you mean" compares with

@@ -100,7 +100,7 @@ class Environment:
     between  the two parameters that are the ends between which its joint should begin: a deck whose joint begins
            beyond is warned. (): there are none
     springs  the parameters that name a joint, and are the stiffness with which it is pushed back where it touches: a
-           deck is warned where the dynamics' step is long for that (met/contact.py). (): there is none
+           deck is warned where the dynamics' step is long for that (met/analysis/contact.py). (): there is none
     rubs   the parameter that names the one joint on which it puts dry friction. "": none does
 
     What it may do to the servo of one joint, such as to let it fail:

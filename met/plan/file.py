@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from met.diagnostic import Problem, error
-from met.files import open_regular, read_regular, whole_file
+from met.host.files import open_regular, read_regular, whole_file
 from met.plan import Experiment, Formula, Plan
 from met.plan.codec import Damaged, decode, encode
 

@@ -12,12 +12,14 @@ from collections.abc import Callable, Mapping
 
 from met.plan import Experiment
 from met.plan.channel import Channel
-from met.program import balancing, base, failing, guiding, link_sensors, orientations, payloads, sensing
+from met.program import balancing, orientations
+from met.program.control import failing, guiding, link_sensors, sensing
+from met.program.control.substituted import LIMITED
 from met.program.evaluation import gravity, law
 from met.program.machine import PARAMETER, Actuator, Machine
+from met.program.motion import base, payloads
 from met.program.observe import derived
 from met.program.step import EVENTS, Step
-from met.program.substituted import LIMITED
 from met.program.values import Values, answer, parameters, returned
 from met.servos.servo import Asked, Seen
 from met.trace import Real, both, floor, where

@@ -11,13 +11,13 @@ from met.dynamics.tree import Tree
 from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
-from met.program import failing, link_sensors, sensing
-from met.program.base import Base, base_of, free_base
-from met.program.bodies import slopes
+from met.program.control import failing, link_sensors, sensing
 from met.program.machine import Actuator, Machine, ReadCell
-from met.program.payloads import laden, shared, slopes_of_payloads
+from met.program.motion.base import Base, base_of, free_base
+from met.program.motion.bodies import slopes
+from met.program.motion.payloads import laden, shared, slopes_of_payloads
+from met.program.motion.world import ArmWorld, environment_values
 from met.program.values import Values, answer, returned
-from met.program.world import ArmWorld, environment_values
 from met.servos.servo import Asked, Control, Drive, JointMotion, Seen
 from met.trace import Real, Truth, both, not_, where
 from met.vectors import Vector

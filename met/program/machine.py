@@ -23,8 +23,8 @@ from met.metrics.metric import Metric
 from met.parameter import Memory, Parameter, State
 from met.plan import BASE, Experiment, Formula, Joint, LinkSensor, Payload, SensorUse, ServoUse, Structure
 from met.plan.channel import Channel, channels
-from met.program import guided
-from met.program.courses import recorded
+from met.program.control import guided
+from met.program.motion.courses import recorded
 from met.program.values import Values, answer, parameters, returned
 from met.sensors.sensor import Sensor
 from met.servos.servo import Asked, Drive, JointMotion, Parts, Servo
@@ -208,7 +208,7 @@ class Machine:
 
     @cached_property
     def courses(self) -> Formulas:
-        """Of a prescribed base: how it moves, as formulas of time (`met.program.courses`)."""
+        """Of a prescribed base: how it moves, as formulas of time (`met.program.motion.courses`)."""
         return recorded(self.experiment)
 
     @cached_property

@@ -17,10 +17,10 @@ from met.dynamics.recursion import Wrench, reactions
 from met.dynamics.spatial import Vector, add, choose, dot
 from met.integrators.integrator import Motion
 from met.plan.channel import XYZ, Channel
-from met.program import payloads
-from met.program.base import Base, motions
 from met.program.evaluation import Derivative
 from met.program.machine import Machine, ReadCell
+from met.program.motion import payloads
+from met.program.motion.base import Base, motions
 from met.trace import Real, sqrt
 from met.vectors import Quaternion, quaternion
 

@@ -15,14 +15,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from met.integrators.integrator import Motion, Slope
-from met.program import base, bodies, cells, friction
+from met.program import cells, friction
 from met.program.asking import Question, advanced, asked, inconstant
+from met.program.control.substituted import Substituted
 from met.program.evaluation import Derivative, brakes, derivative, driven_by
-from met.program.grapple import Grapple
 from met.program.machine import Actuator, Machine
+from met.program.motion import base, bodies
+from met.program.motion.grapple import Grapple
 from met.program.observe import Observed
 from met.program.sticking import sticking
-from met.program.substituted import Substituted
 from met.program.values import Values
 from met.trace import Real, Truth, any_of, both, either, isfinite, not_, sign, where
 from met.trace.program import Call, Control, Every, Phase, Run, Tape, WhileAny

@@ -10,8 +10,8 @@ import pytest
 import batch
 from batch.campaigns import performing, tasks
 from met.diagnostic import Problem
+from met.messages.render import render
 from met.plan import Plan
-from met.render import render
 from tests.batch import plans, whole
 
 CASES, OF_TASK = 40, 8

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from met.diagnostic import Problem
-from met.render import render
+from met.messages.render import render
 
 
 def refused(caught: pytest.ExceptionInfo[Problem]) -> str:

@@ -23,8 +23,8 @@ from batch.queries.failures import failures
 from batch.terminal import running
 from met import cli
 from met.diagnostic import Problem
+from met.messages.render import render
 from met.plan import Plan
-from met.render import render
 from met.run import DONE, FAILED, LOST, TIMED_OUT
 from tests.batch import plans, poisoned, whole
 from tests.batch.door import ARM

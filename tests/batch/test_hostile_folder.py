@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from met import entry_points, interpreter
+from met.host import entry_points, interpreter
 from met.plan import file as plan_file
 from tests.batch import plans
 
@@ -174,4 +174,4 @@ def test_one_file_says_how_a_python_is_started() -> None:
     paths = [path for room in ("batch", "hw", "ic", "met") for path in (ROOT / room).rglob("*.py")]
     found = {str(path.relative_to(ROOT)) for path in paths if names.search(path.read_text(encoding="utf-8"))}
     # the last two only tell a user what to type
-    assert found == {"met/interpreter.py", "batch/export/parquet.py", "ic/cli_new.py"}
+    assert found == {"met/host/interpreter.py", "batch/export/parquet.py", "ic/cli_new.py"}

@@ -12,8 +12,8 @@ import pytest
 import ic
 from batch.terminal.profile import told
 from ic.find import standard_decks
+from met.analysis.profile import Input, Part, Profile
 from met.cli import main
-from met.profile import Input, Part, Profile
 from tests.batch import plans
 
 MADE_UP = Profile(

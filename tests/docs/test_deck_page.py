@@ -27,7 +27,8 @@ from ic.meaning.mechanics.shapes import SHAPES
 from ic.meaning.parameters.scope import Scope
 from ic.read import read
 from ic.text.complaints import Complaints
-from met import models, render, units
+from met import models, units
+from met.messages import render
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "deck.md").read_text(encoding="utf-8")

@@ -28,7 +28,7 @@ import pytest
 
 from met import cli, models
 from met.diagnostic import Problem
-from met.render import render
+from met.messages.render import render
 
 ROOT = Path(__file__).parents[2]
 FILE = ROOT / "docs" / "diagnostics.md"

@@ -13,8 +13,9 @@ import xarray
 
 import batch
 import ic
-from met import cli, render
+from met import cli
 from met.diagnostic import Problem
+from met.messages import render
 from met.servos.servo import JointMotion
 from met.trace import Graph
 

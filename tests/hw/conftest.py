@@ -13,7 +13,7 @@ from hw.beds.wire import WireBed
 from hw.line import Line
 from hw.transcript import Recorded, Writer
 from met.diagnostic import Problem
-from met.render import render
+from met.messages.render import render
 from tests.hw.device import Device
 from tests.hw.relay import Faults, Relay
 

@@ -9,7 +9,7 @@ from ic.grammar.syntax import Deck
 from ic.read import read
 from ic.text.preprocess import Tokens, preprocess
 from met.diagnostic import Problem
-from met.render import render
+from met.messages.render import render
 
 
 class Desk:

@@ -7,7 +7,6 @@ from pathlib import Path
 import ic
 from ic.driver.compile import Compiled, Select
 from met.plan import Experiment
-from met.render import render
 
 ARM = """\
 arm swing {

@@ -13,7 +13,7 @@ import pytest
 
 from met import cli
 from met.diagnostic import Place, Problem, error
-from met.entry_points import EntryPoint, offered
+from met.host.entry_points import EntryPoint, offered
 from met.version import VERSION
 
 ROOT = Path(__file__).parents[2]

@@ -17,11 +17,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from met import cache
 from met.backends.llvm import kernel
 from met.backends.reference.plain import execute
-from met.cache import folder
 from met.diagnostic import Problem
+from met.host import cache
+from met.host.cache import folder
 from met.trace import (
     atan2,
     both,

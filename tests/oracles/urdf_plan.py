@@ -11,9 +11,9 @@ from ic.robots.entries import ArmEntries
 from ic.robots.files import load
 from met.dynamics.kinematics import link_motions
 from met.dynamics.recursion import solve
+from met.messages.render import render
 from met.plan import Experiment
 from met.program.machine import Machine
-from met.render import render
 from tests.oracles.urdf_pinocchio import UrdfPinocchio
 from tests.oracles.worst import Worst, relative
 

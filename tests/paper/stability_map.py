@@ -2,7 +2,7 @@
 
     python -m tests.paper.stability_map          writes docs/figures/stability_map.png, and prints the limits
 
-Above the limit an eigenvalue of the loop from tick to tick is larger than one (met/margin.py).
+Above the limit an eigenvalue of the loop from tick to tick is larger than one (met/analysis/margin.py).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import ic
-from met.margin import margins
+from met.analysis.margin import margins
 from tests.paper.figures import FOLDER, INK, MUTED, SURFACE
 
 RATES = (50, 100, 200, 500, 1000, 2000, 5000)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from batch.terminal.margin import as_data, in_words, remedy, told, verdict
+from met.analysis.margin import HEAVIEST, LIGHTEST, Margin, margins
 from met.cli import main
-from met.margin import HEAVIEST, LIGHTEST, Margin, margins
 from met.plan import Experiment
 from tests.substitution.hybrid import compiled, deck, ran
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from met.margin import margins
+from met.analysis.margin import margins
 from tests.oracles.worst import Worst
 from tests.substitution.hybrid import RATIO, ROTOR, compiled, deck, inertias, loads, r_of, ran, shaft
 

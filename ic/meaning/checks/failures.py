@@ -15,11 +15,11 @@ from ic.meaning.control.servos import Use
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
+from met.analysis.probe import accelerates
 from met.diagnostic import Label, Place
 from met.frozen import frozen
 from met.instants import has_come
 from met.plan import EnvironmentUse, Schedule, ServoUse, Substitution
-from met.probe import accelerates
 
 
 @frozen

@@ -9,8 +9,8 @@ from ic.meaning.control.servos import Use
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
+from met.analysis.probe import reads
 from met.plan import ServoUse, Structure
-from met.probe import reads
 
 
 def remark_unread(scope: Scope, uses: Iterable[Use], structure: Structure) -> None:

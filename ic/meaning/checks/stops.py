@@ -25,7 +25,7 @@ def check_stops(complaints: Complaints, experiment: Experiment) -> None:
     uses = {use.name: use for use in structure.environment if models.find("environment", use.model).springs}
     if not uses or not experiment.cases.count:
         return
-    from met.contact import contacts
+    from met.analysis.contact import contacts
 
     integrator = models.find("integrator", structure.integrator)
     enough = ENOUGH.get(integrator.order, FEW)

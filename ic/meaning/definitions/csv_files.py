@@ -24,7 +24,7 @@ from ic.text.limits import MOST_CSV_BYTES, MOST_CSV_ROWS
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
-from met.other_units import suggest
+from met.messages.other_units import suggest
 from met.units import PURE, Dimension, Measure
 
 LONGEST_NAME = 40  # characters of a column's name that a message shows

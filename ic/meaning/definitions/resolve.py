@@ -18,7 +18,7 @@ from ic.text.complaints import Complaints, known_words, where_it_belongs, with_a
 from ic.text.files import library_defines
 from met.diagnostic import Label, Place, Problem, did_you_mean, error, meant
 from met.frozen import frozen
-from met.render import shown_place
+from met.messages.render import shown_place
 
 """What paths of a run begin with, besides joints."""
 

@@ -10,8 +10,9 @@ from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, evaluate
 from ic.meaning.expressions.quantity import Value, ValueList
 from ic.text.complaints import MOST_DIAGNOSTICS, known_words
 from ic.text.lexer import COMMAND_LINE
-from met import other_units, units
+from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.messages import other_units
 
 DEEPEST = 64  # lets that need lets: far more than a deck has, far less than Python's recursion bears
 

@@ -9,9 +9,10 @@ import math
 from typing import cast
 
 from ic.grammar.syntax import Unit
-from met import other_units, units
+from met import units
 from met.diagnostic import Place, Problem, error
 from met.frozen import frozen
+from met.messages import other_units
 from met.trace import Real, Scalar
 from met.units import PURE, Dimension
 

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from met import cache
 from met.backends.backend import checked_inputs
 from met.backends.llvm.emit import emit, numbered
 from met.backends.llvm.pieces import cut, operations
 from met.diagnostic import Problem, error
 from met.frozen import frozen
+from met.host import cache
 from met.trace.program import Program
 from met.trace.recorder import record
 from met.trace.recording import Recording

@@ -31,7 +31,7 @@ from hw.pace import pace
 from hw.ports import config_of
 from met import cli
 from met.plan import Experiment
-from met.program.plant import bed_values, plant_c
+from met.program.control.plant import bed_values, plant_c
 
 pytestmark = [pytest.mark.alone, pytest.mark.slow]
 

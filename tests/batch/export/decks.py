@@ -9,7 +9,7 @@ from typing import Any
 
 import batch
 import ic
-from met.render import render
+from met.messages.render import render
 
 DECK = """
 let reach = 0.8 m;

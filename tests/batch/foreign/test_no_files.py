@@ -16,8 +16,8 @@ import batch
 from batch.campaigns.folder import Folder, beside
 from hw.transcript import read
 from met.diagnostic import Problem
+from met.messages.render import render
 from met.plan import file as plan_file
-from met.render import render
 from tests.batch import plans
 from tests.batch.begun import begin, go_on, plan, refused, short_tasks
 from tests.batch.foreign.archives import DECK, met

@@ -23,8 +23,8 @@ from batch.executors import job
 from hw import records, transcript
 from hw.beds.replay import ReplayBed
 from met.diagnostic import Problem
+from met.messages.render import render
 from met.plan import file as plan_file
-from met.render import render
 from tests.batch import plans
 from tests.batch.begun import begin, go_on, refused, short_tasks
 from tests.batch.begun import plan as campaigns_plan

@@ -14,7 +14,7 @@ import pytest
 from batch.archive.read import ArchiveFile
 from batch.terminal import braille, show
 from batch.terminal.progress import Bar
-from met.visible import line, say, visible
+from met.messages.visible import line, say, visible
 from tests.batch.foreign.archives import changed, met, readers
 from tests.batch.foreign.mutations import CONTROL
 

@@ -11,8 +11,8 @@ import pytest
 
 from batch.plotting import plot
 from met.diagnostic import Problem
+from met.messages.render import render
 from met.plan import Coordinate
-from met.render import render
 from tests.batch import plans
 from tests.batch.plotting.pictures import shown
 from tests.batch.report import archives

@@ -18,8 +18,8 @@ from batch.plotting import plot
 from batch.plotting.maps import DOTTED, STRIPES
 from met import run as engine
 from met.diagnostic import Problem
+from met.messages.render import render
 from met.plan import Experiment, Requirement
-from met.render import render
 from tests.batch import plans
 from tests.batch.plotting.pictures import cells, shown
 from tests.batch.report import archives

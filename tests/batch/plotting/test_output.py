@@ -12,7 +12,7 @@ import pytest
 from batch.plotting import draw, plot
 from batch.plotting.sheet import sheet
 from met.diagnostic import Problem
-from met.render import render
+from met.messages.render import render
 from tests.batch.plotting.pictures import archive
 
 pytestmark = pytest.mark.usefixtures("engine")

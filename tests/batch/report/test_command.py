@@ -12,7 +12,7 @@ import batch.report
 from batch.report import writing
 from met import cli
 from met.diagnostic import Problem
-from met.render import render
+from met.messages.render import render
 from tests.batch import plans
 from tests.batch.report import archives
 

@@ -19,7 +19,7 @@ from batch.report.data import gather
 from batch.report.maps import ruler
 from batch.report.payload import _column
 from batch.report.thinning import thin, thin_clock
-from met.margin import margins
+from met.analysis.margin import margins
 from tests.batch import plans
 from tests.batch.report import archives
 

@@ -18,9 +18,9 @@ from hw import build as building
 from hw.bed import Capability
 from hw.build import Config, build, config_c, counted, guard, qemu
 from hw.ports import Port, opened
-from met import cache
 from met.diagnostic import Problem
-from met.render import render
+from met.host import cache
+from met.messages.render import render
 from tests.hw.firmware.device import PLAIN, SHAFT, Sensors
 from tests.hw.firmware.line import FREE, PLANT, STEPPED, behind_a_terminal
 from tests.substitution.hybrid import compiled, deck

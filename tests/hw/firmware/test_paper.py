@@ -20,7 +20,7 @@ from hw.build import Config, build
 from met.backends.llvm import kernel
 from met.plan import Experiment
 from met.program import build as build_kernel
-from met.program.plant import Plant, plant_c
+from met.program.control.plant import Plant, plant_c
 from met.run import inputs
 from tests.hw.firmware import wire
 from tests.hw.firmware.device import Device

@@ -6,7 +6,7 @@ import pytest
 
 from ic.formatting.formatter import formatted, prove
 from met.diagnostic import Problem
-from met.render import render
+from met.messages.render import render
 
 
 def fmt(text: str, *strings: str) -> str:

@@ -30,7 +30,7 @@ from ic.grammar.syntax import (
 )
 from ic.read import read
 from met.diagnostic import Place, Problem
-from met.render import render, to_json
+from met.messages.render import render, to_json
 from tests.ic.decktext import Desk
 
 TWO_LINK = """\

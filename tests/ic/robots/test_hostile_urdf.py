@@ -12,7 +12,7 @@ import pytest
 from ic.robots.entries import arm_entries
 from ic.robots.urdf import read
 from met.diagnostic import Problem
-from met.render import render
+from met.messages.render import render
 from tests.ic.robots.test_arms_from_urdf import RICH
 from tests.ic.robots.two import TWO, check
 from tests.oracles.random_urdf import random_urdf

@@ -7,7 +7,7 @@ from pathlib import Path
 import ic
 from ic.driver.compile import Compiled
 from met.diagnostic import Problem
-from met.render import render
+from met.messages.render import render
 from tests.ic.small_decks import changed, messages
 
 TWO = """\

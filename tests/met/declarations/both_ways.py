@@ -24,10 +24,10 @@ from met.guides.guide import Sight, Stance
 from met.integrators.integrator import Motion, Slope
 from met.parameter import Parameter
 from met.plan import Experiment
-from met.program.base import base_of, free_base
-from met.program.bodies import coordinates
-from met.program.link_sensors import Aboard, Accelerations
+from met.program.control.link_sensors import Aboard, Accelerations
 from met.program.machine import Machine
+from met.program.motion.base import base_of, free_base
+from met.program.motion.bodies import coordinates
 from met.sensors.sensor import Felt, Sensed
 from met.servos.servo import Asked, JointMotion, Seen, Servo
 from met.substitution.balance import Balanced

@@ -16,7 +16,7 @@ from met import run as engine
 from met.diagnostic import Problem
 from met.integrators import modified_euler
 from met.integrators.integrator import Integrator, Motion, Slope, ahead, by_parts, mean
-from met.render import render
+from met.messages.render import render
 from met.trace import Real
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, experiment
 

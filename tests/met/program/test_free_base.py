@@ -328,7 +328,7 @@ servo drive {
     found = experiment(tmp_path, ARM, servo, text)
     run = engine.run(found)
     assert run.cause == [""]
-    from met.margin import margins
+    from met.analysis.margin import margins
 
     ((margin,),) = margins(found)
     rotor = 100.0**2 * 1e-4

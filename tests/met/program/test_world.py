@@ -10,9 +10,9 @@ import pytest
 from met.diagnostic import Problem
 from met.integrators.integrator import Motion
 from met.parameter import WORLD
-from met.program.base import Base
 from met.program.machine import Machine
-from met.program.world import ArmWorld
+from met.program.motion.base import Base
+from met.program.motion.world import ArmWorld
 from tests.ic.small_decks import changed, experiment
 from tests.met.tree_deck import TREE
 from tests.oracles.plan_tree import pinocchio

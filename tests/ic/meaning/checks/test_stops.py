@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from met import run as engine
-from met.contact import contacts
+from met.analysis.contact import contacts
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, experiment, messages
 
 STOP = "environment { end = joint_stop { joint = hinge;  upper = 1 deg;  stiffness = STIFF N*m/rad; } }"

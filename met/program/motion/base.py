@@ -25,9 +25,9 @@ from met.dynamics.tree import Tree
 from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import BASE
-from met.program.bodies import FreeBody, bodies, flight, place
-from met.program.courses import TIME
 from met.program.machine import PARAMETER, Machine, ReadCell
+from met.program.motion.bodies import FreeBody, bodies, flight, place
+from met.program.motion.courses import TIME
 from met.trace import Scalar
 from met.trace.program import Tape
 from met.vectors import quaternion_rpy

@@ -11,7 +11,7 @@ from met.frozen import frozen
 from met.plan import Experiment
 from met.program.build import Builder
 from met.program.machine import Machine
-from met.program.world import environment_values
+from met.program.motion.world import environment_values
 from met.run import inputs
 
 

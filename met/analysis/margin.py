@@ -19,8 +19,8 @@ from met.backends.reference.plain import PlainTape, follow
 from met.frozen import frozen
 from met.plan import Experiment
 from met.program.build import Builder
+from met.program.control.substituted import Mounted
 from met.program.machine import Machine
-from met.program.substituted import Mounted
 from met.run import inputs
 from met.servos.servo import Asked
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import ic
+from met.analysis.profile import FLOPS, Profile, as_data, by_part, hoisted, profile
 from met.backends.llvm import kernel
 from met.backends.llvm.pieces import operations
 from met.plan import Experiment
-from met.profile import FLOPS, Profile, as_data, by_part, hoisted, profile
 from met.program.build import build
 from met.trace.recorder import record
 

@@ -13,8 +13,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from met import interpreter
 from met.frozen import frozen
+from met.host import interpreter
 
 PACKAGE = "met_arm"
 
@@ -41,7 +41,7 @@ def offered(group: str) -> list[EntryPoint]:
     own: list[EntryPoint] = []
     others: list[EntryPoint] = []
     seen: set[str] = set()
-    checkout = Path(__file__).parent.parent / "setup.cfg"
+    checkout = Path(__file__).parents[2] / "setup.cfg"
     if checkout.is_file():
         seen.add(PACKAGE)
         own = [EntryPoint(*pair, PACKAGE) for pair in _in_setup_cfg(checkout.read_text("utf-8"), group)]

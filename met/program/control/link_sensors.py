@@ -17,11 +17,13 @@ from met.environments.environment import World
 from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import BASE
-from met.program import bodies, cells, payloads, sensing
-from met.program.base import Base, base_of
+from met.program import cells
+from met.program.control import sensing
 from met.program.machine import Fitted, Machine, ReadCell
+from met.program.motion import bodies, payloads
+from met.program.motion.base import Base, base_of
+from met.program.motion.world import ArmWorld, environment_values
 from met.program.values import answer
-from met.program.world import ArmWorld, environment_values
 from met.trace import Real
 from met.trace.program import Tape
 from met.vectors import ZERO, Vector, add, cross, sub, turn_vector_back

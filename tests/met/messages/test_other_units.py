@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from met.other_units import remedy, suggest
+from met.messages.other_units import remedy, suggest
 from met.units import UNITS, parse_unit
 from tests.oracles.package import Package
 

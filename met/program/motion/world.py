@@ -9,9 +9,9 @@ from met.dynamics.tree import Tree
 from met.environments.environment import Environment
 from met.integrators.integrator import Motion
 from met.parameter import WORLD
-from met.program.base import Base, motions
 from met.program.machine import Machine, ReadCell
-from met.program.payloads import seen
+from met.program.motion.base import Base, motions
+from met.program.motion.payloads import seen
 from met.program.values import Values, parameters
 from met.trace import Real
 from met.vectors import ZERO, Matrix, Vector

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from met import files
+from met.host import files
 
 
 def test_a_regular_file_is_read_also_through_a_link(tmp_path: Path) -> None:

@@ -15,8 +15,8 @@ from met.backends.c.emit import emit, literal
 from met.frozen import frozen
 from met.plan import Experiment, Formula
 from met.program.build import build
+from met.program.control.substituted import Mounted, Substituted
 from met.program.machine import PARAMETER, Machine
-from met.program.substituted import Mounted, Substituted
 from met.trace import Real
 from met.trace.graph import evaluate
 from met.trace.program import Call, Phase, Program, Tape, Unless0

@@ -31,7 +31,7 @@ def packages() -> dict[str, str]:
     may have found it by other ways; it is left out where Python looks anyway, and where it would hide its library.
     """
     named = [os.path.abspath(each) for each in os.environ.get("PYTHONPATH", "").split(os.pathsep) if each]
-    home = str(Path(__file__).resolve().parents[1])
+    home = str(Path(__file__).resolve().parents[2])
     ours = [] if home in map(os.path.realpath, [*site.getsitepackages(), site.getusersitepackages()]) else [home]
     return {"PYTHONPATH": os.pathsep.join(dict.fromkeys([*ours, *named])), "PYTHONSAFEPATH": "1"}
 

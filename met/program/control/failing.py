@@ -9,8 +9,8 @@ from dataclasses import replace
 from met.diagnostic import Problem, error
 from met.environments.environment import Environment
 from met.frozen import frozen
+from met.program.control.sensing import replaced, truth
 from met.program.machine import Actuator, Machine, ReadCell
-from met.program.sensing import replaced, truth
 from met.program.values import Values, answer, parameters, returned
 from met.servos.servo import Control, Seen
 from met.trace import Real

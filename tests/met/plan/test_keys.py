@@ -13,7 +13,7 @@ from met.diagnostic import Place
 from met.plan import Cases, Experiment, Quantity, Structure, keys
 from tests.batch import plans
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 CASE_KEYS = ["d9f6d43def9ece78", "5c0b17f28b717e62", "2f0bcebdefa8c834"]
 CASE_IDS = ["a152d04dcd853ed6", "14c98b2ecb75da00", "6b7fa51b851fcffd"]
 STRUCTURE_KEY = "d40f15af1496fedc"
@@ -46,9 +46,8 @@ def test_ids_and_keys_are_what_they_were() -> None:
 @pytest.mark.slow
 def test_another_process_finds_the_same_ids() -> None:
     """String hashes differ from process to process; ids must not."""
-    program = (
-        "from met.plan import keys; from tests.met.test_keys import first_plan; print(*keys.case_ids(first_plan()))"
-    )
+    module = "tests.met.plan.test_keys"
+    program = f"from met.plan import keys; from {module} import first_plan; print(*keys.case_ids(first_plan()))"
     said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT)
     assert said.stdout.split() == CASE_IDS
 

@@ -26,11 +26,12 @@ from met.dynamics.spatial import (
 from met.guides.guide import Sight, Stance
 from met.integrators.integrator import Motion
 from met.plan import COMPONENTS, GuideUse
-from met.program import base, bodies, cells, payloads
-from met.program.base import Base
-from met.program.courses import rate_of_rpy, values_and_rates
-from met.program.guided import GUIDE, own, owner
+from met.program import cells
+from met.program.control.guided import GUIDE, own, owner
 from met.program.machine import Machine, ReadCell
+from met.program.motion import base, bodies, payloads
+from met.program.motion.base import Base
+from met.program.motion.courses import rate_of_rpy, values_and_rates
 from met.program.values import answer, returned
 from met.trace import Real
 from met.trace.program import Tape

@@ -14,12 +14,13 @@ from met.dynamics.recursion import Wrench, solve
 from met.dynamics.spatial import ZERO, add, choose, compose, inverse, turn_vector
 from met.integrators.integrator import Motion
 from met.plan import INSTANT
-from met.program import cells, payloads
-from met.program.base import base_of, free_base, motions
-from met.program.bodies import place
+from met.program import cells
 from met.program.evaluation import driven_by
 from met.program.machine import Actuator, Machine
-from met.program.payloads import CARRIED, FLYING, cell
+from met.program.motion import payloads
+from met.program.motion.base import base_of, free_base, motions
+from met.program.motion.bodies import place
+from met.program.motion.payloads import CARRIED, FLYING, cell
 from met.program.values import Values
 from met.servos.servo import Drive
 from met.trace import Real, Truth, any_of, both, either, not_

@@ -33,8 +33,8 @@ from met.dynamics.tree import Tree
 from met.integrators.integrator import Motion
 from met.plan import Payload
 from met.program import cells
-from met.program.bodies import PAYLOAD, FreeBody, bodies, flight, place, slopes
 from met.program.machine import Machine, ReadCell
+from met.program.motion.bodies import PAYLOAD, FreeBody, bodies, flight, place, slopes
 from met.trace import Truth
 from met.trace.program import Tape
 from met.vectors import ZERO, Vector, quaternion_rpy

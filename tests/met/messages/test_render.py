@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from met.diagnostic import Diagnostic, Expansion, Label, Place, error
-from met.render import count_line, render, shown_place, to_json, wants_colour
+from met.messages.render import count_line, render, shown_place, to_json, wants_colour
 
 ARM = "\n" * 41 + "    rate = 300 Hz;\n"
 

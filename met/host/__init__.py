@@ -1,0 +1,1 @@
+"""The computer that MET runs on: files, the cache of compiled objects, other Pythons, installed packages."""

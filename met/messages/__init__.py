@@ -1,0 +1,1 @@
+"""Messages to people and editors: diagnostics are rendered, texts made visible, units proposed."""
