@@ -36,7 +36,7 @@ ORDER = (
 Face = TypeVar("Face", bound=Callable[..., Any])
 
 
-class Table(click.Group):
+class CommandTable(click.Group):
     """The commands of the table, each imported when it is asked for."""
 
     def table(self) -> dict[str, EntryPoint]:
@@ -91,7 +91,7 @@ class Table(click.Group):
 
 
 @click.command(
-    cls=Table,
+    cls=CommandTable,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
     epilog="Start with `met run two_link.ic`. `met COMMAND --help` says more.",
 )

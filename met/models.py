@@ -51,7 +51,7 @@ class Model(Protocol):
 
 
 @frozen
-class Group:
+class ModelGroup:
     """One kind of model: the entry-point group, MET's own declarations, and the type they must have."""
 
     entry_points: str
@@ -112,16 +112,16 @@ def _laws() -> tuple[Iterable[Any], type]:
     return LAWS, Law
 
 
-GROUPS: dict[Kind, Group] = {
-    "servo": Group("met.servos", _servos),
-    "sensor": Group("met.sensors", _sensors),
-    "environment": Group("met.environments", _environments),
-    "command": Group("met.profiles", _commands),
-    "guide": Group("met.guides", _guides),
-    "metric": Group("met.metrics", _metrics),
-    "integrator": Group("met.integrators", _integrators),
-    "bed": Group("met.beds", _beds),
-    "law": Group("met.laws", _laws),
+GROUPS: dict[Kind, ModelGroup] = {
+    "servo": ModelGroup("met.servos", _servos),
+    "sensor": ModelGroup("met.sensors", _sensors),
+    "environment": ModelGroup("met.environments", _environments),
+    "command": ModelGroup("met.profiles", _commands),
+    "guide": ModelGroup("met.guides", _guides),
+    "metric": ModelGroup("met.metrics", _metrics),
+    "integrator": ModelGroup("met.integrators", _integrators),
+    "bed": ModelGroup("met.beds", _beds),
+    "law": ModelGroup("met.laws", _laws),
 }
 
 

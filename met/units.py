@@ -265,7 +265,7 @@ def parse_unit(written: str, names: Mapping[str, Measure] = MappingProxyType({})
     names: further words and what they stand for here, such as `joint`. ValueError where it cannot be read: a
     declaration is a programmer's text (a deck's units are read by ic).
     """
-    return _Reader(written, names).whole()
+    return _UnitReader(written, names).whole()
 
 
 def _power(name: str, exponent: int) -> str:
@@ -283,7 +283,7 @@ def _spoken() -> Mapping[Dimension, str]:
 _PIECE = re.compile(r"\s*(?:(%|[A-Za-z_]+)|(-?\d+)|([*/^()]))")
 
 
-class _Reader:
+class _UnitReader:
     """Recursive descent over a declaration's unit."""
 
     def __init__(self, written: str, names: Mapping[str, Measure]) -> None:

@@ -17,8 +17,8 @@ from met.diagnostic import Problem, error
 from met.dynamics.spatial import HERE, IDENTITY, Pose, compose, inverse, rotation_quaternion, sub
 from met.frozen import frozen
 from met.plan import BASE, Experiment, Formula, Plan
-from met.program.machine import PARAMETER, Machine
-from met.program.motion.base import Base, motions, prescribed
+from met.program.motion.base import BaseMotion, motions, prescribed
+from met.program.system import PARAMETER, System
 from met.vectors import quaternion
 
 POSITION = "q"
@@ -161,17 +161,17 @@ def prescribed_pose(experiment: Experiment, values: Mapping[str, Any], time: np.
     memory = {PARAMETER + path: value for path, value in values.items()}
     step = experiment.structure.schedule.step
     instant: Any = np.floor(time / step + INSTANT) * step
-    return prescribed(Machine(experiment), memory.__getitem__, instant).pose
+    return prescribed(System(experiment), memory.__getitem__, instant).pose
 
 
 def world_poses(
     experiment: Experiment, values: Mapping[str, Any], q: Sequence[Any], base: Pose = HERE
 ) -> dict[str, Pose]:
     """Every link's frame in the world, whose numbers are those of all rows at once where they change."""
-    machine = Machine(experiment)
+    system = System(experiment)
     memory = {PARAMETER + path: value for path, value in values.items()}
-    machine.keep_tree(memory.__getitem__, memory.__setitem__)
-    found = motions(machine.tree(memory.__getitem__), q, [0.0] * len(q), Base(base))
+    system.keep_tree(memory.__getitem__, memory.__setitem__)
+    found = motions(system.tree(memory.__getitem__), q, [0.0] * len(q), BaseMotion(base))
     return {name: motion.pose for name, motion in found.items()}
 
 

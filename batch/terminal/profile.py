@@ -6,13 +6,13 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from ic.printing.columns import columns, count, size
-from met.analysis.profile import Part, Profile
+from met.analysis.profile import RunProfile, WorkCost
 from met.plan import Experiment
 
 EVENTS = "friction events"
 
 
-def told(found: Profile, experiment: Experiment) -> Iterator[str]:
+def told(found: RunProfile, experiment: Experiment) -> Iterator[str]:
     """The profile in lines."""
     schedule = experiment.structure.schedule
     yield (
@@ -38,7 +38,7 @@ def told(found: Profile, experiment: Experiment) -> Iterator[str]:
         yield "  kept: numbers that these leave in a case's memory; taken by: operations of a step that take one"
 
 
-def _table(found: Profile) -> Iterator[tuple[str, ...]]:
+def _table(found: RunProfile) -> Iterator[tuple[str, ...]]:
     """A row a kind of work, its parts under it; what is done seldom in one row."""
     yield "a step of a case", "times", "operations", "flops", "ns", "share"
     steady = [part for part in found.parts if not part.event]
@@ -56,7 +56,7 @@ def _table(found: Profile) -> Iterator[tuple[str, ...]]:
     yield "the whole run", "", "", "", _number(found.ns), "100 %"
 
 
-def _row(name: str, parts: Sequence[Part], whole: float, *, times: bool = True) -> tuple[str, ...]:
+def _row(name: str, parts: Sequence[WorkCost], whole: float, *, times: bool = True) -> tuple[str, ...]:
     ns = sum(part.ns for part in parts)
     return (
         name,
@@ -67,7 +67,7 @@ def _row(name: str, parts: Sequence[Part], whole: float, *, times: bool = True) 
     )
 
 
-def _events(parts: Sequence[Part]) -> str:
+def _events(parts: Sequence[WorkCost]) -> str:
     """How often friction made a block decide anew, and go back."""
     rate = {part.work: part.calls for part in parts if part.event}
     decided, split = rate.get("friction decisions", 0.0), rate.get("friction splits", 0.0)
@@ -76,7 +76,7 @@ def _events(parts: Sequence[Part]) -> str:
     return f"friction events of a block: {_number(decided)} decisions at rest and {_number(split)} splits a step"
 
 
-def _kernel(found: Profile) -> Iterator[tuple[str, str]]:
+def _kernel(found: RunProfile) -> Iterator[tuple[str, str]]:
     yield "timed", f"{found.steps:,} steps of {count(found.blocks, 'block')} on one core, best of several"
     yield "block", f"{found.lanes} cases, {found.vector} of them in a register ({found.cpu})"
     yield "code", f"{size(found.code_bytes)} in {count(found.pieces, 'piece')}"
@@ -85,7 +85,7 @@ def _kernel(found: Profile) -> Iterator[tuple[str, str]]:
     yield "folded", f"{count(found.constants, 'parameter')} that no case varies"
 
 
-def _inputs(found: Profile) -> Iterator[tuple[str, ...]]:
+def _inputs(found: RunProfile) -> Iterator[tuple[str, ...]]:
     """What a sweep varies, how much of its work is done before the first step, and how much each step has of it."""
     yield "varied", "sets", "once", "kept", "taken by"
     for each in found.inputs:

@@ -21,7 +21,7 @@ from met.servos.motor import damping, torque
 from met.substitution import butterworth, shaft
 from met.substitution.emulated import SUBSTEP
 from met.trace import cos, sin
-from met.trace.program import Call, Phase, Program, Tape, Unless0
+from met.trace.program import CallPhase, Phase, Program, Tape, Unless0
 from met.trace.recorder import record
 
 MOTOR = ("kt", "resistance", "tau_max", "f_c", "f_v", "inertia", "kt_load", "f_cut")
@@ -68,9 +68,13 @@ def _kernel(count: int) -> Kernel:
         tape.output("drive_current", drive / kt)
 
     program = Program(
-        base_hz=1000.0, start=(Call(Phase("begin", begin)),), tick=(Unless0((Call(Phase("advance", advance)),)),),
-        end=(Call(Phase("read", read)),), inputs=(*_GIVEN, *PARAMETERS), outputs=("rate", "drive_current"),
-    )  # fmt: skip
+        base_hz=1000.0,
+        start=(CallPhase(Phase("begin", begin)),),
+        tick=(Unless0((CallPhase(Phase("advance", advance)),)),),
+        end=(CallPhase(Phase("read", read)),),
+        inputs=(*_GIVEN, *PARAMETERS),
+        outputs=("rate", "drive_current"),
+    )
     return backends.load(record(program), LANES)
 
 

@@ -62,7 +62,7 @@ from met.trace import Real, clip
 
 def control(p: Any, held: Any, seen: Seen) -> Control:
     """The servo's computer, at its rate: gives every output below."""
-    return Control({"qd_cmd": seen.asked.value})
+    return Control({"qd_cmd": seen.setpoint.value})
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:

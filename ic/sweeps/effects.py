@@ -1,8 +1,8 @@
 """Checks that what `--set` sets does something in one of the runs and sweeps that are asked for.
 
-Each run is resolved once more with what was set in question. A number becomes an input of the program, and `met.analysis.audit`
-says whether anything is computed from it. Anything else becomes a name that nothing has: reading it is an error. This
-is done for one structure after the other, until all is found to do something.
+Each run is resolved once more with what was set in question. A number becomes an input of the program, and
+`met.analysis.audit` says whether anything is computed from it. Anything else becomes a name that nothing has: reading
+it is an error. This is done for one structure after the other, until all is found to do something.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from met.program.build import COORDINATE, build
 from met.trace.graph import live
 from met.trace.program import WhileAny, walk
 from met.trace.recorder import record
-from met.trace.recording import Section
+from met.trace.recording import CodeSection
 
 
 def idle(experiment: Experiment) -> tuple[str, ...]:
@@ -36,7 +36,7 @@ def idle(experiment: Experiment) -> tuple[str, ...]:
         needed |= found
 
 
-def _reads(section: Section, needed: set[str], given: set[int]) -> tuple[set[str], set[str]]:
+def _reads(section: CodeSection, needed: set[str], given: set[int]) -> tuple[set[str], set[str]]:
     """Inputs and cells from which the section computes these cells, these outputs and what it records."""
     roots = [ref for cell, ref in section.stores if cell in needed]
     roots += [ref for _, ref in section.records]

@@ -10,8 +10,8 @@ from met.backends.reference.plain import PlainTape, follow
 from met.frozen import frozen
 from met.plan import Experiment
 from met.program.build import Builder
-from met.program.machine import Machine
 from met.program.motion.world import environment_values
+from met.program.system import System
 from met.run import inputs
 
 
@@ -29,11 +29,11 @@ class Contact:
 def contacts(experiment: Experiment, case: int = 0) -> tuple[Contact, ...]:
     """Of every stop that may push its joint, for the arm as it begins in this case: the inertia that the joint feels
     where all others keep their modes, and its rotor's. Not of a joint that feels none."""
-    machine = Machine(experiment)
-    stops = [(name, model) for name, model in machine.environment if model.springs]
+    system = System(experiment)
+    stops = [(name, model) for name, model in system.environment if model.springs]
     if not stops:
         return ()
-    builder = Builder(machine)
+    builder = Builder(system)
     program = builder.program()
     values = inputs(experiment, np.array([case]))[0]
     tape = PlainTape(program, dict(zip(program.inputs, values, strict=True)), 1)
@@ -43,12 +43,12 @@ def contacts(experiment: Experiment, case: int = 0) -> tuple[Contact, ...]:
         follow(tape, program.tick)
         arm = builder.step.observed(tape)
         for name, model in stops:
-            _, p = environment_values(machine, name, model, tape.read)
+            _, p = environment_values(system, name, model, tape.read)
             if model.idle is not None and model.idle(p, experiment.structure.schedule.duration) is not None:
                 continue
-            joint, stiffness = (machine.value(f"environment.{name}.{part}", tape.read) for part in model.springs)
-            number = next(i for i, each in enumerate(machine.joints) if each.name == joint)
-            actuator = machine.actuators[number]
+            joint, stiffness = (system.value(f"environment.{name}.{part}", tape.read) for part in model.springs)
+            number = next(i for i, each in enumerate(system.joints) if each.name == joint)
+            actuator = system.actuators[number]
             if actuator is not None and actuator.gives:
                 continue
             inertia = float(arm.effective[number][0] + arm.derivative.solved.rotor[number])

@@ -20,9 +20,9 @@ from met.frozen import frozen
 from met.plan import Experiment
 from met.program.build import Builder
 from met.program.control.substituted import Mounted
-from met.program.machine import Machine
+from met.program.system import System
 from met.run import inputs
-from met.servos.servo import Asked
+from met.servos.servo import Setpoint
 
 GROWS = 1.0 + 1e-6
 """Eigenvalues above it grow; the slow modes of a servo with a heavy arm come that near to one."""
@@ -146,11 +146,11 @@ def _margins(experiment: Experiment, case: int, known: dict[tuple[Any, ...], _Kn
         lightest, heaviest = LIGHTEST, HEAVIEST
         if least > 0.0 and together < np.inf:
             lightest, heaviest = min(lightest, 0.5 * least), max(heaviest, 2.0 * together)
-        key = (each.joint, lightest, heaviest, *(builder.machine.value(path, tape.read) for path in own))
+        key = (each.joint, lightest, heaviest, *(builder.system.value(path, tape.read) for path in own))
         if key not in known:
             known[key] = _Known(loop.stretches(lightest, heaviest), {})
         lower, limit = _around(known[key], loop, (least, together), (lightest, heaviest))
-        delay = float(builder.machine.value(f"{each.joint}.bed.delay", tape.read))
+        delay = float(builder.system.value(f"{each.joint}.bed.delay", tape.read))
         rate_hz = builder.schedule.base_hz / beds.divisor
         yield Margin(
             case, each.joint, each.law.name, each.bed.name, rate_hz, delay, r, together, least, lower, limit, heaviest
@@ -205,7 +205,7 @@ def _faultless(experiment: Experiment) -> Experiment:
 
 def _begun(experiment: Experiment, case: int) -> tuple[Builder, PlainTape]:
     """The program after its first tick, in plain numbers."""
-    builder = Builder(Machine(experiment))
+    builder = Builder(System(experiment))
     program = builder.program()
     values = inputs(experiment, np.array([case]))[0]
     tape = PlainTape(program, dict(zip(program.inputs, values, strict=True)), 1)
@@ -243,7 +243,7 @@ class _Loop:
         tape.cells = _Noting(tape.cells)
         self._around(cells, self.rotor)
         # Under a position command the angle acts back; else it only adds up.
-        back = f"{each.joint}:angle" if each.actuator.asked == "position" else ""
+        back = f"{each.joint}:angle" if each.actuator.command_kind == "position" else ""
         written = tape.cells.written
         self.names = [name for name in cells if name in written and (name == back or not name.endswith(_ANGLES))]
         # The shaft turns on at one rate, and nothing else is under way.
@@ -265,12 +265,12 @@ class _Loop:
         self.beds.act(tape)
         return {name: float(tape.cells[name]) for name in cells}
 
-    def _asked(self) -> Asked:
+    def _asked(self) -> Setpoint:
         """The command, of the deck's kind, under which the shaft turns on at the steady rate."""
         rate = self.rate / self.motor.ratio
-        kind = self.each.actuator.asked
+        kind = self.each.actuator.command_kind
         value = {"position": self.beds.period * rate, "rate": rate}.get(kind, 0.0)
-        return Asked(kind, value, rate if kind == "position" else 0.0)
+        return Setpoint(kind, value, rate if kind == "position" else 0.0)
 
     def radius(self, r: float) -> float:
         """The largest size of an eigenvalue of the map from tick to tick."""

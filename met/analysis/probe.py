@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from met import models
 from met.plan import ServoUse
-from met.servos.servo import Asked, JointMotion, Seen
+from met.servos.servo import JointMotion, Seen, Setpoint
 from met.trace import Graph, Real, Scalar
 
 T = TypeVar("T")
@@ -29,7 +29,7 @@ def reads(use: ServoUse, values: Mapping[str, Any]) -> frozenset[str] | None:
     of_law = parts.integrals if parts.continuous else (*parts.outputs, *parts.integrals)
     seen = Seen(
         graph.input("q"), graph.input("qd"),
-        Asked(use.command.kind if use.command is not None else "none", graph.input(":asked"), graph.input(":slope")),
+        Setpoint(use.command.kind if use.command is not None else "none", graph.input(":asked"), graph.input(":slope")),
         0.0 if parts.continuous else 1.0, graph.input(":time"),
         SimpleNamespace(**{state.name: graph.input(state.name) for state in parts.natural}),
     )  # fmt: skip

@@ -21,20 +21,19 @@ from typing import Any
 import numpy as np
 
 from met import backends
-from met.backends.backend import Block as Cases
-from met.backends.backend import Kernel
+from met.backends.backend import Block, Kernel
 from met.backends.llvm.pieces import operations
 from met.frozen import frozen
 from met.plan import Experiment, Formula
 from met.program.build import build
-from met.program.machine import PARAMETER, TREE
+from met.program.system import PARAMETER, TREE
 from met.run import inputs
 from met.trace import fma
 from met.trace.counting import counting
 from met.trace.graph import LEAVES, OPERANDS
-from met.trace.program import Every, Phase, Program, Record, Run, Tape, Unless0, WhileAny, walk
+from met.trace.program import Every, Phase, Program, RecordPhase, RunPhase, Tape, Unless0, WhileAny, walk
 from met.trace.recorder import record
-from met.trace.recording import Block, Recorded, Recording, Section, Step, Straight
+from met.trace.recording import Branch, CodeSection, RecordedControl, Recording, RecordSection, RunSection
 
 FLOPS = {"add": 1, "sub": 1, "mul": 1, "div": 1, "sqrt": 1, "fma": 2}
 """Operations that count as arithmetic, and for how much; comparing, choosing and moving count for none."""
@@ -62,7 +61,7 @@ Work = Callable[[], object]
 
 
 @frozen
-class Part:
+class WorkCost:
     """One kind of work. All numbers are a step's and a case's, averages over the run.
 
     work        `first stage`;  part: `dynamics` of it, or "" for what is none of its parts
@@ -98,7 +97,7 @@ class Input:
 
 
 @frozen
-class Profile:
+class RunProfile:
     """What is told of an experiment's kernel.
 
     lanes         cases a block; vector: cases a register;  cpu: LLVM's name of the processor
@@ -126,7 +125,7 @@ class Profile:
     peak: float
     constants: int
     inputs: tuple[Input, ...]
-    parts: tuple[Part, ...]
+    parts: tuple[WorkCost, ...]
 
     @property
     def flops(self) -> float:
@@ -139,7 +138,7 @@ class Profile:
         return self.flops / (self.ns * 1e-9) / self.peak
 
 
-def profile(experiment: Experiment) -> Profile:
+def profile(experiment: Experiment) -> RunProfile:
     """Measures an experiment's kernel on this core. Raises Problem where the experiment cannot be built."""
     begun = time.perf_counter()
     recording = record(build(experiment))
@@ -161,7 +160,7 @@ def profile(experiment: Experiment) -> Profile:
         lambda: made.run(cases, ticks, threads=1), chains, *(_alone(made, number, halfway) for number in numbers)
     ])  # fmt: skip
     ns = {number: each * 1e9 / (_CALLS * _STARTS * made.lanes) for number, each in zip(numbers, alone, strict=True)}
-    return Profile(
+    return RunProfile(
         experiment=experiment.name,
         cases=experiment.cases.count,
         joints=len(experiment.structure.moving),
@@ -204,7 +203,13 @@ def _chains() -> tuple[Work, int]:
 
     names = tuple(f"x{i}" for i in range(chains))
     program = Program(
-        1.0, (Run(Phase("start", start)),), (Run(Phase("chains", tick)),), (Run(Phase("end", end)),), ("x",), 0, names
+        1.0,
+        (RunPhase(Phase("start", start)),),
+        (RunPhase(Phase("chains", tick)),),
+        (RunPhase(Phase("end", end)),),
+        ("x",),
+        0,
+        names,
     )
     made = backends.load(record(program))
     cases = np.ones((blocks * made.lanes, 1))
@@ -214,8 +219,8 @@ def _chains() -> tuple[Work, int]:
 
 def hoisted(experiment: Experiment, recording: Recording) -> Iterator[Input]:
     """What of the work that depends on each coordinate is done before the first step, and what is left to a step."""
-    sections = {step.section for step in _all(recording.start) if isinstance(step, Straight)}
-    ticking = {step.section for step in _all(recording.tick) if isinstance(step, (Straight, Recorded))}
+    sections = {step.section for step in _all(recording.start) if isinstance(step, RunSection)}
+    ticking = {step.section for step in _all(recording.tick) if isinstance(step, (RunSection, RecordSection))}
     for coordinate in experiment.cases.coordinates:
         count, kept = 0, set()
         for section in (recording.sections[i] for i in sections):
@@ -231,7 +236,7 @@ def hoisted(experiment: Experiment, recording: Recording) -> Iterator[Input]:
         yield Input(coordinate.path, len(coordinate.sets), count, len(kept), readers)
 
 
-def _reads(section: Section, cells: set[str]) -> int:
+def _reads(section: CodeSection, cells: set[str]) -> int:
     """Live operations that take one of these cells."""
     found = 0
     for i in operations(section):
@@ -241,7 +246,7 @@ def _reads(section: Section, cells: set[str]) -> int:
     return found
 
 
-def by_part(section: Section) -> dict[str, tuple[int, int]]:
+def by_part(section: CodeSection) -> dict[str, tuple[int, int]]:
     """Live operations and flops of a section by the part that they belong to, in order of first appearance."""
     found: dict[str, tuple[int, int]] = {}
     parts = iter((*section.parts, (len(section.nodes), "")))
@@ -259,12 +264,12 @@ def by_part(section: Section) -> dict[str, tuple[int, int]]:
 
 def _parts(
     recording: Recording, calls: Mapping[tuple[int, bool], float], alone: Mapping[int, float]
-) -> tuple[Part, ...]:
+) -> tuple[WorkCost, ...]:
     """Every kind of work of a step, in the order in which a step comes to it.
 
     calls  of a section a step, by its number and whether within a loop;  alone: ns of a call of it and case
     """
-    found: dict[tuple[str, str, bool], Part] = {}
+    found: dict[tuple[str, str, bool], WorkCost] = {}
     for (number, event), rate in calls.items():
         section = recording.sections[number]
         shares = by_part(section) or {section.parts[0][1]: (0, 0)}  # what only moves numbers has no operations
@@ -272,9 +277,9 @@ def _parts(
         for path, (ops, flops) in shares.items():
             phase, _, part = path.partition("/")
             key = (_work(phase), part, event)
-            old = found.get(key, Part(*key, 0.0, 0.0, 0.0, 0.0))
+            old = found.get(key, WorkCost(*key, 0.0, 0.0, 0.0, 0.0))
             ns = alone[number] * rate * (ops / whole if ops else 1.0)
-            found[key] = Part(*key, max(old.calls, rate), old.operations + ops * rate, old.flops + flops * rate,
+            found[key] = WorkCost(*key, max(old.calls, rate), old.operations + ops * rate, old.flops + flops * rate,
                               old.ns + ns)  # fmt: skip
     return tuple(sorted(found.values(), key=_place))
 
@@ -284,7 +289,7 @@ def _work(phase: str) -> str:
     return next((work for begin, work in WORK.items() if phase.startswith(begin)), phase)
 
 
-def _place(part: Part) -> tuple[bool, int, int]:
+def _place(part: WorkCost) -> tuple[bool, int, int]:
     """Where a part stands in the table: in the order of a step, what is none of a stage's parts after those."""
     works = list(WORK.values())
     return (
@@ -306,20 +311,20 @@ def _calls(made: Kernel, cases: np.ndarray, ticks: int) -> dict[tuple[int, bool]
         """Ticks from the first to the last that the divisor divides."""
         return ticks // divisor - (first + divisor - 1) // divisor + 1
 
-    def note(body: tuple[Step, ...], first: int, divisor: int, event: float | None) -> None:
+    def note(body: tuple[RecordedControl, ...], first: int, divisor: int, event: float | None) -> None:
         """event: how often a loop turns that the body stands in."""
         for node in body:
             match node:
-                case Straight(section):
+                case RunSection(section):
                     key = (section, event is not None)
                     found[key] = found.get(key, 0.0) + (ticks_of(first, divisor) if event is None else event)
-                case Recorded(section, own):
+                case RecordSection(section, own):
                     found[section, False] = ticks_of(0, own)
-                case Block(Every(own), inner):
+                case Branch(Every(own), inner):
                     note(inner, first, math.lcm(divisor, own), event)
-                case Block(Unless0(), inner):
+                case Branch(Unless0(), inner):
                     note(inner, max(first, 1), divisor, event)
-                case Block(WhileAny(), inner):
+                case Branch(WhileAny(), inner):
                     note(inner, first, divisor, next(turns))
 
     note(made.recording.start, 0, 1, None)
@@ -328,14 +333,14 @@ def _calls(made: Kernel, cases: np.ndarray, ticks: int) -> dict[tuple[int, bool]
     return found
 
 
-def _alone(made: Kernel, number: int, state: Cases) -> Work:
+def _alone(made: Kernel, number: int, state: Block) -> Work:
     """Work that calls a section many times in a row, from copies of this state."""
     recording = made.recording
     section = recording.sections[number]
-    program, step = recording.program, Straight(0)
+    program, step = recording.program, RunSection(0)
     if section.records:
-        only = next(node for node in walk(program.tick) if isinstance(node, Record))
-        program, step = replace(program, tick=(replace(only, divisor=1),)), Recorded(0, 1)  # type: ignore[assignment]
+        only = next(node for node in walk(program.tick) if isinstance(node, RecordPhase))
+        program, step = replace(program, tick=(replace(only, divisor=1),)), RecordSection(0, 1)  # type: ignore[assignment]
     else:
         program = replace(program, tick=())
     single = Recording(program, (section,), (), (step,), (), recording.cells)
@@ -378,13 +383,13 @@ def _best(works: Sequence[Work]) -> list[float]:
     return least
 
 
-def _all(body: tuple[Step, ...]) -> Iterator[Step]:
+def _all(body: tuple[RecordedControl, ...]) -> Iterator[RecordedControl]:
     for node in body:
         yield node
-        if isinstance(node, Block):
+        if isinstance(node, Branch):
             yield from _all(node.body)
 
 
-def as_data(found: Profile) -> Mapping[str, Any]:
+def as_data(found: RunProfile) -> Mapping[str, Any]:
     """The profile as JSON can hold it."""
     return {**asdict(found), "flops": found.flops, "share_of_peak": found.share_of_peak}

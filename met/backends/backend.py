@@ -1,4 +1,7 @@
-"""What a back end offers (`Backend`), and what it makes of a recorded program (`Kernel`, `Block`)."""
+"""What a back end offers (`Backend`), and what it makes of a recorded program (`Kernel`, `Block`).
+
+Three implement it: `LlvmKernel` and `LlvmBlock`, `Library` and `CBlock` in C, `Interpreter` and `InterpretedBlock`.
+"""
 
 from __future__ import annotations
 

@@ -82,18 +82,18 @@ class Joint:
         """The joint's component of a six-vector: angular z or linear z."""
         return 2 if self.kind == "revolute" else 5
 
-    def at(self, q: Real) -> Step:
+    def at(self, q: Real) -> JointTransform:
         """The way from the parent frame to the child frame at position q."""
         if self.kind == "prismatic":
-            return Step(self.swing, self.offset, self.twist, self.zero, self.slide + q)
+            return JointTransform(self.swing, self.offset, self.twist, self.zero, self.slide + q)
         angle = q if is_zero(self.angle) else q + self.angle
         (c, s), (c0, s0) = turn_by(angle), self.zero
         if not (constant(c0) and constant(s0) and (c0, s0) == NO_TURN):
             c, s = c * c0 - s * s0, s * c0 + c * s0
-        return Step(self.swing, self.offset, self.twist, (c, s), self.slide)
+        return JointTransform(self.swing, self.offset, self.twist, (c, s), self.slide)
 
 
-class Step(NamedTuple):
+class JointTransform(NamedTuple):
     """The five shifts and turns of a joint at one position (head of this file)."""
 
     swing: Turn

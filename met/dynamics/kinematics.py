@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from met.dynamics.joints import Step
+from met.dynamics.joints import JointTransform
 from met.dynamics.spatial import (
     HERE,
     ZERO,
@@ -81,7 +81,7 @@ def link_motions(
     return result
 
 
-def joint_poses(tree: Tree, steps: Sequence[Step], base: Pose = HERE) -> tuple[Pose, ...]:
+def joint_poses(tree: Tree, steps: Sequence[JointTransform], base: Pose = HERE) -> tuple[Pose, ...]:
     """The recursion's frames in the world, by joint."""
     poses = [HERE] * len(steps)
     root = compose(base, tree.base)
@@ -92,7 +92,7 @@ def joint_poses(tree: Tree, steps: Sequence[Step], base: Pose = HERE) -> tuple[P
 
 
 def joint_rates(
-    tree: Tree, steps: Sequence[Step], qd: Sequence[Real], base_velocity: tuple[Vector, Vector] = (ZERO, ZERO)
+    tree: Tree, steps: Sequence[JointTransform], qd: Sequence[Real], base_velocity: tuple[Vector, Vector] = (ZERO, ZERO)
 ) -> tuple[tuple[Vector, Vector], ...]:
     """Angular velocity and velocity of the origin of the recursion's frames, in their axes, by joint."""
     rates = [(ZERO, ZERO)] * len(steps)

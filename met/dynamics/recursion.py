@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from met.dynamics.floating import Factors, accelerated, factors
-from met.dynamics.joints import Step
+from met.dynamics.joints import JointTransform
 from met.dynamics.spatial import (
     AT,
     NOTHING,
@@ -83,7 +83,7 @@ class Solved:
     singular: tuple[Truth, ...]
     mode: tuple[Truth, ...]
     rotor: tuple[Real, ...]
-    steps: tuple[Step, ...]
+    steps: tuple[JointTransform, ...]
     w: tuple[Vector, ...]
     wd: tuple[Vector, ...]
     a: tuple[Vector, ...]

@@ -1,6 +1,6 @@
 """Plan -> program: what an experiment's models compute, phase by phase, and when."""
 
 from met.program.build import build
-from met.program.machine import Machine
+from met.program.system import System
 
-__all__ = ["Machine", "build"]
+__all__ = ["System", "build"]

@@ -38,12 +38,12 @@ def advanced(integrator: Integrator, settled: Sequence[Slope], h: Real, y: Motio
             raise TypeError(f"slope(c, y) was given {wrong}")
         questions.append(Question(c, there))
         if len(questions) > len(settled):
-            raise _Open
+            raise _Unanswered
         return settled[len(questions) - 1]
 
     try:
         end = answer(f"integrator `{integrator.name}`", integrator.advance, slope, h, y, k1)
-    except (_Open, Problem):
+    except (_Unanswered, Problem):
         if len(questions) <= len(settled):
             raise
     if len(questions) > len(settled):
@@ -103,5 +103,5 @@ def _wrong(y: object, like: Motion) -> str:
     return f"a Motion of {told[0]}; the arm has {told[1]}"
 
 
-class _Open(Passing):
+class _Unanswered(Passing):
     """A question has no answer yet. No Exception: a model that catches those is not to catch this."""

@@ -7,15 +7,15 @@ from collections.abc import Mapping, Sequence
 from met.integrators.integrator import Motion
 from met.program import friction
 from met.program.evaluation import Derivative, brakes, derivative, driven_by
-from met.program.machine import Machine
 from met.program.sticking import Sticking, sticking
-from met.program.values import Values, answer, returned
-from met.servos.servo import Asked, Seen
+from met.program.system import System
+from met.program.values import NamedValues, answer, returned
+from met.servos.servo import Seen, Setpoint
 from met.trace import Real, both, sign, where
 from met.trace.program import Tape
 
 
-def balance(machine: Machine, tape: Tape, y: Motion, begun: Mapping[str, Mapping[str, Real]]) -> None:
+def balance(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[str, Real]]) -> None:
     """Writes states and integrals of the servos that can be balanced, for the arm at state y.
 
     begun  by joint, what its servo holds, and its states, as they begin where it is not balanced
@@ -23,19 +23,19 @@ def balance(machine: Machine, tape: Tape, y: Motion, begun: Mapping[str, Mapping
     The torques are those with which none of their joints accelerates. Other joints move as their servos let them; one
     at rest stays where its dry friction holds it while all of them do, and moves where it does not.
     """
-    balanced = [actuator for actuator in machine.working if actuator.servo.balance is not None]
+    balanced = [actuator for actuator in system.working if actuator.servo.balance is not None]
     if not balanced:
         return
-    held = [Values("", {} if a is None else begun[a.use.joint]) for a in machine.actuators]
+    held = [NamedValues("", {} if a is None else begun[a.use.joint]) for a in system.actuators]
 
     def moved(modes: Mapping[str, Real]) -> Derivative:
         return derivative(
-            machine, tape.read, y=y, held=held, friction=modes, time=0.0, begin=0.0, part=tape.part,
+            system, tape.read, y=y, held=held, friction=modes, time=0.0, begin=0.0, part=tape.part,
             told={actuator.index: 0.0 for actuator in balanced},
         )  # fmt: skip
 
-    others = [each for each in sticking(machine) if not each.state and each.actuator not in balanced]
-    levels = {each.name: _level(machine, tape, y, each, held) for each in others}
+    others = [each for each in sticking(system) if not each.state and each.actuator not in balanced]
+    levels = {each.name: _level(system, tape, y, each, held) for each in others}
     modes = {each.name: where(levels[each.name] > 0.0, sign(each.rate(y)), 1.0) for each in others}
     found = moved(modes)
     if others:
@@ -50,21 +50,21 @@ def balance(machine: Machine, tape: Tape, y: Motion, begun: Mapping[str, Mapping
         assert actuator.servo.balance is not None
         parts, starts = actuator.parts, begun[actuator.use.joint]
         q, qd = y.q[actuator.index], y.qd[actuator.index]
-        stays = {"position": Asked("position", q, qd), "rate": Asked("rate", qd, 0.0)}
-        asked = stays.get(actuator.asked, Asked(actuator.asked, 0.0, 0.0))
-        states = Values(actuator.owner, {state.name: starts[state.name] for state in parts.natural})
-        seen = Seen(q, qd, asked, 0.0, 0.0, states)
-        p = machine.servo_values(actuator, tape.read)
+        stays = {"position": Setpoint("position", q, qd), "rate": Setpoint("rate", qd, 0.0)}
+        setpoint = stays.get(actuator.command_kind, Setpoint(actuator.command_kind, 0.0, 0.0))
+        states = NamedValues(actuator.owner, {state.name: starts[state.name] for state in parts.natural})
+        seen = Seen(q, qd, setpoint, 0.0, 0.0, states)
+        p = system.servo_values(actuator, tape.read)
         new = answer(actuator.owner, actuator.servo.balance, p, found.loads[actuator.index], seen)
         names = [part.name for part in (*parts.natural, *parts.integrals)]
         for name, value in returned(actuator.owner, "balance", new, names).items():
             tape.write(f"{actuator.path}.{name}", value)
 
 
-def _level(machine: Machine, tape: Tape, y: Motion, each: Sticking, held: Sequence[Values]) -> Real:
+def _level(system: System, tape: Tape, y: Motion, each: Sticking, held: Sequence[NamedValues]) -> Real:
     """The level of dry friction at a joint, its servo's and its brakes', N m (N)."""
-    on_joints = brakes(machine, tape.read, y, 0.0, 0.0)
+    on_joints = brakes(system, tape.read, y, 0.0, 0.0)
     level = on_joints.get(each.name, 0.0)
     if each.actuator is None:
         return level
-    return level + driven_by(machine, each.actuator, tape.read, y, held[each.number], 0.0, 0.0).drive.dry
+    return level + driven_by(system, each.actuator, tape.read, y, held[each.number], 0.0, 0.0).drive.dry

@@ -16,14 +16,14 @@ from met.program import balancing, orientations
 from met.program.control import failing, guiding, link_sensors, sensing
 from met.program.control.substituted import LIMITED
 from met.program.evaluation import gravity, law
-from met.program.machine import PARAMETER, Actuator, Machine
 from met.program.motion import base, payloads
 from met.program.observe import derived
-from met.program.step import EVENTS, Step
-from met.program.values import Values, answer, parameters, returned
-from met.servos.servo import Asked, Seen
+from met.program.step import EVENTS, StepPhases
+from met.program.system import PARAMETER, Actuator, System
+from met.program.values import NamedValues, answer, parameters, returned
+from met.servos.servo import Seen, Setpoint
 from met.trace import Real, both, floor, where
-from met.trace.program import Call, Control, Every, Phase, Program, Record, Run, Tape, Unless0
+from met.trace.program import CallPhase, Control, Every, Phase, Program, RecordPhase, RunPhase, Tape, Unless0
 
 Body = Callable[[Tape], None]
 
@@ -42,49 +42,49 @@ def build(experiment: Experiment, *, wire: bool = False, late: int = 0) -> Progr
           `wire:<joint>.current` (A)
     late  ticks of a bed's `delay` that pass on the wire: what is told now is held from so many ticks later on
     """
-    return Builder(Machine(experiment), wire=wire, late=late).program()
+    return Builder(System(experiment), wire=wire, late=late).program()
 
 
 class Builder:
-    """The phases of one machine. Every method that takes a tape is the body of a phase."""
+    """The phases of one system's program. Every method that takes a tape is the body of a phase."""
 
-    def __init__(self, machine: Machine, *, wire: bool = False, late: int = 0) -> None:
-        self.machine = machine
-        self.schedule = machine.structure.schedule
-        self.joints = tuple(joint.name for joint in machine.joints)
-        self.step = Step(machine, wire=wire, late=late)
+    def __init__(self, system: System, *, wire: bool = False, late: int = 0) -> None:
+        self.system = system
+        self.schedule = system.structure.schedule
+        self.joints = tuple(joint.name for joint in system.joints)
+        self.step = StepPhases(system, wire=wire, late=late)
 
     def program(self) -> Program:
         instant = self.schedule.dynamics
-        columns = [channel for recorded in self.machine.structure.record for channel in recorded.channels]
-        held, at_rows = derived(self.machine)
+        columns = [channel for recorded in self.system.structure.record for channel in recorded.channels]
+        held, at_rows = derived(self.system)
         tick: list[Control] = [Unless0((Every(instant, self.step.finish()),)), *self.step.grapple.events()]
         tick += self.step.beds.before_servos()
-        for divisor in sorted({use.divisor for use in self.machine.structure.sensors}):
-            tick.append(Every(divisor, (Run(Phase(f"sensors_{divisor}", self._sensors(divisor))),)))
-        for divisor in sorted({use.divisor for use in guiding.ticking(self.machine)}):
-            tick.append(Every(divisor, (Run(Phase(f"guides_{divisor}", self._guides(divisor))),)))
-        for divisor in sorted({actuator.use.divisor for actuator in self.machine.working if actuator.ticks}):
-            tick.append(Every(divisor, (Run(Phase(f"servos_{divisor}", self._servos(divisor))),)))
+        for divisor in sorted({use.divisor for use in self.system.structure.sensors}):
+            tick.append(Every(divisor, (RunPhase(Phase(f"sensors_{divisor}", self._sensors(divisor))),)))
+        for divisor in sorted({use.divisor for use in guiding.ticking(self.system)}):
+            tick.append(Every(divisor, (RunPhase(Phase(f"guides_{divisor}", self._guides(divisor))),)))
+        for divisor in sorted({actuator.use.divisor for actuator in self.system.working if actuator.ticks}):
+            tick.append(Every(divisor, (RunPhase(Phase(f"servos_{divisor}", self._servos(divisor))),)))
         tick += self.step.begin()
         if held:
-            tick.append(Every(instant, (Call(Phase("observe", self._observe(held))),)))
-        for divisor in sorted({channel.divisor for _, _, channel in self.machine.metrics}):
-            tick.append(Every(divisor, (Run(Phase(f"metrics_{divisor}", self._metrics(divisor))),)))
+            tick.append(Every(instant, (CallPhase(Phase("observe", self._observe(held))),)))
+        for divisor in sorted({channel.divisor for _, _, channel in self.system.metrics}):
+            tick.append(Every(divisor, (RunPhase(Phase(f"metrics_{divisor}", self._metrics(divisor))),)))
         if columns:
-            tick.append(Record(Phase("record", self._recorder(columns, held, at_rows)), self.schedule.record))
+            tick.append(RecordPhase(Phase("record", self._recorder(columns, held, at_rows)), self.schedule.record))
 
-        coordinates = tuple(coordinate.path for coordinate in self.machine.experiment.cases.coordinates)
+        coordinates = tuple(coordinate.path for coordinate in self.system.experiment.cases.coordinates)
         return Program(
             base_hz=self.schedule.base_hz,
-            start=(Run(Phase("start", self.start)), *self.step.beds.begin_run()),
+            start=(RunPhase(Phase("start", self.start)), *self.step.beds.begin_run()),
             tick=tuple(tick),
-            end=(Run(Phase("end", self.end)),),
-            inputs=(*coordinates, *self.machine.experiment.cases.noise, *self.step.beds.wire_inputs),
+            end=(RunPhase(Phase("end", self.end)),),
+            inputs=(*coordinates, *self.system.experiment.cases.noise, *self.step.beds.wire_inputs),
             columns=len(columns),
             outputs=(
                 *OUTPUTS,
-                *(METRIC + name for name, _, _ in self.machine.metrics),
+                *(METRIC + name for name, _, _ in self.system.metrics),
                 *(COORDINATE + path for path in coordinates),
                 *self.step.beds.wire_outputs,
             ),
@@ -96,25 +96,25 @@ class Builder:
 
     def start(self, tape: Tape) -> None:
         """Parameters that vary, then the state at t = 0."""
-        experiment = self.machine.experiment
+        experiment = self.system.experiment
         inputs = {coordinate.path: tape.input(coordinate.path) for coordinate in experiment.cases.coordinates}
         values = experiment.formulas.replay(inputs)
-        for path in self.machine.varying:
+        for path in self.system.varying:
             tape.write(PARAMETER + path, values[experiment.parameters[path].value.output])  # type: ignore[union-attr]
-        self.machine.keep_tree(tape.read, tape.write)
+        self.system.keep_tree(tape.read, tape.write)
         for joint in self.joints:
             for name in ("q", "qd"):
-                tape.write(f"{joint}.{name}", self.machine.value(f"initial.{joint}.{name}", tape.read))
-        base.start(self.machine, tape)
-        payloads.start(self.machine, tape)
-        guiding.start(self.machine, tape)
-        link_sensors.start(self.machine, tape, lambda y: gravity(self.machine, tape.read, y, 0.0))
-        begun = {actuator.use.joint: self._begin_servo(tape, actuator) for actuator in self.machine.working}
-        if self.machine.structure.balanced:
-            balancing.balance(self.machine, tape, self.step.state(tape), begun)
-        for actuator in self.machine.working:
+                tape.write(f"{joint}.{name}", self.system.value(f"initial.{joint}.{name}", tape.read))
+        base.start(self.system, tape)
+        payloads.start(self.system, tape)
+        guiding.start(self.system, tape)
+        link_sensors.start(self.system, tape, lambda y: gravity(self.system, tape.read, y, 0.0))
+        begun = {actuator.use.joint: self._begin_servo(tape, actuator) for actuator in self.system.working}
+        if self.system.structure.balanced:
+            balancing.balance(self.system, tape, self.step.state(tape), begun)
+        for actuator in self.system.working:
             self._begin_sensors(tape, actuator)
-        for name, metric, _ in self.machine.metrics:
+        for name, metric, _ in self.system.metrics:
             for memory in metric.memory:
                 tape.write(f"{METRIC}{name}.{memory.name}", memory.start)
 
@@ -123,7 +123,7 @@ class Builder:
         parts, servo = actuator.parts, actuator.servo
         starts: dict[str, Real] = {part.name: part.start for part in (*parts.memory, *parts.states)}
         if servo.begin is not None:
-            p = self.machine.servo_values(actuator, tape.read)
+            p = self.system.servo_values(actuator, tape.read)
             found = answer(actuator.owner, servo.begin, p, *self._state_of(tape, self.joints[actuator.index]))
             starts.update(returned(actuator.owner, "begin", found, (state.name for state in parts.natural)))
         for name, value in starts.items():
@@ -133,20 +133,20 @@ class Builder:
     def _begin_sensors(self, tape: Tape, actuator: Actuator) -> None:
         """What the servo's sensors hold, and what was seen, where a run begins."""
         natural = {state.name: tape.read(f"{actuator.path}.{state.name}") for state in actuator.parts.natural}
-        states = Values(actuator.owner, natural)
-        p, state = self.machine.servo_values(actuator, tape.read), self._state_of(tape, self.joints[actuator.index])
-        seen = Seen(*sensing.measured(actuator, p, *state, states), Asked("none", 0.0, 0.0), 0.0, 0.0, states)
-        sensing.start(self.machine, tape, actuator, seen)
-        for of in failing.quantities(actuator) if actuator.use.joint in self.machine.failing else ():
+        states = NamedValues(actuator.owner, natural)
+        p, state = self.system.servo_values(actuator, tape.read), self._state_of(tape, self.joints[actuator.index])
+        seen = Seen(*sensing.measured(actuator, p, *state, states), Setpoint("none", 0.0, 0.0), 0.0, 0.0, states)
+        sensing.start(self.system, tape, actuator, seen)
+        for of in failing.quantities(actuator) if actuator.use.joint in self.system.failing else ():
             tape.write(f"saw:{actuator.use.joint}.{of}", sensing.truth(seen, of))
 
     def end(self, tape: Tape) -> None:
         for name in OUTPUTS:
             tape.output(name, tape.read(name))
-        for name, metric, _ in self.machine.metrics:
+        for name, metric, _ in self.system.metrics:
             p, held = self._metric(tape, name)
             tape.output(METRIC + name, answer(f"metric `{name}`", metric.result, p, held, tape.time))
-        for coordinate in self.machine.experiment.cases.coordinates:
+        for coordinate in self.system.experiment.cases.coordinates:
             tape.output(COORDINATE + coordinate.path, tape.input(coordinate.path))
         for name, cell in self.step.beds.wire_outputs.items():
             tape.output(name, tape.read(cell))
@@ -154,19 +154,19 @@ class Builder:
     # Sensors of links, guides and servos.
 
     def _sensors(self, divisor: int) -> Body:
-        return lambda tape: link_sensors.tick(self.machine, tape, divisor)
+        return lambda tape: link_sensors.tick(self.system, tape, divisor)
 
     def _guides(self, divisor: int) -> Body:
         def body(tape: Tape) -> None:
-            for use in guiding.ticking(self.machine):
+            for use in guiding.ticking(self.system):
                 if use.divisor == divisor:
-                    guiding.tick(self.machine, tape, use)
+                    guiding.tick(self.system, tape, use)
 
         return body
 
     def _servos(self, divisor: int) -> Body:
         def body(tape: Tape) -> None:
-            for actuator in self.machine.working:
+            for actuator in self.system.working:
                 if actuator.ticks and actuator.use.divisor == divisor:
                     self._tick(tape, actuator)
 
@@ -175,10 +175,10 @@ class Builder:
     def _tick(self, tape: Tape, actuator: Actuator) -> None:
         """One tick of one servo's computer, on the state at this time."""
         joint = self.joints[actuator.index]
-        asked = self.machine.asked(actuator, tape.read, tape.time)
+        setpoint = self.system.setpoint(actuator, tape.read, tape.time)
         if actuator.use.command is not None:
-            tape.write(f"{actuator.path}.command", asked.value)
-        on_bed, between = self.step.beds.seen(tape, actuator), actuator in self.machine.between
+            tape.write(f"{actuator.path}.command", setpoint.value)
+        on_bed, between = self.step.beds.seen(tape, actuator), actuator in self.system.between
 
         def state(channel: str) -> Real:
             return self._carried_state(tape, channel) if between else tape.read(channel)
@@ -189,12 +189,12 @@ class Builder:
             q, qd = self._carried(tape, actuator) if between else self._state_of(tape, joint)
         states = {each.name: state(f"{actuator.path}.{each.name}") for each in actuator.parts.natural}
         if on_bed is None:
-            p = self.machine.servo_values(actuator, tape.read)
-            q, qd = sensing.measured(actuator, p, q, qd, Values(actuator.owner, states))
-        seen = self.seen(actuator, q, qd, asked, tape.time, states)
-        seen = sensing.ticked(self.machine, tape, actuator, seen, state)
-        if joint in self.machine.failing:
-            seen = failing.seen(self.machine, actuator, tape.read, seen, f"saw:{joint}.")
+            p = self.system.servo_values(actuator, tape.read)
+            q, qd = sensing.measured(actuator, p, q, qd, NamedValues(actuator.owner, states))
+        seen = self.seen(actuator, q, qd, setpoint, tape.time, states)
+        seen = sensing.ticked(self.system, tape, actuator, seen, state)
+        if joint in self.system.failing:
+            seen = failing.seen(self.system, actuator, tape.read, seen, f"saw:{joint}.")
             for of in failing.quantities(actuator):
                 tape.write(f"saw:{joint}.{of}", sensing.truth(seen, of))
         for fitted in actuator.sensors:
@@ -202,18 +202,26 @@ class Builder:
         self.compute(tape, actuator, seen)
 
     def seen(
-        self, actuator: Actuator, q: Real, qd: Real, asked: Asked, time: Real, states: Mapping[str, Real] | None = None
+        self,
+        actuator: Actuator,
+        q: Real,
+        qd: Real,
+        setpoint: Setpoint,
+        time: Real,
+        states: Mapping[str, Real] | None = None,
     ) -> Seen:
         """How things are with a servo's joint at a tick."""
         period = actuator.use.divisor / self.schedule.base_hz
-        return Seen(q, qd, asked, period, time, Values(actuator.owner, states or {}))
+        return Seen(q, qd, setpoint, period, time, NamedValues(actuator.owner, states or {}))
 
     def compute(self, tape: Tape, actuator: Actuator, seen: Seen) -> None:
         """What the servo's computer does with what it sees and is asked: new outputs, integrals a tick on."""
         parts, period = actuator.parts, seen.period
-        held = Values(actuator.owner, {part.name: tape.read(f"{actuator.path}.{part.name}") for part in parts.memory})
-        p = self.machine.servo_values(actuator, tape.read)
-        found = failing.given(self.machine, actuator, tape.read, p, seen.time, law(actuator, p, held, seen))
+        held = NamedValues(
+            actuator.owner, {part.name: tape.read(f"{actuator.path}.{part.name}") for part in parts.memory}
+        )
+        p = self.system.servo_values(actuator, tape.read)
+        found = failing.given(self.system, actuator, tape.read, p, seen.time, law(actuator, p, held, seen))
         for name, slope in found.slopes.items():
             path = f"{actuator.path}.{name}"
             tape.write(path, tape.read(path) + period * slope)
@@ -246,19 +254,19 @@ class Builder:
 
     # Metrics and the recorder.
 
-    def _metric(self, tape: Tape, name: str) -> tuple[Values, Values]:
-        metric = next(model for known, model, _ in self.machine.metrics if known == name)
+    def _metric(self, tape: Tape, name: str) -> tuple[NamedValues, NamedValues]:
+        metric = next(model for known, model, _ in self.system.metrics if known == name)
         owner = f"metric `{name}` (model {metric.name})"
-        p = parameters(owner, f"metrics.{name}", metric.parameters, lambda path: self.machine.value(path, tape.read))
+        p = parameters(owner, f"metrics.{name}", metric.parameters, lambda path: self.system.value(path, tape.read))
         held = {memory.name: tape.read(f"{METRIC}{name}.{memory.name}") for memory in metric.memory}
-        return p, Values(owner, held)
+        return p, NamedValues(owner, held)
 
     def _metrics(self, divisor: int) -> Body:
         period = divisor / self.schedule.base_hz
 
         def body(tape: Tape) -> None:
             dt = where(tape.tick == 0.0, 0.0, period)
-            for name, metric, channel in self.machine.metrics:
+            for name, metric, channel in self.system.metrics:
                 if channel.divisor == divisor:
                     p, held = self._metric(tape, name)
                     owner = f"metric `{name}` (model {metric.name})"

@@ -12,13 +12,13 @@ from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
 from met.program.control import failing, link_sensors, sensing
-from met.program.machine import Actuator, Machine, ReadCell
-from met.program.motion.base import Base, base_of, free_base
+from met.program.motion.base import BaseMotion, base_of, free_base
 from met.program.motion.bodies import slopes
 from met.program.motion.payloads import laden, shared, slopes_of_payloads
 from met.program.motion.world import ArmWorld, environment_values
-from met.program.values import Values, answer, returned
-from met.servos.servo import Asked, Control, Drive, JointMotion, Seen
+from met.program.system import Actuator, ReadCell, System
+from met.program.values import NamedValues, answer, returned
+from met.servos.servo import Control, Drive, JointMotion, Seen, Setpoint
 from met.trace import Real, Truth, both, not_, where
 from met.vectors import Vector
 
@@ -48,18 +48,18 @@ class Derivative:
     solved: Solved
     shown: Mapping[str, Real]
     gravity: Vector
-    base: Base
+    base: BaseMotion
     stored: tuple[Real, Real]
     astray: tuple[Truth, ...]
     loads: tuple[Real, ...]
 
 
 def derivative(
-    machine: Machine,
+    system: System,
     read: ReadCell,
     *,
     y: Motion,
-    held: Sequence[Values],
+    held: Sequence[NamedValues],
     friction: Mapping[str, Real],
     time: Real,
     begin: Real,
@@ -76,21 +76,21 @@ def derivative(
     """
     with part("servo physics"):
         driven = tuple(
-            None if actuator is None else driven_by(machine, actuator, read, y, held[i], time, begin)
-            for i, actuator in enumerate(machine.actuators)
+            None if actuator is None else driven_by(system, actuator, read, y, held[i], time, begin)
+            for i, actuator in enumerate(system.actuators)
         )
     drives = tuple(None if each is None else each.drive for each in driven)
-    tree, base, n = laden(machine, read), base_of(machine, read, y, time), len(machine.joints)
+    tree, base, n = laden(system, read), base_of(system, read, y, time), len(system.joints)
     with part("environment"):
-        loads = _environment(machine, tree, read, y, base, time, begin)
-        wrenches, on_payloads = shared(machine, read, loads.wrenches)
+        loads = _environment(system, tree, read, y, base, time, begin)
+        wrenches, on_payloads = shared(system, read, loads.wrenches)
 
     told = told or {}
     given: list[Real] = []
     mode: list[Truth] = []
     dry: list[Real] = []
     for i, drive in enumerate(drives):
-        s = friction.get(machine.joints[i].name)
+        s = friction.get(system.joints[i].name)
         if i in told:
             mode.append(False)
             given.append(told[i])
@@ -103,7 +103,7 @@ def derivative(
             in_torque_mode = s != 0.0
         mode.append(in_torque_mode)
         given.append(drive.qdd if drive is not None else 0.0)
-        dry.append(0.0 if s is None else s * level_of(machine, i, drive, loads))
+        dry.append(0.0 if s is None else s * level_of(system, i, drive, loads))
 
     smooth = [
         loads.torques[i] + (0.0 if drive is None or i in told else drive.torque) for i, drive in enumerate(drives)
@@ -121,27 +121,27 @@ def derivative(
             base_acceleration=(base.wd, base.a),
             base_rate=base.w,
             wrenches=wrenches,
-            velocity_products=machine.structure.velocity_products,
+            velocity_products=system.structure.velocity_products,
         )
-    of_states, state_needs = _slopes(machine, driven, friction)
-    needs = {joint.name: a - b for joint, a, b in zip(machine.joints, smooth, solved.tau_load, strict=True)}
+    of_states, state_needs = _slopes(system, driven, friction)
+    needs = {joint.name: a - b for joint, a, b in zip(system.joints, smooth, solved.tau_load, strict=True)}
     qd, qdd = (*y.qd[:n],), solved.qdd
-    body = free_base(machine)
+    body = free_base(system)
     if body is not None:
         of_base = slopes(body, y, pose=base.pose, turned=base.turned, solved=solved.base_acceleration)
         qd, qdd = (*qd, *of_base[0]), (*qdd, *of_base[1])
-    of_payloads = slopes_of_payloads(machine, read, y, on_payloads, loads.gravity)
+    of_payloads = slopes_of_payloads(system, read, y, on_payloads, loads.gravity)
     qdd = (*qdd, *of_payloads[1])
-    if machine.sensors:
+    if system.sensors:
         with part("sensors"):
             moved = link_sensors.Accelerations(qdd, solved.base_acceleration, loads.gravity)
-            felt = link_sensors.Aboard(machine, read, tree, y, base, time, begin, moved)
-            own = dict(zip(machine.states, y.x, strict=True))
-            of_states = (*of_states, *link_sensors.slopes(machine, read, felt, own))
+            felt = link_sensors.Aboard(system, read, tree, y, base, time, begin, moved)
+            own = dict(zip(system.states, y.x, strict=True))
+            of_states = (*of_states, *link_sensors.slopes(system, read, felt, own))
     return Derivative(
         slope=Slope((*qd, *of_payloads[0]), qdd, of_states),
         tau=tuple(
-            a - b + _of_brakes(machine, i, drives[i], loads, smooth[i] - a)
+            a - b + _of_brakes(system, i, drives[i], loads, smooth[i] - a)
             for i, (a, b) in enumerate(zip(solved.tau, loads.torques, strict=True))
         ),
         need=needs | state_needs,
@@ -159,7 +159,7 @@ def derivative(
 
 
 @frozen
-class Driven:
+class ServoResponse:
     """A servo at a stage: its physics, the slopes of its states, law and sensors, and what it shows, by channel."""
 
     drive: Drive
@@ -168,34 +168,36 @@ class Driven:
 
 
 def driven_by(
-    machine: Machine, actuator: Actuator, read: ReadCell, y: Motion, held: Values, time: Real, begin: Real
-) -> Driven:
+    system: System, actuator: Actuator, read: ReadCell, y: Motion, held: NamedValues, time: Real, begin: Real
+) -> ServoResponse:
     """What a servo does at state y with this memory, its answers checked against its declaration.
 
     A continuous law is asked here, for this stage; `held` is then not read.
     """
     servo, parts, owner = actuator.servo, actuator.parts, actuator.owner
-    own = {name: y.x[machine.states.index(name)] for name in actuator.states}
-    natural = Values(owner, {state.name: own[f"{actuator.path}.{state.name}"] for state in parts.natural})
-    p = machine.servo_values(actuator, read)
+    own = {name: y.x[system.states.index(name)] for name in actuator.states}
+    natural = NamedValues(owner, {state.name: own[f"{actuator.path}.{state.name}"] for state in parts.natural})
+    p = system.servo_values(actuator, read)
     q, qd = y.q[actuator.index], y.qd[actuator.index]
     slopes: dict[str, Real] = {}
     shown: dict[str, Real] = {}
-    seen = Seen(*sensing.measured(actuator, p, q, qd, natural), Asked("none", 0.0, 0.0), 0.0, time, natural)
-    of_sensors = sensing.slopes(machine, actuator, read, seen, own)
+    seen = Seen(*sensing.measured(actuator, p, q, qd, natural), Setpoint("none", 0.0, 0.0), 0.0, time, natural)
+    of_sensors = sensing.slopes(system, actuator, read, seen, own)
     if parts.continuous:
-        seen = sensing.through(machine, actuator, read, replace(seen, asked=machine.asked(actuator, read, time)), own)
-        seen = failing.seen(machine, actuator, read, seen, None)
+        seen = sensing.through(
+            system, actuator, read, replace(seen, setpoint=system.setpoint(actuator, read, time)), own
+        )
+        seen = failing.seen(system, actuator, read, seen, None)
         integrals = {state.name: own[f"{actuator.path}.{state.name}"] for state in parts.integrals}
-        found = law(actuator, p, Values(owner, integrals), seen)
-        found = failing.given(machine, actuator, read, p, seen.time, found)
-        held = Values(owner, {**found.outputs, **integrals})
+        found = law(actuator, p, NamedValues(owner, integrals), seen)
+        found = failing.given(system, actuator, read, p, seen.time, found)
+        held = NamedValues(owner, {**found.outputs, **integrals})
         slopes.update(found.slopes)
-        shown.update({"command": seen.asked.value} if actuator.use.command is not None else {}, **found.outputs)
+        shown.update({"command": seen.setpoint.value} if actuator.use.command is not None else {}, **found.outputs)
         for of in map(sensing.quantity, actuator.sensors):
             shown[f"sensor.{of}"] = sensing.truth(seen, of)
-    coupled = failing.coupled(machine, actuator, read, begin)
-    motion = JointMotion(q, qd, time, begin, actuator.asked, 1.0 if coupled is None else coupled)
+    coupled = failing.coupled(system, actuator, read, begin)
+    motion = JointMotion(q, qd, time, begin, actuator.command_kind, 1.0 if coupled is None else coupled)
     drive = answer(owner, servo.drive, p, held, natural, motion)
     if coupled is not None:
         given = None if drive.given is None else both(drive.given, coupled > 0.0)
@@ -204,14 +206,14 @@ def driven_by(
     if coupled is not None:
         for state in parts.natural:
             if state.between:
-                back = (state.start - own[f"{actuator.path}.{state.name}"]) / machine.structure.schedule.step
+                back = (state.start - own[f"{actuator.path}.{state.name}"]) / system.structure.schedule.step
                 slopes[state.name] = coupled * slopes[state.name] + (1.0 - coupled) * back
     shown.update(returned(owner, "signals", drive.signals, (signal.name for signal in parts.signals)))
     by_channel = {f"{actuator.path}.{name}": slope for name, slope in slopes.items()}
-    return Driven(drive, by_channel | of_sensors, {f"{actuator.path}.{name}": x for name, x in shown.items()})
+    return ServoResponse(drive, by_channel | of_sensors, {f"{actuator.path}.{name}": x for name, x in shown.items()})
 
 
-def law(actuator: Actuator, p: Values, held: Values, seen: Seen) -> Control:
+def law(actuator: Actuator, p: NamedValues, held: NamedValues, seen: Seen) -> Control:
     """What a servo's control law gives, checked against its declaration."""
     owner, parts = actuator.owner, actuator.parts
     assert actuator.servo.control is not None
@@ -222,12 +224,12 @@ def law(actuator: Actuator, p: Values, held: Values, seen: Seen) -> Control:
 
 
 def _slopes(
-    machine: Machine, driven: Sequence[Driven | None], friction: Mapping[str, Real]
+    system: System, driven: Sequence[ServoResponse | None], friction: Mapping[str, Real]
 ) -> tuple[tuple[Real, ...], dict[str, Real]]:
     """Slopes of the servos' states, and those of states with dry friction as they are without."""
     slopes: list[Real] = []
     needs: dict[str, Real] = {}
-    for actuator in machine.working:
+    for actuator in system.working:
         each = driven[actuator.index]
         assert each is not None
         for channel in actuator.states:
@@ -255,52 +257,52 @@ class _Loads:
     dry: dict[str, Real]
 
 
-def level_of(machine: Machine, joint: int, drive: Drive | None, loads: _Loads) -> Real:
+def level_of(system: System, joint: int, drive: Drive | None, loads: _Loads) -> Real:
     """The level of dry friction at a joint: its servo's, and brakes'."""
-    name = machine.joints[joint].name
+    name = system.joints[joint].name
     if drive is None:
         return loads.dry[name]
     return drive.dry + loads.dry[name] if name in loads.dry else drive.dry
 
 
-def _of_brakes(machine: Machine, joint: int, drive: Drive | None, loads: _Loads, friction: Real) -> Real:
+def _of_brakes(system: System, joint: int, drive: Drive | None, loads: _Loads, friction: Real) -> Real:
     """Of a joint's dry friction, against the motion, what its brakes bear: their share of the level."""
-    name = machine.joints[joint].name
+    name = system.joints[joint].name
     if name not in loads.dry:
         return 0.0
-    level, own = level_of(machine, joint, drive, loads), loads.dry[name]
+    level, own = level_of(system, joint, drive, loads), loads.dry[name]
     rubs = level > 0.0
     return where(rubs, own / where(rubs, level, 1.0) * friction, 0.0)
 
 
-def gravity(machine: Machine, read: ReadCell, y: Motion, time: Real) -> Vector:
+def gravity(system: System, read: ReadCell, y: Motion, time: Real) -> Vector:
     """Uniform gravity of all environment models at state y, world axes, m/s^2."""
-    base = base_of(machine, read, y, time)
-    return _environment(machine, laden(machine, read), read, y, base, time, time).gravity
+    base = base_of(system, read, y, time)
+    return _environment(system, laden(system, read), read, y, base, time, time).gravity
 
 
-def brakes(machine: Machine, read: ReadCell, y: Motion, time: Real, begin: Real) -> dict[str, Real]:
+def brakes(system: System, read: ReadCell, y: Motion, time: Real, begin: Real) -> dict[str, Real]:
     """Dry friction that environment models put on joints at state y, by name, N m (N)."""
-    if not machine.braked:
+    if not system.braked:
         return {}
-    tree, base = laden(machine, read), base_of(machine, read, y, time)
-    return _environment(machine, tree, read, y, base, time, begin, [m for m in machine.environment if m[1].rubs]).dry
+    tree, base = laden(system, read), base_of(system, read, y, time)
+    return _environment(system, tree, read, y, base, time, begin, [m for m in system.environment if m[1].rubs]).dry
 
 
 def _environment(
-    machine: Machine, tree: Tree, read: ReadCell, y: Motion, base: Base, time: Real, begin: Real,
+    system: System, tree: Tree, read: ReadCell, y: Motion, base: BaseMotion, time: Real, begin: Real,
     models: Sequence[tuple[str, Environment]] | None = None,
 ) -> _Loads:  # fmt: skip
     """Sum of the loads of these models; of all, where None. Wrenches are on links and payloads."""
-    world = ArmWorld(machine, read, tree, y, base, time, begin)
+    world = ArmWorld(system, read, tree, y, base, time, begin)
     gravity: list[Real] = [0.0, 0.0, 0.0]
-    torques: list[Real] = [0.0 for _ in machine.joints]
+    torques: list[Real] = [0.0 for _ in system.joints]
     wrenches: dict[str, tuple[Vector, Vector]] = {}
     dry: dict[str, Real] = {}
-    for name, model in machine.environment if models is None else models:
+    for name, model in system.environment if models is None else models:
         if model.loads is None:
             continue
-        owner, p = environment_values(machine, name, model, read)
+        owner, p = environment_values(system, name, model, read)
         loads = answer(owner, model.loads, p, world)
         gravity = [a + b for a, b in zip(gravity, loads.gravity, strict=True)]
         for joint, torque in loads.torques.items():

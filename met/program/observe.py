@@ -18,22 +18,22 @@ from met.dynamics.spatial import Vector, add, choose, dot
 from met.integrators.integrator import Motion
 from met.plan.channel import XYZ, Channel
 from met.program.evaluation import Derivative
-from met.program.machine import Machine, ReadCell
 from met.program.motion import payloads
-from met.program.motion.base import Base, motions
+from met.program.motion.base import BaseMotion, motions
+from met.program.system import ReadCell, System
 from met.trace import Real, sqrt
 from met.vectors import Quaternion, quaternion
 
 
-def derived(machine: Machine) -> tuple[list[Channel], list[Channel]]:
+def derived(system: System) -> tuple[list[Channel], list[Channel]]:
     """The derived channels that are asked for: those computed at every instant, and those at recorded rows alone.
 
     A metric sees every instant. So does a record whose rows lie between instants, for they show the last one's value.
     """
-    structure = machine.structure
+    structure = system.structure
     paths = [path for recorded in structure.record for path in recorded.channels]
-    watched = [channel for _, _, channel in machine.metrics if channel.derived]
-    recorded = [channel for channel in map(machine.channels.__getitem__, paths) if channel.derived]
+    watched = [channel for _, _, channel in system.metrics if channel.derived]
+    recorded = [channel for channel in map(system.channels.__getitem__, paths) if channel.derived]
     between = structure.schedule.record % structure.schedule.dynamics != 0
     held = {channel.path: channel for channel in (watched + recorded if between else watched)}
     rows = {channel.path: channel for channel in recorded if channel.path not in held}
@@ -47,12 +47,12 @@ class Observed:
     """
 
     def __init__(
-        self, machine: Machine, read: ReadCell, y: Motion, base: Base, found: Callable[[], Derivative]
+        self, system: System, read: ReadCell, y: Motion, base: BaseMotion, found: Callable[[], Derivative]
     ) -> None:
-        self.machine, self.read, self.y = machine, read, y
-        self.joints = tuple(joint.name for joint in machine.joints)
+        self.system, self.read, self.y = system, read, y
+        self.joints = tuple(joint.name for joint in system.joints)
         n = len(self.joints)
-        self.tree, self.q, self.qd, self.base = machine.tree(read), y.q[:n], y.qd[:n], base
+        self.tree, self.q, self.qd, self.base = system.tree(read), y.q[:n], y.qd[:n], base
         self._found = found
         self._jacobians: dict[str, tuple[tuple[Vector, Vector], ...]] = {}
 
@@ -95,11 +95,11 @@ class Observed:
 
     def _of_payload(self, parts: list[str]) -> Real:
         name, kind, *rest = parts
-        payload, motion = next(each for each in self.machine.structure.payloads if each.name == name), self.seen[name]
+        payload, motion = next(each for each in self.system.structure.payloads if each.name == name), self.seen[name]
         if kind == "carried":
             return choose(payloads.carried(payload, self.read), 1.0, 0.0) if payload.flies else 1.0
         if kind == "distance":
-            way = payloads.way(self.machine, payload, self.read, motion, self.motions[payload.link])
+            way = payloads.way(self.system, payload, self.read, motion, self.motions[payload.link])
             return sqrt(dot(way, way))
         return _of_frame(motion, kind, rest[0])
 
@@ -128,7 +128,7 @@ class Observed:
 
     @cached_property
     def reactions(self) -> tuple[Wrench, ...]:
-        return reactions(payloads.laden(self.machine, self.read), self.derivative.solved)
+        return reactions(payloads.laden(self.system, self.read), self.derivative.solved)
 
     @cached_property
     def motions(self) -> dict[str, LinkMotion]:
@@ -138,9 +138,9 @@ class Observed:
     def seen(self) -> dict[str, LinkMotion]:
         """Every payload in the world, by name."""
         return {
-            each.name: payloads.seen(self.machine, each, self.read, self.y, self.motions)
+            each.name: payloads.seen(self.system, each, self.read, self.y, self.motions)
             if each.flies else self.motions[each.name]
-            for each in self.machine.structure.payloads
+            for each in self.system.structure.payloads
         }  # fmt: skip
 
     @cached_property
@@ -156,8 +156,8 @@ class Observed:
             base=base.pose,
             base_velocity=(base.w, base.v),
         )
-        for payload in self.machine.flying:
-            body = payloads.body_of(self.machine, payload, self.read)
+        for payload in self.system.flying:
+            body = payloads.body_of(self.system, payload, self.read)
             own = energy_of(body, self.seen[payload.name], found.gravity)
             total = Energy(
                 total.kinetic + own.kinetic,

@@ -19,14 +19,14 @@ from met.program import cells, friction
 from met.program.asking import Question, advanced, asked, inconstant
 from met.program.control.substituted import Substituted
 from met.program.evaluation import Derivative, brakes, derivative, driven_by
-from met.program.machine import Actuator, Machine
 from met.program.motion import base, bodies
 from met.program.motion.grapple import Grapple
 from met.program.observe import Observed
 from met.program.sticking import sticking
-from met.program.values import Values
+from met.program.system import Actuator, System
+from met.program.values import NamedValues
 from met.trace import Real, Truth, any_of, both, either, isfinite, not_, sign, where
-from met.trace.program import Call, Control, Every, Phase, Run, Tape, WhileAny
+from met.trace.program import CallPhase, Control, Every, Phase, RunPhase, Tape, WhileAny
 
 SINGULAR, NOT_FINITE, ASTRAY = 1.0, 2.0, 4.0
 """Causes of a failed case (output `failure`); 0 is none, 3 what ended it from outside (met/run.py)."""
@@ -38,39 +38,39 @@ FROM, STAGE = "from:", "stage:"
 """Prefixes of copies of the state: at the start of the (sub)step that was just done, and at a stage on the way."""
 
 
-class Step:
-    """The phases of a step of one machine. Every method that takes a tape is the body of a phase."""
+class StepPhases:
+    """The phases of one step of a system. Every method that takes a tape is the body of a phase."""
 
-    def __init__(self, machine: Machine, *, wire: bool = False, late: int = 0) -> None:
-        self.machine = machine
-        self.beds = Substituted(machine, self.loads, wire=wire, late=late)
-        self.schedule = machine.structure.schedule
-        self.joints = tuple(joint.name for joint in machine.joints)
-        self.coordinates = bodies.coordinates(machine)
-        self.states = machine.states
-        self.sticking = sticking(machine)
-        self.grapple = Grapple(machine, self.state, lambda tape, actuator: self._held(tape, actuator, 1.0))
-        self._asked = asked(machine.integrator, len(self.coordinates), len(self.states), self.schedule.step)
-        self._derive = Call(Phase("derive", self.derive))
-        self._slope = Call(Phase("slope", self.slope))
+    def __init__(self, system: System, *, wire: bool = False, late: int = 0) -> None:
+        self.system = system
+        self.beds = Substituted(system, self.loads, wire=wire, late=late)
+        self.schedule = system.structure.schedule
+        self.joints = tuple(joint.name for joint in system.joints)
+        self.coordinates = bodies.coordinates(system)
+        self.states = system.states
+        self.sticking = sticking(system)
+        self.grapple = Grapple(system, self.state, lambda tape, actuator: self._held(tape, actuator, 1.0))
+        self._asked = asked(system.integrator, len(self.coordinates), len(self.states), self.schedule.step)
+        self._derive = CallPhase(Phase("derive", self.derive))
+        self._slope = CallPhase(Phase("slope", self.slope))
         count = len(self.sticking)
-        one_by_one = Run(Phase("decide_one", self.decide_one))
+        one_by_one = RunPhase(Phase("decide_one", self.decide_one))
         self._decide = (
-            WhileAny("undecided", friction.passes(count), (self._derive, Run(Phase("decide", self.decide)))),
+            WhileAny("undecided", friction.passes(count), (self._derive, RunPhase(Phase("decide", self.decide)))),
             *([WhileAny("undecided", friction.passes_one_by_one(count), (self._derive, one_by_one))] * (count > 1)),
-            WhileAny("undecided", 1, (Run(Phase("left_open", self.left_open)),)),
+            WhileAny("undecided", 1, (RunPhase(Phase("left_open", self.left_open)),)),
         )
         # what may hide that a number is none: joints whose acceleration may be given, and all that may stick
-        gives = [a.use.joint for a in machine.working if a.gives or a.level != 0.0]
+        gives = [a.use.joint for a in system.working if a.gives or a.level != 0.0]
         self._needs = tuple(dict.fromkeys((*gives, *(each.name for each in self.sticking))))
-        self._straying = [actuator for actuator in self.machine.working if actuator.strays]
-        self._split = WhileAny("crossing", 1, (Run(Phase("split", self.split)),))
+        self._straying = [actuator for actuator in self.system.working if actuator.strays]
+        self._split = WhileAny("crossing", 1, (RunPhase(Phase("split", self.split)),))
 
     def begin(self) -> tuple[Control, ...]:
         """What happens at an instant once the servos have ticked: modes, then the step's first stage."""
         decide = self._decide if self.sticking else ()
-        judge = WhileAny("suspect", 1, (Run(Phase("judge", self.judge)),))
-        modes, due = Run(Phase("modes", self.modes)), self.schedule.dynamics
+        judge = WhileAny("suspect", 1, (RunPhase(Phase("judge", self.judge)),))
+        modes, due = RunPhase(Phase("modes", self.modes)), self.schedule.dynamics
         return (Every(due, (modes, *decide)), *self.beds.after_modes(), Every(due, (self._derive, judge)))
 
     def finish(self) -> tuple[Control, ...]:
@@ -78,21 +78,21 @@ class Step:
         parts = self._stages(again=False)
         if self.sticking:
             again = (
-                Run(Phase("modes_again", self.modes_again)),
+                RunPhase(Phase("modes_again", self.modes_again)),
                 *self._decide,
                 self._derive,
-                WhileAny("suspect", 1, (Run(Phase("judge_again", self.judge_again)),)),
+                WhileAny("suspect", 1, (RunPhase(Phase("judge_again", self.judge_again)),)),
                 *self._stages(again=True),
                 self._split,
             )
             parts = (*parts, self._split, WhileAny("again", friction.SPLITS, again))
-        return (*parts, Run(Phase("carry", self.carry))) if self.machine.between else parts
+        return (*parts, RunPhase(Phase("carry", self.carry))) if self.system.between else parts
 
     # Modes.
 
     def modes(self, tape: Tape) -> None:
         """What begins at an instant: held values for the first stage, friction modes from the rates."""
-        for actuator in self.machine.between:
+        for actuator in self.system.between:
             for memory in actuator.parts.memory:
                 channel = f"{actuator.path}.{memory.name}"
                 tape.write(f"first:{channel}", tape.read(channel))
@@ -123,13 +123,13 @@ class Step:
         """The levels of dry friction at the state, where a step or substep begins, in the units of what they hold."""
         fraction, y = tape.read("fraction"), self.state(tape)
         time, begin = self._time(tape, fraction), tape.read("instant")
-        on_joints = brakes(self.machine, tape.read, y, time, begin)
+        on_joints = brakes(self.system, tape.read, y, time, begin)
         found: list[Real] = []
         for each in self.sticking:
             own: list[Real] = [] if each.level is None else [each.level]
             if each.level is None and each.actuator is not None:
                 held = self._held(tape, each.actuator, fraction)
-                drive = driven_by(self.machine, each.actuator, tape.read, y, held, time, begin).drive
+                drive = driven_by(self.system, each.actuator, tape.read, y, held, time, begin).drive
                 own.append(drive.friction[each.state] if each.state else drive.dry)
             if each.name in on_joints:
                 own.append(on_joints[each.name])
@@ -196,7 +196,7 @@ class Step:
         # Infinities that cancel leave not a number, so a plain sum misses none; a sum of numbers that is none only
         # makes `judge` look.
         parts = (*found.slope.qdd, *found.slope.xd, *y.q, *y.qd, *(found.need[name] for name in self._needs))
-        total: Real = sum((*parts, *bodies.orientation(self.machine, tape)), 0.0)
+        total: Real = sum((*parts, *bodies.orientation(self.system, tape)), 0.0)
         wrong = either(not_(isfinite(total)), singular != 0.0)
         tape.write_mask("suspect", either(wrong, astray != 0.0) if self._straying else wrong)
 
@@ -224,8 +224,8 @@ class Step:
         astray: Real = tape.read("astray") if self._straying else 0.0
         cause: Real = where(astray != 0.0, ASTRAY, 0.0)
         number: Real = where(astray != 0.0, astray - 1.0, 0.0)
-        of_bodies = list(enumerate(bodies.bodies(self.machine), len(self.joints)))
-        for i, fitted in reversed(list(enumerate(self.machine.sensors, len(self.joints) + len(of_bodies)))):
+        of_bodies = list(enumerate(bodies.bodies(self.system), len(self.joints)))
+        for i, fitted in reversed(list(enumerate(self.system.sensors, len(self.joints) + len(of_bodies)))):
             told = [part for name in fitted.channels for part in (name, f"slope:{name}")]
             bad = not_(isfinite(sum((tape.read(name) for name in told), 0.0)))
             cause, number = where(bad, NOT_FINITE, cause), where(bad, float(i), number)
@@ -242,7 +242,7 @@ class Step:
             told += [f"need:{name}" for name in self._needs if name == joint or name.startswith(f"{joint}.servo.")]
             told += [f"slope:{name}" for name in self.states if name.startswith(f"{joint}.servo.")]
             bad = not_(isfinite(sum((tape.read(name) for name in told), 0.0)))
-            if bodies.bodies(self.machine):  # a joint that moves well, and only bears what a body does, is not named
+            if bodies.bodies(self.system):  # a joint that moves well, and only bears what a body does, is not named
                 bad = both(bad, either(not_(moves), not_(elsewhere)))
             cause, number = where(bad, NOT_FINITE, cause), where(bad, float(i), number)
         singular = tape.read("singular")
@@ -265,8 +265,8 @@ class Step:
     def observed(self, tape: Tape) -> Observed:
         """The arm at an instant, with the derivative that `derive` took of it."""
         y = self.state(tape)
-        stands = base.base_of(self.machine, tape.read, y, tape.read("instant"))
-        return Observed(self.machine, tape.read, y, stands, lambda: self._derivative(tape, y, 0.0))
+        stands = base.base_of(self.system, tape.read, y, tape.read("instant"))
+        return Observed(self.system, tape.read, y, stands, lambda: self._derivative(tape, y, 0.0))
 
     def _derivative(self, tape: Tape, y: Motion, fraction: Real, told: dict[int, Real] | None = None) -> Derivative:
         """The derivative at the state y, at the share `fraction` of the dynamics step that began last.
@@ -274,11 +274,11 @@ class Step:
         told  accelerations of the substituted joints; None: those that the law gives
         """
         held = [
-            Values("no servo", {}) if actuator is None else self._held(tape, actuator, fraction)
-            for actuator in self.machine.actuators
+            NamedValues("no servo", {}) if actuator is None else self._held(tape, actuator, fraction)
+            for actuator in self.system.actuators
         ]
         return derivative(
-            self.machine,
+            self.system,
             tape.read,
             y=y,
             held=held,
@@ -292,17 +292,17 @@ class Step:
     def _time(self, tape: Tape, fraction: Real) -> Real:
         return tape.read("instant") + fraction * self.schedule.step
 
-    def _held(self, tape: Tape, actuator: Actuator, fraction: Real) -> Values:
+    def _held(self, tape: Tape, actuator: Actuator, fraction: Real) -> NamedValues:
         """What the servo's computer holds; between the first and last tick of a step for a servo that is faster."""
         numbers: dict[str, Real] = {}
         for memory in actuator.parts.memory:
             channel = f"{actuator.path}.{memory.name}"
             now = tape.read(channel)
-            if actuator in self.machine.between:
+            if actuator in self.system.between:
                 first = tape.read(f"first:{channel}")
                 now = first + fraction * (now - first)
             numbers[memory.name] = now
-        return Values(actuator.owner, numbers)
+        return NamedValues(actuator.owner, numbers)
 
     # The integrator's stages.
 
@@ -311,8 +311,8 @@ class Step:
         name = "advance_again" if again else "advance"
         parts: list[Control] = []
         for settled in range(self._asked):
-            parts += [Run(Phase(f"{name}_{settled + 1}", self._towards(settled, again))), self._slope]
-        return (*parts, Run(Phase(name, self._arrival(self._asked, again))))
+            parts += [RunPhase(Phase(f"{name}_{settled + 1}", self._towards(settled, again))), self._slope]
+        return (*parts, RunPhase(Phase(name, self._arrival(self._asked, again))))
 
     def _towards(self, settled: int, again: bool) -> Callable[[Tape], None]:
         """The body of the piece that ends at a question, `settled` of them being answered before."""
@@ -321,7 +321,7 @@ class Step:
             fraction = tape.read("fraction") if again else 0.0
             question = self._integrate(tape, settled, fraction)
             if not isinstance(question, Question):
-                raise inconstant(self.machine.integrator)
+                raise inconstant(self.system.integrator)
             cells.store(tape, True, self.coordinates, self.states, question.there, STAGE)
             tape.write(f"{STAGE}fraction", fraction + question.share * (1.0 - fraction))
 
@@ -335,15 +335,15 @@ class Step:
             y = self.state(tape)
             y_new = self._integrate(tape, settled, tape.read("fraction") if again else 0.0)
             if isinstance(y_new, Question):
-                raise inconstant(self.machine.integrator)
+                raise inconstant(self.system.integrator)
             if self.sticking:
                 crossed = any_of(friction.crossings(self._sliding(tape), y_new))
                 cells.store(tape, True, self.coordinates, self.states, y, FROM)
-                bodies.keep_orientation(self.machine, tape, FROM)
+                bodies.keep_orientation(self.system, tape, FROM)
                 tape.write_mask("crossing", both(active, crossed))
                 tape.write_mask("again", False)
             cells.store(tape, active, self.coordinates, self.states, y_new)
-            bodies.turn(self.machine, tape, active, y_new)
+            bodies.turn(self.system, tape, active, y_new)
 
         return body
 
@@ -365,7 +365,7 @@ class Step:
             for n in range(1, settled + 1)
         ]
         h = (1.0 - fraction) * self.schedule.step
-        return advanced(self.machine.integrator, answers, h, y, self._first_slope(tape, y.qd))
+        return advanced(self.system.integrator, answers, h, y, self._first_slope(tape, y.qd))
 
     def _first_slope(self, tape: Tape, qd: tuple[Real, ...]) -> Slope:
         """The first stage's slope, as `derive` left it; qd are the rates then."""
@@ -397,11 +397,11 @@ class Step:
         cells.count(tape, both(active, may_split), "friction.splits")
         cells.count(tape, both(active, not_(may_split)), "friction.clamped")
         cells.store(tape, active, self.coordinates, self.states, reached.y)
-        bodies.turn(self.machine, tape, active, reached.y, FROM)
+        bodies.turn(self.system, tape, active, reached.y, FROM)
 
     def carry(self, tape: Tape) -> None:
         """The slope of the step just done, for servos that tick before the next; none for what is at rest and rubs."""
-        for actuator in self.machine.between:
+        for actuator in self.system.between:
             for name, cell in self._carried(actuator):
                 now = tape.read(cell)
                 slope = (now - tape.read(f"before:{name}")) / self.schedule.step
@@ -417,7 +417,7 @@ class Step:
     def state(self, tape: Tape, copy: str = "") -> Motion:
         """The state, or a copy of it: a stage's as it is, another where a (sub)step begins."""
         y = cells.state(tape, self.coordinates, self.states, copy)
-        return y if copy == STAGE else bodies.begun(self.machine, y)
+        return y if copy == STAGE else bodies.begun(self.system, y)
 
     def _friction(self, tape: Tape) -> dict[str, Real]:
         return {each.name: tape.read(f"friction:{each.name}") for each in self.sticking}

@@ -1,10 +1,10 @@
-"""What has dry friction in a machine: joints, and rates on the motor's side of their servos (docs/physics.md)."""
+"""What has dry friction in a system: joints, and rates on the motor's side of their servos (docs/physics.md)."""
 
 from __future__ import annotations
 
 from met.frozen import frozen
 from met.integrators.integrator import Motion
-from met.program.machine import Actuator, Machine
+from met.program.system import Actuator, System
 from met.trace import Real
 
 
@@ -31,17 +31,17 @@ class Sticking:
         return y.x[self.number] if self.state else y.qd[self.number]
 
 
-def sticking(machine: Machine) -> tuple[Sticking, ...]:
+def sticking(system: System) -> tuple[Sticking, ...]:
     """Joints first, then states; none of a joint whose motor is on a bed: its friction is the bed's."""
-    on_bed = [actuator.index for actuator, _, _ in machine.mounted]
-    free = [actuator for actuator in machine.working if actuator.index not in on_bed]
+    on_bed = [actuator.index for actuator, _, _ in system.mounted]
+    free = [actuator for actuator in system.working if actuator.index not in on_bed]
     joints = []
-    for i, (joint, actuator) in enumerate(zip(machine.joints, machine.actuators, strict=True)):
+    for i, (joint, actuator) in enumerate(zip(system.joints, system.actuators, strict=True)):
         own = 0.0 if actuator is None else actuator.level
-        level = None if joint.name in machine.braked else own
+        level = None if joint.name in system.braked else own
         if i not in on_bed and level != 0.0:
             joints.append(Sticking(joint.name, f"{joint.name}.qd", actuator, "", i, level))
-    names = machine.states
+    names = system.states
     states = [
         Sticking(f"{a.path}.{name}", f"{a.path}.{name}", a, name, names.index(f"{a.path}.{name}"), level)
         for a in free for name, level in a.levels.items() if level != 0.0

@@ -20,7 +20,7 @@ Read = Callable[[str], Any]
 """From a parameter's path to its value: a number (float or traced), a list or a word."""
 
 
-class Values:
+class NamedValues:
     """Numbers by name. Reading a name that the model does not declare is a placed mistake of the model's author."""
 
     __slots__ = ("_numbers", "_owner")
@@ -41,7 +41,7 @@ class Values:
         raise Problem(error("E211", message, help=f"declared: {declared}"))
 
 
-def parameters(owner: str, prefix: str, declared: Iterable[Parameter], read: Read) -> Values:
+def parameters(owner: str, prefix: str, declared: Iterable[Parameter], read: Read) -> NamedValues:
     """The declared parameters of a model in use under the path `prefix`."""
     numbers: dict[str, Any] = {}
     for parameter in declared:
@@ -50,7 +50,7 @@ def parameters(owner: str, prefix: str, declared: Iterable[Parameter], read: Rea
             numbers[parameter.name] = tuple(read(f"{path}.{axis}") for axis in "xyz")
         else:
             numbers[parameter.name] = read(path)
-    return Values(owner, numbers)
+    return NamedValues(owner, numbers)
 
 
 class Passing(BaseException):

@@ -30,7 +30,7 @@ from met.servos.compliant_gearbox import JOINT_FRICTION, geared
 from met.servos.friction import BRISTLE, LOSS, SHAFT, friction, steady
 from met.servos.friction import PARAMETERS as FRICTION
 from met.servos.motor import ARMATURE, RATIO
-from met.servos.servo import Asked, Control, Drive, JointMotion, Seen, Servo
+from met.servos.servo import Control, Drive, JointMotion, Seen, Servo, Setpoint
 from met.trace import Real, both, clip, either, maximum, sign, sqrt, where
 
 ELASTIC = ("gear", ("elastic",))
@@ -38,19 +38,19 @@ ELASTIC = ("gear", ("elastic",))
 
 def control(p: Any, held: Any, seen: Seen) -> Control:
     """Position and rate loop: the current to be driven."""
-    if seen.asked.kind == "torque":
-        current = seen.asked.value / (p.ratio * p.kt)
+    if seen.setpoint.kind == "torque":
+        current = seen.setpoint.value / (p.ratio * p.kt)
         return Control({"current_cmd": clip(current, -p.i_max, p.i_max)}, {"integral": 0.0})
-    error = _error(p, seen.asked, seen.q, seen.qd)
+    error = _error(p, seen.setpoint, seen.q, seen.qd)
     wanted = p.kp * error + p.ki * held.integral
     return Control({"current_cmd": clip(wanted, -p.i_max, p.i_max)}, {"integral": _within(error, wanted, p.i_max)})
 
 
-def _error(p: Any, asked: Asked, q: Real, qd: Real) -> Real:
+def _error(p: Any, setpoint: Setpoint, q: Real, qd: Real) -> Real:
     """Error of the motor's rate, rad/s; q, qd: its angle and rate over the ratio."""
-    rate = p.ratio * asked.value
-    if asked.kind == "position":
-        rate = p.feed_forward * (p.ratio * asked.slope) + p.k_position * (p.ratio * (asked.value - q))
+    rate = p.ratio * setpoint.value
+    if setpoint.kind == "position":
+        rate = p.feed_forward * (p.ratio * setpoint.slope) + p.k_position * (p.ratio * (setpoint.value - q))
     return rate - p.ratio * qd
 
 
@@ -110,8 +110,8 @@ def balance(p: Any, torque: Real, seen: Seen) -> Mapping[str, Real]:
         tau_m, at_motor = (torque + p.f_v_joint * seen.qd + sign(seen.qd) * p.f_c_joint) / p.ratio + rubs, seen.q
     current = clip(tau_m / p.kt, -p.i_max, p.i_max)
     voltage = clip(p.resistance * current + p.kt * w, -p.v_max, p.v_max)
-    torques = seen.asked.kind == "torque"
-    integral = 0.0 if torques else rate_loop.wound(p, current, _error(p, seen.asked, at_motor, seen.qd))
+    torques = seen.setpoint.kind == "torque"
+    integral = 0.0 if torques else rate_loop.wound(p, current, _error(p, seen.setpoint, at_motor, seen.qd))
     amplifier = where(p.ki_current > 0.0, voltage, 0.0)
     return {**states, "current": current, "amplifier": amplifier, "integral": integral}
 

@@ -36,7 +36,7 @@ def measured(p: Any, q: Real, qd: Real, states: Any) -> tuple[Real, Real]:
 
 def control(p: Any, held: Any, seen: Seen) -> Control:
     """The rate loop: the motor's voltage."""
-    return rate_loop.rate_loop(p, held.integral, seen.asked, q=seen.q, qd=seen.qd)
+    return rate_loop.rate_loop(p, held.integral, seen.setpoint, q=seen.q, qd=seen.qd)
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
@@ -74,7 +74,7 @@ def balance(p: Any, torque: Real, seen: Seen) -> Mapping[str, Real]:
     """The gear is wound up by what the joint takes, and the motor holds it so."""
     states, tau_m = balanced(p, torque, seen.qd)
     at_motor = seen.q + states["deflection"]  # seen with nothing wound up
-    return {**states, **rate_loop.balanced(p, tau_m, seen.asked, q=at_motor, qd=seen.qd)}
+    return {**states, **rate_loop.balanced(p, tau_m, seen.setpoint, q=at_motor, qd=seen.qd)}
 
 
 def balanced(p: Any, torque: Real, qd: Real) -> tuple[dict[str, Real], Real]:

@@ -26,19 +26,19 @@ from met.trace import Real
 
 def control(p: Any, held: Any, seen: Seen) -> Control:
     """The servo's computer: it hands the command on."""
-    return Control({"value": seen.asked.value, "slope": seen.asked.slope, "since": seen.time})
+    return Control({"value": seen.setpoint.value, "slope": seen.setpoint.slope, "since": seen.time})
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
     """The acceleration that follows the command."""
-    asked = held.value + held.slope * (joint.time - held.since)
+    setpoint = held.value + held.slope * (joint.time - held.since)
     w = p.bandwidth
     if joint.command == "rate":
-        qdd = held.slope + w * (asked - joint.qd)
+        qdd = held.slope + w * (setpoint - joint.qd)
     elif joint.command == "position":
-        qdd = 2.0 * w * (held.slope - joint.qd) + w * w * (asked - joint.q)
+        qdd = 2.0 * w * (held.slope - joint.qd) + w * w * (setpoint - joint.q)
     else:
-        qdd = asked
+        qdd = setpoint
     return Drive(given=True, qdd=qdd, rotor=p.rotor)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from met.parameter import Memory, Parameter, State
 from met.servos.motor import TABLE_1, damping
-from met.servos.servo import Asked, Control
+from met.servos.servo import Control, Setpoint
 from met.trace import Real, both, clip, either, maximum, sqrt, where
 
 COMMANDS = ("rate", "position", "torque")
@@ -33,26 +33,26 @@ OUTPUTS = (Memory(name="voltage", unit="V", doc="voltage on the drive motor"),)
 INTEGRALS = (State(name="integral", unit="rad", doc="integral of the motor's rate error"),)
 
 
-def rate_loop(p: Any, integral: Real, asked: Asked, *, q: Real, qd: Real) -> Control:
+def rate_loop(p: Any, integral: Real, setpoint: Setpoint, *, q: Real, qd: Real) -> Control:
     """The motor's voltage. q, qd: its angle and rate over the ratio, as the loop sees them (rad, rad/s; m, m/s)."""
-    if asked.kind == "torque":
-        torque_m = asked.value / p.ratio
+    if setpoint.kind == "torque":
+        torque_m = setpoint.value / p.ratio
         voltage = p.resistance * torque_m / p.kt + p.kt * p.ratio * qd
         return Control({"voltage": clip(voltage, -p.v_max, p.v_max)}, {"integral": 0.0})
 
-    error = p.ratio * (_rate_asked(p, q, asked) - qd)
+    error = p.ratio * (_rate_wanted(p, q, setpoint) - qd)
     wanted = p.kp * error + p.ki * integral
     winding_up = either(both(wanted > p.v_max, error > 0.0), both(wanted < -p.v_max, error < 0.0))
     return Control({"voltage": clip(wanted, -p.v_max, p.v_max)}, {"integral": where(winding_up, 0.0, error)})
 
 
-def balanced(p: Any, tau_m: Real, asked: Asked, *, q: Real, qd: Real) -> dict[str, Real]:
+def balanced(p: Any, tau_m: Real, setpoint: Setpoint, *, q: Real, qd: Real) -> dict[str, Real]:
     """The integral with which the loop sets the voltage that drives its motor with this torque, N m."""
-    if asked.kind == "torque":
+    if setpoint.kind == "torque":
         return {"integral": 0.0}
     tau_m = clip(tau_m, -p.tau_max, p.tau_max)
     voltage = clip(p.resistance / p.kt * tau_m + p.kt * p.ratio * qd, -p.v_max, p.v_max)
-    return {"integral": wound(p, voltage, p.ratio * (_rate_asked(p, q, asked) - qd))}
+    return {"integral": wound(p, voltage, p.ratio * (_rate_wanted(p, q, setpoint) - qd))}
 
 
 def wound(p: Any, wanted: Real, error: Real) -> Real:
@@ -75,7 +75,7 @@ def full(p: Any) -> dict[str, Real]:
     return {"voltage": p.v_max}
 
 
-def _rate_asked(p: Any, q: Real, asked: Asked) -> Real:
-    if asked.kind == "position":
-        return asked.slope + p.k_position * (asked.value - q)
-    return asked.value
+def _rate_wanted(p: Any, q: Real, setpoint: Setpoint) -> Real:
+    if setpoint.kind == "position":
+        return setpoint.slope + p.k_position * (setpoint.value - q)
+    return setpoint.value

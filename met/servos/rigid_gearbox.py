@@ -32,7 +32,7 @@ from met.trace import Real
 
 def control(p: Any, held: Any, seen: Seen) -> Control:
     """The rate loop: the motor's voltage."""
-    return rate_loop.rate_loop(p, held.integral, seen.asked, q=seen.q, qd=seen.qd)
+    return rate_loop.rate_loop(p, held.integral, seen.setpoint, q=seen.q, qd=seen.qd)
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
@@ -53,7 +53,7 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
 def balance(p: Any, torque: Real, seen: Seen) -> Mapping[str, Real]:
     """The motor gives what the joint and friction take; the loop's integral is what that wants."""
     rubs, bent = steady(p, p.ratio * seen.qd)
-    return {**bent, **rate_loop.balanced(p, torque / p.ratio + rubs, seen.asked, q=seen.q, qd=seen.qd)}
+    return {**bent, **rate_loop.balanced(p, torque / p.ratio + rubs, seen.setpoint, q=seen.q, qd=seen.qd)}
 
 
 def fastest(p: Any) -> Real:

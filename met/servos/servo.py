@@ -15,17 +15,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from met.frozen import frozen
+from met.messages.renamed import old_fields, old_names
 from met.parameter import Memory, Only, Parameter, Signal, State, there
 from met.servos.motor import Motor
 from met.trace import Real, Truth
 
 
 @frozen
-class Asked:
-    """What the joint's command asks at a tick: its kind, its value and the value's rate of change.
+class Setpoint:
+    """The joint's setpoint at a tick or a stage: the kind of its command, its value and the value's rate of change.
 
     kind   "rate" (value in rad/s), "position" (rad), "torque" (N m, at the joint) or "acceleration" (rad/s^2); m/s, m,
            N and m/s^2 on a prismatic joint
@@ -37,12 +38,13 @@ class Asked:
     slope: Real
 
 
+@old_fields(asked="setpoint")
 @frozen
 class Seen:
-    """What the servo's control law sees, at a tick or a stage.
+    """The quantities that the servo's control law sees, at a tick or a stage.
 
     q, qd   position and rate as the servo's encoder and tachometer measure them (`Servo.measured`), through sensors
-    asked   the command
+    setpoint  of the joint's command
     period  time from this tick to the next, s; 0 of a continuous law
     time    of the tick or stage, s
     states  the servo's own states by name, which sensors on the motor's side see; `states.motor_rate`
@@ -50,7 +52,7 @@ class Seen:
 
     q: Real
     qd: Real
-    asked: Asked
+    setpoint: Setpoint
     period: float
     time: Real = 0.0
     states: Any = None
@@ -223,3 +225,7 @@ def parts(servo: Servo, words: Mapping[str, str], *, continuous: bool = False) -
         tuple(part for part in servo.signals if there(part, words)),
         continuous,
     )
+
+
+if not TYPE_CHECKING:  # a type checker knows the new names alone
+    __getattr__ = old_names(__name__, {"Asked": "Setpoint"}, globals())

@@ -17,7 +17,7 @@ from met.trace import Real, Truth, absolute, both, clip, sign, where
 
 
 @frozen
-class Side:
+class JointSide:
     """One substituted joint's side of the balance.
 
     ratio    N;  inertia: N^2 (J_m + c), kg m^2 (kg)
@@ -46,7 +46,7 @@ class Balanced:
 Matrix = Sequence[Sequence[Real]]
 
 
-def balanced(sides: Sequence[Side], Lambda: Matrix, b_0: Sequence[Real]) -> list[Balanced]:
+def balanced(sides: Sequence[JointSide], Lambda: Matrix, b_0: Sequence[Real]) -> list[Balanced]:
     """The motion of all joints. Lambda, b_0: tau_load = Lambda qdd + b_0, joint side.
 
     At rest a joint begins stuck, and passes follow in which all that friction does not hold break away at once, and
@@ -70,13 +70,13 @@ def balanced(sides: Sequence[Side], Lambda: Matrix, b_0: Sequence[Real]) -> list
     ]  # fmt: skip
 
 
-def bare(sides: Sequence[Side], Lambda: Matrix, b_0: Sequence[Real]) -> list[Balanced]:
+def bare(sides: Sequence[JointSide], Lambda: Matrix, b_0: Sequence[Real]) -> list[Balanced]:
     """The same without friction, as eq. 10 of the paper has it."""
     qdd = solved(sides, Lambda, b_0, [1.0] * len(sides), dry=False)
     return [Balanced(a, 0.0, 1.0, side.net) for side, a in zip(sides, qdd, strict=True)]
 
 
-def _decided(side: Side, s: Real, qdd: Real, load: Real) -> Real:
+def _decided(side: JointSide, s: Real, qdd: Real, load: Real) -> Real:
     need = side.net - load / side.ratio
     breaks_away = both(s == 0.0, absolute(need) > side.dry)
     turned_back = both(s != 0.0, s * qdd < 0.0)
@@ -89,7 +89,7 @@ def loads(Lambda: Matrix, b_0: Sequence[Real], qdd: Sequence[Real]) -> list[Real
 
 
 def solved(
-    sides: Sequence[Side], Lambda: Matrix, b_0: Sequence[Real], s: Sequence[Real], *, dry: bool = True
+    sides: Sequence[JointSide], Lambda: Matrix, b_0: Sequence[Real], s: Sequence[Real], *, dry: bool = True
 ) -> list[Real]:
     """qdd for these directions of sliding, exactly 0 where s is: elimination in order, the matrix being definite."""
     m = len(sides)

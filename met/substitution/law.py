@@ -8,9 +8,10 @@ and what acceleration the arm is told.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from met.frozen import frozen
+from met.messages.renamed import old_names
 from met.parameter import Memory, Parameter
 from met.servos.motor import Motor
 from met.substitution.balance import Balanced
@@ -18,8 +19,8 @@ from met.trace import Real
 
 
 @frozen
-class Told:
-    """What is known of one substituted joint at a tick; shaft side but for b_0.
+class LawInput:
+    """All that a law is told of one substituted joint at a tick; shaft side but for b_0.
 
     motor    as the servo believes it;  inertia: of the bed's shaft, kg m^2
     rate     filtered rate read now, before: at the tick before, rad/s
@@ -43,8 +44,8 @@ class Told:
 
 
 @frozen
-class Given:
-    """What a law gives: load torque on the shaft (N m), acceleration of the joint for the arm (rad/s^2; m/s^2)."""
+class LawOutput:
+    """The answer of a law: load torque on the shaft (N m), joint acceleration for the arm (rad/s^2; m/s^2)."""
 
     torque: Real
     qdd: Real
@@ -57,7 +58,7 @@ class Law:
     observer  whether it has one: parameters `torque_noise`, `drift`, `reading_noise`
     balance   "full": friction is part of the balance, means over the tick; "bare": neither; "none": there is none
     memory    of its own, one a joint
-    give      (p, held, told, load) -> Given of each joint, and its new memory by name. p, held, told: one a joint;
+    give      (p, held, told, load) -> LawOutput of each joint, and its new memory by name. p, held, told: one a joint;
               load: joint accelerations -> Lambda qdd + b_0, N m (N)
     """
 
@@ -68,8 +69,8 @@ class Law:
     balance: Literal["full", "bare", "none"] = "full"
     memory: tuple[Memory, ...] = ()
     give: Callable[
-        [Sequence[Any], Sequence[Any], Sequence[Told], Callable[[Sequence[Real]], Sequence[Real]]],
-        Sequence[tuple[Given, Mapping[str, Real]]],
+        [Sequence[Any], Sequence[Any], Sequence[LawInput], Callable[[Sequence[Real]], Sequence[Real]]],
+        Sequence[tuple[LawOutput, Mapping[str, Real]]],
     ]
 
 
@@ -84,3 +85,6 @@ OBSERVER = (
     Parameter(name="reading_noise", unit="rad^2/s", default=1e-5, above=0.0, doc="density of the reading's noise"),
 )
 """How far the observer trusts what it believes. 1e-5 rad^2/s is 0.1 rad/s, rms, at 1 kHz."""
+
+if not TYPE_CHECKING:  # a type checker knows the new names alone
+    __getattr__ = old_names(__name__, {"Told": "LawInput", "Given": "LawOutput"}, globals())

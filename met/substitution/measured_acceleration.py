@@ -13,13 +13,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from met.parameter import Memory, Parameter
-from met.substitution.law import Given, Law, Told
+from met.substitution.law import Law, LawInput, LawOutput
 from met.trace import Real, exp
 
 
 def give(
-    p: Sequence[Any], held: Sequence[Any], told: Sequence[Told], load: Callable[[Sequence[Real]], Sequence[Real]]
-) -> Sequence[tuple[Given, Mapping[str, Real]]]:
+    p: Sequence[Any], held: Sequence[Any], told: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
+) -> Sequence[tuple[LawOutput, Mapping[str, Real]]]:
     shaft = []
     for own, memory, joint in zip(p, held, told, strict=True):
         new = (joint.rate - joint.before) / joint.period
@@ -29,7 +29,7 @@ def give(
     given = []
     for a, joint_a, joint, taken in zip(shaft, qdd, told, load(qdd), strict=True):
         torque = -taken / joint.motor.ratio + (joint.inertia - joint.motor.inertia) * a
-        given.append((Given(torque, joint_a), {"acceleration": a}))
+        given.append((LawOutput(torque, joint_a), {"acceleration": a}))
     return given
 
 

@@ -18,7 +18,7 @@ Square = tuple[Four, Four, Four, Four]
 
 
 @frozen
-class Model:
+class DiscreteModel:
     """The bed over one tick.
 
     A, B   x at the next tick is A x + B u
@@ -28,7 +28,7 @@ class Model:
     B: Four
 
 
-def model(*, inertia: Real, damping: Real, f_cut: Real, period: Real) -> Model:
+def model(*, inertia: Real, damping: Real, f_cut: Real, period: Real) -> DiscreteModel:
     """The bed that is believed in: shaft inertia (kg m^2), Kt^2/R + F_v (N m s/rad, above 0), filter (Hz), tick (s)."""
     decay = damping / inertia
     of = butterworth.over(f_cut, period)
@@ -41,10 +41,10 @@ def model(*, inertia: Real, damping: Real, f_cut: Real, period: Real) -> Model:
 
     columns = [after(*(1.0 if i == j else 0.0 for i in range(5))) for j in range(5)]
     rows = tuple((columns[0][i], columns[1][i], columns[2][i], columns[3][i]) for i in range(4))
-    return Model((rows[0], rows[1], rows[2], rows[3]), columns[4])
+    return DiscreteModel((rows[0], rows[1], rows[2], rows[3]), columns[4])
 
 
-def predicted(of: Model, x: Four, u: Real) -> Four:
+def predicted(of: DiscreteModel, x: Four, u: Real) -> Four:
     """x at the next tick, with the torque u (N m) held until then."""
     rows = [sum((a * b for a, b in zip(row, x, strict=True)), b * u) for row, b in zip(of.A, of.B, strict=True)]
     return rows[0], rows[1], rows[2], rows[3]
@@ -77,7 +77,7 @@ def gain_of(P: Square, noise: Noise) -> Four:
     return P[0][1] / total, P[1][1] / total, P[2][1] / total, P[3][1] / total
 
 
-def next_covariance(of: Model, P: Square, noise: Noise) -> Square:
+def next_covariance(of: DiscreteModel, P: Square, noise: Noise) -> Square:
     """The covariance of x before the next reading, from that before this one: one turn of Riccati's recursion."""
     gain = gain_of(P, noise)
     read = [[P[i][j] - gain[i] * P[1][j] for j in range(4)] for i in range(4)]

@@ -11,23 +11,23 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from met.substitution.law import BAND, Given, Law, Told
+from met.substitution.law import BAND, Law, LawInput, LawOutput
 from met.trace import Real
 
 
-def balanced(told: Told) -> Given:
+def balanced(told: LawInput) -> LawOutput:
     """The load torque that gives the shaft its part in the balance, and the joint's part."""
     found = told.balance
     assert found is not None
     torque = (told.inertia + told.extra) * (told.motor.ratio * found.qdd) - (found.net - found.friction)
-    return Given(torque, found.qdd)
+    return LawOutput(torque, found.qdd)
 
 
 def give(
-    p: Sequence[Any], held: Sequence[Any], told: Sequence[Told], load: Callable[[Sequence[Real]], Sequence[Real]]
-) -> Sequence[tuple[Given, Mapping[str, Real]]]:
+    p: Sequence[Any], held: Sequence[Any], told: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
+) -> Sequence[tuple[LawOutput, Mapping[str, Real]]]:
     return [
-        (Given(balanced(joint).torque, (joint.rate - joint.before) / (joint.period * joint.motor.ratio)), {})
+        (LawOutput(balanced(joint).torque, (joint.rate - joint.before) / (joint.period * joint.motor.ratio)), {})
         for joint in told
     ]
 

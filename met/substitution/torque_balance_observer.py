@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from met.substitution.law import BAND, OBSERVER, Given, Law, Told
+from met.substitution.law import BAND, OBSERVER, Law, LawInput, LawOutput
 from met.substitution.torque_balance import balanced
 from met.trace import Real
 
 
 def give(
-    p: Sequence[Any], held: Sequence[Any], told: Sequence[Told], load: Callable[[Sequence[Real]], Sequence[Real]]
-) -> Sequence[tuple[Given, Mapping[str, Real]]]:
+    p: Sequence[Any], held: Sequence[Any], told: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
+) -> Sequence[tuple[LawOutput, Mapping[str, Real]]]:
     return [(balanced(joint), {}) for joint in told]
 
 

@@ -14,19 +14,19 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from met.parameter import Parameter
-from met.substitution.law import BAND, OBSERVER, Given, Law, Told
+from met.substitution.law import BAND, OBSERVER, Law, LawInput, LawOutput
 from met.substitution.torque_balance import balanced
 from met.trace import Real
 
 
 def give(
-    p: Sequence[Any], held: Sequence[Any], told: Sequence[Told], load: Callable[[Sequence[Real]], Sequence[Real]]
-) -> Sequence[tuple[Given, Mapping[str, Real]]]:
-    given: list[tuple[Given, Mapping[str, Real]]] = []
+    p: Sequence[Any], held: Sequence[Any], told: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
+) -> Sequence[tuple[LawOutput, Mapping[str, Real]]]:
+    given: list[tuple[LawOutput, Mapping[str, Real]]] = []
     for own, joint in zip(p, told, strict=True):
         pull = own.gain * joint.inertia / joint.period * (joint.w_ref - joint.w)
         shared = balanced(joint)
-        given.append((Given(shared.torque + pull, shared.qdd), {}))
+        given.append((LawOutput(shared.torque + pull, shared.qdd), {}))
     return given
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from met.trace.graph import OPERANDS, TRUTHS, Node
 from met.trace.program import WhileAny
-from met.trace.recording import Block, Recording, Section, Step
+from met.trace.recording import Branch, CodeSection, RecordedControl, Recording
 
 # operands that are truths, by operation and position; all others are numbers
 _TRUTH_OPERANDS = {("and", 1), ("and", 2), ("where", 1)}
@@ -57,7 +57,7 @@ def check_nodes(where: str, nodes: Sequence[Node]) -> None:
                 raise ValueError(f"{where}: node {i}, `{op}`, takes node {ref >> 1}, `{kind}`, for what it is not")
 
 
-def _check_results(section: Section, cells: set[str], columns: int, outputs: int) -> None:
+def _check_results(section: CodeSection, cells: set[str], columns: int, outputs: int) -> None:
     for kind, there, results in (
         ("cell", cells, section.stores), ("column", range(columns), section.records),
         ("output", range(outputs), section.outputs),
@@ -71,9 +71,9 @@ def _check_results(section: Section, cells: set[str], columns: int, outputs: int
             raise ValueError(f"{section.name}: it sets a {kind} twice")
 
 
-def _check_control(body: Sequence[Step], sections: int, cells: set[str]) -> None:
+def _check_control(body: Sequence[RecordedControl], sections: int, cells: set[str]) -> None:
     for step in body:
-        if isinstance(step, Block):
+        if isinstance(step, Branch):
             if isinstance(step.condition, WhileAny) and step.condition.cell not in cells:
                 raise ValueError(f"a loop goes by the cell {step.condition.cell!r}, which there is not")
             _check_control(step.body, sections, cells)

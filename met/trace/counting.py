@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from met.frozen import frozen
 from met.trace.graph import Real
-from met.trace.program import Control, Every, Phase, Program, Run, Tape, Unless0, WhileAny
+from met.trace.program import Control, Every, Phase, Program, RunPhase, Tape, Unless0, WhileAny
 
 
 @frozen
@@ -40,7 +40,7 @@ def counting(program: Program) -> tuple[Program, tuple[Loop, ...]]:
                 loop = Loop(node.cell, f"loop.{number}.entries", f"loop.{number}.turns", outer)
                 loops.append(loop)
                 inner = counted(node.body, False)
-                made += [Run(_come_to(loop)), WhileAny(node.cell, node.at_most, (Run(_turn(loop)), *inner))]
+                made += [RunPhase(_come_to(loop)), WhileAny(node.cell, node.at_most, (RunPhase(_turn(loop)), *inner))]
             elif isinstance(node, (Every, Unless0)):
                 made.append(replace(node, body=counted(node.body, outer)))
             else:
@@ -49,7 +49,7 @@ def counting(program: Program) -> tuple[Program, tuple[Loop, ...]]:
 
     start, tick = counted(program.start, True), counted(program.tick, True)
     names = tuple(name for loop in loops for name in (loop.entries, loop.turns))
-    end = (*program.end, Run(_told(names)))
+    end = (*program.end, RunPhase(_told(names)))
     return replace(program, start=start, tick=tick, end=end, outputs=(*program.outputs, *names)), tuple(loops)
 
 

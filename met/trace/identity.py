@@ -18,7 +18,7 @@ from typing import Any
 
 from met.trace.graph import OPERANDS, live
 from met.trace.program import WhileAny
-from met.trace.recording import Block, Recorded, Recording, Section, Step
+from met.trace.recording import Branch, CodeSection, RecordedControl, Recording, RecordSection
 from met.trace.slicing import cells_behind, slice_roots
 
 
@@ -83,18 +83,18 @@ class _Writer:
     def _put(self, *words: Any) -> None:
         self.lines.append(" ".join(map(str, words)))
 
-    def _control(self, body: Iterable[Step]) -> list[Any]:
+    def _control(self, body: Iterable[RecordedControl]) -> list[Any]:
         """A body of control, without what nothing here needs."""
         kept: list[Any] = []
         for step in body:
-            if isinstance(step, Block):
+            if isinstance(step, Branch):
                 inner = self._control(step.body)
                 if inner:
                     kept.append([*self._condition(step.condition), inner])
                 continue
             section = self._section(step.section)
             if section is not None:
-                kept.append(["row", step.divisor, section] if isinstance(step, Recorded) else section)
+                kept.append(["row", step.divisor, section] if isinstance(step, RecordSection) else section)
         return kept
 
     def _condition(self, condition: Any) -> list[Any]:
@@ -117,7 +117,7 @@ class _Writer:
             self._write(section, self.sections[number])
         return self.sections[number]
 
-    def _write(self, section: Section, number: int) -> None:
+    def _write(self, section: CodeSection, number: int) -> None:
         order = live(section.nodes, slice_roots(section, self.needed, self.outputs, self.columns))
         place = {i: 2 * n for n, i in enumerate(order)}
         self._put("section", number)

@@ -45,7 +45,7 @@ class Tape(Protocol):
         """One of the program's inputs."""
 
     def record(self, column: int, value: Real) -> None:
-        """One column of the row that is being recorded; only in a `Record`."""
+        """One column of the row that is being recorded; only in a `RecordPhase`."""
 
     def output(self, name: str, value: Real) -> None:
         """One of the program's outputs; only in `end`."""
@@ -63,14 +63,14 @@ class Phase:
 
 
 @frozen
-class Run:
-    """A phase, at this point. Neighbouring `Run`s become one straight piece."""
+class RunPhase:
+    """A phase, at this point. Neighbouring `RunPhase`s become one straight piece."""
 
     phase: Phase
 
 
 @frozen
-class Call:
+class CallPhase:
     """A phase, at this point, whose code is there once however often it is called: it stays a piece of its own."""
 
     phase: Phase
@@ -105,14 +105,14 @@ class WhileAny:
 
 
 @frozen
-class Record:
+class RecordPhase:
     """A phase that records row k // divisor, at ticks that `divisor` divides; nothing where no record is kept."""
 
     phase: Phase
     divisor: int
 
 
-Control = Run | Call | Every | Unless0 | WhileAny | Record
+Control = RunPhase | CallPhase | Every | Unless0 | WhileAny | RecordPhase
 
 
 @frozen
@@ -136,8 +136,10 @@ class Program:
 
     @property
     def record_divisor(self) -> int:
-        """Ticks a row; 1 where nothing is recorded. All `Record`s of a program have one divisor."""
-        divisors = {node.divisor for node in walk((*self.start, *self.tick, *self.end)) if isinstance(node, Record)}
+        """Ticks a row; 1 where nothing is recorded. All `RecordPhase`s of a program have one divisor."""
+        divisors = {
+            node.divisor for node in walk((*self.start, *self.tick, *self.end)) if isinstance(node, RecordPhase)
+        }
         if len(divisors) > 1:
             raise ValueError(f"a program records at one rate, not at every {sorted(divisors)} ticks")
         return divisors.pop() if divisors else 1

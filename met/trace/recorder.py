@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from met.trace import check
 from met.trace.fuse import fused
 from met.trace.graph import Graph, Real, Truth
-from met.trace.program import Call, Control, Every, Phase, Program, Record, Run, Unless0, WhileAny, walk
-from met.trace.recording import Block, Recorded, Recording, Section, Step, Straight
+from met.trace.program import CallPhase, Control, Every, Phase, Program, RecordPhase, RunPhase, Unless0, WhileAny, walk
+from met.trace.recording import Branch, CodeSection, RecordedControl, Recording, RecordSection, RunSection
 from met.trace.scalar import Mask, Scalar
 from met.trace.slicing import cells_behind, slice_roots
 
@@ -85,7 +85,7 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
     Stores that no phase and no condition ever reads are dropped with all that only they need; then, unless `fuse` is
     false, products are fused into sums (`met.trace.fuse`).
     """
-    sections: list[Section] = []
+    sections: list[CodeSection] = []
     made: dict[tuple[tuple[int, ...], str], int] = {}
 
     def section(phases: list[Phase], where: str) -> int:
@@ -98,7 +98,7 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
             made[key] = len(sections)
             names = list(dict.fromkeys(phase.name for phase in phases))
             sections.append(
-                Section(
+                CodeSection(
                     "+".join(names[:3] + ["..."] * (len(names) > 3)),
                     tuple(tape.graph.nodes),
                     tuple(
@@ -113,28 +113,28 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
             )
         return made[key]
 
-    def steps(body: tuple[Control, ...], where: str) -> tuple[Step, ...]:
-        result: list[Step] = []
+    def steps(body: tuple[Control, ...], where: str) -> tuple[RecordedControl, ...]:
+        result: list[RecordedControl] = []
         waiting: list[Phase] = []
 
         def flush() -> None:
             if waiting:
-                result.append(Straight(section(waiting, where)))
+                result.append(RunSection(section(waiting, where)))
                 waiting.clear()
 
         for node in _flat(body):
-            if isinstance(node, Run):
+            if isinstance(node, RunPhase):
                 waiting.append(node.phase)
                 continue
             flush()
-            if isinstance(node, Call):
-                result.append(Straight(section([node.phase], where)))
-            elif isinstance(node, Record):
+            if isinstance(node, CallPhase):
+                result.append(RunSection(section([node.phase], where)))
+            elif isinstance(node, RecordPhase):
                 if where != "tick":
                     raise ValueError(f"{node.phase.name} records in `{where}`; rows belong to ticks")
-                result.append(Recorded(section([node.phase], "record"), node.divisor))
+                result.append(RecordSection(section([node.phase], "record"), node.divisor))
             else:
-                result.append(Block(node, steps(node.body, where)))
+                result.append(Branch(node, steps(node.body, where)))
         flush()
         return tuple(result)
 
@@ -167,13 +167,15 @@ def _flat(body: tuple[Control, ...]) -> Iterator[Control]:
 
 
 def _refuse_nested_records(program: Program) -> None:
-    """A row has all its columns at every `divisor`th tick, so a `Record` depends on nothing else."""
+    """A row has all its columns at every `divisor`th tick, so a `RecordPhase` depends on nothing else."""
     for node in walk((*program.start, *_flat(program.tick), *program.end)):
-        if isinstance(node, (Every, Unless0, WhileAny)) and any(isinstance(inner, Record) for inner in walk(node.body)):
+        if isinstance(node, (Every, Unless0, WhileAny)) and any(
+            isinstance(inner, RecordPhase) for inner in walk(node.body)
+        ):
             raise ValueError("a Record stands within another condition; its own divisor says when it records")
 
 
-def _check_complete(program: Program, sections: list[Section]) -> None:
+def _check_complete(program: Program, sections: list[CodeSection]) -> None:
     columns = {column for one in sections for column, _ in one.records}
     missing = sorted(set(range(program.columns)) - columns)
     if missing:
@@ -185,7 +187,7 @@ def _check_complete(program: Program, sections: list[Section]) -> None:
         raise ValueError("a record divisor is at least 1")
 
 
-def _check_written(program: Program, sections: list[Section], asked: set[str]) -> None:
+def _check_written(program: Program, sections: list[CodeSection], asked: set[str]) -> None:
     """Raises ValueError where a cell is read that nothing writes: a name that is misspelt would be 0 for ever."""
     written = {cell for one in sections for cell, _ in one.stores}.union(program.counters)
     for one in sections:
@@ -196,7 +198,7 @@ def _check_written(program: Program, sections: list[Section], asked: set[str]) -
         raise ValueError(f"a loop goes by the cell {cell!r}, which nothing writes")
 
 
-def _without_dead_stores(sections: list[Section], asked: set[str]) -> list[Section]:
+def _without_dead_stores(sections: list[CodeSection], asked: set[str]) -> list[CodeSection]:
     """The sections without stores to cells that nothing live reads."""
     read = set(asked)
     kept = [_storing(one, read) for one in sections]
@@ -212,13 +214,13 @@ def _without_dead_stores(sections: list[Section], asked: set[str]) -> list[Secti
         ]
 
 
-def _storing(section: Section, read: set[str]) -> Section:
+def _storing(section: CodeSection, read: set[str]) -> CodeSection:
     """The section with its stores to these cells alone."""
     stores = tuple(store for store in section.stores if store[0] in read)
-    return Section(section.name, section.nodes, stores, section.records, section.outputs, section.parts)
+    return CodeSection(section.name, section.nodes, stores, section.records, section.outputs, section.parts)
 
 
-def _fused(sections: list[Section], program: Program, body: tuple[Step, ...]) -> list[Section]:
+def _fused(sections: list[CodeSection], program: Program, body: tuple[RecordedControl, ...]) -> list[CodeSection]:
     """The sections with products fused into sums, those of the state as if nothing but the state were computed."""
     outputs: frozenset[int] = frozenset()
     cells: frozenset[str] = frozenset()
@@ -229,11 +231,11 @@ def _fused(sections: list[Section], program: Program, body: tuple[Step, ...]) ->
     for one in sections:
         leading = None if program.state_outputs is None else slice_roots(one, cells, outputs)
         nodes = fused(one.nodes, one.roots, leading)
-        result.append(Section(one.name, tuple(nodes), one.stores, one.records, one.outputs, one.parts))
+        result.append(CodeSection(one.name, tuple(nodes), one.stores, one.records, one.outputs, one.parts))
     return result
 
 
-def _cells(sections: list[Section], asked: set[str]) -> tuple[str, ...]:
+def _cells(sections: list[CodeSection], asked: set[str]) -> tuple[str, ...]:
     """Every cell in use, in order of first use over the program, so that neighbours in time are in memory."""
     names: dict[str, None] = {}
     for one in sections:

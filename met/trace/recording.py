@@ -13,7 +13,7 @@ from met.trace.program import Every, Program, Unless0, WhileAny
 
 
 @frozen
-class Section:
+class CodeSection:
     """Consecutive phases as one recorded piece. References are into `nodes`; what is not live is to be ignored.
 
     stores    (cell, reference), in order of writing; the value a cell has afterwards
@@ -40,14 +40,14 @@ class Section:
 
 
 @frozen
-class Straight:
+class RunSection:
     """Control of a recorded program: the section of that number, here."""
 
     section: int
 
 
 @frozen
-class Recorded:
+class RecordSection:
     """Control of a recorded program: a section that records, at ticks that `divisor` divides."""
 
     section: int
@@ -55,14 +55,14 @@ class Recorded:
 
 
 @frozen
-class Block:
+class Branch:
     """Control of a recorded program: an `Every`, `Unless0` or `WhileAny` (`condition`, its body unused)."""
 
     condition: Every | Unless0 | WhileAny
-    body: tuple[Step, ...]
+    body: tuple[RecordedControl, ...]
 
 
-Step = Straight | Recorded | Block
+RecordedControl = RunSection | RecordSection | Branch
 
 
 @frozen
@@ -70,8 +70,8 @@ class Recording:
     """A recorded program: its sections, the control over them, and the cells, in the order of memory."""
 
     program: Program
-    sections: tuple[Section, ...]
-    start: tuple[Step, ...]
-    tick: tuple[Step, ...]
-    end: tuple[Step, ...]
+    sections: tuple[CodeSection, ...]
+    start: tuple[RecordedControl, ...]
+    tick: tuple[RecordedControl, ...]
+    end: tuple[RecordedControl, ...]
     cells: tuple[str, ...]

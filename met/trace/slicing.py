@@ -6,29 +6,29 @@ from collections.abc import Collection, Iterable, Iterator
 
 from met.trace.graph import live
 from met.trace.program import WhileAny
-from met.trace.recording import Block, Section, Step
+from met.trace.recording import Branch, CodeSection, RecordedControl
 
 
-def sections_in(body: Iterable[Step]) -> Iterator[int]:
+def sections_in(body: Iterable[RecordedControl]) -> Iterator[int]:
     """The numbers of the sections that a body of control runs, in order; one that it runs twice comes twice."""
     for step in body:
-        if isinstance(step, Block):
+        if isinstance(step, Branch):
             yield from sections_in(step.body)
         else:
             yield step.section
 
 
-def loops_in(body: Iterable[Step]) -> Iterator[tuple[str, frozenset[int]]]:
+def loops_in(body: Iterable[RecordedControl]) -> Iterator[tuple[str, frozenset[int]]]:
     """The loops in a body of control, inner ones too: the cell that each goes by, and the sections that it runs."""
     for step in body:
-        if isinstance(step, Block):
+        if isinstance(step, Branch):
             if isinstance(step.condition, WhileAny):
                 yield step.condition.cell, frozenset(sections_in(step.body))
             yield from loops_in(step.body)
 
 
 def slice_roots(
-    section: Section, cells: Collection[str], outputs: Collection[int], columns: Collection[int] = ()
+    section: CodeSection, cells: Collection[str], outputs: Collection[int], columns: Collection[int] = ()
 ) -> list[int]:
     """References of what a section does for these outputs and columns of a row, which need these cells."""
     return [
@@ -39,8 +39,8 @@ def slice_roots(
 
 
 def cells_behind(
-    sections: Iterable[Section],
-    body: Iterable[Step],
+    sections: Iterable[CodeSection],
+    body: Iterable[RecordedControl],
     outputs: Collection[int],
     columns: Collection[int] = (),
     *,

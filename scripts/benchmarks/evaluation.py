@@ -24,7 +24,7 @@ from benchmarks.benchmark import Benchmark, Derived, Target, Untaken, ratio
 from met.backends.llvm import kernel
 from met.dynamics.recursion import solve
 from met.dynamics.tree import Tree
-from met.trace.program import Phase, Program, Run, Tape
+from met.trace.program import Phase, Program, RunPhase, Tape
 
 TITLE = "forward dynamics, ns per evaluation and case, one core, many cases"
 
@@ -71,7 +71,7 @@ def program(arm: Arm, *, dynamic: bool = False) -> Program:
             tape.output(f"qd.{i}", tape.read(f"qd.{i}"))
 
     return Program(
-        1.0, (Run(Phase("start", start)),), (Run(Phase("evaluate", tick)),), (Run(Phase("end", end)),),
+        1.0, (RunPhase(Phase("start", start)),), (RunPhase(Phase("evaluate", tick)),), (RunPhase(Phase("end", end)),),
         tuple(f"{name}.{i}" for name in names for i in numbers), 0, tuple(f"qd.{i}" for i in numbers),
     )  # fmt: skip
 

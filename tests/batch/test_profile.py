@@ -12,22 +12,22 @@ import pytest
 import ic
 from batch.terminal.profile import told
 from ic.find import standard_decks
-from met.analysis.profile import Input, Part, Profile
+from met.analysis.profile import Input, RunProfile, WorkCost
 from met.cli import main
 from tests.batch import plans
 
-MADE_UP = Profile(
+MADE_UP = RunProfile(
     experiment="gains", cases=36, joints=2, lanes=32, vector=8, cpu="znver4", code_bytes=19442, pieces=18, cached=True,
     recording_s=0.0104, compiling_s=0.0057, blocks=2, steps=1500, ns=20.0, peak=50e9, constants=59,
     inputs=(Input("gearbox.kp", 2, 0, 2, 2), Input("links.lower.mass", 1, 1234, 3, 18)),
     parts=(
-        Part("servo computers", "", False, 4.0, 176.0, 96.0, 5.5),
-        Part("first stage", "servo physics", False, 1.0, 18.0, 14.0, 0.75),
-        Part("first stage", "dynamics", False, 1.0, 1411.0, 87.0, 12.25),
-        Part("first stage", "", False, 1.0, 24.0, 12.5, 1.0),
-        Part("recorder", "", False, 0.1, 0.0, 0.0, 0.04),
-        Part("friction decisions", "", True, 0.326, 41.8, 2.3, 0.25),
-        Part("friction splits", "", True, 0.0, 0.0, 0.0, 0.0),
+        WorkCost("servo computers", "", False, 4.0, 176.0, 96.0, 5.5),
+        WorkCost("first stage", "servo physics", False, 1.0, 18.0, 14.0, 0.75),
+        WorkCost("first stage", "dynamics", False, 1.0, 1411.0, 87.0, 12.25),
+        WorkCost("first stage", "", False, 1.0, 24.0, 12.5, 1.0),
+        WorkCost("recorder", "", False, 0.1, 0.0, 0.0, 0.04),
+        WorkCost("friction decisions", "", True, 0.326, 41.8, 2.3, 0.25),
+        WorkCost("friction splits", "", True, 0.0, 0.0, 0.0, 0.0),
     ),
 )  # fmt: skip
 

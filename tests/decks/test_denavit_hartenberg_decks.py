@@ -13,7 +13,7 @@ from met import run as engine
 from met.diagnostic import Problem
 from met.dynamics.kinematics import link_motions
 from met.plan import Experiment
-from met.program.machine import Machine
+from met.program.system import System
 from tests.oracles import denavit_hartenberg as dh
 from tests.oracles.package import Package
 
@@ -27,7 +27,7 @@ SEED = 560
 ])  # fmt: skip
 def test_links_are_where_the_published_rows_have_them(deck: str, rows: tuple[dh.Row, ...], kinds: str) -> None:
     (made,) = ic.compile(deck).experiments
-    tree = Machine(made).tree(lambda _: 0.0)
+    tree = System(made).tree(lambda _: 0.0)
     for q in np.random.default_rng(SEED).uniform(-3.0, 3.0, (10, 6)):
         motions = link_motions(tree, tuple(q), (0.0,) * 6)
         for link, wanted in zip(made.structure.links, dh.poses("classic", rows, kinds, q), strict=True):

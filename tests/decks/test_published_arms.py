@@ -15,7 +15,7 @@ from met import run as engine
 from met.dynamics.kinematics import link_motions
 from met.plan import Experiment
 from met.plan.channel import recordable
-from met.program.machine import Machine
+from met.program.system import System
 from tests.oracles import published_arms as published
 from tests.oracles.package import Package
 from tests.oracles.published_arms import FOOT, INCH, POUND, SLUG, lacks, tensor
@@ -66,7 +66,7 @@ def inertia(made: Experiment, link: str) -> list[float]:
 
 def place(made: Experiment, link: str, degrees: list[float]) -> np.ndarray:
     """Where the origin of the link's frame is at these joint angles."""
-    tree = Machine(made).tree(lambda path: value(made, path))
+    tree = System(made).tree(lambda path: value(made, path))
     found = link_motions(tree, tuple(np.array(degrees) * DEG), (0.0,) * len(degrees))
     return np.array(found[link].pose.p, float)
 

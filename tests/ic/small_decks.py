@@ -6,6 +6,7 @@ from pathlib import Path
 
 import ic
 from ic.driver.compile import Compiled, Select
+from met.messages.render import render
 from met.plan import Experiment
 
 ARM = """\

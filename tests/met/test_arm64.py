@@ -21,7 +21,7 @@ from met.program.build import build
 from met.run import inputs
 from met.trace import atan2, cos, exp, floor, fma, gather, log, rint, sin, sqrt, tanh, where
 from met.trace.noise import Stream, normal
-from met.trace.program import Phase, Program, Record, Run, Tape
+from met.trace.program import Phase, Program, RecordPhase, RunPhase, Tape
 from met.trace.recorder import record as recorded
 
 pytestmark = pytest.mark.slow
@@ -112,7 +112,7 @@ def test_every_operation_has_the_same_bits(tools: None, tmp_path: Path, cpu: str
     def end(t: Tape) -> None:
         t.output("x", t.input("x"))
 
-    program = Program(7.0, (), (Record(Phase("row", row), 1),), (Run(Phase("end", end)),), ("x",), 16, ("x",))
+    program = Program(7.0, (), (RecordPhase(Phase("row", row), 1),), (RunPhase(Phase("end", end)),), ("x",), 16, ("x",))
     rng = np.random.default_rng(3)
     some = rng.standard_normal(90) * 10.0 ** rng.uniform(-9, 4, 90)
     special = [0.0, -0.0, np.inf, -np.inf, np.nan, 5e-324, -1e308, 0.5, 1.5, 2.5]

@@ -46,7 +46,7 @@ from met.trace import (
     where,
 )
 from met.trace.graph import evaluate, live
-from met.trace.program import Every, Phase, Program, Record, Run, Unless0, WhileAny
+from met.trace.program import Every, Phase, Program, RecordPhase, RunPhase, Unless0, WhileAny
 from met.trace.recorder import record
 from tests.instruction_sets import RUNNABLE
 
@@ -111,13 +111,13 @@ def machine_like_program():
 
     return Program(
         300.0,
-        (Run(begin),),
+        (RunPhase(begin),),
         (
-            Every(3, (Run(servo),)),
-            Unless0((Run(step), Run(ask), WhileAny("left", 4, (Run(halve),)))),
-            Record(row, 2),
+            Every(3, (RunPhase(servo),)),
+            Unless0((RunPhase(step), RunPhase(ask), WhileAny("left", 4, (RunPhase(halve),)))),
+            RecordPhase(row, 2),
         ),
-        (Run(finish),),
+        (RunPhase(finish),),
         ("q", "gain"),
         5,
         ("q", "time"),
@@ -199,7 +199,7 @@ def test_bits_do_not_depend_on_recording():
 @pytest.mark.parametrize("columns", [1, 3, 8, 9, 64, 100])
 def test_rows_of_any_width_reach_their_case(columns):
     row = Phase("row", lambda t: [t.record(i, t.input("x") * 1000.0 + t.tick + i / 128.0) for i in range(columns)])
-    program = Program(1.0, (), (Record(row, 1),), (), ("x",), columns, ())
+    program = Program(1.0, (), (RecordPhase(row, 1),), (), ("x",), columns, ())
     for lanes, cpu in ((4, "haswell"), (16, None), (2, None)):
         for cases in (1, 5, 33):
             x = np.arange(1.0, cases + 1.0)[:, None]
@@ -254,7 +254,7 @@ def test_a_row_may_be_longer_than_a_threads_stack():
         for column in range(columns):
             t.record(column, t.input("a") * t.tick + float(column))
 
-    program = Program(10.0, (), (Record(Phase("rows", rows), 1),), (), ("a",), columns)
+    program = Program(10.0, (), (RecordPhase(Phase("rows", rows), 1),), (), ("a",), columns)
     made = kernel.compile(program, 32)
     cases = np.arange(40.0)
     found = []
@@ -311,7 +311,7 @@ def as_program(steps):
             t.output(f"o{i}", value)
 
     outputs = tuple(f"o{i}" for i in range(len(steps)))
-    return Program(1.0, (), (), (Run(Phase("all", body)),), ("x", "y", "z"), 0, outputs)
+    return Program(1.0, (), (), (RunPhase(Phase("all", body)),), ("x", "y", "z"), 0, outputs)
 
 
 @pytest.mark.slow
@@ -363,7 +363,7 @@ def test_not_a_number_reaches_the_end_through_limits():
         t.output("max", maximum(t.input("y"), x))
         t.output("constant", minimum(x, 1.0))
 
-    program = Program(1.0, (), (), (Run(Phase("p", body)),), ("x", "y"), 0, ("clip", "min", "max", "constant"))
+    program = Program(1.0, (), (), (RunPhase(Phase("p", body)),), ("x", "y"), 0, ("clip", "min", "max", "constant"))
     for lanes, cpu, level in ((4, "haswell", 2), (8, None, 3), (8, None, 0)):
         _, outputs = kernel.compile(program, lanes, cpu, level=level).run(np.array([[math.nan, 0.0]]), 0)
         assert np.isnan(outputs).all()
@@ -376,7 +376,7 @@ def test_the_compiler_fuses_nothing_by_itself():
         t.output("product", product)  # a product that is asked for stays one
         t.output("difference", product - t.input("z"))
 
-    program = Program(1.0, (), (), (Run(Phase("p", body)),), ("x", "y", "z"), 0, ("product", "difference"))
+    program = Program(1.0, (), (), (RunPhase(Phase("p", body)),), ("x", "y", "z"), 0, ("product", "difference"))
     x = np.array([[0.1, 0.1, 0.1 * 0.1]])
     for level in (0, 2, 3):
         assert kernel.compile(program, level=level).run(x, 0)[1].tolist() == [[0.1 * 0.1, 0.0]]
@@ -408,9 +408,9 @@ def test_a_long_section_cut_into_pieces_has_the_same_bits():
     )
     program = Program(
         1.0,
-        (Run(start),),
-        (Run(Phase("long", body)),),
-        (Run(end),),
+        (RunPhase(start),),
+        (RunPhase(Phase("long", body)),),
+        (RunPhase(end),),
         ("x",),
         0,
         (*(f"o{i}" for i in range(12)), "a", "b"),
@@ -421,7 +421,7 @@ def test_a_long_section_cut_into_pieces_has_the_same_bits():
     for above, shortest, longest in ((10**9, 1, 1), (100, 20, 60), (100, 200, 700)):
         text = emit(recording, 8, above=above, shortest=shortest, longest=longest)
         loaded = llvm.Loaded(llvm.assemble(text, machine), machine)
-        results.append(kernel.Kernel(recording, 8, machine, loaded, False).run(inputs, 4)[1])
+        results.append(kernel.LlvmKernel(recording, 8, machine, loaded, False).run(inputs, 4)[1])
         assert (text.count('@"long#') > 20) == (longest == 60)
     assert results[0].tobytes() == results[1].tobytes() == results[2].tobytes()
     plain = [list(execute(program, case, 4)[1].values()) for case in inputs]
@@ -455,7 +455,7 @@ def test_tick_0_starts_a_block_afresh():
 def test_a_blocks_inputs_and_cells_may_be_changed_between_steps():
     add = Phase("add", lambda t: t.write("x", t.read("x") + t.input("u")))
     end = Phase("end", lambda t: t.output("x", t.read("x")))
-    block = kernel.compile(Program(1.0, (), (Run(add),), (Run(end),), ("u",), 0, ("x",))).block([[1.0]])
+    block = kernel.compile(Program(1.0, (), (RunPhase(add),), (RunPhase(end),), ("u",), 0, ("x",))).block([[1.0]])
     block.step(0, 2)
     block.inputs[0, 0] = 10.0
     block.cells()["x"][0] += 0.5
@@ -508,7 +508,7 @@ def test_a_processor_without_fma_is_refused_and_on_request_has_the_same_bits(mon
 
 def answer(value):
     body = Phase("p", lambda t: t.output("x", t.input("x") + value))
-    return Program(1.0, (), (), (Run(body),), ("x",), 0, ("x",))
+    return Program(1.0, (), (), (RunPhase(body),), ("x",), 0, ("x",))
 
 
 def outcome(program):

@@ -13,7 +13,7 @@ from met.dynamics.kinematics import link_motions
 from met.dynamics.recursion import solve
 from met.messages.render import render
 from met.plan import Experiment
-from met.program.machine import Machine
+from met.program.system import System
 from tests.oracles.urdf_pinocchio import UrdfPinocchio
 from tests.oracles.worst import Worst, relative
 
@@ -47,7 +47,7 @@ def made_from(path: Path, folder: Path) -> Experiment:
 def see(experiment: Experiment, path: Path, where: str, poses: Worst, torques: Worst, accelerations: Worst) -> None:
     """Compares at random states, each figure as a share of the largest number of its kind; positions of a metre."""
     names, theirs = body(path).names, UrdfPinocchio(path)
-    tree = Machine(experiment).tree(lambda _: 0.0)
+    tree = System(experiment).tree(lambda _: 0.0)
     moving = [joint.name for joint in experiment.structure.moving]
     file_name = {name: written for written, name in names.joints.items()}
     assert sorted(file_name[name] for name in moving) == sorted(theirs.joints), where

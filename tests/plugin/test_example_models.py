@@ -16,7 +16,7 @@ import pytest
 from met import models
 from met import run as engine
 from met.diagnostic import Problem
-from met.servos.servo import Asked, JointMotion, Seen
+from met.servos.servo import JointMotion, Seen, Setpoint
 from met.trace import Formulas, Graph
 from tests.ic.small_decks import check, experiment, messages
 
@@ -49,7 +49,7 @@ class Still:
 
 
 def test_the_servos_computer_hands_the_rate_on() -> None:
-    seen = Seen(q=0.0, qd=0.1, asked=Asked("rate", np.float64(0.4), np.float64(0.0)), period=0.001)
+    seen = Seen(q=0.0, qd=0.1, setpoint=Setpoint("rate", np.float64(0.4), np.float64(0.0)), period=0.001)
     assert load("velocity_servo").control(SERVO, SimpleNamespace(), seen).outputs == {"qd_cmd": 0.4}
 
 

@@ -49,7 +49,7 @@ def recorded() -> tuple[Experiment, Recording, np.ndarray]:
     return experiment, recording, rows
 
 
-def ran(experiment: Experiment, of: kernel.Kernel, cases: np.ndarray | None = None, **options: int) -> np.ndarray:
+def ran(experiment: Experiment, of: kernel.LlvmKernel, cases: np.ndarray | None = None, **options: int) -> np.ndarray:
     inputs = engine.inputs(experiment, np.arange(CASES) if cases is None else cases)
     rows, _ = of.run(inputs, experiment.structure.schedule.ticks, **options)
     assert rows is not None

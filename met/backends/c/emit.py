@@ -23,13 +23,13 @@ from met.frozen import frozen
 from met.trace.graph import OPERANDS, TRUTHS, Node
 from met.trace.primitives import bits_of
 from met.trace.program import Every, Unless0, WhileAny
-from met.trace.recording import Block, Recorded, Recording, Section, Step, Straight
+from met.trace.recording import Branch, CodeSection, RecordedControl, Recording, RecordSection, RunSection
 
 _INFIX = {"mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "and": "&&"}
 
 
 @frozen
-class Source:
+class CSource:
     """A program in C: its text, and what its inputs, outputs and cells are called there, by name."""
 
     text: str
@@ -38,9 +38,9 @@ class Source:
     cells: Mapping[str, str]
 
 
-def emit(recording: Recording) -> Source:
+def emit(recording: Recording) -> CSource:
     """The C of a program."""
-    return _Emitter(recording).source()
+    return _CEmitter(recording).source()
 
 
 def literal(value: float) -> str:
@@ -66,7 +66,7 @@ def _members(prefix: str, names: Iterable[str]) -> dict[str, str]:
     return made
 
 
-class _Emitter:
+class _CEmitter:
     """Writes one program."""
 
     def __init__(self, recording: Recording) -> None:
@@ -80,13 +80,13 @@ class _Emitter:
         self.tables: dict[tuple[float, ...], str] = {}
         self.timed = any(one.nodes[i][0] == "time" for one in recording.sections for i in one.order)
 
-    def source(self) -> Source:
+    def source(self) -> CSource:
         sections = [self._section(n, one) for n, one in enumerate(self.recording.sections)]
         entries = [self._start(), self._tick(), self._end()]
         tables = [f"static const uint64_t {name}[] = {{{', '.join(_pattern(x) for x in table)}}};\n"
                   for table, name in self.tables.items()]  # fmt: skip
         parts = [HEAD, functions(self.called), self._memory(), *tables, *sections, *entries]
-        return Source("\n".join(part for part in parts if part),
+        return CSource("\n".join(part for part in parts if part),
                       *({name: f"met.{member}" for name, member in names.items()}
                         for names in (self.inputs, self.outputs, self.cells)))  # fmt: skip
 
@@ -115,16 +115,16 @@ class _Emitter:
         time = [f"    met.time = met.tick / {literal(self.program.base_hz)};"] if self.timed else []
         return [f"    met.tick = {tick};", *time]
 
-    def _steps(self, body: Sequence[Step], depth: int) -> list[str]:
+    def _steps(self, body: Sequence[RecordedControl], depth: int) -> list[str]:
         pad = "    " * depth
         lines: list[str] = []
         for node in body:
             match node:
-                case Straight(section):
+                case RunSection(section):
                     lines.append(f"{pad}{self.names[section]}();")
-                case Recorded(section, divisor):
+                case RecordSection(section, divisor):
                     lines.append(f"{pad}if (k % {divisor} == 0) {self.names[section]}();")
-                case Block(condition, inner):
+                case Branch(condition, inner):
                     match condition:
                         case Every(divisor):
                             head = f"if (k % {divisor} == 0)"
@@ -138,7 +138,7 @@ class _Emitter:
 
     # One straight piece
 
-    def _section(self, number: int, section: Section) -> str:
+    def _section(self, number: int, section: CodeSection) -> str:
         nodes = section.nodes
         lines: list[str] = []
         drawn: dict[tuple[int, ...], str] = {}

@@ -62,7 +62,7 @@ class Library:
         inputs = checked_inputs(program, inputs)
         rows = np.empty((len(inputs), ticks // program.record_divisor + 1, program.columns)) if record else None
         outputs = np.empty((len(inputs), len(program.outputs)))
-        block = Case(self, np.zeros((1, len(program.inputs))))
+        block = CBlock(self, np.zeros((1, len(program.inputs))))
         for case, given in enumerate(inputs):
             block.inputs[:, 0] = given
             found = block.recorded(0, ticks)
@@ -73,11 +73,11 @@ class Library:
                 progress(case + 1)
         return rows, outputs
 
-    def block(self, inputs: np.ndarray) -> Case:
-        return Case(self, inputs)
+    def block(self, inputs: np.ndarray) -> CBlock:
+        return CBlock(self, inputs)
 
 
-class Case:
+class CBlock:
     """One case that is stepped by hand, as `met.backends.backend.Block` has it."""
 
     def __init__(self, library: Library, inputs: np.ndarray) -> None:

@@ -17,7 +17,7 @@ from met.backends.llvm.pieces import CUT_ABOVE, LONGEST, SHORTEST, Piece, cut
 from met.backends.llvm.pieces import check as check_pieces
 from met.trace import check
 from met.trace.graph import OPERANDS, TRUTHS
-from met.trace.recording import Recording, Section
+from met.trace.recording import CodeSection, Recording
 
 _CALLS = {"sqrt": "llvm.sqrt", "floor": "llvm.floor", "rint": "llvm.roundeven", "abs": "llvm.fabs", "fma": "llvm.fma"}
 _ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
@@ -47,7 +47,7 @@ def emit(
     inline  whether short code may be put in its caller's place; never where its time alone is asked for
     above, shortest, longest   operations of a section that is cut, and of its pieces (met/backends/llvm/pieces.py)
     """
-    return _Emitter(recording, lanes, vector or lanes, width, inline, (above, shortest, longest)).text()
+    return _LlvmEmitter(recording, lanes, vector or lanes, width, inline, (above, shortest, longest)).text()
 
 
 _NAME = re.compile(r'[%@](?:"[^"]*"|[\w.$#-]+)|^[\w.$-]+(?=:)|  ;.*', re.MULTILINE)
@@ -94,7 +94,7 @@ def _remark(name: str) -> str:
     return f"  ; {name}" if name.isprintable() and name else ""
 
 
-class _Emitter:
+class _LlvmEmitter:
     """Writes one module."""
 
     def __init__(
@@ -159,7 +159,7 @@ class _Emitter:
 
     # One straight piece
 
-    def _function(self, symbol: str, section: Section, piece: Piece) -> str:
+    def _function(self, symbol: str, section: CodeSection, piece: Piece) -> str:
         nodes = section.nodes
         lines: list[str] = []
         put = lines.append

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 from met.trace.program import Every, Unless0, WhileAny
-from met.trace.recording import Block, Recorded, Recording, Step, Straight
+from met.trace.recording import Branch, RecordedControl, Recording, RecordSection, RunSection
 
 ENTRY = "met_run"
 
@@ -87,23 +87,23 @@ class _Entry:
         self.put(f"  %{n}.rest = urem i64 {self.now[0]}, {divisor}", f"  %{n} = icmp eq i64 %{n}.rest, 0")
         return f"%{n}"
 
-    def steps(self, body: Iterable[Step]) -> None:
+    def steps(self, body: Iterable[RecordedControl]) -> None:
         for node in body:
             match node:
-                case Straight(section):
+                case RunSection(section):
                     self.call(section)
-                case Recorded():
+                case RecordSection():
                     self.record(node)
-                case Block(Every(divisor), inner):
+                case Branch(Every(divisor), inner):
                     self.guarded(self.due(divisor), "every", partial(self.steps, inner))
-                case Block(Unless0(), inner):
+                case Branch(Unless0(), inner):
                     n = self.label("later")
                     self.put(f"  %{n} = icmp ne i64 {self.now[0]}, 0")
                     self.guarded(f"%{n}", "unless0", partial(self.steps, inner))
-                case Block(WhileAny() as condition, inner):
+                case Branch(WhileAny() as condition, inner):
                     self.while_any(condition, inner)
 
-    def while_any(self, condition: WhileAny, body: tuple[Step, ...]) -> None:
+    def while_any(self, condition: WhileAny, body: tuple[RecordedControl, ...]) -> None:
         n = self.label("w")
         vector = f"<{self.lanes} x double>"
         self.counters.append(f"  %{n}.p = alloca i64")
@@ -129,7 +129,7 @@ class _Entry:
         self.rare -= 1
         self.put(f"  br label %ask.{n}", f"after.{n}:")
 
-    def record(self, node: Recorded) -> None:
+    def record(self, node: RecordSection) -> None:
         n = self.label("row")
         due = self.due(node.divisor)
         self.put(f"  %{n} = and i1 {due}, %recording")

@@ -40,7 +40,9 @@ _CHUNK, _CALL = 256, 1 << 16
 _SIGNATURE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4, *[ctypes.c_int64] * 6)
 
 
-def compile(program: Program, lanes: int | None = None, cpu: str | None = None, *, level: int | None = None) -> Kernel:
+def compile(
+    program: Program, lanes: int | None = None, cpu: str | None = None, *, level: int | None = None
+) -> LlvmKernel:
     """Machine code of a program.
 
     lanes   cases a block: 2, 4, 8, 16 or 32; by default what is fastest here. Decides nothing but speed.
@@ -58,7 +60,7 @@ def from_recording(
     *,
     level: int | None = None,
     inline: bool = True,
-) -> Kernel:
+) -> LlvmKernel:
     """Machine code of a program that is recorded already. inline: as `met.backends.llvm.emit.emit` has it."""
     from met.backends.llvm import machine as llvm
 
@@ -68,7 +70,7 @@ def from_recording(
     lanes, text = written(recording, machine, lanes, inline=inline)
     name = cache.key(numbered(text), llvm.versions(), machine.cpu, machine.features, str(level))
     code, hit = cache.kept(name, lambda: llvm.assemble(text, machine, level=level))
-    return Kernel(recording, lanes, machine, llvm.Loaded(code, machine), hit)
+    return LlvmKernel(recording, lanes, machine, llvm.Loaded(code, machine), hit)
 
 
 def written(
@@ -104,7 +106,7 @@ def _refuse_or_warn(machine: Machine) -> None:
 
 
 @frozen
-class Kernel:
+class LlvmKernel:
     """Machine code of a program. `cached` says whether it was found rather than made."""
 
     recording: Recording
@@ -238,19 +240,19 @@ class Kernel:
         flat = results.reshape(-1)[: blocks * width * lanes].reshape(blocks, width, lanes)
         outputs[:] = flat.transpose(0, 2, 1).reshape(blocks * lanes, width)[:cases]
 
-    def block(self, inputs: np.ndarray) -> Block:
+    def block(self, inputs: np.ndarray) -> LlvmBlock:
         """One block whose state stays from call to call. inputs [case, input]; at most `lanes` cases."""
-        return Block(self, inputs)
+        return LlvmBlock(self, inputs)
 
 
-class Block:
+class LlvmBlock:
     """Up to `lanes` cases, stepped by hand: the bed's loop, a debugger.
 
     inputs    [input, lane], to be changed at will between steps
     outputs   [output, lane], as of the last step
     """
 
-    def __init__(self, kernel: Kernel, inputs: np.ndarray | Sequence[Sequence[float]]) -> None:
+    def __init__(self, kernel: LlvmKernel, inputs: np.ndarray | Sequence[Sequence[float]]) -> None:
         given = np.atleast_2d(np.asarray(inputs, dtype=np.float64))
         program = kernel.program
         if not 1 <= len(given) <= kernel.lanes or given.shape[1] != len(program.inputs):

@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 from met.trace.graph import LEAVES, OPERANDS
-from met.trace.recording import Section
+from met.trace.recording import CodeSection
 
 # operations above which a section is cut, and the bounds of a piece
 CUT_ABOVE = 500
@@ -44,12 +44,12 @@ class Piece:
     small: bool = True
 
 
-def operations(section: Section) -> list[int]:
+def operations(section: CodeSection) -> list[int]:
     """Positions of the live nodes that are to be computed."""
     return [i for i in section.order if section.nodes[i][0] not in LEAVES]
 
 
-def cut(section: Section, above: int = CUT_ABOVE, shortest: int = SHORTEST, longest: int = LONGEST) -> list[Piece]:
+def cut(section: CodeSection, above: int = CUT_ABOVE, shortest: int = SHORTEST, longest: int = LONGEST) -> list[Piece]:
     """The section's pieces, at least one."""
     nodes = section.nodes
     body = operations(section)
@@ -96,7 +96,7 @@ def cut(section: Section, above: int = CUT_ABOVE, shortest: int = SHORTEST, long
     return pieces
 
 
-def check(section: Section, pieces: list[Piece]) -> None:
+def check(section: CodeSection, pieces: list[Piece]) -> None:
     """Raises ValueError where the pieces are not the section: an operation or a store that is missing, or a value that
     a piece takes and does not have."""
     nodes = section.nodes
@@ -126,7 +126,7 @@ def check(section: Section, pieces: list[Piece]) -> None:
         raise ValueError(f"{section.name}: its pieces do not store what it stores")
 
 
-def _bounds(section: Section, body: list[int], number: dict[int, int], shortest: int, longest: int) -> list[int]:
+def _bounds(section: CodeSection, body: list[int], number: dict[int, int], shortest: int, longest: int) -> list[int]:
     """Where to cut: each piece ends where the fewest values cross, within its bounds."""
     nodes = section.nodes
     change = [0] * (len(body) + 2)

@@ -10,8 +10,7 @@ from met.backends.backend import checked_inputs
 from met.frozen import frozen
 from met.trace.graph import Node, evaluate
 from met.trace.program import Every, Program, Unless0
-from met.trace.recording import Block as Branch
-from met.trace.recording import Recorded, Recording, Step
+from met.trace.recording import Branch, RecordedControl, Recording, RecordSection
 
 
 @frozen
@@ -43,17 +42,17 @@ class Interpreter:
     ) -> tuple[np.ndarray | None, np.ndarray]:
         program = self.program
         inputs = checked_inputs(program, inputs)
-        block = Cases(self.recording, inputs)
+        block = InterpretedBlock(self.recording, inputs)
         rows = block.recorded(0, ticks)
         if progress is not None:
             progress(len(inputs))
         return rows if record else None, block.outputs.T.copy()
 
-    def block(self, inputs: np.ndarray) -> Cases:
-        return Cases(self.recording, inputs)
+    def block(self, inputs: np.ndarray) -> InterpretedBlock:
+        return InterpretedBlock(self.recording, inputs)
 
 
-class Cases:
+class InterpretedBlock:
     """Cases that are stepped together, as `met.backends.backend.Block` has it."""
 
     def __init__(self, recording: Recording, inputs: np.ndarray) -> None:
@@ -90,11 +89,11 @@ class Cases:
     def cells(self) -> Mapping[str, np.ndarray]:
         return {name: self.state[slot] for name, slot in self._cell.items()}
 
-    def _follow(self, body: Iterable[Step]) -> None:
+    def _follow(self, body: Iterable[RecordedControl]) -> None:
         """Runs a body of control at this tick."""
         for step in body:
             if not isinstance(step, Branch):
-                if not isinstance(step, Recorded) or self._tick % step.divisor == 0:
+                if not isinstance(step, RecordSection) or self._tick % step.divisor == 0:
                     self._section(step.section)
             elif isinstance(step.condition, Every):
                 if self._tick % step.condition.divisor == 0:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from met.trace.graph import show
 from met.trace.program import Every, WhileAny
-from met.trace.recording import Block, Recorded, Recording, Step
+from met.trace.recording import Branch, RecordedControl, Recording, RecordSection
 
 
 def lines(recording: Recording) -> Iterator[str]:
@@ -30,10 +30,10 @@ def lines(recording: Recording) -> Iterator[str]:
             yield f"    output {program.outputs[output]} = {_operand(reference)}"
 
 
-def _control(steps: Sequence[Step], names: Sequence[str], indent: str) -> Iterator[str]:
+def _control(steps: Sequence[RecordedControl], names: Sequence[str], indent: str) -> Iterator[str]:
     """Control, one line a step with the section's name, the bodies of blocks indented."""
     for step in steps:
-        if isinstance(step, Block):
+        if isinstance(step, Branch):
             match step.condition:
                 case Every(divisor):
                     yield f"{indent}at ticks that {divisor} divides:"
@@ -43,7 +43,7 @@ def _control(steps: Sequence[Step], names: Sequence[str], indent: str) -> Iterat
                 case _:
                     yield f"{indent}at all ticks but tick 0:"
             yield from _control(step.body, names, indent + "    ")
-        elif isinstance(step, Recorded):
+        elif isinstance(step, RecordSection):
             yield f"{indent}section {step.section}, {names[step.section]}, at ticks that {step.divisor} divides"
         else:
             yield f"{indent}section {step.section}, {names[step.section]}"

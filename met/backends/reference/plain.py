@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from met.trace.graph import Real, Truth
-from met.trace.program import Call, Control, Every, Program, Record, Run, Unless0, WhileAny
+from met.trace.program import CallPhase, Control, Every, Program, RecordPhase, RunPhase, Unless0, WhileAny
 
 
 class PlainTape:
@@ -83,9 +83,9 @@ def follow(tape: PlainTape, body: tuple[Control, ...]) -> None:
     """Runs the body once, at the tape's tick."""
     for node in body:
         match node:
-            case Run(phase) | Call(phase):
+            case RunPhase(phase) | CallPhase(phase):
                 phase.body(tape)
-            case Record(phase, divisor):
+            case RecordPhase(phase, divisor):
                 if tape.k % divisor == 0:
                     tape.row = tape.k // divisor
                     phase.body(tape)

@@ -10,34 +10,34 @@ from met.diagnostic import Problem, error
 from met.environments.environment import Environment
 from met.frozen import frozen
 from met.program.control.sensing import replaced, truth
-from met.program.machine import Actuator, Machine, ReadCell
-from met.program.values import Values, answer, parameters, returned
+from met.program.system import Actuator, ReadCell, System
+from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.servo import Control, Seen
 from met.trace import Real
 
 
 @frozen
-class Step:
-    """A step of the dynamics: when it began and its length, s."""
+class StepTimes:
+    """When a step of the dynamics began, and its length, s: `met.environments.window.Step`."""
 
     begin: Real
     step: float
 
 
-def coupled(machine: Machine, actuator: Actuator, read: ReadCell, begin: Real) -> Real | None:
+def coupled(system: System, actuator: Actuator, read: ReadCell, begin: Real) -> Real | None:
     """How far the servo has hold of its joint in the step that began then; None where nothing lets it go, ever."""
     held: Real | None = None
-    step = Step(begin, machine.structure.schedule.step)
-    for owner, model, p in _about(machine, actuator, read):
+    step = StepTimes(begin, system.structure.schedule.step)
+    for owner, model, p in _about(system, actuator, read):
         if model.loose is not None:
             own = 1.0 - answer(owner, model.loose, p, step)
             held = own if held is None else held * own
     return held
 
 
-def given(machine: Machine, actuator: Actuator, read: ReadCell, p: Values, time: Real, found: Control) -> Control:
+def given(system: System, actuator: Actuator, read: ReadCell, p: NamedValues, time: Real, found: Control) -> Control:
     """What comes out of the servo's law."""
-    for owner, model, own in _about(machine, actuator, read):
+    for owner, model, own in _about(system, actuator, read):
         if model.gives is None:
             continue
         if actuator.servo.full is None:
@@ -49,9 +49,9 @@ def given(machine: Machine, actuator: Actuator, read: ReadCell, p: Values, time:
     return found
 
 
-def seen(machine: Machine, actuator: Actuator, read: ReadCell, seen: Seen, last: str | None) -> Seen:
+def seen(system: System, actuator: Actuator, read: ReadCell, seen: Seen, last: str | None) -> Seen:
     """What the law sees. last: what cells begin with that hold what it saw at its last tick; None: there is none."""
-    for owner, model, p in _about(machine, actuator, read):
+    for owner, model, p in _about(system, actuator, read):
         if model.sees is None:
             continue
         for of in quantities(actuator):
@@ -65,9 +65,9 @@ def quantities(actuator: Actuator) -> tuple[str, ...]:
     return ("q", "qd", *(state.name for state in actuator.parts.natural))
 
 
-def _about(machine: Machine, actuator: Actuator, read: ReadCell) -> Iterator[tuple[str, Environment, Values]]:
+def _about(system: System, actuator: Actuator, read: ReadCell) -> Iterator[tuple[str, Environment, NamedValues]]:
     """The models that are about this servo: what to call each, its declaration, its parameters."""
-    for name, model in machine.failing.get(actuator.use.joint, ()):
+    for name, model in system.failing.get(actuator.use.joint, ()):
         owner = f"environment model `{model.name}` (as `{name}`)"
-        p = parameters(owner, f"environment.{name}", model.parameters, lambda path: machine.value(path, read))
+        p = parameters(owner, f"environment.{name}", model.parameters, lambda path: system.value(path, read))
         yield owner, model, p

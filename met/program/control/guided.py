@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 from met import models
 from met.parameter import Parameter
 from met.plan import GuideUse
-from met.program.values import Values, answer, parameters
-from met.servos.servo import Asked
+from met.program.values import NamedValues, answer, parameters
+from met.servos.servo import Setpoint
 from met.trace import Real
 
 if TYPE_CHECKING:
-    from met.program.machine import Machine, ReadCell
+    from met.program.system import ReadCell, System
 
 GUIDE = "guide:"
 """Prefix of cells of guides: the rate and position that a joint is asked, by joint; the time of the tick, by guide."""
@@ -24,26 +24,26 @@ def owner(use: GuideUse) -> str:
     return f"guide `{use.name}` (model {use.model})"
 
 
-def own(machine: Machine, use: GuideUse, read: ReadCell) -> tuple[Values, list[Values]]:
+def own(system: System, use: GuideUse, read: ReadCell) -> tuple[NamedValues, list[NamedValues]]:
     """The guide's parameters, and those of each of its joints."""
     guide = models.find("guide", use.model, use.place)
 
-    def values(head: str, declared: Iterable[Parameter]) -> Values:
-        return parameters(owner(use), head, declared, lambda path: machine.value(path, read))
+    def values(head: str, declared: Iterable[Parameter]) -> NamedValues:
+        return parameters(owner(use), head, declared, lambda path: system.value(path, read))
 
     joints = [values(f"guides.{use.name}.{joint}", guide.of_joint) for joint in use.joints]
     return values(f"guides.{use.name}", guide.parameters), joints
 
 
-def asked(machine: Machine, joint: str, kind: str, use: GuideUse, read: ReadCell, time: Real) -> Asked:
+def setpoint(system: System, joint: str, kind: str, use: GuideUse, read: ReadCell, time: Real) -> Setpoint:
     """What the guide asks of a joint at a time: between its ticks, the rate of the last one and where that leads."""
     guide = models.find("guide", use.model, use.place)
     if guide.course is None:
         rate = read(f"{GUIDE}{joint}.rate")
         if kind == "rate":
-            return Asked(kind, rate, 0.0)
-        return Asked(kind, read(f"{GUIDE}{joint}.position") + rate * (time - read(f"{GUIDE}{use.name}.time")), rate)
-    p, joints = own(machine, use, read)
-    begins = [machine.value(f"initial.{each}.q", read) for each in use.joints]
+            return Setpoint(kind, rate, 0.0)
+        return Setpoint(kind, read(f"{GUIDE}{joint}.position") + rate * (time - read(f"{GUIDE}{use.name}.time")), rate)
+    p, joints = own(system, use, read)
+    begins = [system.value(f"initial.{each}.q", read) for each in use.joints]
     value, slope = answer(owner(use), guide.course, p, joints, begins, time)[use.joints.index(joint)]
-    return Asked(kind, value, slope)
+    return Setpoint(kind, value, slope)

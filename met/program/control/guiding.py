@@ -28,23 +28,23 @@ from met.integrators.integrator import Motion
 from met.plan import COMPONENTS, GuideUse
 from met.program import cells
 from met.program.control.guided import GUIDE, own, owner
-from met.program.machine import Machine, ReadCell
 from met.program.motion import base, bodies, payloads
-from met.program.motion.base import Base
+from met.program.motion.base import BaseMotion
 from met.program.motion.courses import rate_of_rpy, values_and_rates
+from met.program.system import ReadCell, System
 from met.program.values import answer, returned
 from met.trace import Real
 from met.trace.program import Tape
 
 
-def ticking(machine: Machine) -> Iterator[GuideUse]:
+def ticking(system: System) -> Iterator[GuideUse]:
     """The guides that have a computer."""
-    return (use for use in machine.structure.guides if models.find("guide", use.model, use.place).steer is not None)
+    return (use for use in system.structure.guides if models.find("guide", use.model, use.place).steer is not None)
 
 
-def start(machine: Machine, tape: Tape) -> None:
+def start(system: System, tape: Tape) -> None:
     """Where guides begin: their joints' positions, no rates, and the guided frames, from which paths are counted."""
-    for use in ticking(machine):
+    for use in ticking(system):
         tape.write(f"{GUIDE}{use.name}.time", 0.0)
         for joint in use.joints:
             tape.write(f"{GUIDE}{joint}.position", tape.read(f"{joint}.q"))
@@ -53,29 +53,29 @@ def start(machine: Machine, tape: Tape) -> None:
         for memory in guide.memory:
             tape.write(f"guides.{use.name}.{memory.name}", memory.start)
         if guide.components is not None:
-            found = _ArmAt(machine, use, tape.read, *_state(machine, tape, 0.0)).stance(answers=False)
+            found = _ArmAt(system, use, tape.read, *_state(system, tape, 0.0)).stance(answers=False)
             for name, value in zip(_begun(use), (*(x for row in found.R for x in row), *found.p), strict=True):
                 tape.write(name, value)
 
 
-def tick(machine: Machine, tape: Tape, use: GuideUse) -> None:
+def tick(system: System, tape: Tape, use: GuideUse) -> None:
     """One tick of a guide's computer, on the state at this time."""
     guide = models.find("guide", use.model, use.place)
     assert guide.steer is not None
-    period = use.divisor / machine.structure.schedule.base_hz
+    period = use.divisor / system.structure.schedule.base_hz
     begun = {joint: tape.read(f"{GUIDE}{joint}.position") for joint in use.joints}
     positions = {joint: at + period * tape.read(f"{GUIDE}{joint}.rate") for joint, at in begun.items()}
-    y, stands = _state(machine, tape, tape.time)
-    number = {joint.name: i for i, joint in enumerate(machine.joints)}
-    q = [positions.get(joint.name, y.q[i]) for i, joint in enumerate(machine.joints)]
+    y, stands = _state(system, tape, tape.time)
+    number = {joint.name: i for i, joint in enumerate(system.joints)}
+    q = [positions.get(joint.name, y.q[i]) for i, joint in enumerate(system.joints)]
     sight = Sight(
         time=tape.time,
-        slides=tuple(machine.joints[number[joint]].kind == "prismatic" for joint in use.joints),
-        arm=_ArmAt(machine, use, tape.read, y, stands),
-        asked=_ArmAt(machine, use, tape.read, Motion((*q, *y.q[len(q) :]), y.qd, y.x), stands),
-        wanted=_wanted(machine, tape, use),
+        slides=tuple(system.joints[number[joint]].kind == "prismatic" for joint in use.joints),
+        arm=_ArmAt(system, use, tape.read, y, stands),
+        asked=_ArmAt(system, use, tape.read, Motion((*q, *y.q[len(q) :]), y.qd, y.x), stands),
+        wanted=_wanted(system, tape, use),
     )
-    found = answer(owner(use), guide.steer, *own(machine, use, tape.read), sight)
+    found = answer(owner(use), guide.steer, *own(system, use, tape.read), sight)
     shown = returned(owner(use), "steer", found.memory, (memory.name for memory in guide.memory))
     for name, value in shown.items():
         tape.write(f"guides.{use.name}.{name}", value)
@@ -88,19 +88,19 @@ def tick(machine: Machine, tape: Tape, use: GuideUse) -> None:
 class _ArmAt:
     """A `met.guides.guide.Arm`: the arm with its joints at y.q, and what else is known of its motion at this time."""
 
-    def __init__(self, machine: Machine, use: GuideUse, read: ReadCell, y: Motion, stands: Base) -> None:
-        n = len(machine.joints)
-        tree, self._base = machine.tree(read), stands
-        self._free = machine.structure.free
-        self._laden = payloads.laden(machine, read)
+    def __init__(self, system: System, use: GuideUse, read: ReadCell, y: Motion, stands: BaseMotion) -> None:
+        n = len(system.joints)
+        tree, self._base = system.tree(read), stands
+        self._free = system.structure.free
+        self._laden = payloads.laden(system, read)
         self._q, self._qd = y.q[:n], y.qd[:n]
-        names = [joint.name for joint in machine.joints]
+        names = [joint.name for joint in system.joints]
         self._own = [names.index(joint) for joint in use.joints]
-        point = tuple(machine.value(f"guides.{use.name}.point.{axis}", read) for axis in "xyz")
-        link = machine.value(f"guides.{use.name}.link", read)
+        point = tuple(system.value(f"guides.{use.name}.point.{axis}", read) for axis in "xyz")
+        link = system.value(f"guides.{use.name}.link", read)
         self._moves = jacobian(tree, self._q, link, point, stands.pose)
         at_rest = [0.0] * n
-        frame = base.motions(tree, self._q, at_rest, Base(stands.pose))[link]
+        frame = base.motions(tree, self._q, at_rest, BaseMotion(stands.pose))[link]
         self._R, self._p = frame.pose.R, frame.position(point)
 
     def stance(self, *, answers: bool) -> Stance:
@@ -133,10 +133,10 @@ class _ArmAt:
         return [(w, add(v, cross(w, arm))) for w, v in found]
 
 
-def _state(machine: Machine, tape: Tape, time: Real) -> tuple[Motion, Base]:
+def _state(system: System, tape: Tape, time: Real) -> tuple[Motion, BaseMotion]:
     """The arm at an instant, and its base."""
-    y = bodies.begun(machine, cells.state(tape, bodies.coordinates(machine), machine.states))
-    return y, base.base_of(machine, tape.read, y, time)
+    y = bodies.begun(system, cells.state(tape, bodies.coordinates(system), system.states))
+    return y, base.base_of(system, tape.read, y, time)
 
 
 def _begun(use: GuideUse) -> list[str]:
@@ -144,13 +144,13 @@ def _begun(use: GuideUse) -> list[str]:
     return [f"{GUIDE}{use.name}.{name}" for name in (*(f"R{i}{j}" for i in range(3) for j in range(3)), *"xyz")]
 
 
-def _wanted(machine: Machine, tape: Tape, use: GuideUse) -> Stance:
+def _wanted(system: System, tape: Tape, use: GuideUse) -> Stance:
     """The path at this time: its courses, counted from where the guided frame began."""
     begun = [tape.read(name) for name in _begun(use)]
     R: Matrix = tuple(tuple(begun[i : i + 3]) for i in (0, 3, 6))  # type: ignore[assignment]
     values, rates = values_and_rates(
         f"path of guide `{use.name}`", f"guides.{use.name}", use.courses, use.place,
-        lambda path: machine.value(path, tape.read), tape.time,
+        lambda path: system.value(path, tape.read), tape.time,
     )  # fmt: skip
     place, moving = ([part[name] for name in COMPONENTS[:3]] for part in (values, rates))
     angles, turning = ([part[name] for name in COMPONENTS[3:]] for part in (values, rates))

@@ -19,10 +19,10 @@ from met.integrators.integrator import Motion
 from met.plan import BASE
 from met.program import cells
 from met.program.control import sensing
-from met.program.machine import Fitted, Machine, ReadCell
 from met.program.motion import bodies, payloads
-from met.program.motion.base import Base, base_of
+from met.program.motion.base import BaseMotion, base_of
 from met.program.motion.world import ArmWorld, environment_values
+from met.program.system import Fitted, ReadCell, System
 from met.program.values import answer
 from met.trace import Real
 from met.trace.program import Tape
@@ -51,10 +51,10 @@ class Aboard(ArmWorld):
     """
 
     def __init__(
-        self, machine: Machine, read: ReadCell, tree: Tree, y: Motion, base: Base, time: Real, begin: Real,
+        self, system: System, read: ReadCell, tree: Tree, y: Motion, base: BaseMotion, time: Real, begin: Real,
         moved: Accelerations | None, place: Place | None = None,
     ) -> None:  # fmt: skip
-        super().__init__(machine, read, tree, y, base, time, begin)
+        super().__init__(system, read, tree, y, base, time, begin)
         self._moved, self._place = moved, place
 
     def link(self, link: str) -> LinkMotion:
@@ -119,69 +119,69 @@ class Aboard(ArmWorld):
 
 
 def free_fall(
-    machine: Machine, read: ReadCell, world: World, gravity: Vector, motion: LinkMotion, point: Vector = ZERO
+    system: System, read: ReadCell, world: World, gravity: Vector, motion: LinkMotion, point: Vector = ZERO
 ) -> Vector:
     """Acceleration of a body that falls freely where a point of a frame is, and moves so; world axes, m/s^2."""
     found = gravity
-    for name, model in machine.environment:
+    for name, model in system.environment:
         if model.falls is not None:
-            owner, p = environment_values(machine, name, model, read)
+            owner, p = environment_values(system, name, model, read)
             there = motion.position(point), motion.velocity(point)
             found = add(found, answer(owner, model.falls, p, world, *there))
     return found
 
 
-def start(machine: Machine, tape: Tape, gravity: Callable[[Motion], Vector]) -> None:
+def start(system: System, tape: Tape, gravity: Callable[[Motion], Vector]) -> None:
     """Where sensors begin: settled on joints that do not accelerate, and bodies that fall freely.
 
     gravity  at a state where a run begins, as in `Accelerations`
     """
-    if not machine.sensors:
+    if not system.sensors:
         return
-    y, stands = _state(machine, tape, 0.0)
-    at_once = Aboard(machine, tape.read, machine.tree(tape.read), y, stands, 0.0, 0.0, None)
+    y, stands = _state(system, tape, 0.0)
+    at_once = Aboard(system, tape.read, system.tree(tape.read), y, stands, 0.0, 0.0, None)
     g = gravity(y)
-    qdd: list[Real] = [0.0 for _ in machine.joints]
+    qdd: list[Real] = [0.0 for _ in system.joints]
     base = stands.wd, stands.a
-    for body in bodies.bodies(machine):
+    for body in bodies.bodies(system):
         own = bodies.flight(body, tape.read, y)
-        fall = free_fall(machine, tape.read, at_once, g, LinkMotion(own.pose, own.w, own.v))
+        fall = free_fall(system, tape.read, at_once, g, LinkMotion(own.pose, own.w, own.v))
         qdd += [*fall, 0.0, 0.0, 0.0]
         if body.name == BASE:
             base = ZERO, turn_vector_back(own.pose.R, fall)
     moved = Accelerations(tuple(qdd), base, g)
-    felt = Aboard(machine, tape.read, machine.tree(tape.read), y, stands, 0.0, 0.0, moved)
-    for fitted in machine.sensors:
-        sensing.begin(machine, tape, fitted, measured(machine, fitted, tape.read, felt))
+    felt = Aboard(system, tape.read, system.tree(tape.read), y, stands, 0.0, 0.0, moved)
+    for fitted in system.sensors:
+        sensing.begin(system, tape, fitted, measured(system, fitted, tape.read, felt))
 
 
-def slopes(machine: Machine, read: ReadCell, felt: Aboard, own: Mapping[str, Real]) -> tuple[Real, ...]:
+def slopes(system: System, read: ReadCell, felt: Aboard, own: Mapping[str, Real]) -> tuple[Real, ...]:
     """Slopes of the sensors' states at a stage, in their order. own: the states, by channel."""
     found: dict[str, Real] = {}
-    for fitted in machine.sensors:
+    for fitted in system.sensors:
         if fitted.sensor.follow is not None:
-            found.update(sensing.followed(machine, fitted, read, own, measured(machine, fitted, read, felt)))
-    return tuple(found[name] for fitted in machine.sensors for name in fitted.channels)
+            found.update(sensing.followed(system, fitted, read, own, measured(system, fitted, read, felt)))
+    return tuple(found[name] for fitted in system.sensors for name in fitted.channels)
 
 
-def tick(machine: Machine, tape: Tape, divisor: int) -> None:
+def tick(system: System, tape: Tape, divisor: int) -> None:
     """A tick of the sensors of this divisor, on the state at this time."""
-    y, stands = _state(machine, tape, tape.time)
-    tree, period = machine.tree(tape.read), divisor / machine.structure.schedule.base_hz
-    for fitted, use in zip(machine.sensors, machine.structure.sensors, strict=True):
+    y, stands = _state(system, tape, tape.time)
+    tree, period = system.tree(tape.read), divisor / system.structure.schedule.base_hz
+    for fitted, use in zip(system.sensors, system.structure.sensors, strict=True):
         if use.divisor == divisor:
-            felt = Aboard(machine, tape.read, tree, y, stands, tape.time, tape.time, None, use.place)
-            find = partial(measured, machine, fitted, tape.read, felt)
-            sensing.tick(machine, tape, fitted, find, divisor, period, tape.read)
+            felt = Aboard(system, tape.read, tree, y, stands, tape.time, tape.time, None, use.place)
+            find = partial(measured, system, fitted, tape.read, felt)
+            sensing.tick(system, tape, fitted, find, divisor, period, tape.read)
 
 
-def measured(machine: Machine, fitted: Fitted, read: ReadCell, felt: Aboard) -> Real:
+def measured(system: System, fitted: Fitted, read: ReadCell, felt: Aboard) -> Real:
     """The quantity that a sensor is of."""
     assert fitted.sensor.measures is not None
-    return answer(fitted.owner, fitted.sensor.measures, sensing.values(machine, fitted, read), felt)
+    return answer(fitted.owner, fitted.sensor.measures, sensing.values(system, fitted, read), felt)
 
 
-def _state(machine: Machine, tape: Tape, time: Real) -> tuple[Motion, Base]:
+def _state(system: System, tape: Tape, time: Real) -> tuple[Motion, BaseMotion]:
     """The arm at an instant, and its base."""
-    y = bodies.begun(machine, cells.state(tape, bodies.coordinates(machine), machine.states))
-    return y, base_of(machine, tape.read, y, time)
+    y = bodies.begun(system, cells.state(tape, bodies.coordinates(system), system.states))
+    return y, base_of(system, tape.read, y, time)

@@ -16,12 +16,12 @@ from met.frozen import frozen
 from met.plan import Experiment, Formula
 from met.program.build import build
 from met.program.control.substituted import Mounted, Substituted
-from met.program.machine import PARAMETER, Machine
+from met.program.system import PARAMETER, System
 from met.trace import Real
 from met.trace.graph import evaluate
-from met.trace.program import Call, Phase, Program, Tape, Unless0
+from met.trace.program import CallPhase, Phase, Program, Tape, Unless0
 from met.trace.recorder import record
-from met.trace.recording import Straight
+from met.trace.recording import RunSection
 
 _INPUTS = ("voltage", "current", "rate", "seed", "repeat")
 _OUTPUTS = ("rate", "shaft_rate", "shaft_angle")
@@ -141,7 +141,7 @@ def _beds(experiment: Experiment) -> Substituted:
     def no_arm(tape: Tape) -> tuple[list[list[Real]], list[Real]]:
         raise AssertionError("a bed alone asks nothing of an arm")
 
-    return Substituted(Machine(experiment), no_arm)
+    return Substituted(System(experiment), no_arm)
 
 
 @frozen
@@ -155,7 +155,7 @@ class _Phases:
 
     def program(self) -> Program:
         names = ("settle", "begin", "hold", "bed", "read")
-        settle, begin, hold, bed, read = (Call(Phase(name, getattr(self, name))) for name in names)
+        settle, begin, hold, bed, read = (CallPhase(Phase(name, getattr(self, name))) for name in names)
         return Program(
             base_hz=1.0 / self.period, start=(settle, begin) if self.settled else (begin,),
             tick=(Unless0((hold, bed)),), end=(read,), inputs=_INPUTS, outputs=_OUTPUTS,
@@ -194,7 +194,7 @@ def _settled(experiment: Experiment, joint: str, case: int) -> dict[str, float]:
     settled = {path: float(plain[output]) for path, output in varying.items()}
     recording = record(build(experiment))
     first = recording.start[0]
-    assert isinstance(first, Straight)
+    assert isinstance(first, RunSection)
     section = recording.sections[first.section]
     values = evaluate(section.nodes, section.order, lambda node: coordinates.get(node[1], 0.0), arrays=False)
     for name, ref in section.stores:

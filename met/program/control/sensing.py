@@ -9,8 +9,8 @@ from typing import Any
 
 from met.diagnostic import Problem, error
 from met.plan import REPEAT, SEED, SensorUse
-from met.program.machine import Actuator, Fitted, Machine, ReadCell
-from met.program.values import Values, answer, parameters, returned
+from met.program.system import Actuator, Fitted, ReadCell, System
+from met.program.values import NamedValues, answer, parameters, returned
 from met.sensors.sensor import Reading, Sensed
 from met.servos.servo import Seen
 from met.trace import Real
@@ -18,7 +18,7 @@ from met.trace.noise import Stream, normal
 from met.trace.program import Tape
 
 
-def measured(actuator: Actuator, p: Values, q: Real, qd: Real, states: Values) -> tuple[Real, Real]:
+def measured(actuator: Actuator, p: NamedValues, q: Real, qd: Real, states: NamedValues) -> tuple[Real, Real]:
     """Position and rate where the servo's encoder and tachometer sit, of a joint that moves so."""
     if actuator.servo.measured is None:
         return q, qd
@@ -31,26 +31,24 @@ def truth(seen: Seen, of: str) -> Real:
     return found
 
 
-def start(machine: Machine, tape: Tape, actuator: Actuator, seen: Seen) -> None:
+def start(system: System, tape: Tape, actuator: Actuator, seen: Seen) -> None:
     """States, memory and reading where a run begins."""
     for fitted in actuator.sensors:
         value = truth(seen, quantity(fitted))
-        begin(machine, tape, fitted, value)
+        begin(system, tape, fitted, value)
 
 
-def slopes(
-    machine: Machine, actuator: Actuator, read: ReadCell, seen: Seen, own: Mapping[str, Real]
-) -> dict[str, Real]:
+def slopes(system: System, actuator: Actuator, read: ReadCell, seen: Seen, own: Mapping[str, Real]) -> dict[str, Real]:
     """Slopes of the sensors' states at a stage, by channel. own: the states, by channel."""
     found: dict[str, Real] = {}
     for fitted in actuator.sensors:
         if fitted.sensor.follow is None:
             continue
-        found.update(followed(machine, fitted, read, own, truth(seen, quantity(fitted))))
+        found.update(followed(system, fitted, read, own, truth(seen, quantity(fitted))))
     return found
 
 
-def through(machine: Machine, actuator: Actuator, read: ReadCell, seen: Seen, own: Mapping[str, Real]) -> Seen:
+def through(system: System, actuator: Actuator, read: ReadCell, seen: Seen, own: Mapping[str, Real]) -> Seen:
     """What a continuous law sees through its sensors at a stage."""
 
     def never() -> Real:
@@ -58,18 +56,18 @@ def through(machine: Machine, actuator: Actuator, read: ReadCell, seen: Seen, ow
 
     for fitted in actuator.sensors:
         sensed = Sensed(partial(truth, seen, quantity(fitted)), 0.0, never)
-        p, states = values(machine, fitted, read), _states(fitted, own.__getitem__)
-        reading = answer(fitted.owner, fitted.sensor.read, p, Values(fitted.owner, {}), states, sensed)
+        p, states = values(system, fitted, read), _states(fitted, own.__getitem__)
+        reading = answer(fitted.owner, fitted.sensor.read, p, NamedValues(fitted.owner, {}), states, sensed)
         seen = replaced(actuator, seen, quantity(fitted), reading.value)
     return seen
 
 
-def ticked(machine: Machine, tape: Tape, actuator: Actuator, seen: Seen, state: Callable[[str], Real]) -> Seen:
+def ticked(system: System, tape: Tape, actuator: Actuator, seen: Seen, state: Callable[[str], Real]) -> Seen:
     """What a sampled law sees through its sensors at a tick. state: gives their states, by channel."""
     found = seen
     for fitted in actuator.sensors:
         of = quantity(fitted)
-        value = tick(machine, tape, fitted, partial(truth, seen, of), actuator.use.divisor, seen.period, state)
+        value = tick(system, tape, fitted, partial(truth, seen, of), actuator.use.divisor, seen.period, state)
         found = replaced(actuator, found, of, value)
     return found
 
@@ -77,9 +75,9 @@ def ticked(machine: Machine, tape: Tape, actuator: Actuator, seen: Seen, state: 
 # One sensor
 
 
-def begin(machine: Machine, tape: Tape, fitted: Fitted, value: Real) -> None:
+def begin(system: System, tape: Tape, fitted: Fitted, value: Real) -> None:
     """States, memory and reading where a run begins, the quantity having been at this value."""
-    found = answer(fitted.owner, fitted.sensor.begin, values(machine, fitted, tape.read), value)
+    found = answer(fitted.owner, fitted.sensor.begin, values(system, fitted, tape.read), value)
     names = [*(state.name for state in fitted.states), *(memory.name for memory in fitted.memory)]
     returned(fitted.owner, "begin", found, names)
     for name, number in found.items():
@@ -87,30 +85,30 @@ def begin(machine: Machine, tape: Tape, fitted: Fitted, value: Real) -> None:
     tape.write(fitted.path, value)
 
 
-def followed(machine: Machine, fitted: Fitted, read: ReadCell, own: Mapping[str, Real], value: Real) -> dict[str, Real]:
+def followed(system: System, fitted: Fitted, read: ReadCell, own: Mapping[str, Real], value: Real) -> dict[str, Real]:
     """Slopes of the states of a sensor that has a circuit, by channel. own: the states, by channel."""
     assert fitted.sensor.follow is not None
-    p, states = values(machine, fitted, read), _states(fitted, own.__getitem__)
+    p, states = values(system, fitted, read), _states(fitted, own.__getitem__)
     new = answer(fitted.owner, fitted.sensor.follow, p, states, value)
     returned(fitted.owner, "follow", new, (state.name for state in fitted.states))
     return {f"{fitted.path}.{name}": slope for name, slope in new.items()}
 
 
 def tick(
-    machine: Machine, tape: Tape, fitted: Fitted, find: Callable[[], Real], divisor: int, period: float,
+    system: System, tape: Tape, fitted: Fitted, find: Callable[[], Real], divisor: int, period: float,
     state: Callable[[str], Real],
 ) -> Real:  # fmt: skip
     """What a sensor reads at a tick of its computer, and its memory a tick on.
 
     find   gives the quantity;  state  its states, by channel
     """
-    cases = machine.experiment.cases
+    cases = system.experiment.cases
     seed = tape.input(SEED) if SEED in cases.noise else float(cases.seed)
     repeat = tape.input(REPEAT) if REPEAT in cases.noise else 0.0
     stream, number = Stream(seed, repeat, fitted.path), tape.tick / float(divisor)
     sensed = Sensed(find, period, partial(normal, stream, number))
-    p = values(machine, fitted, tape.read)
-    held = Values(fitted.owner, {part.name: tape.read(f"{fitted.path}.{part.name}") for part in fitted.memory})
+    p = values(system, fitted, tape.read)
+    held = NamedValues(fitted.owner, {part.name: tape.read(f"{fitted.path}.{part.name}") for part in fitted.memory})
     reading: Reading = answer(fitted.owner, fitted.sensor.read, p, held, _states(fitted, state), sensed)
     returned(fitted.owner, "read", reading.held, (memory.name for memory in fitted.memory))
     for name, new in reading.held.items():
@@ -125,13 +123,13 @@ def quantity(fitted: Fitted) -> str:
     return fitted.use.of
 
 
-def values(machine: Machine, fitted: Fitted, read: ReadCell) -> Values:
+def values(system: System, fitted: Fitted, read: ReadCell) -> NamedValues:
     """The sensor's parameters."""
-    return parameters(fitted.owner, fitted.path, fitted.parameters, lambda path: machine.value(path, read))
+    return parameters(fitted.owner, fitted.path, fitted.parameters, lambda path: system.value(path, read))
 
 
-def _states(fitted: Fitted, state: Callable[[str], Real]) -> Values:
-    return Values(fitted.owner, {part.name: state(f"{fitted.path}.{part.name}") for part in fitted.states})
+def _states(fitted: Fitted, state: Callable[[str], Real]) -> NamedValues:
+    return NamedValues(fitted.owner, {part.name: state(f"{fitted.path}.{part.name}") for part in fitted.states})
 
 
 def replaced(actuator: Actuator, seen: Seen, of: str, value: Real) -> Seen:
@@ -139,4 +137,4 @@ def replaced(actuator: Actuator, seen: Seen, of: str, value: Real) -> Seen:
     if of in ("q", "qd"):
         return replace(seen, q=value) if of == "q" else replace(seen, qd=value)
     numbers: dict[str, Any] = {part.name: getattr(seen.states, part.name) for part in actuator.parts.natural}
-    return replace(seen, states=Values(actuator.owner, numbers | {of: value}))
+    return replace(seen, states=NamedValues(actuator.owner, numbers | {of: value}))

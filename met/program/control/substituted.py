@@ -18,16 +18,16 @@ from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import REPEAT, SEED
 from met.program import cells
-from met.program.machine import Actuator, Machine
-from met.program.values import Values, answer, parameters, returned
+from met.program.system import Actuator, System
+from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.motor import Motor, torque
 from met.substitution import balance, observer
 from met.substitution.bed import Bed, Wire
-from met.substitution.law import Given, Law, Told
+from met.substitution.law import Law, LawInput, LawOutput
 from met.substitution.shaft import lasting
 from met.trace import Real, absolute, clip, sign, where
 from met.trace.noise import Stream, normal
-from met.trace.program import Control, Every, Phase, Run, Tape, Unless0, WhileAny
+from met.trace.program import Control, Every, Phase, RunPhase, Tape, Unless0, WhileAny
 
 QUEUE = 3
 """Ticks of delay that there is room for (parameter `delay` of a bed)."""
@@ -62,17 +62,17 @@ Loads = Callable[[Tape], tuple[list[list[Real]], list[Real]]]
 
 
 class Substituted:
-    """The phases of a machine's substituted joints, which tick together. wire: a real bed is at the wire, which takes
+    """The phases of a system's substituted joints, which tick together. wire: a real bed is at the wire, which takes
     `late` of the bed's ticks of delay by itself."""
 
-    def __init__(self, machine: Machine, loads: Loads, *, wire: bool = False, late: int = 0) -> None:
-        self.machine = machine
+    def __init__(self, system: System, loads: Loads, *, wire: bool = False, late: int = 0) -> None:
+        self.system = system
         self.loads = loads
         self.wire = wire
         self.late = late
-        self.mounted = tuple(Mounted(a, machine.joints[a.index].name, bed, law) for a, bed, law in machine.mounted)
-        self.dynamics = machine.structure.schedule.dynamics
-        self.base_hz = machine.structure.schedule.base_hz
+        self.mounted = tuple(Mounted(a, system.joints[a.index].name, bed, law) for a, bed, law in system.mounted)
+        self.dynamics = system.structure.schedule.dynamics
+        self.base_hz = system.structure.schedule.base_hz
         self.divisor = self.mounted[0].actuator.use.divisor if self.mounted else 1
         self.law = self.mounted[0].law if self.mounted else None
         self.period = self.divisor / self.base_hz
@@ -102,11 +102,11 @@ class Substituted:
         """What is done before the first tick."""
         if not self.mounted:
             return ()
-        parts: tuple[Control, ...] = (Run(Phase("beds", self.start)),)
+        parts: tuple[Control, ...] = (RunPhase(Phase("beds", self.start)),)
         if self.law is not None and self.law.observer:
             turns = max(100, math.ceil(SETTLING / self.period))
-            settle = WhileAny("always", turns, (Run(Phase("covariance", self.covariance)),))
-            parts = (*parts, settle, Run(Phase("gain", self.gain)))
+            settle = WhileAny("always", turns, (RunPhase(Phase("covariance", self.covariance)),))
+            parts = (*parts, settle, RunPhase(Phase("gain", self.gain)))
         return parts
 
     def before_servos(self) -> tuple[Control, ...]:
@@ -115,17 +115,17 @@ class Substituted:
             return ()
         moved: tuple[Control, ...] = ()
         if not self.wire:
-            moved = (Unless0((Every(self.divisor, (Run(Phase("bed", self.advance)),)),)),)
+            moved = (Unless0((Every(self.divisor, (RunPhase(Phase("bed", self.advance)),)),)),)
         both_due = math.lcm(self.divisor, self.dynamics)
-        follow = Every(both_due, (Run(Phase("follow", self.follow)),))
-        return (*moved, Every(self.divisor, (Run(Phase("read", self.read)),)), follow)
+        follow = Every(both_due, (RunPhase(Phase("follow", self.follow)),))
+        return (*moved, Every(self.divisor, (RunPhase(Phase("read", self.read)),)), follow)
 
     def after_modes(self) -> tuple[Control, ...]:
         """At an instant, once modes are decided, and at the servos' ticks after that."""
         if not self.mounted:
             return ()
         arm, law, first = (
-            Every(due, (Run(Phase(name, body)),))
+            Every(due, (RunPhase(Phase(name, body)),))
             for due, name, body in (
                 (self.dynamics, "arm", self.arm), (self.divisor, "law", self.act), (self.dynamics, "given", self.first)
             )
@@ -177,7 +177,7 @@ class Substituted:
     def advance(self, tape: Tape) -> None:
         """The emulated beds, from the last tick to this one."""
         tick = tape.tick / float(self.divisor) - 1.0
-        cases = self.machine.experiment.cases
+        cases = self.system.experiment.cases
         seed = tape.input(SEED) if SEED in cases.noise else float(cases.seed)
         repeat = tape.input(REPEAT) if REPEAT in cases.noise else 0.0
         for each in self.mounted:
@@ -256,7 +256,7 @@ class Substituted:
             found = solve(sides, Lambda, b_0)
         told = [self._told(tape, each, one) for each, one in zip(self.mounted, found, strict=True)]
         p = [self._law_values(tape, each) for each in self.mounted]
-        held = [Values(f"law `{each.law.name}`", {m.name: tape.read(f"{each.joint}.law.{m.name}")
+        held = [NamedValues(f"law `{each.law.name}`", {m.name: tape.read(f"{each.joint}.law.{m.name}")
                 for m in each.law.memory}) for each in self.mounted]  # fmt: skip
         owner = f"law `{self.law.name}`"
         given = answer(owner, self.law.give, p, held, told, lambda qdd: balance.loads(Lambda, b_0, qdd))
@@ -310,7 +310,7 @@ class Substituted:
             current = where(due, tape.read(f"{each.joint}:queue.{i}.current"), current)
         return Wire(voltage, current)
 
-    def _send(self, tape: Tape, each: Mounted, given: Given) -> Wire:
+    def _send(self, tape: Tape, each: Mounted, given: LawOutput) -> Wire:
         """Puts a command on the wire, and gives back what the amplifiers hold from now on: an older one, if delayed."""
         name = each.joint
         p = self._bed_values(tape, each)
@@ -348,20 +348,22 @@ class Substituted:
             tape.write(f"{each.joint}:w_ref", after)
             tape.write(f"{each.joint}.law.reference_rate", side.w)
 
-    def _side(self, tape: Tape, each: Mounted, w: Real, voltage: Real, band: Real) -> balance.Side:
+    def _side(self, tape: Tape, each: Mounted, w: Real, voltage: Real, band: Real) -> balance.JointSide:
         """A joint's side of the balance at a rate of its shaft and a voltage."""
         motor = self.motor(tape, each)
         mean = 0.0 if each.law.balance == "bare" else 0.5 * motor.damping * self.period
         unknown = self._observed(tape, each)[3] if each.law.observer else 0.0
         viscous = 0.0 if each.law.balance == "bare" else motor.f_v * w
         net = torque(motor.kt, motor.resistance, motor.tau_max, voltage, w) + unknown - viscous
-        return balance.Side(motor.ratio, motor.ratio * motor.ratio * (motor.inertia + mean), net, motor.f_c, w, band)
+        return balance.JointSide(
+            motor.ratio, motor.ratio * motor.ratio * (motor.inertia + mean), net, motor.f_c, w, band
+        )
 
-    def _told(self, tape: Tape, each: Mounted, found: balance.Balanced | None) -> Told:
+    def _told(self, tape: Tape, each: Mounted, found: balance.Balanced | None) -> LawInput:
         motor, p, name = self.motor(tape, each), self._bed_values(tape, each), each.joint
         mean = each.law.balance == "full"
         extra = p.inertia * (self.period / lasting(motor.damping / p.inertia, self.period) - 1.0) if mean else 0.0
-        return Told(
+        return LawInput(
             motor=motor, inertia=p.inertia, rate=tape.read(f"{name}:read"), before=tape.read(f"{name}:before"),
             w=tape.read(f"{name}:w"), d=self._observed(tape, each)[3] if each.law.observer else 0.0,
             w_ref=tape.read(f"{name}:w_ref") if each.law.observer else 0.0,
@@ -385,10 +387,10 @@ class Substituted:
     def motor(self, tape: Tape, each: Mounted) -> Motor:
         """The joint's motor as its servo believes it."""
         assert each.actuator.servo.motor is not None
-        p = self.machine.servo_values(each.actuator, tape.read)
+        p = self.system.servo_values(each.actuator, tape.read)
         return answer(each.actuator.owner, each.actuator.servo.motor, p)
 
-    def _model(self, tape: Tape, each: Mounted) -> observer.Model:
+    def _model(self, tape: Tape, each: Mounted) -> observer.DiscreteModel:
         p = self._bed_values(tape, each)
         damping = self.motor(tape, each).damping
         return observer.model(inertia=p.inertia, damping=damping, f_cut=p.f_cut, period=self.period)
@@ -429,10 +431,12 @@ class Substituted:
         return self._values(tape, owner, f"{each.joint}.law", each.law.parameters)
 
     def _values(self, tape: Tape, owner: str, prefix: str, declared: Iterable[Parameter]) -> Any:
-        return parameters(owner, prefix, declared, lambda path: self.machine.value(path, tape.read))
+        return parameters(owner, prefix, declared, lambda path: self.system.value(path, tape.read))
 
-    def _bed(self, tape: Tape, each: Mounted) -> Values:
-        return Values(self._owner(each), {m.name: tape.read(f"{each.joint}.bed.{m.name}") for m in each.bed.memory})
+    def _bed(self, tape: Tape, each: Mounted) -> NamedValues:
+        return NamedValues(
+            self._owner(each), {m.name: tape.read(f"{each.joint}.bed.{m.name}") for m in each.bed.memory}
+        )
 
     def _owner(self, each: Mounted) -> str:
         return f"bed `{each.bed.name}` of joint `{each.joint}`"

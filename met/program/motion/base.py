@@ -25,16 +25,16 @@ from met.dynamics.tree import Tree
 from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import BASE
-from met.program.machine import PARAMETER, Machine, ReadCell
 from met.program.motion.bodies import FreeBody, bodies, flight, place
 from met.program.motion.courses import TIME
+from met.program.system import PARAMETER, ReadCell, System
 from met.trace import Scalar
 from met.trace.program import Tape
 from met.vectors import quaternion_rpy
 
 
 @frozen
-class Base:
+class BaseMotion:
     """The base at one stage.
 
     pose    R_WB, and p_WB, m
@@ -55,46 +55,46 @@ class Base:
         return vector if self.pose is HERE else turn_vector_back(self.pose.R, vector)
 
 
-def free_base(machine: Machine) -> FreeBody | None:
+def free_base(system: System) -> FreeBody | None:
     """The base as a body that moves freely; None where it does not."""
-    return bodies(machine)[0] if machine.structure.free else None
+    return bodies(system)[0] if system.structure.free else None
 
 
-def base_of(machine: Machine, read: ReadCell, y: Motion, time: Real) -> Base:
+def base_of(system: System, read: ReadCell, y: Motion, time: Real) -> BaseMotion:
     """The base at a state and a time (s); of a free base y has the coordinates, theta included."""
-    if machine.structure.base is None:
-        return Base()
-    body = free_base(machine)
+    if system.structure.base is None:
+        return BaseMotion()
+    body = free_base(system)
     if body is None:
-        return prescribed(machine, read, time)
+        return prescribed(system, read, time)
     found = flight(body, read, y)
-    return Base(found.pose, found.w, found.v, turned=found.turned)
+    return BaseMotion(found.pose, found.w, found.v, turned=found.turned)
 
 
-def motions(tree: Tree, q: Sequence[Real], qd: Sequence[Real], base: Base) -> dict[str, LinkMotion]:
+def motions(tree: Tree, q: Sequence[Real], qd: Sequence[Real], base: BaseMotion) -> dict[str, LinkMotion]:
     """Every link in the world, by name; the base, where it is one, just where it is."""
     found = link_motions(tree, q, qd, base.pose, (base.w, base.v))
     return found | ({BASE: LinkMotion(base.pose, base.w, base.v)} if BASE in found else {})
 
 
-def prescribed(machine: Machine, read: ReadCell, time: Real) -> Base:
+def prescribed(system: System, read: ReadCell, time: Real) -> BaseMotion:
     """The base as its courses have it at a time (`courses`)."""
-    varying = {path: read(PARAMETER + path) for path in machine.courses.inputs if path != TIME}
-    numbers = machine.courses.replay({TIME: time, **varying})
+    varying = {path: read(PARAMETER + path) for path in system.courses.inputs if path != TIME}
+    numbers = system.courses.replay({TIME: time, **varying})
     found = [settled(x) if isinstance(x, Scalar) else np.float64(x) for x in numbers]
     rows: list[Any] = [tuple(found[i : i + 3]) for i in range(0, len(found), 3)]
     pose = Pose((rows[0], rows[1], rows[2]), rows[3])
-    return Base(pose, *(turn_vector_back(pose.R, row) for row in rows[4:]))
+    return BaseMotion(pose, *(turn_vector_back(pose.R, row) for row in rows[4:]))
 
 
-def start(machine: Machine, tape: Tape) -> None:
+def start(system: System, tape: Tape) -> None:
     """The initial state of a free base: `rate` is given in world axes."""
-    body = free_base(machine)
+    body = free_base(system)
     if body is None:
         return
 
     def given(name: str) -> Vector:
-        x, y, z = (machine.value(f"initial.base.{name}.{axis}", tape.read) for axis in "xyz")
+        x, y, z = (system.value(f"initial.base.{name}.{axis}", tape.read) for axis in "xyz")
         return x, y, z
 
     turn = quaternion_rpy(*given("rpy"))

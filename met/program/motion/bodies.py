@@ -30,7 +30,7 @@ from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import BASE
 from met.program import cells
-from met.program.machine import Machine, ReadCell
+from met.program.system import ReadCell, System
 from met.trace import Truth, cos, sin, sqrt, where
 from met.trace.program import Tape
 from met.vectors import Quaternion, composed
@@ -87,17 +87,17 @@ class Flight:
     turned: Vector
 
 
-def bodies(machine: Machine) -> tuple[FreeBody, ...]:
+def bodies(system: System) -> tuple[FreeBody, ...]:
     """The base, where it is free, then the payloads that fly for a time."""
-    names = ([BASE] if machine.structure.free else []) + [PAYLOAD + each.name for each in machine.flying]
-    joints = len(machine.joints)
+    names = ([BASE] if system.structure.free else []) + [PAYLOAD + each.name for each in system.flying]
+    joints = len(system.joints)
     return tuple(FreeBody(name, joints + SIX * number) for number, name in enumerate(names))
 
 
-def coordinates(machine: Machine) -> tuple[str, ...]:
+def coordinates(system: System) -> tuple[str, ...]:
     """All that is integrated as positions with rates: the joints' names, then those of the bodies' coordinates."""
-    of_bodies = (name for body in bodies(machine) for name in body.coordinates)
-    return (*(joint.name for joint in machine.joints), *of_bodies)
+    of_bodies = (name for body in bodies(system) for name in body.coordinates)
+    return (*(joint.name for joint in system.joints), *of_bodies)
 
 
 def flight(body: FreeBody, read: ReadCell, y: Motion) -> Flight:
@@ -128,29 +128,29 @@ def place(body: FreeBody, tape: Tape, active: Truth, turn: Quaternion, position:
         cells.keep(tape, active, f"{name}.qd", qd)
 
 
-def begun(machine: Machine, y: Motion) -> Motion:
+def begun(system: System, y: Motion) -> Motion:
     """A state at which a (sub)step begins, or is seen: theta is 0 there."""
     q = list(y.q)
-    for body in bodies(machine):
+    for body in bodies(system):
         q[body.first + 3 : body.first + SIX] = (0.0, 0.0, 0.0)
     return Motion(tuple(q), y.qd, y.x)
 
 
-def orientation(machine: Machine, tape: Tape) -> tuple[Real, ...]:
+def orientation(system: System, tape: Tape) -> tuple[Real, ...]:
     """The quaternions of all bodies, at the beginning of the (sub)step."""
-    return tuple(part for body in bodies(machine) for part in _read(body, tape.read, ""))
+    return tuple(part for body in bodies(system) for part in _read(body, tape.read, ""))
 
 
-def keep_orientation(machine: Machine, tape: Tape, copy: str) -> None:
+def keep_orientation(system: System, tape: Tape, copy: str) -> None:
     """Keeps a copy of the orientations at which the (sub)step began."""
-    for body in bodies(machine):
+    for body in bodies(system):
         for name in body.orientation:
             tape.write(f"{copy}{name}", tape.read(name))
 
 
-def turn(machine: Machine, tape: Tape, active: Truth, y: Motion, copy: str = "") -> None:
+def turn(system: System, tape: Tape, active: Truth, y: Motion, copy: str = "") -> None:
     """Takes the turns of a (sub)step that ends at y into the orientations, of which `copy` was their beginning."""
-    for body in bodies(machine):
+    for body in bodies(system):
         _write(body, tape, active, _turned(_read(body, tape.read, copy), body.q(y)[3:]))
 
 

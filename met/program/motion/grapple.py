@@ -16,15 +16,15 @@ from met.integrators.integrator import Motion
 from met.plan import INSTANT
 from met.program import cells
 from met.program.evaluation import driven_by
-from met.program.machine import Actuator, Machine
 from met.program.motion import payloads
 from met.program.motion.base import base_of, free_base, motions
 from met.program.motion.bodies import place
 from met.program.motion.payloads import CARRIED, FLYING, cell
-from met.program.values import Values
+from met.program.system import Actuator, System
+from met.program.values import NamedValues
 from met.servos.servo import Drive
 from met.trace import Real, Truth, any_of, both, either, not_
-from met.trace.program import Control, Every, Phase, Run, Tape, WhileAny
+from met.trace.program import Control, Every, Phase, RunPhase, Tape, WhileAny
 from met.vectors import quaternion
 
 
@@ -36,26 +36,26 @@ class Grapple:
     """
 
     def __init__(
-        self, machine: Machine, state: Callable[[Tape], Motion], held: Callable[[Tape, Actuator], Values]
+        self, system: System, state: Callable[[Tape], Motion], held: Callable[[Tape, Actuator], NamedValues]
     ) -> None:
-        self.machine, self._state, self._held = machine, state, held
+        self.system, self._state, self._held = system, state, held
 
     def events(self) -> tuple[Control, ...]:
         """What happens at an instant."""
-        if not self.machine.flying:
+        if not self.system.flying:
             return ()
-        parts: list[Control] = [Run(Phase("payloads", self.due))]
-        if any(payload.grappled for payload in self.machine.flying):
-            parts.append(WhileAny("grappling", 1, (Run(Phase("grapple", self.grapple)),)))
-        if any(payload.released for payload in self.machine.flying):
-            parts.append(WhileAny("releasing", 1, (Run(Phase("release", self.release)),)))
-        return (Every(self.machine.structure.schedule.dynamics, tuple(parts)),)
+        parts: list[Control] = [RunPhase(Phase("payloads", self.due))]
+        if any(payload.grappled for payload in self.system.flying):
+            parts.append(WhileAny("grappling", 1, (RunPhase(Phase("grapple", self.grapple)),)))
+        if any(payload.released for payload in self.system.flying):
+            parts.append(WhileAny("releasing", 1, (RunPhase(Phase("release", self.release)),)))
+        return (Every(self.system.structure.schedule.dynamics, tuple(parts)),)
 
     def due(self, tape: Tape) -> None:
         """Which payloads are grappled and released at this instant."""
         grappling: list[Truth] = []
         releasing: list[Truth] = []
-        for payload in self.machine.flying:
+        for payload in self.system.flying:
             stage: Real = tape.read(cell(payload, "stage"))
             on = stage == CARRIED
             if payload.grappled:
@@ -72,56 +72,56 @@ class Grapple:
 
     def grapple(self, tape: Tape) -> None:
         """The impact of all payloads that are grappled at this instant, and their being held from now on."""
-        machine, y = self.machine, self._state(tape)
-        base, tree = base_of(machine, tape.read, y, tape.time), machine.tree(tape.read)
-        links = motions(tree, y.q[: len(machine.joints)], y.qd[: len(machine.joints)], base)
+        system, y = self.system, self._state(tape)
+        base, tree = base_of(system, tape.read, y, tape.time), system.tree(tape.read)
+        links = motions(tree, y.q[: len(system.joints)], y.qd[: len(system.joints)], base)
         blows: dict[str, Wrench] = {}
-        for payload in machine.flying:
+        for payload in system.flying:
             if not payload.grappled:
                 continue
             caught = tape.read_mask(cell(payload, "grappling"))
-            own, link = payloads.flown(machine, payload, tape.read, y), links[payload.link]
-            body, pose = payloads.body_of(machine, payload, tape.read), compose(inverse(link.pose), own.pose)
+            own, link = payloads.flown(system, payload, tape.read, y), links[payload.link]
+            body, pose = payloads.body_of(system, payload, tape.read), compose(inverse(link.pose), own.pose)
             blow = raised(momentum(body, twist_against(own, link)), pose)
             before = blows.get(payload.link, (ZERO, ZERO))
             blows[payload.link] = tuple(  # type: ignore[assignment]
                 add(a, tuple(choose(caught, x, 0.0) for x in b))  # type: ignore[arg-type]
                 for a, b in zip(before, blow, strict=True)
             )
-            payloads.hold(machine, tape, caught, payload, pose)
-            for name in payloads.free_body(machine, payload).coordinates:
+            payloads.hold(system, tape, caught, payload, pose)
+            for name in payloads.free_body(system, payload).coordinates:
                 cells.keep(tape, caught, f"{name}.qd", 0.0)
         self._jump(tape, y, blows)
 
     def release(self, tape: Tape) -> None:
         """Payloads that are released at this instant go on as their link moves them."""
-        machine, y = self.machine, self._state(tape)
-        base, n = base_of(machine, tape.read, y, tape.time), len(machine.joints)
-        links = motions(machine.tree(tape.read), y.q[:n], y.qd[:n], base)
-        for payload in machine.flying:
+        system, y = self.system, self._state(tape)
+        base, n = base_of(system, tape.read, y, tape.time), len(system.joints)
+        links = motions(system.tree(tape.read), y.q[:n], y.qd[:n], base)
+        for payload in system.flying:
             if payload.released:
                 gone = tape.read_mask(cell(payload, "releasing"))
                 motion = payloads.with_link(payload, tape.read, links)
-                body, v = payloads.free_body(machine, payload), turn_vector(motion.pose.R, motion.v)
+                body, v = payloads.free_body(system, payload), turn_vector(motion.pose.R, motion.v)
                 place(body, tape, gone, quaternion(motion.pose.R), motion.pose.p, v, motion.w)
                 payloads.let_go(tape, gone, payload)
 
     def _jump(self, tape: Tape, y: Motion, blows: dict[str, Wrench]) -> None:
         """Rates after the impact; by link, the momentum that comes to it, about its origin and in its axes."""
-        machine, n = self.machine, len(self.machine.joints)
-        drives = [self._drive(tape, actuator, y) for actuator in machine.actuators]
-        on_beds = {actuator.index for actuator, _, _ in machine.mounted}
+        system, n = self.system, len(self.system.joints)
+        drives = [self._drive(tape, actuator, y) for actuator in system.actuators]
+        on_beds = {actuator.index for actuator, _, _ in system.mounted}
         solved = solve(
-            payloads.laden(machine, tape.read), y.q[:n], (0.0,) * n,
+            payloads.laden(system, tape.read), y.q[:n], (0.0,) * n,
             mode=tuple(False if i in on_beds else _yields(drive) for i, drive in enumerate(drives)),
             rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives), wrenches=blows,
         )  # fmt: skip
         jumping = tape.read_mask("grappling")
-        jumps = [(joint.name, jump) for joint, jump in zip(machine.joints, solved.qdd, strict=True)]
-        body = free_base(machine)
+        jumps = [(joint.name, jump) for joint, jump in zip(system.joints, solved.qdd, strict=True)]
+        body = free_base(system)
         if body is not None:
             wd, a = solved.base_acceleration
-            R = base_of(machine, tape.read, y, tape.time).pose.R
+            R = base_of(system, tape.read, y, tape.time).pose.R
             jumps += zip(body.coordinates, (*turn_vector(R, a), *wd), strict=True)
         for name, jump in jumps:
             cells.keep(tape, jumping, f"{name}.qd", tape.read(f"{name}.qd") + jump)
@@ -130,12 +130,12 @@ class Grapple:
         if actuator is None:
             return None
         held = self._held(tape, actuator)
-        return driven_by(self.machine, actuator, tape.read, y, held, tape.time, tape.time).drive
+        return driven_by(self.system, actuator, tape.read, y, held, tape.time, tape.time).drive
 
     def _is_time(self, tape: Tape, name: str, event: str) -> Truth:
         """Whether this is an instant not before the event's time."""
-        time: Real = self.machine.value(f"payloads.{name}.{event}", tape.read)
-        return tape.time >= time - INSTANT * self.machine.structure.schedule.step
+        time: Real = self.system.value(f"payloads.{name}.{event}", tape.read)
+        return tape.time >= time - INSTANT * self.system.structure.schedule.step
 
 
 def _yields(drive: Drive | None) -> Truth:

@@ -33,8 +33,8 @@ from met.dynamics.tree import Tree
 from met.integrators.integrator import Motion
 from met.plan import Payload
 from met.program import cells
-from met.program.machine import Machine, ReadCell
 from met.program.motion.bodies import PAYLOAD, FreeBody, bodies, flight, place, slopes
+from met.program.system import ReadCell, System
 from met.trace import Truth
 from met.trace.program import Tape
 from met.vectors import ZERO, Vector, quaternion_rpy
@@ -45,15 +45,15 @@ FLYING, CARRIED, RELEASED = 0.0, 1.0, 2.0
 NOTHING: Wrench = (ZERO, ZERO)
 
 
-def body_of(machine: Machine, payload: Payload, read: ReadCell) -> Rigid:
+def body_of(system: System, payload: Payload, read: ReadCell) -> Rigid:
     """A payload's inertia in its own frame."""
     name = payload.name
-    return rigid_about_centre(machine.mass(name, read), machine.com(name, read), machine.inertia(name, read))
+    return rigid_about_centre(system.mass(name, read), system.com(name, read), system.inertia(name, read))
 
 
-def free_body(machine: Machine, payload: Payload) -> FreeBody:
+def free_body(system: System, payload: Payload) -> FreeBody:
     """Its coordinates."""
-    return next(each for each in bodies(machine) if each.name == PAYLOAD + payload.name)
+    return next(each for each in bodies(system) if each.name == PAYLOAD + payload.name)
 
 
 def cell(payload: Payload, name: str) -> str:
@@ -71,19 +71,19 @@ def held(payload: Payload, read: ReadCell) -> Pose:
     return Pose(((x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8])), (x[9], x[10], x[11]))
 
 
-def laden(machine: Machine, read: ReadCell) -> Tree:
+def laden(system: System, read: ReadCell) -> Tree:
     """The arm with the payloads that its links carry."""
-    tree = machine.tree(read)
-    for payload in machine.flying:
+    tree = system.tree(read)
+    for payload in system.flying:
         x = [read(cell(payload, f"body.{i}")) for i in range(10)]
         body = Rigid(x[0], (x[1], x[2], x[3]), (x[4], x[5], x[6], x[7], x[8], x[9]))
         tree = loaded(tree, payload.link, body)
     return tree
 
 
-def seen(machine: Machine, payload: Payload, read: ReadCell, y: Motion, links: Mapping[str, LinkMotion]) -> LinkMotion:
+def seen(system: System, payload: Payload, read: ReadCell, y: Motion, links: Mapping[str, LinkMotion]) -> LinkMotion:
     """A payload in the world, wherever it is; links: the arm's, in the world."""
-    own, link = flown(machine, payload, read, y), with_link(payload, read, links)
+    own, link = flown(system, payload, read, y), with_link(payload, read, links)
     on = carried(payload, read)
 
     def either(a: Vector, b: Vector) -> Vector:
@@ -93,9 +93,9 @@ def seen(machine: Machine, payload: Payload, read: ReadCell, y: Motion, links: M
     return LinkMotion(Pose((x, y_, z), either(link.pose.p, own.pose.p)), either(link.w, own.w), either(link.v, own.v))
 
 
-def flown(machine: Machine, payload: Payload, read: ReadCell, y: Motion) -> LinkMotion:
+def flown(system: System, payload: Payload, read: ReadCell, y: Motion) -> LinkMotion:
     """A payload that flies, in the world."""
-    found = flight(free_body(machine, payload), read, y)
+    found = flight(free_body(system, payload), read, y)
     return LinkMotion(found.pose, found.w, found.v)
 
 
@@ -105,12 +105,12 @@ def with_link(payload: Payload, read: ReadCell, links: Mapping[str, LinkMotion])
     return LinkMotion(compose(link.pose, pose), *fixed_motion((link.w, link.v), pose))
 
 
-def shared(machine: Machine, read: ReadCell, wrenches: Mapping[str, Wrench]) -> tuple[dict[str, Wrench], ...]:
+def shared(system: System, read: ReadCell, wrenches: Mapping[str, Wrench]) -> tuple[dict[str, Wrench], ...]:
     """Wrenches on links, those on payloads among them that a link carries; and those on payloads that fly.
 
     wrenches  on links and payloads by name, about their frames' origins and in their axes
     """
-    names = {payload.name: payload for payload in machine.flying}
+    names = {payload.name: payload for payload in system.flying}
     links = {name: wrench for name, wrench in wrenches.items() if name not in names}
     own = {name: wrench for name, wrench in wrenches.items() if name in names}
     for name, wrench in own.items():
@@ -126,17 +126,17 @@ def shared(machine: Machine, read: ReadCell, wrenches: Mapping[str, Wrench]) -> 
 
 
 def slopes_of_payloads(
-    machine: Machine, read: ReadCell, y: Motion, wrenches: Mapping[str, Wrench], gravity: Vector
+    system: System, read: ReadCell, y: Motion, wrenches: Mapping[str, Wrench], gravity: Vector
 ) -> tuple[tuple[Real, ...], tuple[Real, ...]]:
     """Slopes of the payloads' coordinates and rates; none while a link carries them. gravity: world axes, m/s^2."""
     qd: list[Real] = []
     qdd: list[Real] = []
-    for payload in machine.flying:
-        body = free_body(machine, payload)
+    for payload in system.flying:
+        body = free_body(system, payload)
         found = flight(body, read, y)
         falling = turn_vector_back(found.pose.R, gravity)
         wrench = wrenches.get(payload.name, NOTHING)
-        solved = free_acceleration(body_of(machine, payload, read), found.w, wrench, falling)
+        solved = free_acceleration(body_of(system, payload, read), found.w, wrench, falling)
         on = carried(payload, read)
         for kept, free in zip((qd, qdd), slopes(body, y, pose=found.pose, turned=found.turned, solved=solved),
                               strict=True):  # fmt: skip
@@ -147,15 +147,15 @@ def slopes_of_payloads(
 # What becomes of them
 
 
-def start(machine: Machine, tape: Tape) -> None:
+def start(system: System, tape: Tape) -> None:
     """Where payloads are when a run begins."""
-    for payload in machine.flying:
+    for payload in system.flying:
         head = f"payloads.{payload.name}"
 
         def given(name: str, head: str = head) -> Vector:
-            return machine.vector(f"{head}.{name}", tape.read)
+            return system.vector(f"{head}.{name}", tape.read)
 
-        body = free_body(machine, payload)
+        body = free_body(system, payload)
         if payload.grappled:
             turn = quaternion_rpy(*given("attitude"))
             w = turn_vector_back(rotation_quaternion(*turn), given("rate"))
@@ -163,14 +163,14 @@ def start(machine: Machine, tape: Tape) -> None:
             tape.write(cell(payload, "stage"), FLYING)
         else:
             place(body, tape, True, (1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO)
-            hold(machine, tape, True, payload, Pose(rotation_rpy(*given("rpy")), given("at")))
+            hold(system, tape, True, payload, Pose(rotation_rpy(*given("rpy")), given("at")))
 
 
-def hold(machine: Machine, tape: Tape, active: Truth, payload: Payload, pose: Pose) -> None:
+def hold(system: System, tape: Tape, active: Truth, payload: Payload, pose: Pose) -> None:
     """Makes a payload a part of its link, at this pose in its frame, where active."""
     for i, x in enumerate((*pose.R[0], *pose.R[1], *pose.R[2], *pose.p)):
         cells.keep(tape, active, cell(payload, f"held.{i}"), x)
-    body = in_tree(machine.tree(tape.read), payload.link, body_of(machine, payload, tape.read), pose)
+    body = in_tree(system.tree(tape.read), payload.link, body_of(system, payload, tape.read), pose)
     _keep_body(tape, active, payload, body)
     cells.keep(tape, active, cell(payload, "stage"), CARRIED)
 
@@ -181,10 +181,10 @@ def let_go(tape: Tape, active: Truth, payload: Payload) -> None:
     cells.keep(tape, active, cell(payload, "stage"), RELEASED)
 
 
-def way(machine: Machine, payload: Payload, read: ReadCell, motion: LinkMotion, link: LinkMotion) -> Vector:
+def way(system: System, payload: Payload, read: ReadCell, motion: LinkMotion, link: LinkMotion) -> Vector:
     """From the point of the link that the payload's frame is to come to, to where it is; world axes, m."""
     x, y, z = motion.pose.p
-    a, b, c = link.position(machine.vector(f"payloads.{payload.name}.at", read))
+    a, b, c = link.position(system.vector(f"payloads.{payload.name}.at", read))
     return x - a, y - b, z - c
 
 

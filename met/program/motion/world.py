@@ -9,37 +9,37 @@ from met.dynamics.tree import Tree
 from met.environments.environment import Environment
 from met.integrators.integrator import Motion
 from met.parameter import WORLD
-from met.program.machine import Machine, ReadCell
-from met.program.motion.base import Base, motions
+from met.program.motion.base import BaseMotion, motions
 from met.program.motion.payloads import seen
-from met.program.values import Values, parameters
+from met.program.system import ReadCell, System
+from met.program.values import NamedValues, parameters
 from met.trace import Real
 from met.vectors import ZERO, Matrix, Vector
 
 
-def environment_values(machine: Machine, name: str, model: Environment, read: ReadCell) -> tuple[str, Values]:
+def environment_values(system: System, name: str, model: Environment, read: ReadCell) -> tuple[str, NamedValues]:
     """What an environment model under the deck's name for it is called in messages, and its parameters."""
     owner = f"environment model `{model.name}` (as `{name}`)"
     head = f"environment.{name}"
-    return owner, parameters(owner, head, model.parameters, lambda path: machine.value(path, read))
+    return owner, parameters(owner, head, model.parameters, lambda path: system.value(path, read))
 
 
 class ArmWorld:
     """A `met.environments.environment.World` at one stage."""
 
     def __init__(
-        self, machine: Machine, read: ReadCell, tree: Tree, y: Motion, base: Base, time: Real, begin: Real
+        self, system: System, read: ReadCell, tree: Tree, y: Motion, base: BaseMotion, time: Real, begin: Real
     ) -> None:
         self.time, self.begin = time, begin
-        self.step = machine.structure.schedule.step
-        self.joints = tuple(joint.name for joint in machine.joints)
-        self.links = (*(each.name for each in machine.structure.links), *(p.name for p in machine.structure.payloads))
-        self._sliding = {joint.name: joint.kind == "prismatic" for joint in machine.joints}
-        self._machine, self._read = machine, read
+        self.step = system.structure.schedule.step
+        self.joints = tuple(joint.name for joint in system.joints)
+        self.links = (*(each.name for each in system.structure.links), *(p.name for p in system.structure.payloads))
+        self._sliding = {joint.name: joint.kind == "prismatic" for joint in system.joints}
+        self._machine, self._read = system, read
         n = len(self.joints)
         self._tree, self._y, self._base = tree, y, base
         self._q, self._qd = y.q[:n], y.qd[:n]
-        self._flying = {payload.name: payload for payload in machine.flying}
+        self._flying = {payload.name: payload for payload in system.flying}
         self._motions: dict[str, LinkMotion] | None = None
 
     def slides(self, joint: str) -> bool:

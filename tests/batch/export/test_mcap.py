@@ -15,7 +15,7 @@ from batch.export import export
 from met import run as engine
 from met.diagnostic import Problem
 from met.dynamics.kinematics import link_motions
-from met.program.machine import Machine
+from met.program.system import System
 from met.vectors import quaternion
 from tests.batch import plans
 from tests.batch.export.decks import CHAIN, DECK, LINKS, Mcap, made, matrix, said
@@ -61,7 +61,7 @@ def test_the_frames_are_where_the_kinematics_have_them(reaches: tuple[ArchiveFil
         outputs = experiment.formulas.replay({"reach": reach})
         values = {path: outputs[q.value.output] if hasattr(q.value, "output") else q.value
                   for path, q in experiment.parameters.items()}  # fmt: skip
-        tree = Machine(experiment).tree(lambda name, values=values: float(values[name.removeprefix("parameter:")]))
+        tree = System(experiment).tree(lambda name, values=values: float(values[name.removeprefix("parameter:")]))
         history = file.groups[0].signal("q", case)
         for q, world in zip(history, read.worlds(f"/case{case}/tf"), strict=True):
             for link, motion in link_motions(tree, q.tolist(), [0.0] * 5).items():

@@ -14,7 +14,7 @@ from batch.archive.read import ArchiveFile
 from batch.export import poses
 from batch.export.picking import pick
 from met.dynamics.kinematics import link_motions
-from met.program.machine import Machine
+from met.program.system import System
 from met.vectors import quaternion
 from tests.batch import plans
 from tests.batch.export import decks
@@ -59,7 +59,7 @@ def test_the_frames_are_those_of_the_kinematics_one_row_at_a_time(reaches: xarra
     [experiment] = reaches.met.plan.experiments
     for case, reach in enumerate(reaches["reach"].values):
         values = poses.parameters(experiment, {"reach": reach})
-        tree = Machine(experiment).tree(lambda name, values=values: values[name.removeprefix("parameter:")])
+        tree = System(experiment).tree(lambda name, values=values: values[name.removeprefix("parameter:")])
         for row in (0, 17, 50):
             q = reaches["q"].values[case, row].tolist()
             motions = link_motions(tree, q, [0.0] * 5)

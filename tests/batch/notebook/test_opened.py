@@ -85,7 +85,7 @@ def test_an_archive_that_is_run_anew_meanwhile(tmp_path: Path) -> None:
         )  # fmt: skip
         assert said(lambda: data.met.frames()) == told
         assert said(lambda: data.met.parameters("#3")) == told
-        assert said(lambda: data.met.plan) == told == said(lambda: data[["qd"]].met.host.sources)
+        assert said(lambda: data.met.plan) == told == said(lambda: data[["qd"]].met.sources)
     with batch.open(archive) as anew:
         assert anew.met.frames().sizes["recorded_case"] == 18
 
@@ -162,7 +162,7 @@ class TestWhatWasRun:
 
     @pytest.mark.slow
     def test_the_deck_and_the_plan(self, data: xarray.Dataset) -> None:
-        files = data.met.host.sources
+        files = data.met.sources
         assert next(iter(files.values())) == TUNING and "<servos/rigid_gearbox.ic>" in files
         assert [experiment.name for experiment in data.met.plan.experiments] == ["tuning"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ic
-from met.analysis.profile import FLOPS, Profile, as_data, by_part, hoisted, profile
+from met.analysis.profile import FLOPS, RunProfile, as_data, by_part, hoisted, profile
 from met.backends.llvm import kernel
 from met.backends.llvm.pieces import operations
 from met.plan import Experiment
@@ -19,7 +19,7 @@ def experiment(deck: str, name: str) -> Experiment:
 
 
 @pytest.fixture(scope="module")
-def gains() -> Profile:
+def gains() -> RunProfile:
     return profile(experiment("two_link.ic", "gains"))
 
 
@@ -51,7 +51,7 @@ def test_a_varied_gain_is_read_where_it_is_used_and_a_varied_mass_is_worked_into
 
 
 @pytest.mark.slow
-def test_a_step_is_counted_as_the_rates_have_it(gains: Profile) -> None:
+def test_a_step_is_counted_as_the_rates_have_it(gains: RunProfile) -> None:
     """Servos at 100 Hz, dynamics and record at 25 Hz; the run's last instant has no step after it, 500 have."""
     calls = {(part.work, part.part): part.calls for part in gains.parts if not part.event}
     assert (gains.steps, gains.cases, gains.joints) == (500, 36, 2)
@@ -60,14 +60,14 @@ def test_a_step_is_counted_as_the_rates_have_it(gains: Profile) -> None:
     assert calls["integrator", ""] == calls["further stages", "dynamics"] == 500 / 500
 
 
-def test_friction_is_counted_apart_and_as_often_as_it_comes(gains: Profile) -> None:
+def test_friction_is_counted_apart_and_as_often_as_it_comes(gains: RunProfile) -> None:
     """At t = 0 both joints are at rest in every case, so each block decides; later they turn on and on."""
     events = {part.work: part for part in gains.parts if part.event}
     assert 1 / 500 <= events["friction decisions"].calls < 0.1
     assert all(part.calls < 0.1 for part in events.values())
 
 
-def test_the_numbers_are_a_profiles(gains: Profile) -> None:
+def test_the_numbers_are_a_profiles(gains: RunProfile) -> None:
     assert gains.lanes % gains.vector == 0 and gains.blocks * gains.steps == 5000  # as many blocks as a short run needs
     assert gains.code_bytes > 1000 and gains.pieces >= 10
     assert 0.0 < gains.share_of_peak < 1.0

@@ -11,7 +11,7 @@ from met import backends
 from met.backends.llvm.emit import emit, numbered
 from met.trace import floor, gather, sqrt, where
 from met.trace.noise import Stream, normal
-from met.trace.program import Call, Every, Phase, Program, Record, Run, Tape, Unless0, WhileAny
+from met.trace.program import CallPhase, Every, Phase, Program, RecordPhase, RunPhase, Tape, Unless0, WhileAny
 from met.trace.recorder import record
 from met.trace.recording import Recording
 
@@ -41,16 +41,22 @@ def everything(*, cell: str = "x", half: float = 0.5) -> Recording:
         tape.write(cell, tape.read(cell) * half)
         tape.write("on", 0.0)
 
-    return record(Program(
-        base_hz=8.0,
-        start=(Run(Phase("start", start)),),
-        tick=(
-            Unless0((Every(2, (Call(Phase("body", body)),)), WhileAny("on", 3, (Run(Phase("again", again)),)))),
-            Record(Phase("row", lambda tape: tape.record(0, tape.read(cell))), 2),
-        ),
-        end=(Run(Phase("end", lambda tape: tape.output("x", tape.read(cell)))),),
-        inputs=("first", "seed", "repeat"), columns=1, outputs=("x",),
-    ))  # fmt: skip
+    return record(
+        Program(
+            base_hz=8.0,
+            start=(RunPhase(Phase("start", start)),),
+            tick=(
+                Unless0(
+                    (Every(2, (CallPhase(Phase("body", body)),)), WhileAny("on", 3, (RunPhase(Phase("again", again)),)))
+                ),
+                RecordPhase(Phase("row", lambda tape: tape.record(0, tape.read(cell))), 2),
+            ),
+            end=(RunPhase(Phase("end", lambda tape: tape.output("x", tape.read(cell)))),),
+            inputs=("first", "seed", "repeat"),
+            columns=1,
+            outputs=("x",),
+        )
+    )
 
 
 def test_names_of_cells_do_not_count() -> None:

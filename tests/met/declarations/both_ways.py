@@ -25,14 +25,14 @@ from met.integrators.integrator import Motion, Slope
 from met.parameter import Parameter
 from met.plan import Experiment
 from met.program.control.link_sensors import Aboard, Accelerations
-from met.program.machine import Machine
 from met.program.motion.base import base_of, free_base
 from met.program.motion.bodies import coordinates
+from met.program.system import System
 from met.sensors.sensor import Felt, Sensed
-from met.servos.servo import Asked, JointMotion, Seen, Servo
+from met.servos.servo import JointMotion, Seen, Servo, Setpoint
 from met.substitution.balance import Balanced
 from met.substitution.bed import Wire
-from met.substitution.law import Told
+from met.substitution.law import LawInput
 from met.trace import Formulas, Graph, Mask, Real, Scalar
 from met.vectors import ZERO, Matrix, Vector
 from tests.met.declarations.values import holds, paths
@@ -266,8 +266,10 @@ def servo_calls(servo: Servo, use: Use, experiment: Experiment) -> dict[str, Cal
     def control(n: Numbers) -> Any:
         assert servo.control is not None
         of_law = parts.integrals if use.analog else (*parts.outputs, *parts.integrals)
-        asked = filled(n, Asked, "asked", kind=command)
-        return servo.control(p(n), held(n, of_law), filled(n, Seen, "seen", asked=asked, states=states(n), **known))
+        setpoint = filled(n, Setpoint, "asked", kind=command)
+        return servo.control(
+            p(n), held(n, of_law), filled(n, Seen, "seen", setpoint=setpoint, states=states(n), **known)
+        )
 
     return {
         "control": control,
@@ -278,8 +280,8 @@ def servo_calls(servo: Servo, use: Use, experiment: Experiment) -> dict[str, Cal
         "begin": lambda n: servo.begin(p(n), n.number("q", n.any), n.number("qd", n.any)),
         "measured": lambda n: servo.measured(p(n), n.number("q", n.any), n.number("qd", n.any), states(n)),
         "balance": lambda n: servo.balance(
-            p(n), n.number("torque", n.any), filled(n, Seen, "seen", asked=filled(n, Asked, "asked", kind=command),
-                                                    states=states(n), **known),
+            p(n), n.number("torque", n.any),
+            filled(n, Seen, "seen", setpoint=filled(n, Setpoint, "asked", kind=command), states=states(n), **known),
         ),
         "fastest": lambda n: servo.fastest(p(n)),
         "fastest_law": lambda n: servo.fastest_law(p(n)),
@@ -334,11 +336,11 @@ class Answers:
             return getattr(self._world, name)
         if name in get_type_hints(Felt):
             return self._answer(lambda: getattr(self._world, name))
-        return lambda *asked: self._answer(lambda: getattr(self._world, name)(*asked), name, *asked)
+        return lambda *arguments: self._answer(lambda: getattr(self._world, name)(*arguments), name, *arguments)
 
-    def _answer(self, find: Callable[[], Any], *asked: Any) -> Any:
+    def _answer(self, find: Callable[[], Any], *arguments: Any) -> Any:
         n = len(self._asked)
-        self._asked.append(asked)
+        self._asked.append(arguments)
         if n == len(self._given):  # the first time, with floats
             self._given.append(find())
         return self._as_numbers(self._given[n], f"answer {n}")
@@ -351,25 +353,25 @@ class Answers:
 
 def _asking(use: Use, experiment: Experiment, ask: Callable[[Numbers, Any], Any]) -> Callable[[Numbers], Any]:
     """A call of a function that asks a world: its answer, and what was asked. The arm is anywhere, and moves."""
-    machine = Machine(experiment)
-    tree = machine.tree(lambda path: math.nan)  # no case varies it
+    system = System(experiment)
+    tree = system.tree(lambda path: math.nan)  # no case varies it
     given: list[Any] = []
 
     def call(numbers: Numbers) -> Any:
         if numbers.graph is None:
             given.clear()
         rng = np.random.default_rng(numbers.rng.integers(2**32))
-        q, qd = (tuple(map(np.float64, rng.normal(size=len(coordinates(machine))))) for _ in range(2))
+        q, qd = (tuple(map(np.float64, rng.normal(size=len(coordinates(system))))) for _ in range(2))
         orientation = rng.normal(size=4)
-        body = free_base(machine)
+        body = free_base(system)
         names = () if body is None else body.orientation
         cells = dict(zip(names, orientation / np.linalg.norm(orientation), strict=False))
         begin = rng.uniform(0.0, 0.2)
         time = begin + rng.uniform() * experiment.structure.schedule.step
         y = Motion(q, qd, ())
-        base = base_of(machine, cells.__getitem__, y, time)
+        base = base_of(system, cells.__getitem__, y, time)
         moved = Accelerations(tuple(map(np.float64, rng.normal(size=len(q)))), (ZERO, ZERO), (0.0, 0.0, -9.81))
-        world = Answers(Aboard(machine, cells.__getitem__, tree, y, base, time, begin, moved), numbers, given)
+        world = Answers(Aboard(system, cells.__getitem__, tree, y, base, time, begin, moved), numbers, given)
         return {"found": ask(numbers, world), "asked": world._asked}
 
     return call
@@ -515,7 +517,7 @@ def _law(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]
 
     def give(n: Numbers) -> Any:
         known = {"balance": None} if law.balance == "none" else {}
-        told = [filled(n, Told, joint, **known or {"balance": filled(n, Balanced, f"{joint}.balance")})
+        told = [filled(n, LawInput, joint, **known or {"balance": filled(n, Balanced, f"{joint}.balance")})
                 for joint in joints]  # fmt: skip
         rows = [[n.number(f"Lambda[{i}][{j}]", n.any) for j in range(3)] for i in range(2)]
         return law.give(

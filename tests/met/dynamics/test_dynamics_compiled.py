@@ -12,7 +12,7 @@ from met.backends.llvm import kernel
 from met.dynamics.effective_inertia import effective_inertia
 from met.dynamics.recursion import reactions, solve
 from met.dynamics.tree import Tree
-from met.trace.program import Phase, Program, Run, Tape
+from met.trace.program import Phase, Program, RunPhase, Tape
 from tests.met.dynamics.passes import CLOSE, pinocchio
 from tests.oracles import dense
 from tests.oracles.random_tree import RandomArm, random_tree
@@ -55,7 +55,7 @@ def program_of(arm: RandomArm) -> Program:
             tape.output(f"o{number}", value)
 
     outputs = tuple(f"o{number}" for number in range(10 * arm.n))
-    return Program(1.0, (), (), (Run(Phase("pass", body)),), tuple(inputs), 0, outputs)
+    return Program(1.0, (), (), (RunPhase(Phase("pass", body)),), tuple(inputs), 0, outputs)
 
 
 def states_of(arm: RandomArm) -> list[RandomArm]:

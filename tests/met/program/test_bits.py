@@ -41,7 +41,7 @@ class Swung:
     def ticks(self) -> int:
         return self.experiment.structure.schedule.ticks
 
-    def run(self, made: kernel.Kernel, **options: int) -> tuple[np.ndarray, np.ndarray]:
+    def run(self, made: kernel.LlvmKernel, **options: int) -> tuple[np.ndarray, np.ndarray]:
         rows, outputs = made.run(self.inputs, self.ticks, **options)
         assert rows is not None
         return rows, outputs

@@ -12,7 +12,7 @@ from met import models
 from met import run as engine
 from met.backends.reference.plain import execute
 from met.program import build
-from met.program.machine import Machine
+from met.program.system import System
 from met.run import Run
 from tests.ic.small_decks import changed, check, experiment
 from tests.met.program.free_flyers import ARM, RUN
@@ -377,7 +377,7 @@ def test_a_fixed_joint_holds_the_bases_matter_as_well(tmp_path: Path) -> None:
 def test_the_program_reads_the_trees_numbers_where_the_bases_mass_varies(tmp_path: Path) -> None:
     sweep = "sweep some of tumbling { vary links.base.mass = [40, 80] kg; }"
     found = experiment(tmp_path, ARM, RUN, sweep, select=["some"])
-    assert Machine(found).varying == ("links.base.mass",)
+    assert System(found).varying == ("links.base.mass",)
     run = engine.run(found)
     single = flown(tmp_path)
     for name in STATE:

@@ -10,9 +10,9 @@ import pytest
 from met.diagnostic import Problem
 from met.integrators.integrator import Motion
 from met.parameter import WORLD
-from met.program.machine import Machine
-from met.program.motion.base import Base
+from met.program.motion.base import BaseMotion
 from met.program.motion.world import ArmWorld
+from met.program.system import System
 from tests.ic.small_decks import changed, experiment
 from tests.met.tree_deck import TREE
 from tests.oracles.plan_tree import pinocchio
@@ -22,8 +22,8 @@ Q, QD = (0.3, -0.7, 0.2, 1.1), (0.5, -0.4, 0.3, -1.0)
 
 
 def world(tmp_path: Path, text: str = TREE) -> ArmWorld:
-    machine = Machine(experiment(tmp_path, text, RUN))
-    return ArmWorld(machine, lambda _: 0.0, machine.tree(lambda _: 0.0), Motion(Q, QD), Base(), time=0.0, begin=0.0)
+    system = System(experiment(tmp_path, text, RUN))
+    return ArmWorld(system, lambda _: 0.0, system.tree(lambda _: 0.0), Motion(Q, QD), BaseMotion(), time=0.0, begin=0.0)
 
 
 @pytest.mark.oracle

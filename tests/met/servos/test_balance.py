@@ -11,7 +11,7 @@ import pytest
 from met import models
 from met import run as engine
 from met.plan import Experiment
-from met.servos.servo import Asked, JointMotion, Seen
+from met.servos.servo import JointMotion, Seen, Setpoint
 from tests.ic.small_decks import check, experiment, messages
 from tests.met.small_models import Use, uses
 
@@ -36,15 +36,15 @@ def test_the_joint_gets_the_torque_and_nothing_in_the_drive_changes(
             continue  # open loop: the law asks what it is told
         made = experiment(tmp_path, use.deck(), select=["it"])
         p, servo, parts, q = values(use, made), use.model, use.parts, 0.3
-        asked = Asked("position", q, qd) if use.command == "position" else Asked("rate", qd, 0.0)
+        setpoint = Setpoint("position", q, qd) if use.command == "position" else Setpoint("rate", qd, 0.0)
         states = {state.name: state.start for state in parts.natural}
         if servo.begin is not None:
             states |= servo.begin(p, q, qd)
-        found = servo.balance(p, torque, Seen(q, qd, asked, 0.0, 0.0, SimpleNamespace(**states)))
+        found = servo.balance(p, torque, Seen(q, qd, setpoint, 0.0, 0.0, SimpleNamespace(**states)))
         assert set(found) == {state.name for state in (*parts.natural, *parts.integrals)}
         held = SimpleNamespace(**{part.name: 0.0 for part in parts.outputs}, **found)
         there = (q, qd) if servo.measured is None else servo.measured(p, q, qd, held)
-        control = servo.control(p, held, Seen(*there, asked, 0.0, 0.0, held))
+        control = servo.control(p, held, Seen(*there, setpoint, 0.0, 0.0, held))
         held = SimpleNamespace(**found, **control.outputs)
         drive = servo.drive(p, held, held, JointMotion(q, qd, 0.0, command=use.command))
         dry = np.sign(qd) * drive.dry
@@ -58,14 +58,14 @@ def test_the_joint_gets_the_torque_and_nothing_in_the_drive_changes(
 def test_a_torque_beyond_the_motor_is_given_as_far_as_it_goes(tmp_path: Path) -> None:
     use = next(each for each in uses("servo", "rigid_gearbox") if each.command == "rate")
     p = values(use, experiment(tmp_path, use.deck(), select=["it"]))
-    found = use.model.balance(p, 1e4, Seen(0.0, 0.0, Asked("rate", 0.0, 0.0), 0.0, 0.0, SimpleNamespace()))
+    found = use.model.balance(p, 1e4, Seen(0.0, 0.0, Setpoint("rate", 0.0, 0.0), 0.0, 0.0, SimpleNamespace()))
     assert found["integral"] * p.ki == pytest.approx(p.resistance * p.tau_max / p.kt)
 
 
 def test_a_loop_without_integral_has_nothing_to_balance_with(tmp_path: Path) -> None:
     use = next(each for each in uses("servo", "rigid_gearbox") if each.command == "rate")
     p = values(use, experiment(tmp_path, use.deck({"ki": "0 V/rad"}), select=["it"]))
-    found = use.model.balance(p, 5.0, Seen(0.0, 0.0, Asked("rate", 0.0, 0.0), 0.0, 0.0, SimpleNamespace()))
+    found = use.model.balance(p, 5.0, Seen(0.0, 0.0, Setpoint("rate", 0.0, 0.0), 0.0, 0.0, SimpleNamespace()))
     assert found == {"integral": 0.0}
 
 

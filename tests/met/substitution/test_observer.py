@@ -24,7 +24,7 @@ def continuous(f_cut: float) -> tuple[np.ndarray, np.ndarray]:
     return A, np.array([1.0 / J, 0.0, 0.0, 0.0])
 
 
-def made(f_cut: float, period: float) -> observer.Model:
+def made(f_cut: float, period: float) -> observer.DiscreteModel:
     return observer.model(inertia=J, damping=DAMPING, f_cut=f_cut, period=period)
 
 

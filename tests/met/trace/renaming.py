@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from met.trace.program import Call, Control, Phase, Program, Record, Run, Tape, WhileAny
+from met.trace.program import CallPhase, Control, Phase, Program, RecordPhase, RunPhase, Tape, WhileAny
 
 Name = Callable[[str], str]
 
@@ -47,7 +47,7 @@ def renamed(program: Program, cell: Name, given: Name = lambda name: name) -> Pr
     def body_of(body: tuple[Control, ...]) -> tuple[Control, ...]:
         out: list[Control] = []
         for node in body:
-            if isinstance(node, Run | Call | Record):
+            if isinstance(node, RunPhase | CallPhase | RecordPhase):
                 out.append(replace(node, phase=phase_of(node.phase)))
             elif isinstance(node, WhileAny):
                 out.append(replace(node, cell=cell(node.cell), body=body_of(node.body)))

@@ -46,7 +46,7 @@ from met.trace import (
 from met.trace.functions import philox
 from met.trace.graph import evaluate
 from met.trace.noise import Stream, normal_pair
-from met.trace.program import Every, Phase, Program, Record, Run, Tape, Unless0, WhileAny
+from met.trace.program import Every, Phase, Program, RecordPhase, RunPhase, Tape, Unless0, WhileAny
 from met.trace.recorder import record
 from tests.met.trace.compiled import STRICT, different, driver, need, run
 
@@ -123,7 +123,9 @@ def table(make: Callable[[Scalar, Scalar, Scalar], list[Scalar]]) -> Program:
     def end(t: Tape) -> None:
         t.output("c", t.input("c"))
 
-    return Program(7.0, (), (Record(Phase("row", row), 1),), (Run(Phase("end", end)),), ("a", "b", "c"), count, ("c",))
+    return Program(
+        7.0, (), (RecordPhase(Phase("row", row), 1),), (RunPhase(Phase("end", end)),), ("a", "b", "c"), count, ("c",)
+    )
 
 
 def meant(program: Program, cases: np.ndarray) -> np.ndarray:
@@ -202,11 +204,18 @@ def test_control_and_memory_are_the_programs(tmp_path: Path) -> None:
         t.output("it_s_*/_'n'", t.read("left"))
 
     program = Program(
-        30.0, (Run(Phase("begin", begin)),),
-        (Unless0((Every(3, (Run(Phase("count", count)),)),)), WhileAny("left", 2, (Run(Phase("turn */ \\", turn)),)),
-         Record(Phase("row", row), 2)),
-        (Run(Phase("end", end)),), ("x", "double"), 4, ("it's */ \"n\"", "it_s_*/_'n'"),
-    )  # fmt: skip
+        30.0,
+        (RunPhase(Phase("begin", begin)),),
+        (
+            Unless0((Every(3, (RunPhase(Phase("count", count)),)),)),
+            WhileAny("left", 2, (RunPhase(Phase("turn */ \\", turn)),)),
+            RecordPhase(Phase("row", row), 2),
+        ),
+        (RunPhase(Phase("end", end)),),
+        ("x", "double"),
+        4,
+        ('it\'s */ "n"', "it_s_*/_'n'"),
+    )
     for x in (0.0, 7.0, -1.0, math.nan):
         same(program, np.array([[x, 5.0]]), tmp_path, ("gcc", "-O1"), 20)
 

@@ -12,9 +12,9 @@ from met.backends.llvm.pieces import check as check_pieces
 from met.backends.llvm.pieces import cut
 from met.trace import where
 from met.trace.check import check
-from met.trace.program import Phase, Program, Run, Tape, WhileAny
+from met.trace.program import Phase, Program, RunPhase, Tape, WhileAny
 from met.trace.recorder import record
-from met.trace.recording import Recording, Section
+from met.trace.recording import CodeSection, Recording
 
 
 def recording() -> Recording:
@@ -22,16 +22,16 @@ def recording() -> Recording:
         x = tape.read("x")
         tape.write("x", where(x < tape.input("most"), x * 2.0 + 1.0, x))
 
-    tick = (Run(Phase("body", body)),)
-    end = (Run(Phase("end", lambda tape: tape.output("x", tape.read("x")))),)
+    tick = (RunPhase(Phase("body", body)),)
+    end = (RunPhase(Phase("end", lambda tape: tape.output("x", tape.read("x")))),)
     return record(Program(1.0, (), tick, end, ("most",), 0, ("x",)))
 
 
-def with_node(i: int, node: tuple[Any, ...]) -> Callable[[Section], Section]:
+def with_node(i: int, node: tuple[Any, ...]) -> Callable[[CodeSection], CodeSection]:
     return lambda section: replace(section, nodes=(*section.nodes[:i], node, *section.nodes[i + 1 :]))
 
 
-def place(section: Section, op: str) -> int:
+def place(section: CodeSection, op: str) -> int:
     return next(i for i in section.order if section.nodes[i][0] == op)
 
 
@@ -76,7 +76,7 @@ def test_a_result_that_is_none_is_refused(changes: dict[str, Any], message: str)
         check(replace(whole, sections=(replace(whole.sections[0], **changes), *whole.sections[1:])))
 
 
-def long_section() -> Section:
+def long_section() -> CodeSection:
     def body(tape: Tape) -> None:
         x = [tape.read(f"x{i}") for i in range(6)]
         for n in range(200):
@@ -84,8 +84,8 @@ def long_section() -> Section:
         for i in range(6):
             tape.write(f"x{i}", x[i])
 
-    end = (Run(Phase("end", lambda tape: tape.output("x0", tape.read("x0")))),)
-    return record(Program(1.0, (), (Run(Phase("body", body)),), end, (), 0, ("x0",))).sections[0]
+    end = (RunPhase(Phase("end", lambda tape: tape.output("x0", tape.read("x0")))),)
+    return record(Program(1.0, (), (RunPhase(Phase("body", body)),), end, (), 0, ("x0",))).sections[0]
 
 
 def test_pieces_that_are_not_the_section_are_refused() -> None:
@@ -108,11 +108,11 @@ def test_pieces_that_are_not_the_section_are_refused() -> None:
 
 
 def test_a_cell_that_nothing_writes_is_refused_when_it_is_recorded() -> None:
-    end = (Run(Phase("end", lambda tape: tape.output("x", tape.read("mispelt")))),)
+    end = (RunPhase(Phase("end", lambda tape: tape.output("x", tape.read("mispelt")))),)
     with pytest.raises(ValueError, match="'end' reads the cell 'mispelt', which nothing writes"):
         record(Program(1.0, (), (), end, (), 0, ("x",)))
     record(Program(1.0, (), (), end, (), 0, ("x",), counters=("mispelt",)))
-    loop = (WhileAny("on", 1, (Run(Phase("body", lambda tape: tape.write("x", 1.0))),)),)
-    end = (Run(Phase("end", lambda tape: tape.output("x", tape.read("x")))),)
+    loop = (WhileAny("on", 1, (RunPhase(Phase("body", lambda tape: tape.write("x", 1.0))),)),)
+    end = (RunPhase(Phase("end", lambda tape: tape.output("x", tape.read("x")))),)
     with pytest.raises(ValueError, match="a loop goes by the cell 'on', which nothing writes"):
         record(Program(1.0, (), loop, end, (), 0, ("x",)))

@@ -7,7 +7,7 @@ import numpy as np
 from met.backends.llvm import kernel
 from met.trace import maximum, where
 from met.trace.counting import counting
-from met.trace.program import Every, Phase, Program, Run, Tape, WhileAny
+from met.trace.program import Every, Phase, Program, RunPhase, Tape, WhileAny
 
 
 def asking() -> Program:
@@ -28,9 +28,11 @@ def asking() -> Program:
     def end(t: Tape) -> None:
         t.output("done", t.read("done"))
 
-    loop = WhileAny("left", 9, (Run(Phase("work", work)), WhileAny("inner", 9, (Run(Phase("inner", inner)),))))
-    tick = (Every(4, (Run(Phase("ask", ask)), loop)),)
-    return Program(100.0, (), tick, (Run(Phase("end", end)),), ("turns",), 0, ("done",))
+    loop = WhileAny(
+        "left", 9, (RunPhase(Phase("work", work)), WhileAny("inner", 9, (RunPhase(Phase("inner", inner)),)))
+    )
+    tick = (Every(4, (RunPhase(Phase("ask", ask)), loop)),)
+    return Program(100.0, (), tick, (RunPhase(Phase("end", end)),), ("turns",), 0, ("done",))
 
 
 def test_a_blocks_loops_are_counted_by_the_case_that_asks_longest_and_no_case_is_changed() -> None:

@@ -15,7 +15,7 @@ from met.program.build import build
 from met.run import prepare, run
 from met.trace import Real
 from met.trace.identity import result_keys, state_key
-from met.trace.program import Call, Every, Phase, Program, Record, Run, Tape, Unless0, WhileAny
+from met.trace.program import CallPhase, Every, Phase, Program, RecordPhase, RunPhase, Tape, Unless0, WhileAny
 from met.trace.recorder import record
 from tests.met.trace.renaming import renamed
 
@@ -55,17 +55,17 @@ def swinging(
 
     return Program(
         base_hz=8.0,
-        start=(Run(Phase("start", start)),),
+        start=(RunPhase(Phase("start", start)),),
         tick=(
             Unless0(
                 (
-                    Every(divisor, (Call(Phase(phase, body)),)),
-                    WhileAny("on", turns, (Run(Phase("again", again)),)),
+                    Every(divisor, (CallPhase(Phase(phase, body)),)),
+                    WhileAny("on", turns, (RunPhase(Phase("again", again)),)),
                 )
             ),
-            Record(Phase("row", lambda tape: tape.record(0, tape.read(cell))), 2),
+            RecordPhase(Phase("row", lambda tape: tape.record(0, tape.read(cell))), 2),
         ),
-        end=(Run(Phase("end", end)),),
+        end=(RunPhase(Phase("end", end)),),
         inputs=("first", "rate"),
         columns=1,
         outputs=("state", "most", "more") if more else ("state", "most"),

@@ -13,7 +13,7 @@ from met.backends.llvm import kernel
 from met.backends.reference.plain import execute
 from met.trace.noise import Stream, channel_number, normal, normal_pair, uniform, uniform_pair
 from met.trace.primitives import PLAIN
-from met.trace.program import Every, Phase, Program, Record, Run
+from met.trace.program import Every, Phase, Program, RecordPhase, RunPhase
 from tests.instruction_sets import RUNNABLE
 
 # A generator without a flaw fails a comparison of statistics at this rate, and one of the five hundred below with a
@@ -28,7 +28,7 @@ def program(draw, inputs=("seed", "repeat", "gain"), columns=1):
         for column, value in enumerate(draw(t)):
             t.record(column, value)
 
-    return Program(1.0, (), (Record(Phase("row", row), 1),), (), inputs, columns, ())
+    return Program(1.0, (), (RecordPhase(Phase("row", row), 1),), (), inputs, columns, ())
 
 
 def stream_of(t, channel="tachometer"):
@@ -105,7 +105,7 @@ def test_what_is_no_place_of_a_draw_gives_no_number(seed, repeat, tick):
         ):
             t.output(name, value)
 
-    one = Program(1.0, (), (), (Run(Phase("end", body)),), ("seed", "repeat", "k"), 0, ("u", "v", "a", "b"))
+    one = Program(1.0, (), (), (RunPhase(Phase("end", body)),), ("seed", "repeat", "k"), 0, ("u", "v", "a", "b"))
     assert np.isnan(kernel.compile(one).run(np.array([[seed, repeat, tick]]), 0)[1]).all()
     assert np.isnan(list(execute(one, [seed, repeat, tick], 0)[1].values())).all()
 
@@ -171,7 +171,7 @@ def test_a_draw_belongs_to_its_tick_however_the_run_gets_there():
     assert np.array_equal(block.recorded(10, 19)[0, :, 0], every[10:20])
     draw = Phase("draw", lambda t: t.write("x", normal(stream_of(t), t.tick)))
     show = Phase("show", lambda t: t.output("x", t.read("x")))
-    slower = Program(1.0, (), (Every(7, (Run(draw),)),), (Run(show),), ("seed", "repeat", "gain"), 0, ("x",))
+    slower = Program(1.0, (), (Every(7, (RunPhase(draw),)),), (RunPhase(show),), ("seed", "repeat", "gain"), 0, ("x",))
     assert [kernel.compile(slower).run(np.array([[1.0, 2.0, 0.0]]), n)[1][0, 0] for n in (0, 6, 7, 59)] == [
         every[0],
         every[0],

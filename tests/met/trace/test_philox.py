@@ -14,7 +14,7 @@ from met.backends.llvm.emit import emit
 from met.trace import Formulas, Graph
 from met.trace.functions import philox
 from met.trace.primitives import ARRAYS, PLAIN
-from met.trace.program import Phase, Program, Run
+from met.trace.program import Phase, Program, RunPhase
 from met.trace.recorder import record
 from tests.instruction_sets import RUNNABLE
 
@@ -117,7 +117,7 @@ def recording():
         for i, word in enumerate(words_of(t)):
             t.output(f"w{i}", word)
 
-    return record(Program(1.0, (), (), (Run(Phase("draw", body)),), NAMES, 0, tuple(f"w{i}" for i in range(5))))
+    return record(Program(1.0, (), (), (RunPhase(Phase("draw", body)),), NAMES, 0, tuple(f"w{i}" for i in range(5))))
 
 
 def test_what_is_no_word_gives_no_number():
@@ -147,7 +147,7 @@ def test_words_that_fall_into_different_pieces_are_the_same(recording):
     text = emit(recording, 8, above=1, shortest=1, longest=1)
     assert text.count('@"draw#') > 3
     loaded = llvm.Loaded(llvm.assemble(text, machine), machine)
-    _, outputs = kernel.Kernel(recording, 8, machine, loaded, False).run(operands(), 0)
+    _, outputs = kernel.LlvmKernel(recording, 8, machine, loaded, False).run(operands(), 0)
     assert np.array_equal(outputs, expected(), equal_nan=True)
 
 
@@ -157,7 +157,7 @@ def test_four_words_take_twenty_short_products(cpu):
         for n in range(4):
             t.output(f"w{n}", philox(*(t.input(name) for name in NAMES), n))
 
-    program = Program(1.0, (), (), (Run(Phase("draw", body)),), NAMES, 0, ("w0", "w1", "w2", "w3"))
+    program = Program(1.0, (), (), (RunPhase(Phase("draw", body)),), NAMES, 0, ("w0", "w1", "w2", "w3"))
     machine = llvm.machine(cpu)
     text = llvm.listing(emit(record(program), machine.width, width=machine.width), machine)
     assert text.count("vpmuludq") == 20 and "vpmullq" not in text

@@ -10,12 +10,12 @@ from met.backends.llvm.pieces import cut, operations
 from met.backends.reference.plain import execute
 from met.trace import sin, where
 from met.trace.graph import OPERANDS
-from met.trace.program import Call, Every, Phase, Program, Record, Run, Unless0, WhileAny
+from met.trace.program import CallPhase, Every, Phase, Program, RecordPhase, RunPhase, Unless0, WhileAny
 from met.trace.recorder import record
 
 
 def run(*bodies):
-    return tuple(Run(Phase(f"p{i}", body)) for i, body in enumerate(bodies))
+    return tuple(RunPhase(Phase(f"p{i}", body)) for i, body in enumerate(bodies))
 
 
 def program(tick, *, start=(), end=(), inputs=("a", "b", "c"), columns=0, outputs=()):
@@ -36,21 +36,21 @@ ROW = Phase("row", lambda t: t.record(0, t.read("n")))
 
 def test_ticks_are_run_at_both_ends_and_the_start_once():
     begin = Phase("begin", lambda t: t.write("n", 100.0))
-    one = program((Run(COUNT),), start=(Run(begin),), end=(Run(SHOW),), inputs=(), outputs=("n",))
+    one = program((RunPhase(COUNT),), start=(RunPhase(begin),), end=(RunPhase(SHOW),), inputs=(), outputs=("n",))
     assert execute(one, {}, 0)[1] == {"n": 101.0}
     assert execute(one, {}, 5)[1] == {"n": 106.0}
 
 
 def test_every_divides_the_tick_and_unless0_leaves_out_the_first():
-    every = program((Every(3, (Run(COUNT),)),), end=(Run(SHOW),), inputs=(), outputs=("n",))
+    every = program((Every(3, (RunPhase(COUNT),)),), end=(RunPhase(SHOW),), inputs=(), outputs=("n",))
     assert [execute(every, {}, k)[1]["n"] for k in range(7)] == [1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0]
-    later = program((Unless0((Run(COUNT),)),), end=(Run(SHOW),), inputs=(), outputs=("n",))
+    later = program((Unless0((RunPhase(COUNT),)),), end=(RunPhase(SHOW),), inputs=(), outputs=("n",))
     assert [execute(later, {}, k)[1]["n"] for k in range(3)] == [0.0, 1.0, 2.0]
 
 
 def test_rows_are_recorded_in_their_place_among_the_phases():
-    before = program((Record(ROW, 2), Run(COUNT)), inputs=(), columns=1)
-    after = program((Run(COUNT), Record(ROW, 2)), inputs=(), columns=1)
+    before = program((RecordPhase(ROW, 2), RunPhase(COUNT)), inputs=(), columns=1)
+    after = program((RunPhase(COUNT), RecordPhase(ROW, 2)), inputs=(), columns=1)
     assert execute(before, {}, 5)[0].tolist() == [[0.0], [2.0], [4.0]]
     assert execute(after, {}, 5)[0].tolist() == [[1.0], [3.0], [5.0]]
 
@@ -58,7 +58,9 @@ def test_rows_are_recorded_in_their_place_among_the_phases():
 def test_while_any_ends_with_its_cell_or_with_its_limit():
     ask = Phase("ask", lambda t: t.write("left", t.input("a")))
     less = Phase("less", lambda t: (t.write("left", t.read("left") - 1.0), t.write("n", t.read("n") + 1.0)))
-    one = program((Run(ask), WhileAny("left", 4, (Run(less),))), end=(Run(SHOW),), inputs=("a",), outputs=("n",))
+    one = program(
+        (RunPhase(ask), WhileAny("left", 4, (RunPhase(less),))), end=(RunPhase(SHOW),), inputs=("a",), outputs=("n",)
+    )
     assert [execute(one, [float(a)], 0)[1]["n"] for a in range(7)] == [0.0, 1.0, 2.0, 3.0, 4.0, 4.0, 4.0]
 
 
@@ -89,8 +91,14 @@ def test_neighbouring_runs_are_one_section_and_pass_values_without_memory():
 def test_a_called_phase_is_there_once_and_passes_values_through_memory():
     twice = Phase("twice", lambda t: t.write("n", t.read("n") + t.read("n")))
     one = program(
-        (Run(COUNT), Call(twice), Run(COUNT), Every(2, (Call(twice), Run(COUNT))), Call(twice)),
-        end=(Run(SHOW),),
+        (
+            RunPhase(COUNT),
+            CallPhase(twice),
+            RunPhase(COUNT),
+            Every(2, (CallPhase(twice), RunPhase(COUNT))),
+            CallPhase(twice),
+        ),
+        end=(RunPhase(SHOW),),
         inputs=(),
         outputs=("n",),
     )
@@ -102,7 +110,9 @@ def test_a_called_phase_is_there_once_and_passes_values_through_memory():
 
 
 def test_every_tick_is_no_condition():
-    recording = record(program((Run(COUNT), Every(1, (Run(COUNT),)), Run(COUNT)), end=(Run(SHOW),), outputs=("n",)))
+    recording = record(
+        program((RunPhase(COUNT), Every(1, (RunPhase(COUNT),)), RunPhase(COUNT)), end=(RunPhase(SHOW),), outputs=("n",))
+    )
     assert len(recording.tick) == 1
 
 
@@ -120,7 +130,9 @@ def test_what_nothing_reads_is_dropped_with_all_that_only_it_needs():
 
 def test_a_cell_that_only_a_condition_reads_is_kept():
     ask = Phase("ask", lambda t: t.write("left", t.input("a")))
-    recording = record(program((Run(ask), WhileAny("left", 1, (Run(COUNT),))), end=(Run(SHOW),), outputs=("n",)))
+    recording = record(
+        program((RunPhase(ask), WhileAny("left", 1, (RunPhase(COUNT),))), end=(RunPhase(SHOW),), outputs=("n",))
+    )
     assert set(recording.cells) == {"left", "n"}
 
 
@@ -140,11 +152,11 @@ def test_masks_pass_through_memory():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        (lambda: program((Every(2, (Record(ROW, 4),)),), columns=1), "within another condition"),
-        (lambda: program((Record(ROW, 2), Record(ROW, 3)), columns=1), "one rate"),
-        (lambda: program((Record(ROW, 1),), columns=2), r"no phase records columns \[1\]"),
+        (lambda: program((Every(2, (RecordPhase(ROW, 4),)),), columns=1), "within another condition"),
+        (lambda: program((RecordPhase(ROW, 2), RecordPhase(ROW, 3)), columns=1), "one rate"),
+        (lambda: program((RecordPhase(ROW, 1),), columns=2), r"no phase records columns \[1\]"),
         (lambda: program((), outputs=("x",)), r"no phase writes the outputs \['x'\]"),
-        (lambda: program((Record(ROW, 1),), start=(Record(ROW, 1),), columns=1), "rows belong to ticks"),
+        (lambda: program((RecordPhase(ROW, 1),), start=(RecordPhase(ROW, 1),), columns=1), "rows belong to ticks"),
         (lambda: program(run(lambda t: t.record(0, 1.0)), columns=1), "recorded in a tick phase"),
         (lambda: program(run(lambda t: t.output("x", 1.0)), outputs=("x",)), "before the end"),
         (lambda: program(run(lambda t: t.input("nothing"))), "no input 'nothing'"),

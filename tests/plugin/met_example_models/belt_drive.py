@@ -20,7 +20,7 @@ from met.trace import Real, both, clip, either, sqrt, where
 
 def control(p: Any, held: Any, seen: Seen) -> Control:
     """The rate loop: the motor's torque, and the slope of its integral, which the engine integrates."""
-    error = seen.asked.value - seen.qd
+    error = seen.setpoint.value - seen.qd
     wanted = p.kp * error + p.ki * held.integral
     winding_up = either(both(wanted > p.limit, error > 0.0), both(wanted < -p.limit, error < 0.0))
     return Control({"torque_cmd": clip(wanted, -p.limit, p.limit)}, slopes={"integral": where(winding_up, 0.0, error)})

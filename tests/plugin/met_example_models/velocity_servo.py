@@ -18,7 +18,7 @@ from met.trace import Real, clip, maximum, sqrt
 
 def control(p: Any, held: Any, seen: Seen) -> Control:
     """The servo's computer: it hands the command on."""
-    return Control({"qd_cmd": seen.asked.value})
+    return Control({"qd_cmd": seen.setpoint.value})
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:

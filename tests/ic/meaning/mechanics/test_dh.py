@@ -13,7 +13,7 @@ from met import run as engine
 from met.dynamics.kinematics import link_motions
 from met.dynamics.spatial import rotation_rpy
 from met.plan import Experiment
-from met.program.machine import Machine
+from met.program.system import System
 from met.trace import Formulas, Graph
 from tests.ic.small_decks import check, experiment, messages
 from tests.oracles import denavit_hartenberg as dh
@@ -50,7 +50,7 @@ def arm(convention: str, rows: Sequence[dh.Row], kinds: str, bodies: Sequence[dh
 
 def frames(made: Experiment, q: Sequence[float]) -> dict[str, np.ndarray]:
     """4x4 of every link's frame in the world, by the tree that the engine moves."""
-    tree = Machine(made).tree(lambda _: 0.0)
+    tree = System(made).tree(lambda _: 0.0)
     found = {}
     for name, motion in link_motions(tree, tuple(q), (0.0,) * len(q)).items():
         found[name] = np.eye(4)

@@ -1,4 +1,4 @@
-"""The machine that an experiment describes: its models looked up, its parameters ready to be read.
+"""The system that an experiment describes: its models looked up, its parameters ready to be read.
 
 This is what stays the same during a run. A parameter is a float where the plan gives it one value, and is read
 from the case's memory where a sweep varies it (`PARAMETER` cells, computed once before the run).
@@ -25,9 +25,9 @@ from met.plan import BASE, Experiment, Formula, Joint, LinkSensor, Payload, Sens
 from met.plan.channel import Channel, channels
 from met.program.control import guided
 from met.program.motion.courses import recorded
-from met.program.values import Values, answer, parameters, returned
+from met.program.values import NamedValues, answer, parameters, returned
 from met.sensors.sensor import Sensor
-from met.servos.servo import Asked, Drive, JointMotion, Parts, Servo
+from met.servos.servo import Drive, JointMotion, Parts, Servo, Setpoint
 from met.substitution import Bed, Law
 from met.trace import Formulas, Graph, Real, Scalar
 from met.vectors import Vector
@@ -100,7 +100,7 @@ class Actuator:
         return (*own, *(name for each in self.sensors for name in each.channels))
 
     @property
-    def asked(self) -> str:
+    def command_kind(self) -> str:
         """Kind of the joint's command; "none" where it has none."""
         return "none" if self.use.command is None else self.use.command.kind
 
@@ -111,8 +111,8 @@ class Actuator:
 
 
 @frozen
-class Machine:
-    """Models and parameters of one experiment."""
+class System:
+    """The models of one experiment, looked up, and its parameters, to be read by path."""
 
     experiment: Experiment
 
@@ -247,22 +247,22 @@ class Machine:
         """What the paths of a link's or payload's parameters begin with."""
         return f"payloads.{link}" if any(each.name == link for each in self.structure.payloads) else f"links.{link}"
 
-    def servo_values(self, actuator: Actuator, read: ReadCell) -> Values:
+    def servo_values(self, actuator: Actuator, read: ReadCell) -> NamedValues:
         return parameters(actuator.owner, actuator.path, actuator.parts.parameters, lambda path: self.value(path, read))
 
-    def asked(self, actuator: Actuator, read: ReadCell, time: Real) -> Asked:
+    def setpoint(self, actuator: Actuator, read: ReadCell, time: Real) -> Setpoint:
         """What the joint's command asks at a time; kind "none" where it has none."""
         if actuator.use.command is not None and actuator.use.command.guide:
             guide = next(use for use in self.structure.guides if use.name == actuator.use.command.guide)
-            return guided.asked(self, actuator.use.joint, actuator.asked, guide, read, time)
+            return guided.setpoint(self, actuator.use.joint, actuator.command_kind, guide, read, time)
         if actuator.profile is None:
-            return Asked("none", 0.0, 0.0)
+            return Setpoint("none", 0.0, 0.0)
         p = parameters(
             f"command `{actuator.profile.name}` of {actuator.owner}", f"{actuator.path}.command",
             actuator.profile.parameters, lambda path: self.value(path, read),
         )  # fmt: skip
         value, slope = answer(actuator.owner, actuator.profile.course, p, time)
-        return Asked(actuator.asked, value, slope)
+        return Setpoint(actuator.command_kind, value, slope)
 
     def tree(self, read: ReadCell) -> Tree:
         """The arm as the dynamics see it: built once where no case varies it, else kept in the case's memory."""
@@ -360,10 +360,10 @@ class Machine:
         """The servo's physics recorded once, to see what it uses; and its levels of dry friction, where known now."""
         graph, parts = Graph(), actuator.parts
         named = [*(output.name for output in parts.outputs), *(state.name for state in parts.integrals)]
-        held = Values(actuator.owner, {name: graph.input(name) for name in named})
-        states = Values(actuator.owner, {state.name: graph.input(state.name) for state in parts.natural})
+        held = NamedValues(actuator.owner, {name: graph.input(name) for name in named})
+        states = NamedValues(actuator.owner, {state.name: graph.input(state.name) for state in parts.natural})
         q, qd, time, begin = (graph.input(name) for name in ("q", "qd", "time", "begin"))
-        joint = JointMotion(q, qd, time, begin, actuator.asked)
+        joint = JointMotion(q, qd, time, begin, actuator.command_kind)
         p = self.servo_values(actuator, graph.input)
         drive = answer(actuator.owner, actuator.servo.drive, p, held, states, joint)
 
