@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import Literal
 
 from met.frozen import frozen
+from met.messages.renamed import old_fields
 
 WORLD = "world"
 """A word that may stand for a link: the ground, whose frame is the world's."""
@@ -101,19 +102,21 @@ class Memory:
     only: Only | None = None
 
 
+@old_fields(between="in_transmission")
 @frozen(kw_only=True)
 class State:
     """A number that nature integrates for a model, with the motion of the arm; recorded under its name.
 
-    between  of a servo: whether it is of what joins motor and joint, such as how far a gear is wound up. Where the
-             servo has let go of the joint it goes back to `start`, by half in each step of modified Euler
+    in_transmission  of a servo: true of a state of what joins motor and joint, such as how far a gear is wound up.
+                     Where the servo has let go of the joint it goes back to `start`, by half in each step of modified
+                     Euler
     """
 
     name: str
     unit: str
     doc: str
     start: float = 0.0
-    between: bool = False
+    in_transmission: bool = False
     only: Only | None = None
 
 

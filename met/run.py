@@ -16,7 +16,7 @@ from met.frozen import frozen
 from met.plan import REPEAT, Experiment, keys
 from met.program.build import COORDINATE, METRIC, OUTPUTS, build
 from met.program.control.substituted import LIMITED
-from met.program.step import ASTRAY, EVENTS, NOT_FINITE, SINGULAR
+from met.program.step import EVENTS, NOT_FINITE, OUT_OF_RANGE, SINGULAR
 from met.trace.identity import result_keys, state_key
 from met.trace.program import Program
 from met.trace.recorder import record
@@ -297,7 +297,7 @@ def _cause(experiment: Experiment, failure: float, number: float, tick: float) -
             f"{head}D is not above 0 {unit}, so qdd is undefined. Nothing outboard has inertia about this "
             f"joint{where}. Give the link mass or the servo a rotor inertia."
         )
-    if failure == ASTRAY:
+    if failure == OUT_OF_RANGE:
         return (
             f"{head}a state of its servo is where it can never be{where}: a step is too long for the servo (try a "
             f"faster rate for the dynamics). The bristles of `friction = lugre` want sigma_0 |motor rate|/f_c times "

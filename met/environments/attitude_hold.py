@@ -93,5 +93,5 @@ ENVIRONMENT = Environment(
     ),
     loads=loads,
     idle=idle,
-    pushes=lambda p: ("link",),
+    pushed_links=lambda p: ("link",),
 )

@@ -40,5 +40,5 @@ ENVIRONMENT = Environment(
     ),
     loads=loads,
     idle=idle,
-    rubs="joint",
+    friction_joint="joint",
 )

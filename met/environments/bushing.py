@@ -117,5 +117,5 @@ ENVIRONMENT = Environment(
     ),
     loads=loads,
     idle=idle,
-    pushes=lambda p: ("link", "to"),
+    pushed_links=lambda p: ("link", "to"),
 )  # fmt: skip

@@ -16,7 +16,7 @@ from met.parameter import Parameter
 from met.trace import Real, where
 
 
-def sees(p: Any, time: Real, of: str, value: Real, last: Real) -> Real:
+def replaced_reading(p: Any, time: Real, of: str, value: Real, last: Real) -> Real:
     if of != p.of:
         return value
     return where(open_at(p, time), 0.0 if p.reads == "zero" else last, value)
@@ -41,5 +41,5 @@ ENVIRONMENT = Environment(
     ),
     idle=idle,
     servo_of="joint",
-    sees=sees,
+    replaced_reading=replaced_reading,
 )

@@ -11,6 +11,7 @@ from dataclasses import field
 from typing import Any, Protocol
 
 from met.frozen import frozen
+from met.messages.renamed import old_fields
 from met.parameter import Parameter
 from met.trace import Real
 from met.vectors import Matrix, Vector
@@ -76,7 +77,7 @@ class Loads:
     torques  torque on joints by name (N m; N)
     forces   wrenches on links
     dry      dry friction on joints by name, its level, N m (N): it opposes motion, and holds at rest. Of a model that
-             declares the joint (`Environment.rubs`) alone
+             declares the joint (`Environment.friction_joint`) alone
     """
 
     gravity: Vector = (0.0, 0.0, 0.0)
@@ -88,6 +89,16 @@ class Loads:
 FILE = Parameter(name="file", shape="text", default="none", doc="CSV file whose columns the lists are, in their stead")
 
 
+@old_fields(
+    pushes="pushed_links",
+    between="initial_range",
+    rubs="friction_joint",
+    loose="decoupling",
+    gives="replaced_outputs",
+    sees="replaced_reading",
+    falls="free_fall",
+    turns="world_rate",
+)
 @frozen(kw_only=True)
 class Environment:
     """The declaration of an environment model; one a file.
@@ -95,28 +106,30 @@ class Environment:
     loads  (p, world) -> Loads. None: it is no load
     idle   (p, duration) -> the parameters because of which it never acts in a run of that length (s), and why, in
            words; None where it may act. Asked where all its numbers are constants. None: it always may
-    pushes (p) -> the parameters that name the links that it acts upon: a deck in which all of these are part of the
-           ground is warned. None: it may act upon others
-    between  the two parameters that are the ends between which its joint should begin: a deck whose joint begins
+    pushed_links  (p) -> the parameters that name the links that it acts upon: a deck in which all of these are part of
+           the ground is warned. None: it may act upon others
+    initial_range  the two parameters that are the ends between which its joint should begin: a deck whose joint begins
            beyond is warned. (): there are none
     springs  the parameters that name a joint, and are the stiffness with which it is pushed back where it touches: a
            deck is warned where the dynamics' step is long for that (met/analysis/contact.py). (): there is none
-    rubs   the parameter that names the one joint on which it puts dry friction. "": none does
+    friction_joint  the parameter that names the one joint on which it puts dry friction. "": none does
 
     What it may do to the servo of one joint, such as to let it fail:
 
     servo_of  the parameter that names the joint
-    loose  (p, step) -> how far the servo has let go of the joint in a step, from 0, not at all, to 1; step has `begin`,
-           when it began, and `step`, its length (s)
-    gives  (p, time, outputs, full) -> outputs of the servo's law, by name, in the stead of these. full: with what the
-           servo's limits allow (`Servo.full`)
-    sees   (p, time, of, value, last) -> what the law sees of the quantity `of` in the stead of this value; last: what
-           it saw at its last tick
+    decoupling  (p, step) -> how far the servo has let go of the joint in a step, from 0, not at all, to 1; step has
+           `begin`, when it began, and `step`, its length (s)
+    replaced_outputs  (p, time, outputs, full) -> outputs of the servo's law, by name, in the place of these. full: with
+           what the servo's limits allow (`Servo.full`)
+    replaced_reading  (p, time, of, value, last) -> what the law sees of the quantity `of` in the place of this value;
+           last: what it saw at its last tick
+
     What of it no instrument on board feels:
 
-    falls  (p, world, position, velocity) -> acceleration of a body that falls freely there, and moves so, beside
+    free_fall  (p, world, position, velocity) -> acceleration of a body that falls freely there, and moves so, beside
            `Loads.gravity`, world axes (m/s^2): of a model whose loads are gravitation, or that has the world turn
-    turns  (p, world) -> angular velocity of the world's axes against directions that do not turn, world axes (rad/s)
+    world_rate  (p, world) -> angular velocity of the world's axes against directions that do not turn, world axes
+           (rad/s)
 
     from_file  a deck may write `file` in the stead of the lists: they are then the columns of their names, and the
            list that rises is the column `time`
@@ -127,16 +140,16 @@ class Environment:
     parameters: tuple[Parameter, ...] = ()
     loads: Callable[[Any, World], Loads] | None = None
     idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None
-    pushes: Callable[[Any], tuple[str, ...]] | None = None
-    between: tuple[str, ...] = ()
+    pushed_links: Callable[[Any], tuple[str, ...]] | None = None
+    initial_range: tuple[str, ...] = ()
     springs: tuple[str, ...] = ()
-    rubs: str = ""
+    friction_joint: str = ""
     servo_of: str = ""
-    loose: Callable[[Any, Any], Real] | None = None
-    gives: Callable[[Any, Real, Mapping[str, Real], Mapping[str, Real]], Mapping[str, Real]] | None = None
-    sees: Callable[[Any, Real, str, Real, Real], Real] | None = None
-    falls: Callable[[Any, World, Vector, Vector], Vector] | None = None
-    turns: Callable[[Any, World], Vector] | None = None
+    decoupling: Callable[[Any, Any], Real] | None = None
+    replaced_outputs: Callable[[Any, Real, Mapping[str, Real], Mapping[str, Real]], Mapping[str, Real]] | None = None
+    replaced_reading: Callable[[Any, Real, str, Real, Real], Real] | None = None
+    free_fall: Callable[[Any, World, Vector, Vector], Vector] | None = None
+    world_rate: Callable[[Any, World], Vector] | None = None
     from_file: bool = False
 
     @property

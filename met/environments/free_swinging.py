@@ -17,7 +17,7 @@ from met.parameter import Parameter
 from met.trace import Real
 
 
-def loose(p: Any, step: Step) -> Real:
+def decoupling(p: Any, step: Step) -> Real:
     return share(step, getattr(p, "from"), p.until)
 
 
@@ -31,5 +31,5 @@ ENVIRONMENT = Environment(
     parameters=(Parameter(name="joint", shape="word", names="joint", doc="joint that swings freely"), *WINDOW),
     idle=idle,
     servo_of="joint",
-    loose=loose,
+    decoupling=decoupling,
 )

@@ -36,12 +36,12 @@ def loads(p: Any, world: World) -> Loads:
     return Loads(forces=tuple(_on_link(p, world, link, field, turning) for link in world.links))
 
 
-def falls(p: Any, world: World, position: Vector, velocity: Vector) -> Vector:
+def free_fall(p: Any, world: World, position: Vector, velocity: Vector) -> Vector:
     field, turning = _around(p, world)
     return _acceleration(p, field, turning, position, velocity)
 
 
-def turns(p: Any, world: World) -> Vector:
+def world_rate(p: Any, world: World) -> Vector:
     return _around(p, world)[1] if p.frame == "orbital" else ZERO
 
 
@@ -126,6 +126,6 @@ ENVIRONMENT = Environment(
         ),
     ),
     loads=loads,
-    falls=falls,
-    turns=turns,
+    free_fall=free_fall,
+    world_rate=world_rate,
 )  # fmt: skip

@@ -65,5 +65,5 @@ ENVIRONMENT = Environment(
     loads=loads,
     springs=("joint", "stiffness"),
     idle=idle,
-    between=("lower", "upper"),
+    initial_range=("lower", "upper"),
 )  # fmt: skip

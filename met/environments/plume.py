@@ -209,5 +209,5 @@ ENVIRONMENT = Environment(
     ),
     loads=loads,
     idle=idle,
-    pushes=lambda p: ("link",) if p.reaction == "off" else ("link", "nozzle_link"),
+    pushed_links=lambda p: ("link",) if p.reaction == "off" else ("link", "nozzle_link"),
 )  # fmt: skip

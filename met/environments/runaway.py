@@ -18,7 +18,7 @@ from met.parameter import Parameter
 from met.trace import Real, where
 
 
-def gives(p: Any, time: Real, outputs: Mapping[str, Real], full: Mapping[str, Real]) -> Mapping[str, Real]:
+def replaced_outputs(p: Any, time: Real, outputs: Mapping[str, Real], full: Mapping[str, Real]) -> Mapping[str, Real]:
     runs = open_at(p, time)
     return {name: where(runs, p.level * full[name], value) for name, value in outputs.items()}
 
@@ -39,5 +39,5 @@ ENVIRONMENT = Environment(
     ),
     idle=idle,
     servo_of="joint",
-    gives=gives,
+    replaced_outputs=replaced_outputs,
 )

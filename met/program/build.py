@@ -178,7 +178,7 @@ class Builder:
         setpoint = self.system.setpoint(actuator, tape.read, tape.time)
         if actuator.use.command is not None:
             tape.write(f"{actuator.path}.command", setpoint.value)
-        on_bed, between = self.step.beds.seen(tape, actuator), actuator in self.system.between
+        on_bed, between = self.step.beds.seen(tape, actuator), actuator in self.system.ticking_between
 
         def state(channel: str) -> Real:
             return self._carried_state(tape, channel) if between else tape.read(channel)
@@ -234,14 +234,14 @@ class Builder:
         q, qd = self._state_of(tape, joint)
         a, s = tape.read(f"carry:{joint}"), self._since(tape)
         rate = qd + s * a
-        rate = where(both(self.step.rubs(tape, joint), qd * rate < 0.0), 0.0, rate)
+        rate = where(both(self.step.has_dry_friction(tape, joint), qd * rate < 0.0), 0.0, rate)
         return q + s * qd + 0.5 * s * s * a, rate
 
     def _carried_state(self, tape: Tape, state: str) -> Real:
         """A servo's state between instants, carried forward as it changed over the step just done."""
         x = tape.read(state)
         carried = x + self._since(tape) * tape.read(f"carry:{state}")
-        return where(both(self.step.rubs(tape, state), x * carried < 0.0), 0.0, carried)
+        return where(both(self.step.has_dry_friction(tape, state), x * carried < 0.0), 0.0, carried)
 
     def _since(self, tape: Tape) -> Real:
         """Time since the last instant, s."""

@@ -37,7 +37,7 @@ class Derivative:
     gravity  acceleration of free fall, of all environment models, world axes, m/s^2
     base     where the base is and how it moves
     stored   kinetic and potential energy in the servos, of what does not move with their joints, J
-    astray   of each moving joint, whether a state of its servo is where it can never be
+    out_of_range  of each moving joint, whether a state of its servo is where it can never be
     loads    what each moving joint would have to be driven with to move so, N m (N): what the arm takes less what the
              environment gives
     """
@@ -50,7 +50,7 @@ class Derivative:
     gravity: Vector
     base: BaseMotion
     stored: tuple[Real, Real]
-    astray: tuple[Truth, ...]
+    out_of_range: tuple[Truth, ...]
     loads: tuple[Real, ...]
 
 
@@ -153,7 +153,7 @@ def derivative(
             sum((drive.kinetic for drive in drives if drive is not None), 0.0),
             sum((drive.potential for drive in drives if drive is not None), 0.0),
         ),
-        astray=tuple(False if drive is None else drive.astray for drive in drives),
+        out_of_range=tuple(False if drive is None else drive.state_out_of_range for drive in drives),
         loads=tuple(a - b for a, b in zip(solved.tau_load, loads.torques, strict=True)),
     )
 
@@ -205,7 +205,7 @@ def driven_by(
     slopes.update(returned(owner, "slopes", drive.slopes, (state.name for state in parts.natural)))
     if coupled is not None:
         for state in parts.natural:
-            if state.between:
+            if state.in_transmission:
                 back = (state.start - own[f"{actuator.path}.{state.name}"]) / system.structure.schedule.step
                 slopes[state.name] = coupled * slopes[state.name] + (1.0 - coupled) * back
     shown.update(returned(owner, "signals", drive.signals, (signal.name for signal in parts.signals)))
@@ -271,8 +271,8 @@ def _of_brakes(system: System, joint: int, drive: Drive | None, loads: _Loads, f
     if name not in loads.dry:
         return 0.0
     level, own = level_of(system, joint, drive, loads), loads.dry[name]
-    rubs = level > 0.0
-    return where(rubs, own / where(rubs, level, 1.0) * friction, 0.0)
+    has_friction = level > 0.0
+    return where(has_friction, own / where(has_friction, level, 1.0) * friction, 0.0)
 
 
 def gravity(system: System, read: ReadCell, y: Motion, time: Real) -> Vector:
@@ -286,7 +286,9 @@ def brakes(system: System, read: ReadCell, y: Motion, time: Real, begin: Real) -
     if not system.braked:
         return {}
     tree, base = laden(system, read), base_of(system, read, y, time)
-    return _environment(system, tree, read, y, base, time, begin, [m for m in system.environment if m[1].rubs]).dry
+    return _environment(
+        system, tree, read, y, base, time, begin, [m for m in system.environment if m[1].friction_joint]
+    ).dry
 
 
 def _environment(
@@ -308,7 +310,7 @@ def _environment(
         for joint, torque in loads.torques.items():
             number = world._number(joint)
             torques[number] = torques[number] + torque
-        returned(owner, "dry", loads.dry, [getattr(p, model.rubs)] if model.rubs else [])
+        returned(owner, "dry", loads.dry, [getattr(p, model.friction_joint)] if model.friction_joint else [])
         for joint, level in loads.dry.items():
             dry[joint] = dry[joint] + level if joint in dry else level
         for force in loads.forces:

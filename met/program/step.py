@@ -28,7 +28,7 @@ from met.program.values import NamedValues
 from met.trace import Real, Truth, any_of, both, either, isfinite, not_, sign, where
 from met.trace.program import CallPhase, Control, Every, Phase, RunPhase, Tape, WhileAny
 
-SINGULAR, NOT_FINITE, ASTRAY = 1.0, 2.0, 4.0
+SINGULAR, NOT_FINITE, OUT_OF_RANGE = 1.0, 2.0, 4.0
 """Causes of a failed case (output `failure`); 0 is none, 3 what ended it from outside (met/run.py)."""
 
 EVENTS = ("friction.splits", "friction.clamped", "friction.undecided")
@@ -63,7 +63,7 @@ class StepPhases:
         # what may hide that a number is none: joints whose acceleration may be given, and all that may stick
         gives = [a.use.joint for a in system.working if a.gives or a.level != 0.0]
         self._needs = tuple(dict.fromkeys((*gives, *(each.name for each in self.sticking))))
-        self._straying = [actuator for actuator in self.system.working if actuator.strays]
+        self._may_leave_range = [actuator for actuator in self.system.working if actuator.may_leave_range]
         self._split = WhileAny("crossing", 1, (RunPhase(Phase("split", self.split)),))
 
     def begin(self) -> tuple[Control, ...]:
@@ -86,13 +86,13 @@ class StepPhases:
                 self._split,
             )
             parts = (*parts, self._split, WhileAny("again", friction.SPLITS, again))
-        return (*parts, RunPhase(Phase("carry", self.carry))) if self.system.between else parts
+        return (*parts, RunPhase(Phase("carry", self.carry))) if self.system.ticking_between else parts
 
     # Modes.
 
     def modes(self, tape: Tape) -> None:
         """What begins at an instant: held values for the first stage, friction modes from the rates."""
-        for actuator in self.system.between:
+        for actuator in self.system.ticking_between:
             for memory in actuator.parts.memory:
                 channel = f"{actuator.path}.{memory.name}"
                 tape.write(f"first:{channel}", tape.read(channel))
@@ -111,12 +111,12 @@ class StepPhases:
         any_at_rest: Truth = False
         for each, level in zip(self.sticking, self._levels(tape), strict=True):
             rate = tape.read(each.cell)
-            rubs = level > 0.0
-            if not isinstance(rubs, bool):
-                cells.keep(tape, active, f"rubs:{each.name}", where(rubs, 1.0, 0.0))
+            has_friction = level > 0.0
+            if not isinstance(has_friction, bool):
+                cells.keep(tape, active, f"rubs:{each.name}", where(has_friction, 1.0, 0.0))
             # without friction at rest it moves freely; a level that rises later in the step opposes the motion at once
-            cells.keep(tape, active, f"friction:{each.name}", where(either(rubs, rate != 0.0), sign(rate), 1.0))
-            any_at_rest = either(any_at_rest, both(rubs, rate == 0.0))
+            cells.keep(tape, active, f"friction:{each.name}", where(either(has_friction, rate != 0.0), sign(rate), 1.0))
+            any_at_rest = either(any_at_rest, both(has_friction, rate == 0.0))
         tape.write_mask("undecided", both(active, any_at_rest))
 
     def _levels(self, tape: Tape) -> list[Real]:
@@ -136,7 +136,7 @@ class StepPhases:
             found.append(own[0] if len(own) == 1 else own[0] + own[1])
         return found
 
-    def rubs(self, tape: Tape, name: str) -> Truth:
+    def has_dry_friction(self, tape: Tape, name: str) -> Truth:
         """Whether what has this name has dry friction, as `modes` found it; False for a case whose level is zero."""
         found = next((each for each in self.sticking if each.name == name), None)
         if found is None:
@@ -157,7 +157,7 @@ class StepPhases:
         for each, level in zip(self.sticking, self._levels(tape), strict=True):
             s = tape.read(f"friction:{each.name}")
             slope = tape.read(f"slope:{each.name}" if each.state else f"{each.name}.qdd")
-            at_rest = both(self.rubs(tape, each.name), each.rate(y) == 0.0)
+            at_rest = both(self.has_dry_friction(tape, each.name), each.rate(y) == 0.0)
             s_new = friction.decide(s, at_rest, tape.read(f"need:{each.name}"), level, slope)
             s_new = where(changed, s, s_new) if one else s_new
             changed = either(changed, s_new != s)
@@ -188,17 +188,17 @@ class StepPhases:
         for i in reversed(range(len(self.joints))):
             singular = where(found.solved.singular[i], float(i + 1), singular)
         tape.write("singular", singular)
-        astray: Real = 0.0
-        for actuator in reversed(self._straying):
-            astray = where(found.astray[actuator.index], float(actuator.index + 1), astray)
-        if self._straying:
-            tape.write("astray", astray)
+        out_of_range: Real = 0.0
+        for actuator in reversed(self._may_leave_range):
+            out_of_range = where(found.out_of_range[actuator.index], float(actuator.index + 1), out_of_range)
+        if self._may_leave_range:
+            tape.write("astray", out_of_range)
         # Infinities that cancel leave not a number, so a plain sum misses none; a sum of numbers that is none only
         # makes `judge` look.
         parts = (*found.slope.qdd, *found.slope.xd, *y.q, *y.qd, *(found.need[name] for name in self._needs))
         total: Real = sum((*parts, *bodies.orientation(self.system, tape)), 0.0)
         wrong = either(not_(isfinite(total)), singular != 0.0)
-        tape.write_mask("suspect", either(wrong, astray != 0.0) if self._straying else wrong)
+        tape.write_mask("suspect", either(wrong, out_of_range != 0.0) if self._may_leave_range else wrong)
 
     def slope(self, tape: Tape) -> None:
         """The derivative at a stage on the way, its slopes alone."""
@@ -221,9 +221,9 @@ class StepPhases:
 
         `need` tells where a joint that sticks hides it, the state where no acceleration depends on it.
         """
-        astray: Real = tape.read("astray") if self._straying else 0.0
-        cause: Real = where(astray != 0.0, ASTRAY, 0.0)
-        number: Real = where(astray != 0.0, astray - 1.0, 0.0)
+        out_of_range: Real = tape.read("astray") if self._may_leave_range else 0.0
+        cause: Real = where(out_of_range != 0.0, OUT_OF_RANGE, 0.0)
+        number: Real = where(out_of_range != 0.0, out_of_range - 1.0, 0.0)
         of_bodies = list(enumerate(bodies.bodies(self.system), len(self.joints)))
         for i, fitted in reversed(list(enumerate(self.system.sensors, len(self.joints) + len(of_bodies)))):
             told = [part for name in fitted.channels for part in (name, f"slope:{name}")]
@@ -298,7 +298,7 @@ class StepPhases:
         for memory in actuator.parts.memory:
             channel = f"{actuator.path}.{memory.name}"
             now = tape.read(channel)
-            if actuator in self.system.between:
+            if actuator in self.system.ticking_between:
                 first = tape.read(f"first:{channel}")
                 now = first + fraction * (now - first)
             numbers[memory.name] = now
@@ -401,11 +401,11 @@ class StepPhases:
 
     def carry(self, tape: Tape) -> None:
         """The slope of the step just done, for servos that tick before the next; none for what is at rest and rubs."""
-        for actuator in self.system.between:
+        for actuator in self.system.ticking_between:
             for name, cell in self._carried(actuator):
                 now = tape.read(cell)
                 slope = (now - tape.read(f"before:{name}")) / self.schedule.step
-                tape.write(f"carry:{name}", where(both(self.rubs(tape, name), now == 0.0), 0.0, slope))
+                tape.write(f"carry:{name}", where(both(self.has_dry_friction(tape, name), now == 0.0), 0.0, slope))
 
     def _carried(self, actuator: Actuator) -> list[tuple[str, str]]:
         """What of a servo's joint is carried forward between instants, and the cells: its rate, the servo's states."""
@@ -428,5 +428,5 @@ class StepPhases:
         for each in self.sticking:
             mode = tape.read(f"friction:{each.name}")
             number = each.number + (len(self.coordinates) if each.state else 0)
-            modes[number] = where(self.rubs(tape, each.name), mode, 0.0)
+            modes[number] = where(self.has_dry_friction(tape, each.name), mode, 0.0)
         return modes

@@ -68,7 +68,7 @@ class Actuator:
     parts    what there is of it in this use
     level    of its dry friction, where it is the same at all times and for all cases, N m (N); None where it varies
     gives    whether it may give the joint's acceleration
-    strays   whether its states may be where they can never be
+    may_leave_range  whether its states may be where they can never be
     levels   of the dry friction on its states, by name, as `level`
     sensors  through which its law sees
     """
@@ -80,7 +80,7 @@ class Actuator:
     parts: Parts
     level: float | None
     gives: bool
-    strays: bool
+    may_leave_range: bool
     levels: Mapping[str, float | None]
     sensors: tuple[Fitted, ...] = ()
 
@@ -141,8 +141,8 @@ class System:
     def braked(self) -> frozenset[str]:
         """Joints on which environment models put dry friction."""
         return frozenset(
-            str(self.experiment.parameters[f"environment.{name}.{model.rubs}"].value)
-            for name, model in self.environment if model.rubs
+            str(self.experiment.parameters[f"environment.{name}.{model.friction_joint}"].value)
+            for name, model in self.environment if model.friction_joint
         )  # fmt: skip
 
     @cached_property
@@ -187,7 +187,7 @@ class System:
         return tuple(self._fitted(use, f"sensors.{use.name}") for use in self.structure.sensors)
 
     @cached_property
-    def between(self) -> tuple[Actuator, ...]:
+    def ticking_between(self) -> tuple[Actuator, ...]:
         """Those that tick between instants: faster than the dynamics, or slower and no multiple of them."""
         step = self.structure.schedule.dynamics
         return tuple(each for each in self.working if each.ticks and each.use.divisor % step)
@@ -346,10 +346,14 @@ class System:
                 message = f"{bare.owner} gives an acceleration, and a brake is on the joint"
             help = "a joint that is told its acceleration has no use for friction"
             raise Problem(error("E219", message, use.place, help=help))
-        if level != 0.0 and any(model.loose is not None for _, model in self.failing.get(use.joint, ())):
+        if level != 0.0 and any(model.decoupling is not None for _, model in self.failing.get(use.joint, ())):
             level = None  # it comes and goes
         return replace(
-            bare, level=level, gives=drive.given is not None, strays=drive.astray is not False, levels=levels
+            bare,
+            level=level,
+            gives=drive.given is not None,
+            may_leave_range=drive.state_out_of_range is not False,
+            levels=levels,
         )
 
     def _fitted(self, use: SensorUse | LinkSensor, path: str) -> Fitted:

@@ -75,14 +75,14 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
     if elastic:
         moved = geared(p, states, joint, tau_m, p.kt * p.i_max, shown)
         return replace(moved, slopes={**electric, **moved.slopes})
-    rubs = friction(p, w, states)
+    drag = friction(p, w, states)
     return Drive(
-        torque=p.ratio * (tau_m - rubs.torque) - p.f_v_joint * joint.qd,
-        dry=p.ratio * rubs.level + p.f_c_joint,
+        torque=p.ratio * (tau_m - drag.torque) - p.f_v_joint * joint.qd,
+        dry=p.ratio * drag.level + p.f_c_joint,
         rotor=p.ratio * p.ratio * p.j_m,
-        slopes={**electric, **rubs.bending},
+        slopes={**electric, **drag.bending},
         signals=shown,
-        astray=rubs.astray,
+        state_out_of_range=drag.state_out_of_range,
     )
 
 
@@ -106,8 +106,8 @@ def balance(p: Any, torque: Real, seen: Seen) -> Mapping[str, Real]:
         states, tau_m = compliant_gearbox.balanced(p, torque, seen.qd)
         at_motor = seen.q + states["deflection"]
     else:
-        rubs, states = steady(p, w)
-        tau_m, at_motor = (torque + p.f_v_joint * seen.qd + sign(seen.qd) * p.f_c_joint) / p.ratio + rubs, seen.q
+        drag, states = steady(p, w)
+        tau_m, at_motor = (torque + p.f_v_joint * seen.qd + sign(seen.qd) * p.f_c_joint) / p.ratio + drag, seen.q
     current = clip(tau_m / p.kt, -p.i_max, p.i_max)
     voltage = clip(p.resistance * current + p.kt * w, -p.v_max, p.v_max)
     torques = seen.setpoint.kind == "torque"

@@ -51,16 +51,16 @@ def geared(p: Any, states: Any, joint: JointMotion, tau_m: Real, strongest: Real
     rate = w / p.ratio - joint.qd
     T = gear.torque(p, states.deflection, rate)
     at_motor = joint.coupled * T / p.ratio
-    rubs = friction(p, w, states, at_motor, strongest)
+    drag = friction(p, w, states, at_motor, strongest)
     return Drive(
         torque=T - p.f_v_joint * joint.qd,
         dry=p.f_c_joint,
-        slopes={"deflection": rate, "motor_rate": (tau_m - at_motor - rubs.torque) / p.j_m, **rubs.bending},
-        friction={"motor_rate": rubs.level / p.j_m},
+        slopes={"deflection": rate, "motor_rate": (tau_m - at_motor - drag.torque) / p.j_m, **drag.bending},
+        friction={"motor_rate": drag.level / p.j_m},
         signals={**shown, "gear_torque": joint.coupled * T},
         kinetic=0.5 * p.j_m * (w * w),
         potential=gear.energy(p, states.deflection),
-        astray=rubs.astray,
+        state_out_of_range=drag.state_out_of_range,
     )
 
 
@@ -80,8 +80,8 @@ def balance(p: Any, torque: Real, seen: Seen) -> Mapping[str, Real]:
 def balanced(p: Any, torque: Real, qd: Real) -> tuple[dict[str, Real], Real]:
     """States behind a gear that drives the joint with this torque at this rate that lasts, and the motor's torque."""
     through = torque + p.f_v_joint * qd + sign(qd) * p.f_c_joint
-    rubs, bent = steady(p, p.ratio * qd, through / p.ratio)
-    return {"deflection": gear.wound(p, through), "motor_rate": p.ratio * qd, **bent}, through / p.ratio + rubs
+    drag, bent = steady(p, p.ratio * qd, through / p.ratio)
+    return {"deflection": gear.wound(p, through), "motor_rate": p.ratio * qd, **bent}, through / p.ratio + drag
 
 
 def fastest_law(p: Any) -> Real:

@@ -70,13 +70,13 @@ class Friction:
     level    of what sticks, against the motion, N m: for the engine to decide
     torque   of what does not, against the motion, N m
     bending  d(bristle)/dt, rad/s; nothing but with `lugre`
-    astray   whether the bristles are bent by twice what they can bear, so that the step is too long for them
+    state_out_of_range  true where the bristles are bent by twice what they can bear: the step is too long for them
     """
 
     level: Real
     torque: Real
     bending: dict[str, Real]
-    astray: Truth = False
+    state_out_of_range: Truth = False
 
 
 def friction(p: Any, w: Real, states: Any, transmitted: Real | None = None, strongest: Real = 0.0) -> Friction:
@@ -94,8 +94,8 @@ def friction(p: Any, w: Real, states: Any, transmitted: Real | None = None, stro
     bears = maximum(p.f_s, p.f_c)
     if transmitted is not None:  # a blow through the gear, now past, may have bent them further
         bears = bears + where(p.loss > 0.0, p.loss * maximum(absolute(transmitted), BLOW * strongest), 0.0)
-    astray = p.sigma_0 * absolute(z) > 2.0 * bears
-    return Friction(0.0, viscous + p.sigma_0 * z + p.sigma_1 * bending, {"bristle": bending}, astray)
+    out_of_range = p.sigma_0 * absolute(z) > 2.0 * bears
+    return Friction(0.0, viscous + p.sigma_0 * z + p.sigma_1 * bending, {"bristle": bending}, out_of_range)
 
 
 def steady(p: Any, w: Real, transmitted: Real | None = None) -> tuple[Real, dict[str, Real]]:

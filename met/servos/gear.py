@@ -37,7 +37,7 @@ def parameters(only: Only | None = None) -> tuple[Parameter, ...]:
 def deflection(only: Only | None = None) -> State:
     """The state that winds the gear up."""
     doc = "motor's angle over the ratio, less the joint's"
-    return State(name="deflection", unit="joint", between=True, only=only, doc=doc)
+    return State(name="deflection", unit="joint", in_transmission=True, only=only, doc=doc)
 
 
 def torque(p: Any, d: Real, rate: Real) -> Real:

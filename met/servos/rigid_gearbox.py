@@ -39,21 +39,21 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
     """The motor, the gearbox and their friction, under the voltage."""
     w_m = p.ratio * joint.qd
     tau_m = torque(p.kt, p.resistance, p.tau_max, held.voltage, w_m)
-    rubs = friction(p, w_m, states)
+    drag = friction(p, w_m, states)
     return Drive(
-        torque=p.ratio * (tau_m - rubs.torque),
-        dry=p.ratio * rubs.level,
+        torque=p.ratio * (tau_m - drag.torque),
+        dry=p.ratio * drag.level,
         rotor=p.ratio * p.ratio * p.j_m,
-        slopes=rubs.bending,
+        slopes=drag.bending,
         signals={"motor_rate": w_m, "motor_torque": tau_m},
-        astray=rubs.astray,
+        state_out_of_range=drag.state_out_of_range,
     )
 
 
 def balance(p: Any, torque: Real, seen: Seen) -> Mapping[str, Real]:
     """The motor gives what the joint and friction take; the loop's integral is what that wants."""
-    rubs, bent = steady(p, p.ratio * seen.qd)
-    return {**bent, **rate_loop.balanced(p, torque / p.ratio + rubs, seen.setpoint, q=seen.q, qd=seen.qd)}
+    drag, bent = steady(p, p.ratio * seen.qd)
+    return {**bent, **rate_loop.balanced(p, torque / p.ratio + drag, seen.setpoint, q=seen.q, qd=seen.qd)}
 
 
 def fastest(p: Any) -> Real:

@@ -86,6 +86,7 @@ class JointMotion:
     coupled: Real = 1.0
 
 
+@old_fields(astray="state_out_of_range")
 @frozen
 class Drive:
     """What the servo does to its joint at a stage.
@@ -102,7 +103,7 @@ class Drive:
                that comes to zero stays there while the slope is no larger than the level
     signals    value of each `Signal` of the servo, by name
     kinetic    energy of what turns in the servo otherwise than with the joint, J;  potential: of what is wound up in it
-    astray     whether a state is where it can never be, so that the step was too long for it: the case then fails
+    state_out_of_range  true where a state is where it can never be: the step was too long for it, and the case fails
     """
 
     torque: Real = 0.0
@@ -115,7 +116,7 @@ class Drive:
     signals: Mapping[str, Real] = field(default_factory=dict)
     kinetic: Real = 0.0
     potential: Real = 0.0
-    astray: Truth = False
+    state_out_of_range: Truth = False
 
 
 @frozen(kw_only=True)

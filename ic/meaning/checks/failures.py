@@ -1,6 +1,6 @@
 """Checks of environment models that act on a joint's servo: that there is such a servo, and that they have an effect.
 
-`Environment.servo_of` has what a model does to a servo, `Environment.rubs` friction beside it.
+`Environment.servo_of` has what a model does to a servo, `Environment.friction_joint` friction beside it.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def check_failures(
         servo, continuous = servos.get(joint), joint in ticks and ticks[joint].continuous
         wrong = _wrong(scope, use, model, joint, servo, continuous=continuous)
         also = [Label(servo.place, "its servo")] if servo is not None else []
-        if wrong is None and joint in beds and model.loose is not None:
+        if wrong is None and joint in beds and model.decoupling is not None:
             wrong = f"`{use.name}` would let go of joint `{joint}`, whose motor is on a bed", "leave it out", place
             also = [Label(bed, "on a bed")] if (bed := beds[joint]) is not None else []
         if wrong is not None:
@@ -66,7 +66,7 @@ def check_failures(
 def check_friction(scope: Scope, uses: Iterable[Use], environment: Iterable[EnvironmentUse]) -> None:
     """Report friction on a joint that is told its acceleration, for which it would do nothing."""
     servos = {use.joint: use for use in uses}
-    for failure in _about(scope, environment, "rubs"):
+    for failure in _about(scope, environment, "friction_joint"):
         servo = servos.get(failure.joint)
         if servo is not None and servo.parameters is not None and accelerates(servo.bare, servo.parameters):
             label = f"servo `{servo.definition}` ({servo.servo.name})"
@@ -97,12 +97,12 @@ def _wrong(
         message = f"joint `{joint}` has no servo to which `{use.name}` could do anything"
         return message, "give the joint a servo, or leave it out", None
     label = f"servo `{servo.definition}` ({servo.servo.name}) of joint `{joint}`"
-    if model.loose is not None and servo.servo.at_rest is not None:
+    if model.decoupling is not None and servo.servo.at_rest is not None:
         message = f"{label} holds a joint that is at rest, and `{use.name}` would give it one that moves"
         return message, f"leave it out: `release` lets a {servo.servo.name} joint go, and a `brake` stops one", None
-    if (model.gives is not None or model.sees is not None) and not servo.has_law:
+    if (model.replaced_outputs is not None or model.replaced_reading is not None) and not servo.has_law:
         return f"{label} has no law that `{use.name}` could do anything to", "leave it out", None
-    if model.gives is not None and servo.servo.full is None:
+    if model.replaced_outputs is not None and servo.servo.full is None:
         known = [name for name, each in models.find_own("servo").items() if each.full is not None]
         own = servo.servo.name in models.find_own("servo")
         remedy = (
@@ -111,7 +111,7 @@ def _wrong(
             else (f"declare `full` in the model `{servo.servo.name}`: the law's outputs at full drive")
         )
         return f"{label} has no drive that could run away", remedy, None
-    if model.sees is None:
+    if model.replaced_reading is None:
         return None
     head = f"environment.{use.name}"
     of, reads = scope.parameters.get(f"{head}.of"), scope.parameters.get(f"{head}.reads")
@@ -126,7 +126,7 @@ def _wrong(
 
 def _check_full(scope: Scope, failure: ServoFailure, servo: Use) -> None:
     """Report a drive that would run away without a limit."""
-    if failure.model.gives is None or servo.servo.full is None or servo.parameters is None:
+    if failure.model.replaced_outputs is None or servo.servo.full is None or servo.parameters is None:
         return
     numbers = servo.parameters
 
@@ -160,7 +160,7 @@ def _window(scope: Scope, failure: ServoFailure) -> tuple[float, float] | None:
 def _remark_between_ticks(scope: Scope, failure: ServoFailure, period: float, duration: float) -> None:
     """Report a window that lies between two ticks of the law, which never sees it."""
     window, model = _window(scope, failure), failure.model
-    if window is None or (model.gives is None and model.sees is None):
+    if window is None or (model.replaced_outputs is None and model.replaced_reading is None):
         return
     begins, ends = window
     if not 0.0 <= begins < min(ends, duration):
@@ -185,7 +185,7 @@ def _remark_overlaps(scope: Scope, failures: Iterable[ServoFailure]) -> None:
     before: dict[tuple[str, str, Any], list[tuple[ServoFailure, tuple[float, float]]]] = {}
     for failure in failures:
         window, model = _window(scope, failure), failure.model
-        if window is None or (model.gives is None and model.sees is None) or model not in known:
+        if window is None or (model.replaced_outputs is None and model.replaced_reading is None) or model not in known:
             continue
         of = scope.parameters.get(f"environment.{failure.use.name}.of")
         same = before.setdefault((failure.joint, model.name, of.value if of is not None else None), [])

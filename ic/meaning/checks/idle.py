@@ -59,7 +59,7 @@ def remark_beginnings(scope: Scope, uses: tuple[EnvironmentUse, ...]) -> None:
     """Report a joint that begins beyond the ends that a model keeps it between. After the initial state's."""
     for use in uses:
         model = models.find("environment", use.model)
-        found = {name: scope.parameters.get(f"environment.{use.name}.{name}") for name in model.between}
+        found = {name: scope.parameters.get(f"environment.{use.name}.{name}") for name in model.initial_range}
         joint = next(
             (
                 str(settled.value)

@@ -55,5 +55,5 @@ def _dead(scope: Scope, structure: Structure, joint: str) -> Iterable[tuple[str,
     for use in structure.environment:
         model, head = models.find("environment", use.model), f"environment.{use.name}"
         about, of = scope.parameters.get(f"{head}.{model.servo_of}"), scope.parameters.get(f"{head}.of")
-        if model.sees is not None and about is not None and about.value == joint and of is not None:
+        if model.replaced_reading is not None and about is not None and about.value == joint and of is not None:
             yield use.name, of

@@ -88,8 +88,8 @@ def check_ticks(scope: Scope, found: tuple[Substitution, ...], ticks: Mapping[st
 def check_brakes(scope: Scope, found: tuple[Substitution, ...], environment: Iterable[EnvironmentUse]) -> None:
     """No model puts dry friction on a joint whose motor is on a bed: there friction is the bed's."""
     for use in environment:
-        rubs = models.find("environment", use.model).rubs
-        joint = scope.parameters.get(f"environment.{use.name}.{rubs}") if rubs else None
+        friction_joint = models.find("environment", use.model).friction_joint
+        joint = scope.parameters.get(f"environment.{use.name}.{friction_joint}") if friction_joint else None
         for each in found:
             if joint is not None and joint.value == each.joint and use.place is not None and each.place is not None:
                 message = f"`{use.name}` puts friction on joint `{each.joint}`, whose motor is on a bed"

@@ -148,9 +148,9 @@ def remark_ground(
     payloads: Sequence[Payload],
 ) -> None:
     """Report an environment model that acts upon links none of which yields to it."""
-    if environment.pushes is None or (base is not None and base.kind == "free"):
+    if environment.pushed_links is None or (base is not None and base.kind == "free"):
         return
-    keys = environment.pushes(SimpleNamespace(**values))
+    keys = environment.pushed_links(SimpleNamespace(**values))
     carriers = {payload.name: payload.link for payload in payloads if not payload.flies}
     links = [carriers.get(values[key], values[key]) for key in keys]
     still = (BASE, WORLD, *ground(arm.links, arm.joints))

@@ -29,8 +29,8 @@ def coupled(system: System, actuator: Actuator, read: ReadCell, begin: Real) -> 
     held: Real | None = None
     step = StepTimes(begin, system.structure.schedule.step)
     for owner, model, p in _about(system, actuator, read):
-        if model.loose is not None:
-            own = 1.0 - answer(owner, model.loose, p, step)
+        if model.decoupling is not None:
+            own = 1.0 - answer(owner, model.decoupling, p, step)
             held = own if held is None else held * own
     return held
 
@@ -38,25 +38,27 @@ def coupled(system: System, actuator: Actuator, read: ReadCell, begin: Real) -> 
 def given(system: System, actuator: Actuator, read: ReadCell, p: NamedValues, time: Real, found: Control) -> Control:
     """What comes out of the servo's law."""
     for owner, model, own in _about(system, actuator, read):
-        if model.gives is None:
+        if model.replaced_outputs is None:
             continue
         if actuator.servo.full is None:
             message = f"{owner}: {actuator.owner} has no drive that could run away"
             raise Problem(error("E219", message, actuator.use.place, help="leave it out for this joint"))
         full = answer(actuator.owner, actuator.servo.full, p)
-        outputs = answer(owner, model.gives, own, time, found.outputs, full)
-        found = replace(found, outputs=returned(owner, "gives", outputs, found.outputs))
+        outputs = answer(owner, model.replaced_outputs, own, time, found.outputs, full)
+        found = replace(found, outputs=returned(owner, "replaced_outputs", outputs, found.outputs))
     return found
 
 
 def seen(system: System, actuator: Actuator, read: ReadCell, seen: Seen, last: str | None) -> Seen:
     """What the law sees. last: what cells begin with that hold what it saw at its last tick; None: there is none."""
     for owner, model, p in _about(system, actuator, read):
-        if model.sees is None:
+        if model.replaced_reading is None:
             continue
         for of in quantities(actuator):
             before = math.nan if last is None else read(f"{last}{of}")
-            seen = replaced(actuator, seen, of, answer(owner, model.sees, p, seen.time, of, truth(seen, of), before))
+            seen = replaced(
+                actuator, seen, of, answer(owner, model.replaced_reading, p, seen.time, of, truth(seen, of), before)
+            )
     return seen
 
 

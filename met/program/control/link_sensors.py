@@ -74,9 +74,9 @@ class Aboard(ArmWorld):
         motion = self.link(link)
         found = motion.w
         for name, model in self._machine.environment:
-            if model.turns is not None:
+            if model.world_rate is not None:
                 owner, p = environment_values(self._machine, name, model, self._read)
-                found = add(found, motion.to_link(answer(owner, model.turns, p, self)))
+                found = add(found, motion.to_link(answer(owner, model.world_rate, p, self)))
         return found
 
     def _acceleration(self, link: str, point: Vector) -> Vector:
@@ -124,10 +124,10 @@ def free_fall(
     """Acceleration of a body that falls freely where a point of a frame is, and moves so; world axes, m/s^2."""
     found = gravity
     for name, model in system.environment:
-        if model.falls is not None:
+        if model.free_fall is not None:
             owner, p = environment_values(system, name, model, read)
             there = motion.position(point), motion.velocity(point)
-            found = add(found, answer(owner, model.falls, p, world, *there))
+            found = add(found, answer(owner, model.free_fall, p, world, *there))
     return found
 
 

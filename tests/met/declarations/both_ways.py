@@ -168,7 +168,7 @@ def calls(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any
     return {name: call for name, call in known.items() if getattr(model, name) is not None}
 
 
-NOT_TRACED = {("environment", "idle"), ("environment", "pushes"), ("guide", "idle"), ("command", "jumps")}
+NOT_TRACED = {("environment", "idle"), ("environment", "pushed_links"), ("guide", "idle"), ("command", "jumps")}
 """Functions that are asked only where all numbers are constants, or about words alone."""
 
 
@@ -384,11 +384,11 @@ def _environment(use: Use, experiment: Experiment) -> dict[str, Callable[[Number
     def loads(n: Numbers, world: Any) -> Any:
         return use.model.loads(p(n), world)
 
-    def falls(n: Numbers, world: Any) -> Any:
-        return use.model.falls(p(n), world, vector(n, "position"), vector(n, "velocity"))
+    def free_fall(n: Numbers, world: Any) -> Any:
+        return use.model.free_fall(p(n), world, vector(n, "position"), vector(n, "velocity"))
 
-    def turns(n: Numbers, world: Any) -> Any:
-        return use.model.turns(p(n), world)
+    def world_rate(n: Numbers, world: Any) -> Any:
+        return use.model.world_rate(p(n), world)
 
     def p(n: Numbers) -> SimpleNamespace:
         return parameters(n, use, experiment)
@@ -402,12 +402,15 @@ def _environment(use: Use, experiment: Experiment) -> dict[str, Callable[[Number
     step = experiment.structure.schedule.step
     return {
         "loads": _asking(use, experiment, loads),
-        "falls": _asking(use, experiment, falls),
-        "turns": _asking(use, experiment, turns),
-        "loose": lambda n: use.model.loose(p(n), SimpleNamespace(begin=time(n), step=step)),
-        "gives": lambda n: use.model.gives(p(n), time(n), outputs(n, "outputs"), outputs(n, "full")),
-        "sees": lambda n: [
-            use.model.sees(p(n), time(n), of, n.number("value", n.any), n.number("last", n.any)) for of in ("q", "qd")
+        "free_fall": _asking(use, experiment, free_fall),
+        "world_rate": _asking(use, experiment, world_rate),
+        "decoupling": lambda n: use.model.decoupling(p(n), SimpleNamespace(begin=time(n), step=step)),
+        "replaced_outputs": lambda n: use.model.replaced_outputs(
+            p(n), time(n), outputs(n, "outputs"), outputs(n, "full")
+        ),
+        "replaced_reading": lambda n: [
+            use.model.replaced_reading(p(n), time(n), of, n.number("value", n.any), n.number("last", n.any))
+            for of in ("q", "qd")
         ],
     }
 

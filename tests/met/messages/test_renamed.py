@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
-from met.servos.servo import Seen, Setpoint
+from met.environments.environment import Environment
+from met.parameter import State
+from met.servos.servo import Drive, Seen, Setpoint
 
 
 @pytest.mark.parametrize(
@@ -39,3 +43,33 @@ def test_a_setpoint_is_read_and_given_by_its_old_name() -> None:
         assert Seen(q=0.0, qd=0.0, asked=setpoint, period=0.001) == seen  # type: ignore[call-arg]
     with pytest.warns(DeprecationWarning, match="the old name goes with MET 0.2"):
         assert replace(seen, asked=other).setpoint is other  # type: ignore[call-arg]
+
+
+def hook(*_: Any) -> Any:
+    """Stands for any function of a model."""
+
+
+OLD_HOOKS = {
+    "pushes": "pushed_links", "between": "initial_range", "rubs": "friction_joint", "loose": "decoupling",
+    "gives": "replaced_outputs", "sees": "replaced_reading", "falls": "free_fall", "turns": "world_rate",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new"), OLD_HOOKS.items())
+def test_a_hook_of_an_environment_may_have_its_old_name(old: str, new: str) -> None:
+    with pytest.warns(DeprecationWarning, match=rf"`Environment\({old}=...\)` is now `Environment\({new}=...\)`"):
+        model = Environment(name="wind", doc="", **{old: hook})  # type: ignore[arg-type]
+    assert getattr(model, new) is hook
+    assert model == Environment(name="wind", doc="", **{new: hook})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("make", "new"),
+    [
+        (lambda: Drive(astray=True), "state_out_of_range"),
+        (lambda: State(name="deflection", unit="joint", doc="", between=True), "in_transmission"),
+    ],
+)
+def test_a_field_of_a_servo_may_have_its_old_name(make: Callable[[], Any], new: str) -> None:
+    with pytest.warns(DeprecationWarning, match=f"is now `.*{new}"):
+        assert getattr(make(), new) is True
