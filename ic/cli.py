@@ -146,7 +146,7 @@ def cases(
     check_options(deck, defines=defines, include_dirs=include_dirs, settings=settings)
     made = _plan(deck, include_dirs, defines, settings, names, not names, True)
     sweeps = [e for e in made.experiments if names or e.varies] or list(made.experiments)
-    shown = [list(groups) for _, groups in groupby(sweeps, lambda experiment: experiment.asked)]
+    shown = [list(groups) for _, groups in groupby(sweeps, lambda experiment: experiment.name_in_deck)]
     if form == "json":
         _print_json([cases_json(groups) for groups in shown])
         return

@@ -183,8 +183,8 @@ def _run(arguments: list[str]) -> int:
         with met.make_context("met", arguments) as context:
             status = met.invoke(context)
         return status if isinstance(status, int) else YES
-    except click.exceptions.Exit as told:  # --help, --version, or a command that leaves early
-        return told.exit_code
+    except click.exceptions.Exit as leaving:  # --help, --version, or a command that leaves early
+        return leaving.exit_code
     except Problem as problem:
         complain(problem.diagnostics, problem.sources, json=json)
         return BAD_INPUT

@@ -20,7 +20,7 @@ from met import units
 from met.diagnostic import Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.host.entry_points import offered
-from met.parameter import Parameter, there
+from met.parameter import Parameter, is_present
 from met.plan import LinkSensor, SensorUse, ServoUse, Structure
 
 if TYPE_CHECKING:
@@ -164,14 +164,14 @@ def _check_names(kind: Kind, model: Any, found_at: str) -> None:
     taken = [name for name, *_ in own] or ["command"]
     shown = [part.name for group in HELD for part in getattr(model, group, ())]
     parameters = [*getattr(model, "parameters", ()), *getattr(model, "of_joint", ())]
-    for names in ([*taken, *shown], there_together(parameters)):
+    for names in ([*taken, *shown], distinct_names(parameters)):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             message = f"{found_at} declares `{twice[0]}` twice"
             raise Problem(error("E215", message, help="each memory, state, signal and parameter has its own name"))
 
 
-def there_together(parameters: Sequence[Parameter]) -> list[str]:
+def distinct_names(parameters: Sequence[Parameter]) -> list[str]:
     """Names of parameters; of those that are there under different words of the same parameter, once."""
     names: list[str] = []
     for n, one in enumerate(parameters):
@@ -222,8 +222,8 @@ def packages(structures: Iterable[Structure]) -> tuple[str, ...]:
         used["servo"] |= {servo.model for servo in each.servos}
         used["sensor"] |= {sensor.model for servo in each.servos for sensor in servo.sensors}
         used["sensor"] |= {sensor.model for sensor in each.sensors}
-        told = [servo.command for servo in each.servos if servo.command is not None]
-        used["command"] |= {command.model for command in told if not command.guide}
+        commands = [servo.command for servo in each.servos if servo.command is not None]
+        used["command"] |= {command.model for command in commands if not command.guide}
         used["command"] |= {course.model for use in (each.base, *each.guides) if use for course in use.courses}
         used["environment"] |= {use.model for use in each.environment}
         used["guide"] |= {use.model for use in each.guides}
@@ -267,7 +267,7 @@ def sensor_parts(use: SensorUse | LinkSensor, group: str) -> tuple[Any, ...]:
     """Those of a sensor's `parameters`, `states` or `memory` that are there under this use's words."""
     sensor = find("sensor", use.model, use.place)
     defaults = {each.name: each.default for each in sensor.parameters if isinstance(each.default, str)}
-    return tuple(part for part in getattr(sensor, group) if there(part, defaults | dict(use.words)))
+    return tuple(part for part in getattr(sensor, group) if is_present(part, defaults | dict(use.words)))
 
 
 def servo_parts(use: ServoUse) -> Parts:

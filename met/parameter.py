@@ -79,7 +79,7 @@ class Parameter:
     only: Only | None = None
 
 
-def there(part: Parameter | Memory | State | Signal, words: Mapping[str, str]) -> bool:
+def is_present(part: Parameter | Memory | State | Signal, words: Mapping[str, str]) -> bool:
     """Whether a part of a servo is there under these words, by the names of their parameters."""
     return part.only is None or words.get(part.only[0]) in part.only[1]
 

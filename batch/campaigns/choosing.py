@@ -18,7 +18,7 @@ def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experime
         return plan.experiments
     by_name: dict[str, list[Experiment]] = {}
     for experiment in plan.experiments:
-        for name in {experiment.name, experiment.asked}:
+        for name in {experiment.name, experiment.name_in_deck}:
             by_name.setdefault(name, []).append(experiment)
     problems = []
     for name in names:
@@ -46,13 +46,13 @@ def selected(
         if not matches:
             last: dict[str, int] = {}
             for e in experiments:
-                last[e.asked] = max(last.get(e.asked, 0), int(e.cases.table[-1]))
+                last[e.name_in_deck] = max(last.get(e.name_in_deck, 0), int(e.cases.table[-1]))
             counts = ", ".join(f"`{name}` has #0 {f'to #{row}' if row else 'alone'}" for name, row in last.items())
             meant = [f"a position is written `'#{case}'`"] if isinstance(case, str) and case.isdecimal() else []
             helps = [*meant, counts, "`met cases DECK` lists them"]
             raise Problem(error("E311", f"no case `{_case_text(case)}`", help=helps))
         if len(matches) > 1 and not _is_row(case):
-            some = ", ".join(f"#{e.cases.table[row]} of `{e.asked}`" for e, row in matches[:4])
+            some = ", ".join(f"#{e.cases.table[row]} of `{e.name_in_deck}`" for e, row in matches[:4])
             message = f"case `{case}` may be any of {len(matches)}: {some}"
             position, alike = matches[0][0].cases.table[matches[0][1]], len({_id_of(*match) for match in matches}) == 1
             remedy = "" if alike else "give more of its id, or "  # cases that differ in structure alone share their ids

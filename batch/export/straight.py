@@ -55,7 +55,9 @@ def _placed(campaign: Campaign, target: Path) -> None:
         lacking = [f"{joint.name}.q" for joint in structure.moving if f"{joint.name}.q" not in recorded]
         if part.recorded and lacking:
             which = "q" if len(lacking) == len(structure.moving) else ", ".join(lacking)
-            message = f"the arm of `{part.experiment.asked}` could not be shown in {target}: {which} is not recorded"
+            message = (
+                f"the arm of `{part.experiment.name_in_deck}` could not be shown in {target}: {which} is not recorded"
+            )
             helps = ("`record = [q, ...]` in the run keeps where its joints are",
                      f"`-o {quoted(target.with_suffix('.csv'))}` needs no positions")  # fmt: skip
             raise Problem(error("E370", message, help=helps))
@@ -75,4 +77,4 @@ def written(campaign: Campaign, target: Path, *, histories: bool) -> Exported:
 
 def _asked(campaign: Campaign) -> list[str]:
     """The runs and sweeps, by the names by which they are asked for."""
-    return list(dict.fromkeys(part.experiment.asked for part in campaign.parts))
+    return list(dict.fromkeys(part.experiment.name_in_deck for part in campaign.parts))

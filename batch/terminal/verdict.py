@@ -140,7 +140,7 @@ def told(
     if not any(summary.recorded for summary in summaries) and campaign.parts[0].experiment.structure.record:
         part = campaign.parts[0]
         first = part.experiment.cases.table[part.rows[0]]
-        out.append(f"         met run {quoted(source)} {part.experiment.asked} --case '#{first}'")
+        out.append(f"         met run {quoted(source)} {part.experiment.name_in_deck} --case '#{first}'")
     if not ok:
         out.append(f"exit 1: {_why_not(summaries)}")
     return out

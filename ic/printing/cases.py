@@ -21,7 +21,7 @@ def print_cases(groups: Sequence[Experiment], *, everything: bool = False) -> It
     """Line by line the table of one sweep, of which these are the groups; of a long one the head and the tail."""
     rows = _Rows(groups)
     total = len(rows.groups)
-    title = f"{groups[0].asked}: {count(total, 'case')}"
+    title = f"{groups[0].name_in_deck}: {count(total, 'case')}"
     if len(groups) > 1:
         yield f"{title}, {len(groups)} structures"
         yield from _structures(groups)
@@ -111,7 +111,7 @@ def cases_json(groups: Sequence[Experiment]) -> dict[str, Any]:
             case["repeat"] = rows.repeat(position)
         made.append(case)
     return {
-        "experiment": groups[0].asked,
+        "experiment": groups[0].name_in_deck,
         "count": len(rows.ids),
         "groups": [
             {

@@ -22,7 +22,7 @@ def notes(plan: Plan) -> Iterator[str]:
 
 def verdict(plan: Plan, diagnostics: Sequence[Diagnostic]) -> str:
     """`two_link.ic: 1 run, 1 sweep, 37 cases: no errors`; the cases are those of all runs and sweeps."""
-    sweeps = len({experiment.asked for experiment in plan.experiments if experiment.varies})
+    sweeps = len({experiment.name_in_deck for experiment in plan.experiments if experiment.varies})
     runs = sum(1 for experiment in plan.experiments if not experiment.varies)
     parts = [count(runs, "run")] if runs else []
     parts += [count(sweeps, "sweep")] if sweeps else []

@@ -124,9 +124,9 @@ def plan_coordinates(
 
 def without_effect(experiment: Experiment) -> tuple[str, ...]:
     """Inputs of the experiment's program that change nothing. Raises Problem where a model cannot be recorded."""
-    from met.analysis.audit import idle
+    from met.analysis.audit import idle_inputs
 
-    return idle(experiment)
+    return idle_inputs(experiment)
 
 
 def check_effects(complaints: Complaints, sweep: Sweep, experiment: Experiment) -> None:

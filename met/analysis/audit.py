@@ -14,7 +14,7 @@ from met.trace.recorder import record
 from met.trace.recording import CodeSection
 
 
-def idle(experiment: Experiment) -> tuple[str, ...]:
+def idle_inputs(experiment: Experiment) -> tuple[str, ...]:
     """Inputs of the experiment's program that change nothing: paths of coordinates, `met.plan.REPEAT` and `SEED`.
 
     Raises Problem where a model cannot be recorded.

@@ -481,8 +481,8 @@ class Experiment:
     tolerances: tuple[Tolerance, ...] = ()
 
     @property
-    def asked(self) -> str:
-        """The name by which a user asks for it: that of the run or sweep."""
+    def name_in_deck(self) -> str:
+        """The name of the run or sweep in the deck, by which a user asks for it."""
         return self.sweep or self.name
 
     @property

@@ -228,8 +228,8 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
         add(path, unit, f"what the {on_link.model} reads", on_link.divisor, "")
         for state in models.sensor_parts(on_link, "states"):
             add(f"{path}.{state.name}", watched_unit(state.unit, unit), state.doc, dynamics, "")
-    told = (*names, *(recorded.name for recorded in structure.record), *(metric.of for metric in structure.metrics))
-    mentioned = {name.split(".")[1] for name in told if name.startswith("links.")}
+    mentions = (*names, *(recorded.name for recorded in structure.record), *(metric.of for metric in structure.metrics))
+    mentioned = {name.split(".")[1] for name in mentions if name.startswith("links.")}
     mentioned |= {link.name for link in structure.links[:1]}
     for link in structure.links:
         for name, unit, doc, parts, frame in OF_LINK:

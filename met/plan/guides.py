@@ -53,7 +53,7 @@ def check_paths(experiment: Experiment, where: str) -> None:
     """What is guided can be: the joints carry the link, and are as many as the components. Raises Damaged."""
     structure = experiment.structure
     for use in structure.guides:
-        found = told(experiment, use)
+        found = guided_components(experiment, use)
         if found is None:
             continue  # missing: E304
         link, components = found
@@ -68,7 +68,7 @@ def check_paths(experiment: Experiment, where: str) -> None:
             raise Damaged(f"{where}.guides.{use.name}", message)
 
 
-def told(experiment: Experiment, use: GuideUse) -> tuple[str, tuple[str, ...]] | None:
+def guided_components(experiment: Experiment, use: GuideUse) -> tuple[str, tuple[str, ...]] | None:
     """The link and the components that a guide with a path guides; None of another, and where words are missing."""
     guide = models.find("guide", use.model, use.place)
     words: dict[str, Any] = {}

@@ -104,8 +104,10 @@ def _value(value: Any) -> Any:
 def _described(value: Any) -> Any:
     """Plain data of a structure, without what changes no number."""
     if dataclasses.is_dataclass(value):
-        told = ((field.name, getattr(value, field.name), in_key(field)) for field in dataclasses.fields(value))
-        return {name: _described(part) for name, part, when in told if when == "always" or (part and when != "never")}
+        described = ((field.name, getattr(value, field.name), in_key(field)) for field in dataclasses.fields(value))
+        return {
+            name: _described(part) for name, part, when in described if when == "always" or (part and when != "never")
+        }
     if isinstance(value, tuple):
         return [_described(part) for part in value]
     return value

@@ -23,7 +23,7 @@ class Question:
     there: Motion
 
 
-def advanced(integrator: Integrator, settled: Sequence[Slope], h: Real, y: Motion, k1: Slope) -> Motion | Question:
+def advance_with(integrator: Integrator, settled: Sequence[Slope], h: Real, y: Motion, k1: Slope) -> Motion | Question:
     """The state at the end of a step of h s from y, or the first question beyond the answers `settled`.
 
     Raises Problem E213 where `advance` raises anything, E214 where it gives back what is no state of the arm.
@@ -49,7 +49,7 @@ def advanced(integrator: Integrator, settled: Sequence[Slope], h: Real, y: Motio
     if len(questions) > len(settled):
         return questions[len(settled)]
     if len(questions) < len(settled):
-        raise inconstant(integrator)
+        raise changed_count(integrator)
     wrong = _wrong(end, y)
     if wrong:
         message = f"integrator `{integrator.name}`: `advance` gives back {wrong}"
@@ -57,7 +57,7 @@ def advanced(integrator: Integrator, settled: Sequence[Slope], h: Real, y: Motio
     return end
 
 
-def asked(integrator: Integrator, joints: int, states: int, h: float) -> int:
+def question_count(integrator: Integrator, joints: int, states: int, h: float) -> int:
     """How many slopes it asks for on its way through a step of h s, the first stage's aside."""
     graph = Graph()
 
@@ -71,11 +71,11 @@ def asked(integrator: Integrator, joints: int, states: int, h: float) -> int:
     answers: list[Slope] = []
     k = motion("k0")
     k1 = Slope(y.qd, k.qd, k.x)
-    while isinstance(advanced(integrator, answers, h, y, k1), Question):
+    while isinstance(advance_with(integrator, answers, h, y, k1), Question):
         k = motion(f"k{len(answers) + 1}")
         answers.append(Slope(k.q, k.qd, k.x))
         if len(answers) > MOST:
-            raise inconstant(integrator)
+            raise changed_count(integrator)
     return len(answers)
 
 
@@ -83,7 +83,7 @@ MOST = 100
 """Slopes that an integrator asks for at most: one that asks for more each time would never end."""
 
 
-def inconstant(integrator: Integrator) -> Problem:
+def changed_count(integrator: Integrator) -> Problem:
     """It asked for another number of slopes than before."""
     message = f"integrator `{integrator.name}`: `advance` asks for more slopes at one time than at another"
     return Problem(error("E214", message, help=(
@@ -99,8 +99,8 @@ def _wrong(y: object, like: Motion) -> str:
     sizes, wanted = ([len(part) for part in (m.q, m.qd, m.x)] for m in (y, like))
     if sizes == wanted:
         return ""
-    told = [f"{a} positions, {b} rates and {c} other states" for a, b, c in (sizes, wanted)]
-    return f"a Motion of {told[0]}; the arm has {told[1]}"
+    shapes = [f"{a} positions, {b} rates and {c} other states" for a, b, c in (sizes, wanted)]
+    return f"a Motion of {shapes[0]}; the arm has {shapes[1]}"
 
 
 class _Unanswered(Passing):

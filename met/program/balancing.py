@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from met.integrators.integrator import Motion
 from met.program import friction
-from met.program.evaluation import Derivative, brakes, derivative, driven_by
+from met.program.evaluation import Derivative, brake_levels, derivative, servo_response
 from met.program.sticking import Sticking, sticking
 from met.program.system import System
 from met.program.values import NamedValues, answer, returned
@@ -31,7 +31,7 @@ def balance(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[s
     def moved(modes: Mapping[str, Real]) -> Derivative:
         return derivative(
             system, tape.read, y=y, held=held, friction=modes, time=0.0, begin=0.0, part=tape.part,
-            told={actuator.index: 0.0 for actuator in balanced},
+            prescribed_qdd={actuator.index: 0.0 for actuator in balanced},
         )  # fmt: skip
 
     others = [each for each in sticking(system) if not each.state and each.actuator not in balanced]
@@ -63,8 +63,8 @@ def balance(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[s
 
 def _level(system: System, tape: Tape, y: Motion, each: Sticking, held: Sequence[NamedValues]) -> Real:
     """The level of dry friction at a joint, its servo's and its brakes', N m (N)."""
-    on_joints = brakes(system, tape.read, y, 0.0, 0.0)
+    on_joints = brake_levels(system, tape.read, y, 0.0, 0.0)
     level = on_joints.get(each.name, 0.0)
     if each.actuator is None:
         return level
-    return level + driven_by(system, each.actuator, tape.read, y, held[each.number], 0.0, 0.0).drive.dry
+    return level + servo_response(system, each.actuator, tape.read, y, held[each.number], 0.0, 0.0).drive.dry

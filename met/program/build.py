@@ -138,7 +138,7 @@ class Builder:
         seen = Seen(*sensing.measured(actuator, p, *state, states), Setpoint("none", 0.0, 0.0), 0.0, 0.0, states)
         sensing.start(self.system, tape, actuator, seen)
         for of in failing.quantities(actuator) if actuator.use.joint in self.system.failing else ():
-            tape.write(f"saw:{actuator.use.joint}.{of}", sensing.truth(seen, of))
+            tape.write(f"saw:{actuator.use.joint}.{of}", sensing.true_value(seen, of))
 
     def end(self, tape: Tape) -> None:
         for name in OUTPUTS:
@@ -192,13 +192,13 @@ class Builder:
             p = self.system.servo_values(actuator, tape.read)
             q, qd = sensing.measured(actuator, p, q, qd, NamedValues(actuator.owner, states))
         seen = self.seen(actuator, q, qd, setpoint, tape.time, states)
-        seen = sensing.ticked(self.system, tape, actuator, seen, state)
+        seen = sensing.seen_at_tick(self.system, tape, actuator, seen, state)
         if joint in self.system.failing:
             seen = failing.seen(self.system, actuator, tape.read, seen, f"saw:{joint}.")
             for of in failing.quantities(actuator):
-                tape.write(f"saw:{joint}.{of}", sensing.truth(seen, of))
+                tape.write(f"saw:{joint}.{of}", sensing.true_value(seen, of))
         for fitted in actuator.sensors:
-            tape.write(fitted.path, sensing.truth(seen, sensing.quantity(fitted)))
+            tape.write(fitted.path, sensing.true_value(seen, sensing.quantity(fitted)))
         self.compute(tape, actuator, seen)
 
     def seen(
@@ -221,7 +221,7 @@ class Builder:
             actuator.owner, {part.name: tape.read(f"{actuator.path}.{part.name}") for part in parts.memory}
         )
         p = self.system.servo_values(actuator, tape.read)
-        found = failing.given(self.system, actuator, tape.read, p, seen.time, law(actuator, p, held, seen))
+        found = failing.law_outputs(self.system, actuator, tape.read, p, seen.time, law(actuator, p, held, seen))
         for name, slope in found.slopes.items():
             path = f"{actuator.path}.{name}"
             tape.write(path, tape.read(path) + period * slope)

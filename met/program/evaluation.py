@@ -14,7 +14,7 @@ from met.integrators.integrator import Motion, Slope
 from met.program.control import failing, link_sensors, sensing
 from met.program.motion.base import BaseMotion, base_of, free_base
 from met.program.motion.bodies import slopes
-from met.program.motion.payloads import laden, shared, slopes_of_payloads
+from met.program.motion.payloads import slopes_of_payloads, split_wrenches, tree_with_payloads
 from met.program.motion.world import ArmWorld, environment_values
 from met.program.system import Actuator, ReadCell, System
 from met.program.values import NamedValues, answer, returned
@@ -64,36 +64,36 @@ def derivative(
     time: Real,
     begin: Real,
     part: Callable[[str], AbstractContextManager[None]],
-    told: Mapping[int, Real] | None = None,
+    prescribed_qdd: Mapping[int, Real] | None = None,
 ) -> Derivative:
     """The derivative at state y.
 
     held      what the servos' computers hold, one for each moving joint
     begin     time at which the dynamics step began that this stage is part of, s
     friction  s in {0, +1, -1}, by the name of what may stick (`Sticking.name`): stuck, sliding forward, backward
-    told      accelerations of joints whose motors are on a bed, by number: the servo does nothing to these
+    prescribed_qdd  accelerations of joints whose motors are on a bed, by number: the servo does nothing to these
     part      of the tape: tells servos, environment and dynamics apart where a profile asks
     """
     with part("servo physics"):
         driven = tuple(
-            None if actuator is None else driven_by(system, actuator, read, y, held[i], time, begin)
+            None if actuator is None else servo_response(system, actuator, read, y, held[i], time, begin)
             for i, actuator in enumerate(system.actuators)
         )
     drives = tuple(None if each is None else each.drive for each in driven)
-    tree, base, n = laden(system, read), base_of(system, read, y, time), len(system.joints)
+    tree, base, n = tree_with_payloads(system, read), base_of(system, read, y, time), len(system.joints)
     with part("environment"):
         loads = _environment(system, tree, read, y, base, time, begin)
-        wrenches, on_payloads = shared(system, read, loads.wrenches)
+        wrenches, on_payloads = split_wrenches(system, read, loads.wrenches)
 
-    told = told or {}
+    prescribed_qdd = prescribed_qdd or {}
     given: list[Real] = []
     mode: list[Truth] = []
     dry: list[Real] = []
     for i, drive in enumerate(drives):
         s = friction.get(system.joints[i].name)
-        if i in told:
+        if i in prescribed_qdd:
             mode.append(False)
-            given.append(told[i])
+            given.append(prescribed_qdd[i])
             dry.append(0.0)
             continue
         in_torque_mode: Truth = True
@@ -106,7 +106,8 @@ def derivative(
         dry.append(0.0 if s is None else s * level_of(system, i, drive, loads))
 
     smooth = [
-        loads.torques[i] + (0.0 if drive is None or i in told else drive.torque) for i, drive in enumerate(drives)
+        loads.torques[i] + (0.0 if drive is None or i in prescribed_qdd else drive.torque)
+        for i, drive in enumerate(drives)
     ]
     with part("dynamics"):
         solved = solve(
@@ -167,7 +168,7 @@ class ServoResponse:
     shown: Mapping[str, Real]
 
 
-def driven_by(
+def servo_response(
     system: System, actuator: Actuator, read: ReadCell, y: Motion, held: NamedValues, time: Real, begin: Real
 ) -> ServoResponse:
     """What a servo does at state y with this memory, its answers checked against its declaration.
@@ -184,18 +185,18 @@ def driven_by(
     seen = Seen(*sensing.measured(actuator, p, q, qd, natural), Setpoint("none", 0.0, 0.0), 0.0, time, natural)
     of_sensors = sensing.slopes(system, actuator, read, seen, own)
     if parts.continuous:
-        seen = sensing.through(
+        seen = sensing.seen_at_stage(
             system, actuator, read, replace(seen, setpoint=system.setpoint(actuator, read, time)), own
         )
         seen = failing.seen(system, actuator, read, seen, None)
         integrals = {state.name: own[f"{actuator.path}.{state.name}"] for state in parts.integrals}
         found = law(actuator, p, NamedValues(owner, integrals), seen)
-        found = failing.given(system, actuator, read, p, seen.time, found)
+        found = failing.law_outputs(system, actuator, read, p, seen.time, found)
         held = NamedValues(owner, {**found.outputs, **integrals})
         slopes.update(found.slopes)
         shown.update({"command": seen.setpoint.value} if actuator.use.command is not None else {}, **found.outputs)
         for of in map(sensing.quantity, actuator.sensors):
-            shown[f"sensor.{of}"] = sensing.truth(seen, of)
+            shown[f"sensor.{of}"] = sensing.true_value(seen, of)
     coupled = failing.coupled(system, actuator, read, begin)
     motion = JointMotion(q, qd, time, begin, actuator.command_kind, 1.0 if coupled is None else coupled)
     drive = answer(owner, servo.drive, p, held, natural, motion)
@@ -278,14 +279,14 @@ def _of_brakes(system: System, joint: int, drive: Drive | None, loads: _Loads, f
 def gravity(system: System, read: ReadCell, y: Motion, time: Real) -> Vector:
     """Uniform gravity of all environment models at state y, world axes, m/s^2."""
     base = base_of(system, read, y, time)
-    return _environment(system, laden(system, read), read, y, base, time, time).gravity
+    return _environment(system, tree_with_payloads(system, read), read, y, base, time, time).gravity
 
 
-def brakes(system: System, read: ReadCell, y: Motion, time: Real, begin: Real) -> dict[str, Real]:
+def brake_levels(system: System, read: ReadCell, y: Motion, time: Real, begin: Real) -> dict[str, Real]:
     """Dry friction that environment models put on joints at state y, by name, N m (N)."""
     if not system.braked:
         return {}
-    tree, base = laden(system, read), base_of(system, read, y, time)
+    tree, base = tree_with_payloads(system, read), base_of(system, read, y, time)
     return _environment(
         system, tree, read, y, base, time, begin, [m for m in system.environment if m[1].friction_joint]
     ).dry

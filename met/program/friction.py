@@ -17,7 +17,7 @@ SPLITS = 2
 """A step is split at most this often; a crossing after that is clamped to the step's end, and counted."""
 
 
-def passes(count: int) -> int:
+def decision_passes(count: int) -> int:
     """Decision passes at rest, at most, for this many things with dry friction: two each.
 
     A pass changes modes of all violators at once. Where many interact that may go round in a circle: then one by one.
@@ -25,7 +25,7 @@ def passes(count: int) -> int:
     return max(3, 2 * count)
 
 
-def passes_one_by_one(count: int) -> int:
+def sequential_passes(count: int) -> int:
     """Passes, at most, that change the mode of the first violator alone, in a fixed order.
 
     Modes at rest are a linear complementarity problem with bounds, and its matrix, of the inertia of what is at rest,

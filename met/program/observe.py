@@ -99,7 +99,7 @@ class Observed:
         if kind == "carried":
             return choose(payloads.carried(payload, self.read), 1.0, 0.0) if payload.flies else 1.0
         if kind == "distance":
-            way = payloads.way(self.system, payload, self.read, motion, self.motions[payload.link])
+            way = payloads.gap(self.system, payload, self.read, motion, self.motions[payload.link])
             return sqrt(dot(way, way))
         return _of_frame(motion, kind, rest[0])
 
@@ -128,7 +128,7 @@ class Observed:
 
     @cached_property
     def reactions(self) -> tuple[Wrench, ...]:
-        return reactions(payloads.laden(self.system, self.read), self.derivative.solved)
+        return reactions(payloads.tree_with_payloads(self.system, self.read), self.derivative.solved)
 
     @cached_property
     def motions(self) -> dict[str, LinkMotion]:
@@ -138,7 +138,7 @@ class Observed:
     def seen(self) -> dict[str, LinkMotion]:
         """Every payload in the world, by name."""
         return {
-            each.name: payloads.seen(self.system, each, self.read, self.y, self.motions)
+            each.name: payloads.payload_motion(self.system, each, self.read, self.y, self.motions)
             if each.flies else self.motions[each.name]
             for each in self.system.structure.payloads
         }  # fmt: skip

@@ -16,9 +16,9 @@ from collections.abc import Callable
 
 from met.integrators.integrator import Motion, Slope
 from met.program import cells, friction
-from met.program.asking import Question, advanced, asked, inconstant
+from met.program.asking import Question, advance_with, changed_count, question_count
 from met.program.control.substituted import Substituted
-from met.program.evaluation import Derivative, brakes, derivative, driven_by
+from met.program.evaluation import Derivative, brake_levels, derivative, servo_response
 from met.program.motion import base, bodies
 from met.program.motion.grapple import Grapple
 from met.program.observe import Observed
@@ -50,14 +50,16 @@ class StepPhases:
         self.states = system.states
         self.sticking = sticking(system)
         self.grapple = Grapple(system, self.state, lambda tape, actuator: self._held(tape, actuator, 1.0))
-        self._asked = asked(system.integrator, len(self.coordinates), len(self.states), self.schedule.step)
+        self._questions = question_count(system.integrator, len(self.coordinates), len(self.states), self.schedule.step)
         self._derive = CallPhase(Phase("derive", self.derive))
         self._slope = CallPhase(Phase("slope", self.slope))
         count = len(self.sticking)
         one_by_one = RunPhase(Phase("decide_one", self.decide_one))
         self._decide = (
-            WhileAny("undecided", friction.passes(count), (self._derive, RunPhase(Phase("decide", self.decide)))),
-            *([WhileAny("undecided", friction.passes_one_by_one(count), (self._derive, one_by_one))] * (count > 1)),
+            WhileAny(
+                "undecided", friction.decision_passes(count), (self._derive, RunPhase(Phase("decide", self.decide)))
+            ),
+            *([WhileAny("undecided", friction.sequential_passes(count), (self._derive, one_by_one))] * (count > 1)),
             WhileAny("undecided", 1, (RunPhase(Phase("left_open", self.left_open)),)),
         )
         # what may hide that a number is none: joints whose acceleration may be given, and all that may stick
@@ -123,13 +125,13 @@ class StepPhases:
         """The levels of dry friction at the state, where a step or substep begins, in the units of what they hold."""
         fraction, y = tape.read("fraction"), self.state(tape)
         time, begin = self._time(tape, fraction), tape.read("instant")
-        on_joints = brakes(self.system, tape.read, y, time, begin)
+        on_joints = brake_levels(self.system, tape.read, y, time, begin)
         found: list[Real] = []
         for each in self.sticking:
             own: list[Real] = [] if each.level is None else [each.level]
             if each.level is None and each.actuator is not None:
                 held = self._held(tape, each.actuator, fraction)
-                drive = driven_by(self.system, each.actuator, tape.read, y, held, time, begin).drive
+                drive = servo_response(self.system, each.actuator, tape.read, y, held, time, begin).drive
                 own.append(drive.friction[each.state] if each.state else drive.dry)
             if each.name in on_joints:
                 own.append(on_joints[each.name])
@@ -226,22 +228,22 @@ class StepPhases:
         number: Real = where(out_of_range != 0.0, out_of_range - 1.0, 0.0)
         of_bodies = list(enumerate(bodies.bodies(self.system), len(self.joints)))
         for i, fitted in reversed(list(enumerate(self.system.sensors, len(self.joints) + len(of_bodies)))):
-            told = [part for name in fitted.channels for part in (name, f"slope:{name}")]
-            bad = not_(isfinite(sum((tape.read(name) for name in told), 0.0)))
+            watched = [part for name in fitted.channels for part in (name, f"slope:{name}")]
+            bad = not_(isfinite(sum((tape.read(name) for name in watched), 0.0)))
             cause, number = where(bad, NOT_FINITE, cause), where(bad, float(i), number)
         for i, body in reversed(of_bodies):
-            told = [f"{name}.{part}" for name in body.coordinates for part in ("qdd", "q", "qd")]
+            watched = [f"{name}.{part}" for name in body.coordinates for part in ("qdd", "q", "qd")]
             turned = sum([tape.read(name) for name in body.orientation], 0.0)
-            good = isfinite(sum((tape.read(name) for name in told), turned))
+            good = isfinite(sum((tape.read(name) for name in watched), turned))
             number = where(good, number, float(i))
             cause = where(good, cause, NOT_FINITE)
         elsewhere = cause == NOT_FINITE
         for i, joint in reversed(list(enumerate(self.joints))):
-            told = [f"{joint}.qdd", f"{joint}.q", f"{joint}.qd"]
-            moves = isfinite(sum((tape.read(name) for name in told), 0.0))
-            told += [f"need:{name}" for name in self._needs if name == joint or name.startswith(f"{joint}.servo.")]
-            told += [f"slope:{name}" for name in self.states if name.startswith(f"{joint}.servo.")]
-            bad = not_(isfinite(sum((tape.read(name) for name in told), 0.0)))
+            watched = [f"{joint}.qdd", f"{joint}.q", f"{joint}.qd"]
+            moves = isfinite(sum((tape.read(name) for name in watched), 0.0))
+            watched += [f"need:{name}" for name in self._needs if name == joint or name.startswith(f"{joint}.servo.")]
+            watched += [f"slope:{name}" for name in self.states if name.startswith(f"{joint}.servo.")]
+            bad = not_(isfinite(sum((tape.read(name) for name in watched), 0.0)))
             if bodies.bodies(self.system):  # a joint that moves well, and only bears what a body does, is not named
                 bad = both(bad, either(not_(moves), not_(elsewhere)))
             cause, number = where(bad, NOT_FINITE, cause), where(bad, float(i), number)
@@ -268,10 +270,12 @@ class StepPhases:
         stands = base.base_of(self.system, tape.read, y, tape.read("instant"))
         return Observed(self.system, tape.read, y, stands, lambda: self._derivative(tape, y, 0.0))
 
-    def _derivative(self, tape: Tape, y: Motion, fraction: Real, told: dict[int, Real] | None = None) -> Derivative:
+    def _derivative(
+        self, tape: Tape, y: Motion, fraction: Real, prescribed_qdd: dict[int, Real] | None = None
+    ) -> Derivative:
         """The derivative at the state y, at the share `fraction` of the dynamics step that began last.
 
-        told  accelerations of the substituted joints; None: those that the law gives
+        prescribed_qdd  accelerations of the substituted joints; None: those that the law gives
         """
         held = [
             NamedValues("no servo", {}) if actuator is None else self._held(tape, actuator, fraction)
@@ -286,7 +290,7 @@ class StepPhases:
             time=self._time(tape, fraction),
             begin=tape.read("instant"),
             part=tape.part,
-            told=self.beds.given(tape, fraction) if told is None else told,
+            prescribed_qdd=self.beds.given(tape, fraction) if prescribed_qdd is None else prescribed_qdd,
         )
 
     def _time(self, tape: Tape, fraction: Real) -> Real:
@@ -310,9 +314,9 @@ class StepPhases:
         """The step (the substep, if `again`) after its first stage: pieces of the integrator, a slope between each."""
         name = "advance_again" if again else "advance"
         parts: list[Control] = []
-        for settled in range(self._asked):
+        for settled in range(self._questions):
             parts += [RunPhase(Phase(f"{name}_{settled + 1}", self._towards(settled, again))), self._slope]
-        return (*parts, RunPhase(Phase(name, self._arrival(self._asked, again))))
+        return (*parts, RunPhase(Phase(name, self._arrival(self._questions, again))))
 
     def _towards(self, settled: int, again: bool) -> Callable[[Tape], None]:
         """The body of the piece that ends at a question, `settled` of them being answered before."""
@@ -321,7 +325,7 @@ class StepPhases:
             fraction = tape.read("fraction") if again else 0.0
             question = self._integrate(tape, settled, fraction)
             if not isinstance(question, Question):
-                raise inconstant(self.system.integrator)
+                raise changed_count(self.system.integrator)
             cells.store(tape, True, self.coordinates, self.states, question.there, STAGE)
             tape.write(f"{STAGE}fraction", fraction + question.share * (1.0 - fraction))
 
@@ -335,7 +339,7 @@ class StepPhases:
             y = self.state(tape)
             y_new = self._integrate(tape, settled, tape.read("fraction") if again else 0.0)
             if isinstance(y_new, Question):
-                raise inconstant(self.system.integrator)
+                raise changed_count(self.system.integrator)
             if self.sticking:
                 crossed = any_of(friction.crossings(self._sliding(tape), y_new))
                 cells.store(tape, True, self.coordinates, self.states, y, FROM)
@@ -365,7 +369,7 @@ class StepPhases:
             for n in range(1, settled + 1)
         ]
         h = (1.0 - fraction) * self.schedule.step
-        return advanced(self.system.integrator, answers, h, y, self._first_slope(tape, y.qd))
+        return advance_with(self.system.integrator, answers, h, y, self._first_slope(tape, y.qd))
 
     def _first_slope(self, tape: Tape, qd: tuple[Real, ...]) -> Slope:
         """The first stage's slope, as `derive` left it; qd are the rates then."""
@@ -417,7 +421,7 @@ class StepPhases:
     def state(self, tape: Tape, copy: str = "") -> Motion:
         """The state, or a copy of it: a stage's as it is, another where a (sub)step begins."""
         y = cells.state(tape, self.coordinates, self.states, copy)
-        return y if copy == STAGE else bodies.begun(self.system, y)
+        return y if copy == STAGE else bodies.with_zero_turn(self.system, y)
 
     def _friction(self, tape: Tape) -> dict[str, Real]:
         return {each.name: tape.read(f"friction:{each.name}") for each in self.sticking}

@@ -335,8 +335,8 @@ class System:
 
     def _actuator(self, index: int, use: ServoUse) -> Actuator:
         servo = models.find("servo", use.model, use.place)
-        told = use.command is not None and not use.command.guide
-        profile = models.find("command", use.command.model, use.place) if use.command and told else None
+        has_course = use.command is not None and not use.command.guide
+        profile = models.find("command", use.command.model, use.place) if use.command and has_course else None
         sensors = tuple(self._fitted(each, f"{use.joint}.servo.sensor.{each.of}") for each in use.sensors)
         bare = Actuator(index, use, servo, profile, models.servo_parts(use), None, False, False, {}, sensors)
         drive, level, levels = self._probe(bare)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from met.frozen import frozen
 from met.messages.renamed import old_fields, old_names
-from met.parameter import Memory, Only, Parameter, Signal, State, there
+from met.parameter import Memory, Only, Parameter, Signal, State, is_present
 from met.servos.motor import Motor
 from met.trace import Real, Truth
 
@@ -219,11 +219,11 @@ def parts(servo: Servo, words: Mapping[str, str], *, continuous: bool = False) -
     """What there is of a servo under these words, by the names of their parameters; of one left out, its default."""
     words = {each.name: each.default for each in servo.parameters if isinstance(each.default, str)} | dict(words)
     return Parts(
-        tuple(part for part in servo.parameters if there(part, words)),
-        tuple(part for part in servo.outputs if there(part, words)),
-        tuple(part for part in servo.integrals if there(part, words)),
-        tuple(part for part in servo.states if there(part, words)),
-        tuple(part for part in servo.signals if there(part, words)),
+        tuple(part for part in servo.parameters if is_present(part, words)),
+        tuple(part for part in servo.outputs if is_present(part, words)),
+        tuple(part for part in servo.integrals if is_present(part, words)),
+        tuple(part for part in servo.states if is_present(part, words)),
+        tuple(part for part in servo.signals if is_present(part, words)),
         continuous,
     )
 

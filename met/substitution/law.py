@@ -58,8 +58,8 @@ class Law:
     observer  whether it has one: parameters `torque_noise`, `drift`, `reading_noise`
     balance   "full": friction is part of the balance, means over the tick; "bare": neither; "none": there is none
     memory    of its own, one a joint
-    give      (p, held, told, load) -> LawOutput of each joint, and its new memory by name. p, held, told: one a joint;
-              load: joint accelerations -> Lambda qdd + b_0, N m (N)
+    give      (p, held, inputs, load) -> LawOutput of each joint, and its new memory by name. p, held,
+              inputs: one a joint;  load: joint accelerations -> Lambda qdd + b_0, N m (N)
     """
 
     name: str

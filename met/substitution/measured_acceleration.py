@@ -18,16 +18,16 @@ from met.trace import Real, exp
 
 
 def give(
-    p: Sequence[Any], held: Sequence[Any], told: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
+    p: Sequence[Any], held: Sequence[Any], inputs: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
 ) -> Sequence[tuple[LawOutput, Mapping[str, Real]]]:
     shaft = []
-    for own, memory, joint in zip(p, held, told, strict=True):
+    for own, memory, joint in zip(p, held, inputs, strict=True):
         new = (joint.rate - joint.before) / joint.period
         share = 1.0 - exp(-2.0 * math.pi * own.low_pass * joint.period)
         shaft.append(memory.acceleration + share * (new - memory.acceleration))
-    qdd = [a / joint.motor.ratio for a, joint in zip(shaft, told, strict=True)]
+    qdd = [a / joint.motor.ratio for a, joint in zip(shaft, inputs, strict=True)]
     given = []
-    for a, joint_a, joint, taken in zip(shaft, qdd, told, load(qdd), strict=True):
+    for a, joint_a, joint, taken in zip(shaft, qdd, inputs, load(qdd), strict=True):
         torque = -taken / joint.motor.ratio + (joint.inertia - joint.motor.inertia) * a
         given.append((LawOutput(torque, joint_a), {"acceleration": a}))
     return given

@@ -15,20 +15,20 @@ from met.substitution.law import BAND, Law, LawInput, LawOutput
 from met.trace import Real
 
 
-def balanced(told: LawInput) -> LawOutput:
+def balanced(inputs: LawInput) -> LawOutput:
     """The load torque that gives the shaft its part in the balance, and the joint's part."""
-    found = told.balance
+    found = inputs.balance
     assert found is not None
-    torque = (told.inertia + told.extra) * (told.motor.ratio * found.qdd) - (found.net - found.friction)
+    torque = (inputs.inertia + inputs.extra) * (inputs.motor.ratio * found.qdd) - (found.net - found.friction)
     return LawOutput(torque, found.qdd)
 
 
 def give(
-    p: Sequence[Any], held: Sequence[Any], told: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
+    p: Sequence[Any], held: Sequence[Any], inputs: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
 ) -> Sequence[tuple[LawOutput, Mapping[str, Real]]]:
     return [
         (LawOutput(balanced(joint).torque, (joint.rate - joint.before) / (joint.period * joint.motor.ratio)), {})
-        for joint in told
+        for joint in inputs
     ]
 
 

@@ -17,9 +17,9 @@ from met.trace import Real
 
 
 def give(
-    p: Sequence[Any], held: Sequence[Any], told: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
+    p: Sequence[Any], held: Sequence[Any], inputs: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
 ) -> Sequence[tuple[LawOutput, Mapping[str, Real]]]:
-    return [(balanced(joint), {}) for joint in told]
+    return [(balanced(joint), {}) for joint in inputs]
 
 
 LAW = Law(name="torque_balance_observer", doc=__doc__, parameters=(BAND, *OBSERVER), observer=True, give=give)

@@ -136,7 +136,7 @@ def test_the_sweeps_of_the_page_have_the_cases_and_structures_that_it_says(tmp_p
     assert said == ""
     counts: dict[str, list[int]] = {}
     for experiment in compiled.plan.experiments:
-        counts.setdefault(experiment.asked, []).append(experiment.cases.count)
+        counts.setdefault(experiment.name_in_deck, []).append(experiment.cases.count)
     assert counts["drives"] == [2, 2, 2]
     assert counts["everything"] == [2, 2, 2, 12, 1]
     assert counts["measured"] == [2, 1]
@@ -144,7 +144,7 @@ def test_the_sweeps_of_the_page_have_the_cases_and_structures_that_it_says(tmp_p
     (text,) = (text for where, _, text in PIECES if where == "chain.ic")
     compiled, said = checked(tmp_path / "chain.ic", text)
     assert said == ""
-    sizes = [each for each in compiled.plan.experiments if each.asked == "sizes"]
+    sizes = [each for each in compiled.plan.experiments if each.name_in_deck == "sizes"]
     assert [(len(each.structure.joints), each.cases.count) for each in sizes] == [(1, 3), (2, 3)]
 
 

@@ -17,7 +17,7 @@ from typing import Any, get_args
 
 from met import models
 from met.frozen import frozen
-from met.parameter import Memory, Parameter, State, there, under
+from met.parameter import Memory, Parameter, State, is_present, under
 from met.plan import JointKind
 from met.servos.servo import Parts, parts
 from met.units import PURE, Dimension, parse_unit
@@ -291,7 +291,7 @@ class Use:
     def absent(self) -> tuple[Parameter, ...]:
         """Those that are there under other words alone."""
         written = models.written(self.model)
-        here = [parameter.name for parameter in written if there(parameter, self.chosen)]
+        here = [parameter.name for parameter in written if is_present(parameter, self.chosen)]
         return tuple(parameter for parameter in written if parameter.name not in here)
 
     def in_plan(self) -> tuple[Parameter, ...]:
@@ -302,7 +302,7 @@ class Use:
     def _here(self, declared: Iterable[Parameter], *, lists: bool = True) -> tuple[Parameter, ...]:
         return tuple(
             under(parameter, self.command) for parameter in declared
-            if there(parameter, self.chosen) and (lists or parameter.shape != "list")
+            if is_present(parameter, self.chosen) and (lists or parameter.shape != "list")
         )  # fmt: skip
 
     @property
@@ -312,7 +312,7 @@ class Use:
 
     def held(self, group: str) -> tuple[Memory | State, ...]:
         """What there is of a group of what the model holds: `memory`, `states`."""
-        return tuple(part for part in getattr(self.model, group) if there(part, self.chosen))
+        return tuple(part for part in getattr(self.model, group) if is_present(part, self.chosen))
 
     def parameter(self, name: str) -> Parameter:
         return next(parameter for parameter in self.parameters() if parameter.name == name)

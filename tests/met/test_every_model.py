@@ -92,7 +92,7 @@ def test_a_parameter_may_be_declared_for_each_of_several_words() -> None:
     """Never twice for one word, nor beside one that is there under all."""
 
     def names(*only: tuple[str, tuple[str, ...]] | None) -> list[str]:
-        return models.there_together([Parameter(name="x", doc="a number", only=each) for each in only])
+        return models.distinct_names([Parameter(name="x", doc="a number", only=each) for each in only])
 
     assert names(("w", ("a",)), ("w", ("b", "c"))) == ["x"]
     assert names(("w", ("a", "b")), ("w", ("b", "c"))) == names(("w", ("a",)), None) == ["x", "x"]

@@ -17,7 +17,7 @@ from ic.text.complaints import known_words, where_it_belongs, with_article
 from met import models
 from met.diagnostic import Label, Place, Problem, did_you_mean
 from met.environments.environment import FILE
-from met.parameter import Only, Parameter, there
+from met.parameter import Only, Parameter, is_present
 
 
 def word_of(expression: Expression | None) -> str | None:
@@ -169,12 +169,12 @@ def use_model(
     parameters = tuple(parameters)
     words = {p.name: word_written(p, body) for p in parameters if p.shape == "word"}
     wrong = [p.name for p in parameters if p.words and not p.names and words[p.name] not in p.words]
-    known = [p.name for p in parameters if there(p, words) or body.get(p.name) is not None]
+    known = [p.name for p in parameters if is_present(p, words) or body.get(p.name) is not None]
     extra = list(extra)
     check_keys(scope, body, [*known, *extra], owner)
     if FILE.name in extra and scope.complaints.is_known_to_lack(owner.place, FILE.name):  # which would have the lists
         scope.complaints.known_missing |= {(owner.place, each.name) for each in parameters if each.shape == "list"}
-    here = [p.name for p in parameters if there(p, words)]
+    here = [p.name for p in parameters if is_present(p, words)]
     owner = replace(owner, others=parameters)
     values: dict[str, Any] = {}
     for wanted in parameters:
@@ -182,7 +182,7 @@ def use_model(
         if wanted.only is not None and wanted.only[0] in wrong:
             scope.checks.fail(owner.join(wanted.name))  # a missing word is reported where words are read
             continue
-        if wanted.only is not None and not there(wanted, words):
+        if wanted.only is not None and not is_present(wanted, words):
             if wanted.name not in here:
                 _check_unused(scope, owner, wanted, wanted.only, body, words)
             continue

@@ -9,7 +9,7 @@ from dataclasses import replace
 from met.diagnostic import Problem, error
 from met.environments.environment import Environment
 from met.frozen import frozen
-from met.program.control.sensing import replaced, truth
+from met.program.control.sensing import true_value, with_value
 from met.program.system import Actuator, ReadCell, System
 from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.servo import Control, Seen
@@ -35,7 +35,9 @@ def coupled(system: System, actuator: Actuator, read: ReadCell, begin: Real) -> 
     return held
 
 
-def given(system: System, actuator: Actuator, read: ReadCell, p: NamedValues, time: Real, found: Control) -> Control:
+def law_outputs(
+    system: System, actuator: Actuator, read: ReadCell, p: NamedValues, time: Real, found: Control
+) -> Control:
     """What comes out of the servo's law."""
     for owner, model, own in _about(system, actuator, read):
         if model.replaced_outputs is None:
@@ -56,8 +58,11 @@ def seen(system: System, actuator: Actuator, read: ReadCell, seen: Seen, last: s
             continue
         for of in quantities(actuator):
             before = math.nan if last is None else read(f"{last}{of}")
-            seen = replaced(
-                actuator, seen, of, answer(owner, model.replaced_reading, p, seen.time, of, truth(seen, of), before)
+            seen = with_value(
+                actuator,
+                seen,
+                of,
+                answer(owner, model.replaced_reading, p, seen.time, of, true_value(seen, of), before),
             )
     return seen
 

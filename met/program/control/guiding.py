@@ -92,7 +92,7 @@ class _ArmAt:
         n = len(system.joints)
         tree, self._base = system.tree(read), stands
         self._free = system.structure.free
-        self._laden = payloads.laden(system, read)
+        self._loaded_tree = payloads.tree_with_payloads(system, read)
         self._q, self._qd = y.q[:n], y.qd[:n]
         names = [joint.name for joint in system.joints]
         self._own = [names.index(joint) for joint in use.joints]
@@ -129,13 +129,13 @@ class _ArmAt:
         """What a free base does to the frame for each unit of each joint's rate: angular velocity and velocity; with
         the payloads that the links carry at this time."""
         arm = sub(self._p, self._base.pose.p)
-        found = base_answers(self._laden, self._q, self._base.pose)
+        found = base_answers(self._loaded_tree, self._q, self._base.pose)
         return [(w, add(v, cross(w, arm))) for w, v in found]
 
 
 def _state(system: System, tape: Tape, time: Real) -> tuple[Motion, BaseMotion]:
     """The arm at an instant, and its base."""
-    y = bodies.begun(system, cells.state(tape, bodies.coordinates(system), system.states))
+    y = bodies.with_zero_turn(system, cells.state(tape, bodies.coordinates(system), system.states))
     return y, base.base_of(system, tape.read, y, time)
 
 

@@ -67,15 +67,15 @@ class Aboard(ArmWorld):
 
     def specific_force(self, link: str, point: Vector = ZERO) -> Vector:
         own, motion = self._acceleration(link, point), self.link(link)
-        falling = free_fall(self._machine, self._read, self, self._known(link).gravity, motion, point)
+        falling = free_fall(self._system, self._read, self, self._known(link).gravity, motion, point)
         return sub(own, motion.to_link(falling))
 
     def spin(self, link: str) -> Vector:
         motion = self.link(link)
         found = motion.w
-        for name, model in self._machine.environment:
+        for name, model in self._system.environment:
             if model.world_rate is not None:
-                owner, p = environment_values(self._machine, name, model, self._read)
+                owner, p = environment_values(self._system, name, model, self._read)
                 found = add(found, motion.to_link(answer(owner, model.world_rate, p, self)))
         return found
 
@@ -97,12 +97,12 @@ class Aboard(ArmWorld):
 
     def _of_payload(self, name: str, moved: Accelerations) -> tuple[Vector, Vector]:
         payload, read = self._flying[name], self._read
-        body = payloads.free_body(self._machine, payload)
+        body = payloads.free_body(self._system, payload)
         own = body.qdd(moved.qdd)
-        flown = payloads.flown(self._machine, payload, read, self._y)
+        flown = payloads.flying_motion(self._system, payload, read, self._y)
         free = own[3:], turn_vector_back(flown.pose.R, own[:3])  # type: ignore[arg-type]
         carrier = self.link(payload.link)
-        held = fixed_acceleration(carrier.w, self._of_frame(payload.link), payloads.held(payload, read))
+        held = fixed_acceleration(carrier.w, self._of_frame(payload.link), payloads.pose_in_link(payload, read))
         on = payloads.carried(payload, read)
         wd, a = (
             (choose(on, x[0], y[0]), choose(on, x[1], y[1]), choose(on, x[2], y[2]))
@@ -160,7 +160,7 @@ def slopes(system: System, read: ReadCell, felt: Aboard, own: Mapping[str, Real]
     found: dict[str, Real] = {}
     for fitted in system.sensors:
         if fitted.sensor.follow is not None:
-            found.update(sensing.followed(system, fitted, read, own, measured(system, fitted, read, felt)))
+            found.update(sensing.sensor_slopes(system, fitted, read, own, measured(system, fitted, read, felt)))
     return tuple(found[name] for fitted in system.sensors for name in fitted.channels)
 
 
@@ -183,5 +183,5 @@ def measured(system: System, fitted: Fitted, read: ReadCell, felt: Aboard) -> Re
 
 def _state(system: System, tape: Tape, time: Real) -> tuple[Motion, BaseMotion]:
     """The arm at an instant, and its base."""
-    y = bodies.begun(system, cells.state(tape, bodies.coordinates(system), system.states))
+    y = bodies.with_zero_turn(system, cells.state(tape, bodies.coordinates(system), system.states))
     return y, base_of(system, tape.read, y, time)

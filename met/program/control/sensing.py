@@ -25,7 +25,7 @@ def measured(actuator: Actuator, p: NamedValues, q: Real, qd: Real, states: Name
     return answer(actuator.owner, actuator.servo.measured, p, q, qd, states)
 
 
-def truth(seen: Seen, of: str) -> Real:
+def true_value(seen: Seen, of: str) -> Real:
     """The quantity itself."""
     found: Real = getattr(seen, of) if of in ("q", "qd") else getattr(seen.states, of)
     return found
@@ -34,7 +34,7 @@ def truth(seen: Seen, of: str) -> Real:
 def start(system: System, tape: Tape, actuator: Actuator, seen: Seen) -> None:
     """States, memory and reading where a run begins."""
     for fitted in actuator.sensors:
-        value = truth(seen, quantity(fitted))
+        value = true_value(seen, quantity(fitted))
         begin(system, tape, fitted, value)
 
 
@@ -44,31 +44,31 @@ def slopes(system: System, actuator: Actuator, read: ReadCell, seen: Seen, own: 
     for fitted in actuator.sensors:
         if fitted.sensor.follow is None:
             continue
-        found.update(followed(system, fitted, read, own, truth(seen, quantity(fitted))))
+        found.update(sensor_slopes(system, fitted, read, own, true_value(seen, quantity(fitted))))
     return found
 
 
-def through(system: System, actuator: Actuator, read: ReadCell, seen: Seen, own: Mapping[str, Real]) -> Seen:
+def seen_at_stage(system: System, actuator: Actuator, read: ReadCell, seen: Seen, own: Mapping[str, Real]) -> Seen:
     """What a continuous law sees through its sensors at a stage."""
 
     def never() -> Real:
         raise Problem(error("E213", "a sensor that a continuous law sees draws noise", help="declare it `clocked`"))
 
     for fitted in actuator.sensors:
-        sensed = Sensed(partial(truth, seen, quantity(fitted)), 0.0, never)
+        sensed = Sensed(partial(true_value, seen, quantity(fitted)), 0.0, never)
         p, states = values(system, fitted, read), _states(fitted, own.__getitem__)
         reading = answer(fitted.owner, fitted.sensor.read, p, NamedValues(fitted.owner, {}), states, sensed)
-        seen = replaced(actuator, seen, quantity(fitted), reading.value)
+        seen = with_value(actuator, seen, quantity(fitted), reading.value)
     return seen
 
 
-def ticked(system: System, tape: Tape, actuator: Actuator, seen: Seen, state: Callable[[str], Real]) -> Seen:
+def seen_at_tick(system: System, tape: Tape, actuator: Actuator, seen: Seen, state: Callable[[str], Real]) -> Seen:
     """What a sampled law sees through its sensors at a tick. state: gives their states, by channel."""
     found = seen
     for fitted in actuator.sensors:
         of = quantity(fitted)
-        value = tick(system, tape, fitted, partial(truth, seen, of), actuator.use.divisor, seen.period, state)
-        found = replaced(actuator, found, of, value)
+        value = tick(system, tape, fitted, partial(true_value, seen, of), actuator.use.divisor, seen.period, state)
+        found = with_value(actuator, found, of, value)
     return found
 
 
@@ -85,7 +85,9 @@ def begin(system: System, tape: Tape, fitted: Fitted, value: Real) -> None:
     tape.write(fitted.path, value)
 
 
-def followed(system: System, fitted: Fitted, read: ReadCell, own: Mapping[str, Real], value: Real) -> dict[str, Real]:
+def sensor_slopes(
+    system: System, fitted: Fitted, read: ReadCell, own: Mapping[str, Real], value: Real
+) -> dict[str, Real]:
     """Slopes of the states of a sensor that has a circuit, by channel. own: the states, by channel."""
     assert fitted.sensor.follow is not None
     p, states = values(system, fitted, read), _states(fitted, own.__getitem__)
@@ -132,7 +134,7 @@ def _states(fitted: Fitted, state: Callable[[str], Real]) -> NamedValues:
     return NamedValues(fitted.owner, {part.name: state(f"{fitted.path}.{part.name}") for part in fitted.states})
 
 
-def replaced(actuator: Actuator, seen: Seen, of: str, value: Real) -> Seen:
+def with_value(actuator: Actuator, seen: Seen, of: str, value: Real) -> Seen:
     """What is seen, with this quantity replaced."""
     if of in ("q", "qd"):
         return replace(seen, q=value) if of == "q" else replace(seen, qd=value)

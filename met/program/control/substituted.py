@@ -254,12 +254,12 @@ class Substituted:
                      for each, w in zip(self.mounted, ahead, strict=True)]  # fmt: skip
             solve = balance.bare if self.law.balance == "bare" else balance.balanced
             found = solve(sides, Lambda, b_0)
-        told = [self._told(tape, each, one) for each, one in zip(self.mounted, found, strict=True)]
+        inputs = [self._law_input(tape, each, one) for each, one in zip(self.mounted, found, strict=True)]
         p = [self._law_values(tape, each) for each in self.mounted]
         held = [NamedValues(f"law `{each.law.name}`", {m.name: tape.read(f"{each.joint}.law.{m.name}")
                 for m in each.law.memory}) for each in self.mounted]  # fmt: skip
         owner = f"law `{self.law.name}`"
-        given = answer(owner, self.law.give, p, held, told, lambda qdd: balance.loads(Lambda, b_0, qdd))
+        given = answer(owner, self.law.give, p, held, inputs, lambda qdd: balance.loads(Lambda, b_0, qdd))
         applied = []
         for each, (one, memory) in zip(self.mounted, given, strict=True):
             returned(owner, "give", memory, (m.name for m in each.law.memory))
@@ -359,7 +359,7 @@ class Substituted:
             motor.ratio, motor.ratio * motor.ratio * (motor.inertia + mean), net, motor.f_c, w, band
         )
 
-    def _told(self, tape: Tape, each: Mounted, found: balance.Balanced | None) -> LawInput:
+    def _law_input(self, tape: Tape, each: Mounted, found: balance.Balanced | None) -> LawInput:
         motor, p, name = self.motor(tape, each), self._bed_values(tape, each), each.joint
         mean = each.law.balance == "full"
         extra = p.inertia * (self.period / lasting(motor.damping / p.inertia, self.period) - 1.0) if mean else 0.0

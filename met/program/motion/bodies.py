@@ -128,7 +128,7 @@ def place(body: FreeBody, tape: Tape, active: Truth, turn: Quaternion, position:
         cells.keep(tape, active, f"{name}.qd", qd)
 
 
-def begun(system: System, y: Motion) -> Motion:
+def with_zero_turn(system: System, y: Motion) -> Motion:
     """A state at which a (sub)step begins, or is seen: theta is 0 there."""
     q = list(y.q)
     for body in bodies(system):

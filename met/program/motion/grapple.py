@@ -15,7 +15,7 @@ from met.dynamics.spatial import ZERO, add, choose, compose, inverse, turn_vecto
 from met.integrators.integrator import Motion
 from met.plan import INSTANT
 from met.program import cells
-from met.program.evaluation import driven_by
+from met.program.evaluation import servo_response
 from met.program.motion import payloads
 from met.program.motion.base import base_of, free_base, motions
 from met.program.motion.bodies import place
@@ -80,7 +80,7 @@ class Grapple:
             if not payload.grappled:
                 continue
             caught = tape.read_mask(cell(payload, "grappling"))
-            own, link = payloads.flown(system, payload, tape.read, y), links[payload.link]
+            own, link = payloads.flying_motion(system, payload, tape.read, y), links[payload.link]
             body, pose = payloads.body_of(system, payload, tape.read), compose(inverse(link.pose), own.pose)
             blow = raised(momentum(body, twist_against(own, link)), pose)
             before = blows.get(payload.link, (ZERO, ZERO))
@@ -88,7 +88,7 @@ class Grapple:
                 add(a, tuple(choose(caught, x, 0.0) for x in b))  # type: ignore[arg-type]
                 for a, b in zip(before, blow, strict=True)
             )
-            payloads.hold(system, tape, caught, payload, pose)
+            payloads.attach(system, tape, caught, payload, pose)
             for name in payloads.free_body(system, payload).coordinates:
                 cells.keep(tape, caught, f"{name}.qd", 0.0)
         self._jump(tape, y, blows)
@@ -101,10 +101,10 @@ class Grapple:
         for payload in system.flying:
             if payload.released:
                 gone = tape.read_mask(cell(payload, "releasing"))
-                motion = payloads.with_link(payload, tape.read, links)
+                motion = payloads.carried_motion(payload, tape.read, links)
                 body, v = payloads.free_body(system, payload), turn_vector(motion.pose.R, motion.v)
                 place(body, tape, gone, quaternion(motion.pose.R), motion.pose.p, v, motion.w)
-                payloads.let_go(tape, gone, payload)
+                payloads.detach(tape, gone, payload)
 
     def _jump(self, tape: Tape, y: Motion, blows: dict[str, Wrench]) -> None:
         """Rates after the impact; by link, the momentum that comes to it, about its origin and in its axes."""
@@ -112,7 +112,7 @@ class Grapple:
         drives = [self._drive(tape, actuator, y) for actuator in system.actuators]
         on_beds = {actuator.index for actuator, _, _ in system.mounted}
         solved = solve(
-            payloads.laden(system, tape.read), y.q[:n], (0.0,) * n,
+            payloads.tree_with_payloads(system, tape.read), y.q[:n], (0.0,) * n,
             mode=tuple(False if i in on_beds else _yields(drive) for i, drive in enumerate(drives)),
             rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives), wrenches=blows,
         )  # fmt: skip
@@ -130,7 +130,7 @@ class Grapple:
         if actuator is None:
             return None
         held = self._held(tape, actuator)
-        return driven_by(self.system, actuator, tape.read, y, held, tape.time, tape.time).drive
+        return servo_response(self.system, actuator, tape.read, y, held, tape.time, tape.time).drive
 
     def _is_time(self, tape: Tape, name: str, event: str) -> Truth:
         """Whether this is an instant not before the event's time."""

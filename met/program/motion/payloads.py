@@ -65,13 +65,13 @@ def carried(payload: Payload, read: ReadCell) -> Truth:
     return read(cell(payload, "stage")) == CARRIED
 
 
-def held(payload: Payload, read: ReadCell) -> Pose:
+def pose_in_link(payload: Payload, read: ReadCell) -> Pose:
     """Its pose in the link's frame, while the link carries it."""
     x = [read(cell(payload, f"held.{i}")) for i in range(12)]
     return Pose(((x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8])), (x[9], x[10], x[11]))
 
 
-def laden(system: System, read: ReadCell) -> Tree:
+def tree_with_payloads(system: System, read: ReadCell) -> Tree:
     """The arm with the payloads that its links carry."""
     tree = system.tree(read)
     for payload in system.flying:
@@ -81,9 +81,11 @@ def laden(system: System, read: ReadCell) -> Tree:
     return tree
 
 
-def seen(system: System, payload: Payload, read: ReadCell, y: Motion, links: Mapping[str, LinkMotion]) -> LinkMotion:
+def payload_motion(
+    system: System, payload: Payload, read: ReadCell, y: Motion, links: Mapping[str, LinkMotion]
+) -> LinkMotion:
     """A payload in the world, wherever it is; links: the arm's, in the world."""
-    own, link = flown(system, payload, read, y), with_link(payload, read, links)
+    own, link = flying_motion(system, payload, read, y), carried_motion(payload, read, links)
     on = carried(payload, read)
 
     def either(a: Vector, b: Vector) -> Vector:
@@ -93,19 +95,19 @@ def seen(system: System, payload: Payload, read: ReadCell, y: Motion, links: Map
     return LinkMotion(Pose((x, y_, z), either(link.pose.p, own.pose.p)), either(link.w, own.w), either(link.v, own.v))
 
 
-def flown(system: System, payload: Payload, read: ReadCell, y: Motion) -> LinkMotion:
+def flying_motion(system: System, payload: Payload, read: ReadCell, y: Motion) -> LinkMotion:
     """A payload that flies, in the world."""
     found = flight(free_body(system, payload), read, y)
     return LinkMotion(found.pose, found.w, found.v)
 
 
-def with_link(payload: Payload, read: ReadCell, links: Mapping[str, LinkMotion]) -> LinkMotion:
+def carried_motion(payload: Payload, read: ReadCell, links: Mapping[str, LinkMotion]) -> LinkMotion:
     """A payload that its link carries, in the world."""
-    link, pose = links[payload.link], held(payload, read)
+    link, pose = links[payload.link], pose_in_link(payload, read)
     return LinkMotion(compose(link.pose, pose), *fixed_motion((link.w, link.v), pose))
 
 
-def shared(system: System, read: ReadCell, wrenches: Mapping[str, Wrench]) -> tuple[dict[str, Wrench], ...]:
+def split_wrenches(system: System, read: ReadCell, wrenches: Mapping[str, Wrench]) -> tuple[dict[str, Wrench], ...]:
     """Wrenches on links, those on payloads among them that a link carries; and those on payloads that fly.
 
     wrenches  on links and payloads by name, about their frames' origins and in their axes
@@ -117,7 +119,7 @@ def shared(system: System, read: ReadCell, wrenches: Mapping[str, Wrench]) -> tu
         payload = names[name]
         on = carried(payload, read)
         before = links.get(payload.link, NOTHING)
-        felt = raised(wrench, held(payload, read))
+        felt = raised(wrench, pose_in_link(payload, read))
         links[payload.link] = tuple(  # type: ignore[assignment]
             tuple(a + choose(on, b, 0.0) for a, b in zip(*parts, strict=True))
             for parts in zip(before, felt, strict=True)
@@ -163,10 +165,10 @@ def start(system: System, tape: Tape) -> None:
             tape.write(cell(payload, "stage"), FLYING)
         else:
             place(body, tape, True, (1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO)
-            hold(system, tape, True, payload, Pose(rotation_rpy(*given("rpy")), given("at")))
+            attach(system, tape, True, payload, Pose(rotation_rpy(*given("rpy")), given("at")))
 
 
-def hold(system: System, tape: Tape, active: Truth, payload: Payload, pose: Pose) -> None:
+def attach(system: System, tape: Tape, active: Truth, payload: Payload, pose: Pose) -> None:
     """Makes a payload a part of its link, at this pose in its frame, where active."""
     for i, x in enumerate((*pose.R[0], *pose.R[1], *pose.R[2], *pose.p)):
         cells.keep(tape, active, cell(payload, f"held.{i}"), x)
@@ -175,13 +177,13 @@ def hold(system: System, tape: Tape, active: Truth, payload: Payload, pose: Pose
     cells.keep(tape, active, cell(payload, "stage"), CARRIED)
 
 
-def let_go(tape: Tape, active: Truth, payload: Payload) -> None:
+def detach(tape: Tape, active: Truth, payload: Payload) -> None:
     """Takes a payload off its link, where active."""
     _keep_body(tape, active, payload, NO_INERTIA)
     cells.keep(tape, active, cell(payload, "stage"), RELEASED)
 
 
-def way(system: System, payload: Payload, read: ReadCell, motion: LinkMotion, link: LinkMotion) -> Vector:
+def gap(system: System, payload: Payload, read: ReadCell, motion: LinkMotion, link: LinkMotion) -> Vector:
     """From the point of the link that the payload's frame is to come to, to where it is; world axes, m."""
     x, y, z = motion.pose.p
     a, b, c = link.position(system.vector(f"payloads.{payload.name}.at", read))

@@ -10,7 +10,7 @@ from met.environments.environment import Environment
 from met.integrators.integrator import Motion
 from met.parameter import WORLD
 from met.program.motion.base import BaseMotion, motions
-from met.program.motion.payloads import seen
+from met.program.motion.payloads import payload_motion
 from met.program.system import ReadCell, System
 from met.program.values import NamedValues, parameters
 from met.trace import Real
@@ -35,7 +35,7 @@ class ArmWorld:
         self.joints = tuple(joint.name for joint in system.joints)
         self.links = (*(each.name for each in system.structure.links), *(p.name for p in system.structure.payloads))
         self._sliding = {joint.name: joint.kind == "prismatic" for joint in system.joints}
-        self._machine, self._read = system, read
+        self._system, self._read = system, read
         n = len(self.joints)
         self._tree, self._y, self._base = tree, y, base
         self._q, self._qd = y.q[:n], y.qd[:n]
@@ -67,13 +67,13 @@ class ArmWorld:
         return self.link(link).rate()
 
     def mass(self, link: str) -> Real:
-        return self._machine.mass(self._own(link), self._read)
+        return self._system.mass(self._own(link), self._read)
 
     def com(self, link: str) -> Vector:
-        return self._machine.com(self._own(link), self._read)
+        return self._system.com(self._own(link), self._read)
 
     def inertia(self, link: str) -> tuple[Real, Real, Real, Real, Real, Real]:
-        return self._machine.inertia(self._own(link), self._read)
+        return self._system.inertia(self._own(link), self._read)
 
     def is_ground(self, link: str) -> bool:
         """Whether this names the ground. Where the arm has a link of that name, no model's parameter is that word."""
@@ -85,7 +85,7 @@ class ArmWorld:
         if self._motions is None:
             self._motions = motions(self._tree, self._q, self._qd, self._base)
         if link in self._flying:
-            return seen(self._machine, self._flying[link], self._read, self._y, self._motions)
+            return payload_motion(self._system, self._flying[link], self._read, self._y, self._motions)
         return self._motions[self._own(link)]
 
     def _own(self, link: str) -> str:

@@ -33,7 +33,7 @@ def choices(found: tuple[Experiment, ...]) -> list[dict[str, str]]:
 
 def test_an_integrator_may_vary(tmp_path: Path) -> None:
     found = groups(tmp_path, "vary integrator = [rk4, midpoint]; vary drive.kp = [1, 2, 3] V*s/rad;")
-    assert [(each.name, each.sweep, each.asked) for each in found] == [
+    assert [(each.name, each.sweep, each.name_in_deck) for each in found] == [
         ("it.rk4", "it", "it"),
         ("it.midpoint", "it", "it"),
     ]

@@ -149,7 +149,7 @@ def test_a_sum_has_the_cases_of_its_parts_one_after_the_other(tmp_path: Path) ->
         "all_of_it.masses",
         "all_of_it.hold",
     ]
-    assert {each.asked for each in found} == {"all_of_it"}
+    assert {each.name_in_deck for each in found} == {"all_of_it"}
     assert [each.cases.table.tolist() for each in found] == [[0, 2], [1, 3], [4, 5, 6], [7]]
 
 

@@ -64,7 +64,7 @@ class Chain:
     def goes_round(self) -> bool:
         """Whether passes that change all at once do not settle."""
         s = np.zeros(len(self.q))
-        for _ in range(friction.passes(len(s))):
+        for _ in range(friction.decision_passes(len(s))):
             qdd, need = self.moved(s)
             new = np.array([friction.decide(*of) for of in zip(s, s == s, need, self.dry, qdd, strict=True)])
             if (new == s).all():
